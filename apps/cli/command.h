@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <ostream>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm::cli {
+
+/// What every command is given beside its own arguments. Answers go to `out`, progress and messages to `progress`.
+struct Console {
+  std::ostream& out;
+  std::ostream& progress;
+  bool json = false;
+  bool quiet = false;
+  unsigned threads = 0;
+  std::uint64_t seed = 1;
+};
+
+/// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc turns
+/// its failure into a message and an exit code.
+using CommandResult = Expected<void>;
+
+}  // namespace helicarm::cli

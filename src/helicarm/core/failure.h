@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <exception>
+#include <map>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+#include <tl/expected.hpp>
+
+namespace helicarm {
+
+/// Why an answer is missing or doubtful: the closed list of codes a caller may meet (docs/reasons.md).
+enum class Reason {
+  // Unreadable input or wrong usage: exit code 2.
+  usage,
+  not_an_image,
+  truncated,
+  bad_size,
+  bad_value,
+  unsupported,
+  missing_file,
+  bad_json,
+  not_finite,
+  unknown_key,
+  path_outside,
+  name_clash,
+  cannot_write,
+  // Refused, the data does not allow a trustworthy answer: exit code 3.
+  blank_image,
+  saturated,
+  plate_not_found,
+  plate_mismatch,
+  too_few_fiducials,
+  ambiguous_labels,
+  calibrator_mismatch,
+  coplanar_fiducials,
+  views_too_close,
+  residual_too_large,
+  uncertain,
+  patient_mismatch,
+  parallel_rays,
+  point_at_infinity,
+  behind_source,
+  not_seen,
+  target_not_found,
+  bad_tunnel,
+  // Only ever warnings.
+  name_differs,
+  bone_taken_as_fixed,
+  tag_disagrees,
+  spacing_missing,
+  few_fiducials,
+  rules_broken,
+};
+
+/// Machine-readable code of a reason, e.g. "too_few_fiducials".
+std::string_view code(Reason reason);
+
+/// 2 for unreadable input or wrong usage, 3 for a refusal.
+int exit_code(Reason reason);
+
+/// A reason, a sentence for a person, the view it concerns (may be empty) and the figures that led to it.
+struct Failure {
+  Reason reason;
+  std::string message;
+  std::string view = {};
+  std::map<std::string, double> figures = {};
+};
+
+using Warning = Failure;
+
+template <class T>
+using Expected = tl::expected<T, Failure>;
+
+inline tl::unexpected<Failure> fail(Reason reason, std::string message,
+                                    std::map<std::string, double> figures = {}) {
+  return tl::unexpected<Failure>(Failure{reason, std::move(message), {}, std::move(figures)});
+}
+
+/// Carries a Failure out of a deep parser; never crosses a public function (see `guarded`).
+class BadInput : public std::exception {
+ public:
+  explicit BadInput(Failure failure) : failure_(std::move(failure)) {}
+  BadInput(Reason reason, std::string message) : failure_{reason, std::move(message), {}, {}} {}
+  const char* what() const noexcept override { return failure_.message.c_str(); }
+  const Failure& failure() const { return failure_; }
+
+ private:
+  Failure failure_;
+};
+
+/// Runs a parser that throws BadInput and hands its Failure back as a value.
+template <class F>
+auto guarded(F&& parse) -> Expected<std::invoke_result_t<F>> {
+  try {
+    return std::forward<F>(parse)();
+  } catch (const BadInput& bad) {
+    return tl::unexpected<Failure>(bad.failure());
+  }
+}
+
+/// The value, or the failure thrown as BadInput: for use inside `guarded`.
+template <class T>
+T value_or_throw(Expected<T> result) {
+  if (!result) throw BadInput(std::move(result).error());
+  if constexpr (!std::is_void_v<T>) return *std::move(result);
+}
+
+}  // namespace helicarm

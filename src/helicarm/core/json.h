@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// Keys keep the order in which they were written.
+using Json = nlohmann::ordered_json;
+
+/// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a key given twice and every
+/// other fault are `bad_json`; nesting is bounded. `origin` (a file name) begins each message.
+Expected<Json> parse_json(std::string_view text, const std::string& origin);
+Expected<Json> read_json(const std::filesystem::path& path);
+
+struct Range {
+  double low;
+  double high;
+};
+
+/// Reads one JSON object strictly: every field is checked for type and range, and a key nobody asked for is an
+/// error. All members throw BadInput, with a message that names file, field, value and limit.
+class JsonReader {
+ public:
+  JsonReader(const Json& value, std::string where);
+
+  bool has(const char* key) const;  ///< present and not null
+  double number(const char* key, Range range);
+  std::optional<double> optional_number(const char* key, Range range);
+  int integer(const char* key, int low, int high);
+  std::string text(const char* key, std::size_t max_length = 200);
+  std::optional<std::string> optional_text(const char* key, std::size_t max_length = 200);
+  bool boolean(const char* key, bool fallback);
+  std::vector<double> numbers(const char* key, std::size_t count, Range range);
+  /// Flattened rows x columns matrix, row major.
+  std::vector<double> matrix(const char* key, std::size_t rows, std::size_t columns, Range range);
+  /// Nested object (must exist), with its own reader.
+  JsonReader object(const char* key);
+  /// Elements of an array of objects; an absent array is empty unless `required`.
+  std::vector<JsonReader> objects(const char* key, bool required, std::size_t max_count = 10000);
+  /// Raw value for a field whose shape the caller checks itself; null when absent.
+  const Json& raw(const char* key);
+  /// Index in `names` of a text field's value.
+  std::size_t choice(const char* key, std::initializer_list<std::string_view> names);
+
+  /// To be called last: throws `unknown_key` for a key that was never asked for.
+  void finish() const;
+
+  const std::string& where() const { return where_; }
+  [[noreturn]] void refuse(Reason reason, const char* key, const std::string& problem) const;
+
+ private:
+  const Json& required(const char* key);
+  double checked(const Json& value, const char* key, Range range) const;
+
+  const Json* value_;
+  std::string where_;
+  std::vector<std::string> asked_;
+};
+
+}  // namespace helicarm

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/core/json.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm {
+namespace {
+
+Reason reason_of(const std::string& text) {
+  auto parsed = parse_json(text, "x.json");
+  EXPECT_FALSE(parsed.has_value());
+  return parsed ? Reason::usage : parsed.error().reason;
+}
+
+TEST(ParseJson, NanIsNotFinite) {
+  EXPECT_EQ(reason_of(R"({"a": NaN})"), Reason::not_finite);
+  EXPECT_EQ(reason_of(R"({"a": [1, -Infinity]})"), Reason::not_finite);
+  EXPECT_EQ(reason_of(R"({"a": 1e999})"), Reason::not_finite);
+}
+
+TEST(ParseJson, BrokenTextIsBadJson) {
+  EXPECT_EQ(reason_of(R"({"a": )"), Reason::bad_json);
+  EXPECT_EQ(reason_of(""), Reason::bad_json);
+  EXPECT_EQ(reason_of("\x89PNG"), Reason::bad_json);
+}
+
+TEST(ParseJson, KeyGivenTwiceIsBadJson) { EXPECT_EQ(reason_of(R"({"a": 1, "a": 2})"), Reason::bad_json); }
+
+TEST(ParseJson, SameKeyInTwoObjectsIsFine) { EXPECT_TRUE(parse_json(R"([{"a": 1}, {"a": 2}])", "x").has_value()); }
+
+TEST(ParseJson, DeepNestingIsRefused) { EXPECT_EQ(reason_of(std::string(100000, '[')), Reason::bad_json); }
+
+template <class F>
+Failure failure_of(const std::string& text, F&& read) {
+  const Json json = *parse_json(text, "x.json");
+  auto result = guarded([&] {
+    JsonReader reader(json, "x.json");
+    read(reader);
+    reader.finish();
+    return 0;
+  });
+  EXPECT_FALSE(result.has_value());
+  return result ? Failure{Reason::usage, ""} : result.error();
+}
+
+TEST(JsonReader, ValueOutsideItsRangeNamesFieldValueAndLimit) {
+  const Failure failure = failure_of(R"({"size": 400})", [](JsonReader& r) { r.number("size", {0.5, 30}); });
+  EXPECT_EQ(failure.reason, Reason::bad_value);
+  EXPECT_EQ(failure.message, "x.json: \"size\": 400 is outside 0.5 to 30");
+}
+
+TEST(JsonReader, KeyNobodyAskedForIsUnknown) {
+  const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) { r.number("size", {0, 9}); });
+  EXPECT_EQ(failure.reason, Reason::unknown_key);
+}
+
+TEST(JsonReader, MissingFieldIsBadValue) {
+  EXPECT_EQ(failure_of("{}", [](JsonReader& r) { r.text("name"); }).reason, Reason::bad_value);
+}
+
+TEST(JsonReader, MatrixOfWrongShapeIsBadValue) {
+  EXPECT_EQ(failure_of(R"({"m": [[1, 2], [3]]})", [](JsonReader& r) { r.matrix("m", 2, 2, {-9, 9}); }).reason,
+            Reason::bad_value);
+}
+
+}  // namespace
+}  // namespace helicarm
