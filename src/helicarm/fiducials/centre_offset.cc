@@ -7,17 +7,15 @@ namespace helicarm {
 
 using Eigen::Vector2d;
 
-Vector2d blob_offset(const DistortionMap& map, const View& view, const Eigen::Vector3d& centre_in_world,
+Vector2d blob_offset(const DistortionMap& map, const View& view, const Vector2d& centre, double depth_mm,
                      double diameter_mm) {
-  const Eigen::Vector3d p = view.camera_from_world * centre_in_world;
   const double radius_mm = 0.5 * diameter_mm;
-  const Vector2d centre = view.project(centre_in_world);
   const Vector2d principal(view.intrinsics.u0, view.intrinsics.v0);
-  const double push = 0.8 * radius_mm * radius_mm / (p.z() * p.z() - radius_mm * radius_mm);
+  const double push = 0.8 * radius_mm * radius_mm / (depth_mm * depth_mm - radius_mm * radius_mm);
   const Vector2d perspective = map.jacobian(centre) * (push * (centre - principal));
   if (map.is_identity()) return perspective;
   // Mean of a smooth function over a disc: its Laplacian times R^2 / 8.
-  const double radius_px = std::abs(view.intrinsics.fy) * radius_mm / p.z();
+  const double radius_px = std::abs(view.intrinsics.fy) * radius_mm / depth_mm;
   const Vector2d here = map.raw_from_rectified(centre);
   Vector2d around = Vector2d::Zero();
   for (const Vector2d& side : {Vector2d(1, 0), Vector2d(-1, 0), Vector2d(0, 1), Vector2d(0, -1)})

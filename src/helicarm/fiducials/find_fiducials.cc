@@ -128,7 +128,8 @@ FiducialStatus absence(const Exposure& exposure, const BallFitter& fitter, const
 }
 
 void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, const View& view, double diameter_mm) {
-  const Vector2d raw = dot.centre_px - blob_offset(map, view, fiducial.centre_in_calibrator, diameter_mm);
+  const Eigen::Vector3d& centre = fiducial.centre_in_calibrator;
+  const Vector2d raw = dot.centre_px - blob_offset(map, view, view.project(centre), view.depth(centre), diameter_mm);
   const auto uv = map.rectified_from_raw(raw);
   if (!uv) return;
   fiducial.status = FiducialStatus::used;
