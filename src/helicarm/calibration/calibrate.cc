@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::size_t least_fiducials = 6;
 constexpr std::size_t comfortable_fiducials = 8;
+constexpr double least_rho = 1e-8;   // 1 / mm: a source 100 km away
 constexpr double belied_sigmas = 3;  // standard deviations of chi2 beyond which the sigmas are not believed
 
 tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
@@ -122,22 +123,34 @@ void rescale_if_belied(CalibrationResult& result) {
        {{"chi2", result.chi2}, {"dof", double(result.dof)}}});
 }
 
+/// A joint fit that failed names no view: a start that misses its own balls tells which one is at fault.
+tl::unexpected<Failure> blame(const std::vector<ViewFiducials>& views,
+                              const std::vector<ViewProblem>& problems, const Failure& failure,
+                              const CalibrationOptions& options) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto fiducials = views[i].fiducials;
+    const auto start = described(views[i].name, uncentred(problems[i].start), fiducials, options);
+    if (!start) return tl::unexpected<Failure>(start.error());
+  }
+  return tl::unexpected<Failure>(failure);
+}
+
 }  // namespace
 
 Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
                                       const CalibrationOptions& options) {
   std::vector<ViewProblem> problems;
+  CalibrationResult result;
   for (const ViewFiducials& view : views) {
     auto problem = problem_of(view);
     if (!problem) return in_view(problem.error(), view.name);
     problems.push_back(*std::move(problem));
+    result.fiducials.push_back(view.fiducials);
   }
-  const auto clean = refine_without_outliers(std::move(problems), options.spread,
-                                             options.rejection_probability, least_fiducials);
-  if (!clean) return tl::unexpected<Failure>(clean.error());
+  const auto clean =
+      refine_without_outliers(problems, options.spread, options.rejection_probability, least_fiducials);
+  if (!clean) return blame(views, problems, clean.error(), options);
   const Refinement& fit = clean->fit;
-
-  CalibrationResult result;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
   const auto n = Eigen::Index(views.size());
@@ -145,13 +158,17 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   for (Eigen::Index i = 0; i < n; ++i)
     by_step.block<10, 10>(10 * i, 10 * i) = parameters_by_step(fit.views[std::size_t(i)]);
   result.joint_covariance = by_step * fit.covariance * by_step.transpose();
-  for (const ViewFiducials& view : views) result.fiducials.push_back(view.fiducials);
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto view = described(views[i].name, uncentred(fit.views[i]), result.fiducials[i], options);
     if (!view) return tl::unexpected<Failure>(view.error());
+    const double rho = fit.views[i].rho;
+    if (!(rho > least_rho))
+      return in_view(
+          {Reason::uncertain, "the balls do not tell how far the X-ray source is", {}, {{"per_mm", rho}}},
+          views[i].name);
     const Eigen::Index rows = 2 * Eigen::Index(clean->problems[i].observations.size());
     const auto j = fit.jacobian.middleRows(row, rows);
     view->dof = int(std::lround(double(rows) - (j * fit.covariance * j.transpose()).trace()));

@@ -28,11 +28,8 @@ struct CalibrationOptions {
   double largest_rms_px = 5;            ///< beyond it (and 3 sigma) labels or calibrator must be wrong
 };
 
-struct CalibrationResult {
-  std::vector<CalibratedView> views;
+struct CalibrationResult : Calibration {
   std::vector<std::vector<Fiducial>> fiducials;  ///< per view, with residuals; false balls marked `rejected`
-  /// Of all views' parameters (CalibratedView::covariance), 10 n x 10 n. Empty: not computed.
-  Eigen::MatrixXd joint_covariance;
   double chi2 = 0;
   int dof = 0;
   double variance_scale = 1;      ///< by which the covariance was enlarged as chi2 belies the balls' sigmas

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -23,6 +24,14 @@ struct CalibratedView {
   double chi2 = 0;
   int dof = 0;
   double condition = 0;  ///< of the normalised DLT's design matrix
+};
+
+/// Views calibrated together.
+struct Calibration {
+  std::vector<CalibratedView> views;
+  /// Of all views' parameters (CalibratedView::covariance), 10 n x 10 n. Empty: not computed, the views are
+  /// taken as exact.
+  Eigen::MatrixXd joint_covariance;
 };
 
 }  // namespace helicarm

@@ -14,18 +14,20 @@ constexpr int most_iterations = 200;
 constexpr double least_gain = 1e-10;  // of chi2, before one last full step
 constexpr double least_damping = 1e-12;
 constexpr double most_damping = 1e12;
-constexpr double least_rho = 1e-8;  // 1 / mm: a source 100 km away
 
-/// Rows at given views; false where a point is not before its source.
+/// Rows at given views; false where a point is not before its source. Without priors rho may pass through
+/// zero on the way: nothing happens there.
 bool evaluate(const std::vector<ViewProblem>& problems, const SpreadPrior& spread, Refinement& at) {
   std::vector<IntrinsicsPrior> beliefs;
   Eigen::Index count = 0;
   for (std::size_t i = 0; i < problems.size(); ++i) {
-    if (!(at.views[i].rho > least_rho)) return false;
     beliefs.push_back(problems[i].prior);
     count += 2 * Eigen::Index(problems[i].observations.size());
   }
   const PriorRows priors = prior_rows(at.views, beliefs, spread);
+  const bool has_source =
+      std::all_of(at.views.begin(), at.views.end(), [](const auto& v) { return v.rho > 0; });
+  if (priors.residuals.size() > 0 && !has_source) return false;
   const Eigen::Index columns = 10 * Eigen::Index(problems.size());
   at.residuals.resize(count + priors.residuals.size());
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), columns);
@@ -52,11 +54,8 @@ std::vector<CentredView> all_moved(const std::vector<CentredView>& views, const 
   return next;
 }
 
-tl::unexpected<Failure> open_view(const Refinement& at) {
-  double rho = at.views.front().rho;
-  for (const CentredView& view : at.views) rho = std::min(rho, view.rho);
-  return fail(Reason::uncertain, "the balls do not fix how far the X-ray source is",
-              {{"source_mm", 1 / rho}});
+tl::unexpected<Failure> open_views(const Refinement& at) {
+  return fail(Reason::uncertain, "the balls' pictures do not fix the views", {{"chi2", at.chi2}});
 }
 
 /// Nothing where the columns, scaled to unit length, are dependent.
@@ -74,7 +73,7 @@ std::optional<Eigen::MatrixXd> covariance_of(const Eigen::MatrixXd& jacobian) {
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const SpreadPrior& spread) {
   Refinement at;
   for (const ViewProblem& problem : problems) at.views.push_back(problem.start);
-  if (!evaluate(problems, spread, at)) return open_view(at);
+  if (!evaluate(problems, spread, at)) return open_views(at);
   double damping = 1e-3;
   bool done = false;
   for (int i = 0; i < most_iterations && !done; ++i) {
@@ -94,7 +93,7 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Spre
     }
   }
   const auto covariance = done ? covariance_of(at.jacobian) : std::nullopt;
-  if (!covariance) return open_view(at);
+  if (!covariance) return open_views(at);
   at.covariance = *covariance;
   return at;
 }
