@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
 
 namespace helicarm {
 
@@ -22,11 +23,13 @@ enum class TargetKind { ball, cross, line_end };
 /// A check point of known place on the calibrator: never used to calibrate, only to measure the TRE.
 struct CalibratorTarget {
   std::string name;
-  Eigen::Vector3d point_in_calibrator;  ///< mm; cross: where the axes meet, line_end: centre of the flat end face
+  Eigen::Vector3d
+      point_in_calibrator;  ///< mm; cross: where the axes meet, line_end: centre of the flat end face
   TargetKind kind;
-  double diameter_mm;                        ///< of the ball or of the wire
-  std::vector<Eigen::Vector3d> directions;   ///< unit; cross: two wire axes, line_end: from the end into the wire
-  double length_mm = 0;                      ///< of a wire; 0 where the file does not say
+  double diameter_mm;  ///< of the ball or of the wire
+  std::vector<Eigen::Vector3d>
+      directions;        ///< unit; cross: two wire axes, line_end: from the end into the wire
+  double length_mm = 0;  ///< of a wire; 0 where the file does not say
 };
 
 struct Calibrator {
@@ -38,8 +41,19 @@ struct Calibrator {
 /// The built-in calibrator: twelve 4 mm balls on the conical helix of Eq. 9 at t = pi/6 + k pi/2, k = 0..11.
 Calibrator udcsc();
 
-/// calibrator.json as docs/formats.md describes it. Refuses (bad_value) fewer than 6 balls, equal labels or places,
-/// and sizes that betray a wrong unit; coplanar balls are `coplanar_fiducials`.
+/// calibrator.json as docs/formats.md describes it. Refuses (bad_value) fewer than 6 balls, equal places,
+/// directions that are not unit and sizes that betray a wrong unit; equal names are `name_clash`; balls
+/// within 1 % of their spread of one plane are `coplanar_fiducials`.
 Expected<Calibrator> read_calibrator(const std::filesystem::path& path);
+Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& origin);
+
+/// A built-in by its name, else the file of that name below `folder` (path_outside where it leads out of it).
+Expected<Calibrator> calibrator_named(const std::string& name_or_path, const std::filesystem::path& folder);
+
+/// What read_calibrator reads.
+Json to_json(const Calibrator& calibrator);
+
+/// The same labels in any order, each ball within 0.01 mm.
+bool same_places(const Calibrator& a, const Calibrator& b);
 
 }  // namespace helicarm

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom/calibrator.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm {
+namespace {
+
+/// The built-in one with a ball, a cross and a line end as targets.
+Json example() {
+  Calibrator calibrator = udcsc();
+  calibrator.name = "mine";
+  calibrator.targets = {{"T1", {1.5, -2, 42}, TargetKind::ball, 3, {}, 0},
+                        {"T2", {10, -50, 33}, TargetKind::cross, 2, {{1, 0, 0}, {0, 0.6, 0.8}}, 16},
+                        {"T3", {14, 11, 91}, TargetKind::line_end, 2, {{0, 0, 1}}, 0}};
+  return to_json(calibrator);
+}
+
+Failure refusal(const Json& json) {
+  const auto calibrator = calibrator_from_json(json, "c.json");
+  EXPECT_FALSE(calibrator.has_value());
+  return calibrator ? Failure{Reason::usage, ""} : calibrator.error();
+}
+
+TEST(Udcsc, FirstAndLastBallAreThoseOfTheHelix) {
+  const Calibrator calibrator = udcsc();
+  ASSERT_EQ(calibrator.balls.size(), 12u);
+  EXPECT_EQ(calibrator.balls.front().label, "P1");
+  EXPECT_EQ(calibrator.balls.back().label, "P12");
+  EXPECT_LT((calibrator.balls.front().centre_in_calibrator - Eigen::Vector3d(51.106, 29.506, 2.083)).norm(),
+            1e-3);
+  EXPECT_LT((calibrator.balls.back().centre_in_calibrator - Eigen::Vector3d(17.057, -29.544, 70.836)).norm(),
+            1e-3);
+  EXPECT_EQ(calibrator.balls.front().diameter_mm, 4.0);
+}
+
+TEST(ReadCalibrator, WhatIsWrittenIsReadBack) {
+  const auto calibrator = calibrator_from_json(example(), "c.json");
+  ASSERT_TRUE(calibrator.has_value()) << calibrator.error().message;
+  EXPECT_EQ(to_json(*calibrator), example());
+  EXPECT_EQ(calibrator->targets[1].kind, TargetKind::cross);
+  EXPECT_EQ(calibrator->targets[1].length_mm, 16);
+}
+
+TEST(ReadCalibrator, NullLengthAndNoTargetsAreFine) {
+  Json json = example();
+  json["targets"][2]["length_mm"] = nullptr;
+  EXPECT_TRUE(calibrator_from_json(json, "c.json").has_value());
+  json.erase("targets");
+  EXPECT_TRUE(calibrator_from_json(json, "c.json").has_value());
+}
+
+TEST(ReadCalibrator, BuiltInIsFoundByNameAndAFileOnlyInsideTheFolder) {
+  EXPECT_TRUE(calibrator_named("udcsc", "/nowhere").has_value());
+  EXPECT_EQ(calibrator_named("../c.json", "/nowhere").error().reason, Reason::path_outside);
+  EXPECT_EQ(calibrator_named("c.json", "/nowhere").error().reason, Reason::missing_file);
+}
+
+TEST(ReadCalibrator, UnknownKeysAreRefused) {
+  Json json = example();
+  json["colour"] = "red";
+  EXPECT_EQ(refusal(json).reason, Reason::unknown_key);
+  json = example();
+  json["balls"][3]["radius_mm"] = 2;
+  EXPECT_EQ(refusal(json).reason, Reason::unknown_key);
+}
+
+TEST(ReadCalibrator, DiameterInMicrometresIsRefusedWithItsLimit) {
+  Json json = example();
+  json["balls"][0]["diameter_mm"] = 4000;
+  EXPECT_EQ(refusal(json).message, "c.json: balls[0]: \"diameter_mm\": 4000 is outside 0.5 to 30");
+}
+
+TEST(ReadCalibrator, CoordinatesInMetresAreRefused) {
+  Json json = example();
+  for (Json& ball : json["balls"])
+    for (Json& value : ball["xyz_mm"]) value = value.get<double>() / 100;
+  const Failure failure = refusal(json);
+  EXPECT_EQ(failure.reason, Reason::bad_value);
+  EXPECT_NE(failure.message.find("metres?"), std::string::npos);
+}
+
+TEST(ReadCalibrator, FiveBallsAreTooFew) {
+  Json json = example();
+  while (json["balls"].size() > 5) json["balls"].erase(5);
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+}
+
+TEST(ReadCalibrator, EqualNamesClash) {
+  Json json = example();
+  json["balls"][1]["label"] = "P1";
+  EXPECT_EQ(refusal(json).reason, Reason::name_clash);
+  json = example();
+  json["targets"][1]["name"] = "T1";
+  EXPECT_EQ(refusal(json).reason, Reason::name_clash);
+  json = example();
+  json["targets"][1]["name"] = "P7";
+  EXPECT_EQ(refusal(json).reason, Reason::name_clash);
+}
+
+TEST(ReadCalibrator, TwoBallsAtOnePlaceAreRefused) {
+  Json json = example();
+  json["balls"][1]["xyz_mm"] = json["balls"][0]["xyz_mm"];
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+}
+
+TEST(ReadCalibrator, BallsOfOnePlaneAreCoplanarWithTheFigure) {
+  Json json = example();
+  for (Json& ball : json["balls"]) {
+    const auto xyz = ball["xyz_mm"].get<std::vector<double>>();
+    ball["xyz_mm"] = {xyz[0], xyz[1], 0.3 * xyz[0] - 0.2 * xyz[1]};
+  }
+  const Failure failure = refusal(json);
+  EXPECT_EQ(failure.reason, Reason::coplanar_fiducials);
+  EXPECT_EQ(exit_code(failure.reason), 3);
+  EXPECT_LT(failure.figures.at("plane_rms_mm"), 1e-9);
+}
+
+TEST(ReadCalibrator, DirectionsMustFitTheKindAndBeUnitAndApart) {
+  Json json = example();
+  json["targets"][2].erase("directions");
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+  json = example();
+  json["targets"][0]["directions"] = {{0, 0, 1}};
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+  json = example();
+  json["targets"][1]["directions"][0] = {1.01, 0, 0};
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+  json = example();
+  json["targets"][1]["directions"] = {{1, 0, 0}, {-1, 0, 0}};
+  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+}
+
+TEST(ReadCalibrator, NearlyUnitDirectionIsNormalised) {
+  Json json = example();
+  json["targets"][2]["directions"] = {{0, 0, 1.0005}};
+  EXPECT_NEAR(calibrator_from_json(json, "c.json")->targets[2].directions[0].norm(), 1, 1e-15);
+}
+
+TEST(SamePlaces, OrderIsFreeAndAShiftIsSeen) {
+  Calibrator other = udcsc();
+  std::swap(other.balls[0], other.balls[5]);
+  EXPECT_TRUE(same_places(other, udcsc()));
+  other.balls[3].centre_in_calibrator.x() += 0.05;
+  EXPECT_FALSE(same_places(other, udcsc()));
+}
+
+}  // namespace
+}  // namespace helicarm
