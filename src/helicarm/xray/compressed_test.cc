@@ -5,6 +5,8 @@
 #include <memory>
 
 #include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcistrmb.h>
+#include <dcmtk/dcmdata/dcostrmb.h>
 #include <dcmtk/dcmdata/dcrleerg.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmjpeg/djencode.h>
@@ -26,7 +28,9 @@ class Compressed : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-    DJEncoderRegistration::registerCodecs();
+    // Without DCMTK's habit of stretching the grey values before lossy compression.
+    DJEncoderRegistration::registerCodecs(ECC_lossyYCbCr, EUC_default, OFFalse, 0, 0, 0, OFTrue, ESS_444,
+                                          OFFalse, OFFalse, 0, 0, 0, 0, 0, 0, 0, 0, OFFalse);
     DcmRLEEncoderRegistration::registerCodecs();
   }
   static void TearDownTestSuite() {

@@ -81,7 +81,7 @@ TEST(DicomCheck, NestedSequencesAreBounded) {
   EXPECT_EQ(reason(with_last_element(DicomBuilder::item(nested(62, true)))), "ok");
   EXPECT_EQ(reason(with_last_element(DicomBuilder::item(nested(64, true)))), "bad_value");
   EXPECT_EQ(reason(with_last_element(DicomBuilder::item(nested(10000, true)))), "bad_value");
-  EXPECT_EQ(reason(with_last_element(DicomBuilder::item(nested(5, false)))), "bad_value");
+  EXPECT_EQ(reason(with_last_element(DicomBuilder::item(nested(5, false)))), "truncated");
 }
 
 TEST(DicomCheck, UndelimitedSequenceAtTheEndOfTheFile) {

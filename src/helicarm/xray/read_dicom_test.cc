@@ -144,7 +144,7 @@ DicomBuilder balls(bool bright) {
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) {
       const int du = u % 50 - 25, dv = v % 50 - 25;
-      const int value = (du * du + dv * dv <= 4 ? 20 : 200) + static_cast<int>(random.index(9));
+      const int value = (du * du + dv * dv <= 2 ? 20 : 200) + static_cast<int>(random.index(9));
       bytes += static_cast<char>(bright ? 255 - value : value);
     }
   return DicomBuilder()
