@@ -25,7 +25,8 @@ double wire_length(const CalibratorTarget& target) {
   return target.length_mm > 0 ? target.length_mm : wire_length_mm;
 }
 
-/// A wire from the end to the end that faces it, or as long as told where no end does.
+/// Half of the wire to the end that faces this one (the other end has the other half), or as long as told
+/// where none does.
 Solid wire_from(const CalibratorTarget& end, const std::vector<CalibratorTarget>& targets) {
   const Vector3d& into = end.directions.front();
   double length = wire_length(end);
@@ -33,7 +34,7 @@ Solid wire_from(const CalibratorTarget& end, const std::vector<CalibratorTarget>
     if (other.kind != TargetKind::line_end || other.name == end.name) continue;
     const Vector3d gap = other.point_in_calibrator - end.point_in_calibrator;
     if (gap.dot(into) > 0 && gap.cross(into).norm() < 0.1 && other.directions.front().dot(into) < -0.99)
-      length = gap.dot(into);
+      length = 0.5 * gap.dot(into);
   }
   return cylinder(end.point_in_calibrator, end.point_in_calibrator + length * into, 0.5 * end.diameter_mm);
 }
@@ -48,18 +49,6 @@ Body target_body(const CalibratorTarget& target, const std::vector<CalibratorTar
     wires.push_back(cylinder(at - half, at + half, 0.5 * target.diameter_mm));
   }
   return steel(target.name, wires);
-}
-
-bool second_end_of_a_wire(const CalibratorTarget& target, const Scene& scene) {
-  if (target.kind != TargetKind::line_end) return false;
-  const Vector3d behind = target.point_in_calibrator + 0.5 * target.directions.front();
-  return std::any_of(scene.begin(), scene.end(), [&](const Body& body) {
-    return body.metal && std::any_of(body.solids.begin(), body.solids.end(), [&](const Solid& solid) {
-             if (solid.kind != Solid::Kind::frustum) return false;
-             const Vector3d p = solid.unit_from_world * behind;
-             return p.z() > 0 && p.z() < 1 && p.head<2>().norm() < 1;
-           });
-  });
 }
 
 }  // namespace
@@ -112,7 +101,7 @@ Scene calibrator_body(const Calibrator& calibrator) {
   for (const CalibratorBall& ball : calibrator.balls)
     scene.push_back(steel(ball.label, {sphere(ball.centre_in_calibrator, 0.5 * ball.diameter_mm)}));
   for (const CalibratorTarget& target : calibrator.targets)
-    if (!second_end_of_a_wire(target, scene)) scene.push_back(target_body(target, calibrator.targets));
+    scene.push_back(target_body(target, calibrator.targets));
 
   const ConeWall wall = cone_wall(calibrator);
   const double foot = wall.radius_at(wall.bottom_mm);
@@ -133,13 +122,14 @@ Scene calibrator_body(const Calibrator& calibrator) {
   return scene;
 }
 
+std::string plate_dot_name(std::size_t index) { return fmt::format("plate {}", index); }
+
 Scene plate_body(const Plate& plate, const RigidTransform& camera_from_plate, const View& view) {
   const RigidTransform world_from_plate = view.camera_from_world.inverse() * camera_from_plate;
   Scene scene;
   for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
     const Vector3d centre(plate.dots_mm[i].x(), plate.dots_mm[i].y(), 0);
-    scene.push_back(
-        steel(fmt::format("plate {}", i), {sphere(world_from_plate * centre, 0.5 * plate.diameter_mm)}));
+    scene.push_back(steel(plate_dot_name(i), {sphere(world_from_plate * centre, 0.5 * plate.diameter_mm)}));
   }
   return scene;
 }

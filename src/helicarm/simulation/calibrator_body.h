@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "helicarm/geometry/view.h"
@@ -30,6 +31,9 @@ std::vector<CalibratorTarget> check_targets(const Calibrator& calibrator);
 
 /// The calibrator as it is made: steel balls and targets, plastic cone, flange, top disc and posts.
 Scene calibrator_body(const Calibrator& calibrator);
+
+/// Name of the body of the plate's dot.
+std::string plate_dot_name(std::size_t index);
 
 /// The plate's balls, placed on the receiver. `camera_from_plate` has its origin in the plate's plane.
 Scene plate_body(const Plate& plate, const RigidTransform& camera_from_plate, const View& view);
