@@ -24,22 +24,23 @@ Solid shaft(const Vector3d& from, const Vector3d& to, double from_radius, double
   return flat_frustum(from, to, from_radius - inset, to_radius - inset, Vector3d::UnitZ(), flattening);
 }
 
-std::vector<Solid> femur(double inset) {
-  return {knob({-19, -23, -10}, {20, 14, 30}, -12, inset), knob({-19, 23, -10}, {20, 15, 28}, -12, inset),
-          knob({-29, 0, 4}, {19, 31, 17}, -20, inset), knob({-40, 0, -5}, {24, 33, 20}, 10, inset),
-          shaft({-36, 0, -5}, {-74, 0, -13}, 33, 17, inset, 0.62)};
-}
+/// A shaft's shell is this much thicker than that of the ends.
+constexpr double shaft_shell = 4;
 
-std::vector<Solid> femoral_shaft(double inset) {
-  return {shaft({-66, 0, -11}, {-175, 0, -36}, 17, 14, inset)};
+std::vector<Solid> femur(double inset) {
+  return {knob({-19, -23, -10}, {20, 14, 30}, -12, inset),
+          knob({-19, 23, -10}, {20, 15, 28}, -12, inset),
+          knob({-29, 0, 4}, {19, 31, 17}, -20, inset),
+          knob({-33, 0, -5}, {20, 34, 20}, 10, inset),
+          shaft({-36, 0, -6}, {-82, 0, -15}, 32, 16, inset, 0.62),
+          shaft({-60, 0, -11}, {-175, 0, -36}, 16, 14, shaft_shell * inset)};
 }
 
 std::vector<Solid> tibia(double inset) {
-  return {knob({9, -18, -8}, {8.5, 20, 24}, 8, inset), knob({9, 18, -8}, {8.5, 20, 23}, 8, inset),
-          knob({6, 0, -6}, {11, 9, 9}, 8, inset), shaft({8, 0, -8}, {52, 0, -17}, 36, 17, inset, 0.68)};
+  return {knob({10, -17, -8}, {9, 21, 24}, 8, inset), knob({10, 18, -8}, {9, 20, 23}, 8, inset),
+          knob({4, 0, -8}, {8, 6, 7}, 8, inset), shaft({10, 0, -8}, {60, 0, -19}, 36, 16, inset, 0.68),
+          shaft({45, 0, -16}, {170, 0, -52}, 16, 12, shaft_shell * inset)};
 }
-
-std::vector<Solid> tibial_shaft(double inset) { return {shaft({46, 0, -15}, {170, 0, -52}, 16, 12, inset)}; }
 
 std::vector<Solid> fibula(double inset) {
   return {knob({24, 37, -22}, {12, 8, 10}, 10, inset), shaft({26, 37, -22}, {165, 30, -62}, 7, 6, inset)};
@@ -53,10 +54,9 @@ std::vector<Solid> skin() {
           ellipsoid({-18, 0, -4}, {62, 61, 54})};
 }
 
-void add_bone(Scene& scene, const char* name, std::vector<Solid> (*bone)(double inset), double shell,
-              const Attenuation& inside) {
+void add_bone(Scene& scene, const char* name, std::vector<Solid> (*bone)(double inset), double shell) {
   scene.push_back({name, bone(0), material::cortical_bone - material::muscle});
-  scene.push_back({name, bone(shell), inside - material::cortical_bone});
+  scene.push_back({name, bone(shell), material::spongy_bone - material::cortical_bone});
 }
 
 }  // namespace
@@ -64,12 +64,10 @@ void add_bone(Scene& scene, const char* name, std::vector<Solid> (*bone)(double 
 Scene knee_body() {
   Scene scene;
   scene.push_back({"skin", skin(), material::muscle});
-  add_bone(scene, "femur", femur, 1.2, material::spongy_bone);
-  add_bone(scene, "tibia", tibia, 1.2, material::spongy_bone);
-  add_bone(scene, "patella", patella, 1.5, material::spongy_bone);
-  add_bone(scene, "femoral shaft", femoral_shaft, 5, material::muscle);
-  add_bone(scene, "tibial shaft", tibial_shaft, 5, material::muscle);
-  add_bone(scene, "fibula", fibula, 2, material::spongy_bone);
+  add_bone(scene, "femur", femur, 1.2);
+  add_bone(scene, "tibia", tibia, 1.2);
+  add_bone(scene, "patella", patella, 1.5);
+  add_bone(scene, "fibula", fibula, 2);
   return scene;
 }
 

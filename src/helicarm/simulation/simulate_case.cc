@@ -92,7 +92,7 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   RandomStream random(options.seed, stream::patient);
   const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
   RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
-  patient_from_knee.translation += Eigen::Vector3d(12, 0, 0);
+  patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
   const RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
 
   const double plate_height = room.plate ? *room.plate->height_above_receiver_mm : 0;
