@@ -61,8 +61,8 @@ Scene shutter_leaves(const SimulationOptions& options, const Shot& shot) {
   const double reach = field_mm * scale * 2;
   Scene leaves;
   for (int side : {-1, 1}) {
-    // The leaf's inner edge lies at 75 to 90 % of the half field.
-    const double edge = side * random.uniform(0.75, 0.9) * field_mm * scale;
+    // The leaf's inner edge lies at 55 to 70 % of the half field.
+    const double edge = side * random.uniform(0.55, 0.7) * field_mm * scale;
     Body leaf{"shutter", {box({edge + side * reach, 0, depth_mm}, {reach, reach, 1})}, {}};
     leaf.attenuation.setConstant(1.8);  // 2 mm of it let 2.7 % through
     leaves.push_back(moved(leaf, world_from_camera));

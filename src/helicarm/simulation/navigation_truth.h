@@ -12,7 +12,9 @@
 
 namespace helicarm::simulation {
 
-/// A 3 mm ball at a tunnel's end, and where it truly is in every frame.
+inline constexpr double tunnel_ball_mm = 3;
+
+/// A ball at a tunnel's end, and where it truly is in every frame.
 struct TunnelPoint {
   std::string name;  ///< FS, FE, TS, TE
   std::string bone;  ///< femur or tibia

@@ -17,8 +17,6 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double tunnel_ball_mm = 3;
-
 Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
   if (options.size != 512 && options.size != 1024)
     return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));

@@ -3,7 +3,10 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "helicarm/core/failure.h"
 
 namespace helicarm::simulation {
 
@@ -23,6 +26,12 @@ enum class Fault {
   saturated,  ///< the open beam is beyond white
 };
 
+/// The words for them on the command line and in truth.json; an unknown one is a `usage` failure.
+std::string_view word(CaseKind kind);
+std::string_view word(Fault fault);
+Expected<CaseKind> case_kind(std::string_view word);
+Expected<Fault> fault(std::string_view word);
+
 struct SimulationOptions {
   std::uint64_t seed = 1;
   CaseKind kind = CaseKind::accuracy;
@@ -35,11 +44,5 @@ struct SimulationOptions {
 
   bool has(Fault fault) const;
 };
-
-inline bool SimulationOptions::has(Fault fault) const {
-  for (Fault each : faults)
-    if (each == fault) return true;
-  return false;
-}
 
 }  // namespace helicarm::simulation
