@@ -16,12 +16,18 @@ RigidTransform somewhere(const Vector3d& place, double spread_mm, RandomStream& 
   return {random_rotation(random), place + pose.translation};
 }
 
-/// A drilled line: the tunnel's, missed by a normal 0.5 mm per axis at each of two points before its start.
+/// A drilled line: the tunnel's, missed by a normal 0.5 mm per axis 40 mm before its start and half way
+/// through.
 ToolLine missed(const std::string& name, const TunnelPoint& start, const TunnelPoint& end,
                 RandomStream& random) {
   const Vector3d axis = (end.in_calibrator - start.in_calibrator).normalized();
-  ToolLine line{name, start.name, end.name, start.in_calibrator - 40 * axis, start.in_calibrator - 10 * axis,
-                0,    0};
+  ToolLine line{name,
+                start.name,
+                end.name,
+                start.in_calibrator - 40 * axis,
+                0.5 * (start.in_calibrator + end.in_calibrator),
+                0,
+                0};
   line.p1_in_calibrator += random_motion(random, 0, 0.5).translation;
   line.p2_in_calibrator += random_motion(random, 0, 0.5).translation;
   line.start_error_mm = distance_to_line(start.in_calibrator, line.p1_in_calibrator, line.p2_in_calibrator);
