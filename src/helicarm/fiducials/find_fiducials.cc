@@ -17,8 +17,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::size_t max_candidates = 30;
-constexpr double paper_sigma_px = 1.5;   // what a quadratic leaves of the distortion
-constexpr double best_sigma_px = 0.2;
+constexpr double paper_systematic = 2e-3;  // of the field radius: what a quadratic leaves of the distortion
 constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
 
@@ -169,7 +168,7 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
     candidates.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1});
   }
   LabellingOptions labelling_options;
-  labelling_options.systematic_sigma_px = method == Method::paper ? paper_sigma_px : best_sigma_px;
+  if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
   const auto labelling = label_balls(calibrator, candidates, prior_of(exposure, map), labelling_options);
   if (!labelling) return tl::unexpected<Failure>(labelling.error());
 
