@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/test_grid.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "helicarm/detection/find_crosses.h"
+#include "helicarm/rectification/lattice.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector2i;
+using Complex = std::complex<double>;
+using Points = std::vector<Complex>;
+
+/// In the plane a similarity is w = scale z + shift with complex numbers, and its least-squares fit is one division.
+GridError error_of(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
+  Complex ideal_middle;
+  Complex seen_middle;
+  for (const std::size_t k : central) {
+    ideal_middle += ideal[k] / double(central.size());
+    seen_middle += seen[k] / double(central.size());
+  }
+  Complex mixed;
+  double squares = 0;
+  for (const std::size_t k : central) {
+    mixed += std::conj(ideal[k] - ideal_middle) * (seen[k] - seen_middle);
+    squares += std::norm(ideal[k] - ideal_middle);
+  }
+  const Complex scale = mixed / squares;
+  GridError error;
+  for (std::size_t k = 0; k < ideal.size(); ++k) {
+    const double distance = std::abs(seen[k] - seen_middle - scale * (ideal[k] - ideal_middle));
+    error.mean_px += distance / double(ideal.size());
+    error.max_px = std::max(error.max_px, distance);
+  }
+  return error;
+}
+
+Complex complex_of(const Vector2d& p) { return {p.x(), p.y()}; }
+
+struct IndexLess {
+  bool operator()(const Vector2i& p, const Vector2i& q) const {
+    return p.x() != q.x() ? p.x() < q.x() : p.y() < q.y();
+  }
+};
+using Grid = std::map<Vector2i, Dot, IndexLess>;
+
+/// A missing crossing as its neighbours in one direction predict it: between two, or beyond two.
+std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Vector2i& step) {
+  const auto place = [&](int k) -> std::optional<Vector2d> {
+    const auto found = grid.find(at + k * step);
+    return found == grid.end() ? std::nullopt : std::optional(found->second.centre_px);
+  };
+  if (place(-1) && place(1)) return 0.5 * (*place(-1) + *place(1));
+  for (const int side : {1, -1})
+    if (place(side) && place(2 * side)) return 2 * *place(side) - *place(2 * side);
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<Dot> find_grid(const Exposure& exposure) {
+  std::vector<Dot> crosses = find_crosses(exposure, {});
+  const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
+  if (lattice.dots.empty()) return crosses;
+  Grid grid;
+  Vector2i low = lattice.dots.front().index;
+  Vector2i high = low;
+  for (const IndexedDot& d : lattice.dots) {
+    grid[d.index] = crosses[d.dot];
+    low = low.cwiseMin(d.index);
+    high = high.cwiseMax(d.index);
+  }
+  std::vector<Dot> complete;
+  for (const auto& [index, cross] : grid) complete.push_back(cross);
+  for (int j = low.y(); j <= high.y(); ++j)
+    for (int i = low.x(); i <= high.x(); ++i) {
+      const Vector2i at(i, j);
+      if (grid.contains(at)) continue;
+      const auto along_i = predicted(grid, at, {1, 0});
+      const auto along_j = predicted(grid, at, {0, 1});
+      if (!along_i && !along_j) continue;
+      Dot start = grid.begin()->second;
+      start.centre_px = along_i && along_j ? 0.5 * (*along_i + *along_j) : along_i.value_or(*along_j);
+      const auto angle_of = [&](const Vector2i& step, double fallback) {
+        for (const int side : {1, -1})
+          if (const auto next = grid.find(at + side * step); next != grid.end()) {
+            const Vector2d d = side * (next->second.centre_px - start.centre_px);
+            return std::atan2(d.y(), d.x());
+          }
+        return fallback;
+      };
+      const auto cross = fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2));
+      if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px && cross->sigma_px < 0.5)
+        complete.push_back(*cross);
+    }
+  return complete;
+}
+
+Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map) {
+  const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
+  TestGrid grid;
+  std::vector<Vector2i> indices;
+  for (const IndexedDot& d : lattice.dots) {
+    const Vector2d raw = crosses[d.dot].centre_px;
+    const auto rectified = map.rectified_from_raw(raw);
+    if (!rectified) continue;
+    grid.raw_px.push_back(raw);
+    grid.rectified_px.push_back(*rectified);
+    indices.push_back(d.index);
+  }
+  grid.crosses = static_cast<int>(indices.size());
+  // The centre is the crossing nearest to the picture's middle that has all eight neighbours.
+  const Vector2d middle(0.5 * (map.width - 1), 0.5 * (map.height - 1));
+  std::vector<std::size_t> central;
+  double nearest = 1e9;
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    std::vector<std::size_t> nine;
+    for (std::size_t k = 0; k < indices.size(); ++k)
+      if ((indices[k] - indices[i]).cwiseAbs().maxCoeff() <= 1) nine.push_back(k);
+    if (const double distance = (grid.raw_px[i] - middle).norm(); nine.size() == 9 && distance < nearest) {
+      nearest = distance;
+      central = nine;
+    }
+  }
+  if (central.empty())
+    return fail(Reason::too_few_fiducials,
+                fmt::format("{} crossings on a grid were found, but no nine that form its middle", grid.crosses),
+                {{"crosses", double(grid.crosses)}});
+  Points ideal;
+  Points raw;
+  Points rectified;
+  for (std::size_t k = 0; k < indices.size(); ++k) {
+    ideal.push_back(complex_of(indices[k].cast<double>()));
+    raw.push_back(complex_of(grid.raw_px[k]));
+    rectified.push_back(complex_of(grid.rectified_px[k]));
+  }
+  grid.raw = error_of(ideal, raw, central);
+  grid.rectified = error_of(ideal, rectified, central);
+  return grid;
+}
+
+}  // namespace helicarm
