@@ -120,7 +120,8 @@ void reweight(std::vector<Pixel>& pixels, const std::vector<double>& residuals, 
   }
 }
 
-std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width, const Arms& arms) {
+std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width, const Arms& arms,
+                             std::span<const Disc> discs) {
   const int u0 = static_cast<int>(std::lround(start.x()));
   const int v0 = static_cast<int>(std::lround(start.y()));
   const double window = 4 * half_width + 4;
@@ -130,9 +131,14 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
   for (int y = -half; y <= half; ++y)
     for (int x = -half; x <= half; ++x)
       if (x * x + y * y <= window * window && image.contains(u0 + x, v0 + y)) {
+        const bool hidden = std::any_of(discs.begin(), discs.end(), [&](const Disc& disc) {
+          return (disc.centre - Vector2d(u0 + x, v0 + y)).squaredNorm() < disc.radius * disc.radius;
+        });
+        if (hidden) continue;
         pixels.push_back({double(x), double(y), double(image(u0 + x, v0 + y)), 1});
         mean += pixels.back().grey;
       }
+  if (pixels.size() < 60) return std::nullopt;
   mean /= double(pixels.size());
 
   Vector p = Vector::Zero();
@@ -210,8 +216,9 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
 
 }  // namespace
 
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle) {
-  return fit_wires(exposure.pixels, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast});
+std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle,
+                             std::span<const Disc> discs) {
+  return fit_wires(exposure.pixels, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast}, discs);
 }
 
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options) {
@@ -228,7 +235,7 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
     if (!arms) continue;
     Arms signed_arms = *arms;
     signed_arms.depth *= sign;
-    const auto cross = fit_wires(exposure.pixels, blob.centre_px, half_width, signed_arms);
+    const auto cross = fit_wires(exposure.pixels, blob.centre_px, half_width, signed_arms, {});
     if (!cross || cross->sigma_px > options.max_sigma_px) continue;
     const auto twin = std::find_if(crosses.begin(), crosses.end(), [&](const Dot& other) {
       return (other.centre_px - cross->centre_px).norm() < 2 * std::max(other.radius_px, cross->radius_px) + 1;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "helicarm/detection/blobs.h"
 #include "helicarm/detection/dot.h"
+#include "helicarm/detection/fit_dot.h"
 #include "helicarm/xray/exposure.h"
 
 namespace helicarm {
@@ -23,7 +25,8 @@ struct CrossOptions {
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options);
 
 /// The crossing near `start` (place, half width, contrast) of two wires that run about along the given angles
-/// (radians), or nothing where the pixels do not show one.
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle);
+/// (radians), or nothing where the pixels do not show one. The discs are left out.
+std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle,
+                             std::span<const Disc> discs);
 
 }  // namespace helicarm

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "helicarm/detection/find_crosses.h"
+#include "helicarm/detection/find_dots.h"
 #include "helicarm/rectification/lattice.h"
 
 namespace helicarm {
@@ -80,17 +81,36 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
     low = low.cwiseMin(d.index);
     high = high.cwiseMax(d.index);
   }
+  // The plate's dots are in the way of some crossings.
+  std::vector<Disc> dots;
+  for (const Dot& dot : find_dots(exposure, {})) {
+    const bool crossing = std::any_of(grid.begin(), grid.end(), [&](const auto& entry) {
+      return (entry.second.centre_px - dot.centre_px).norm() < 0.6 * dot.radius_px;
+    });
+    if (!crossing && dot.misfit < 0.15) dots.push_back({dot.centre_px, dot.radius_px + 2});
+  }
+  const Dot typical = grid.begin()->second;
   std::vector<Dot> complete;
-  for (const auto& [index, cross] : grid) complete.push_back(cross);
   for (int j = low.y(); j <= high.y(); ++j)
     for (int i = low.x(); i <= high.x(); ++i) {
       const Vector2i at(i, j);
-      if (grid.contains(at)) continue;
-      const auto along_i = predicted(grid, at, {1, 0});
-      const auto along_j = predicted(grid, at, {0, 1});
-      if (!along_i && !along_j) continue;
-      Dot start = grid.begin()->second;
-      start.centre_px = along_i && along_j ? 0.5 * (*along_i + *along_j) : along_i.value_or(*along_j);
+      Dot start = typical;
+      const auto known = grid.find(at);
+      if (known != grid.end()) {
+        start = known->second;
+      } else {
+        const auto along_i = predicted(grid, at, {1, 0});
+        const auto along_j = predicted(grid, at, {0, 1});
+        if (!along_i && !along_j) continue;
+        start.centre_px = along_i && along_j ? 0.5 * (*along_i + *along_j) : along_i.value_or(*along_j);
+      }
+      const bool disturbed = std::any_of(dots.begin(), dots.end(), [&](const Disc& disc) {
+        return (disc.centre - start.centre_px).norm() < disc.radius + 4 * start.radius_px + 4;
+      });
+      if (known != grid.end() && !disturbed) {
+        complete.push_back(start);
+        continue;
+      }
       const auto angle_of = [&](const Vector2i& step, double fallback) {
         for (const int side : {1, -1})
           if (const auto next = grid.find(at + side * step); next != grid.end()) {
@@ -99,7 +119,8 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
           }
         return fallback;
       };
-      const auto cross = fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2));
+      const auto cross =
+          fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px && cross->sigma_px < 0.5)
         complete.push_back(*cross);
     }
