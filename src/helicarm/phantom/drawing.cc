@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/phantom/drawing.h"
 
+#include <cmath>
+
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
@@ -52,7 +54,7 @@ class Sheet {
             const char* anchor = "start", double size = 3.5, double turn_deg = 0) {
     body_ += fmt::format(
         "<text transform=\"translate({:.3f} {:.3f}) rotate({})\" font-size=\"{}\" fill=\"{}\" "
-        "text-anchor=\"{}\">{}</text>\n",
+        "text-anchor=\"{}\" paint-order=\"stroke\" stroke=\"white\" stroke-width=\"0.6\">{}</text>\n",
         at.x(), at.y(), turn_deg, size, colour, anchor, escaped(words));
   }
   /// Dimension line from a to b with its length, moved by `offset`, with extension lines.
@@ -62,8 +64,8 @@ class Sheet {
     line(b, b + offset * 1.15, measure, "opacity=\"0.6\"");
     line(a + offset, b + offset, measure, "marker-start=\"url(#arrow)\" marker-end=\"url(#arrow)\"");
     const Eigen::Vector2d above = upright ? Eigen::Vector2d(-1.2, 0) : Eigen::Vector2d(0, -1.2);
-    text((a + b) / 2 + offset + above, fmt::format("{:.6g}", (b - a).norm()), measure, "middle", 3.5,
-         upright ? -90 : 0);
+    text((a + b) / 2 + offset + above, fmt::format("{:.6g}", std::round((b - a).norm() * 100) / 100), measure,
+         "middle", 3.5, upright ? -90 : 0);
   }
   std::string finish() const {
     return fmt::format(
@@ -95,12 +97,11 @@ void draw_view(Sheet& sheet, const Calibrator& calibrator, const Eigen::Matrix<d
   sheet.line(origin, origin + Eigen::Vector2d(0, -12), ink, "marker-end=\"url(#arrow)\"");
   sheet.text(origin + Eigen::Vector2d(13, 1), right, ink);
   sheet.text(origin + Eigen::Vector2d(-1, -13), up, ink);
-  for (const auto& ball : calibrator.balls) {
-    const Eigen::Vector2d at = place(ball.centre_in_calibrator);
-    sheet.circle(at, ball.diameter_mm / 2, steel);
-    sheet.text(at + Eigen::Vector2d(ball.diameter_mm / 2 + 0.6, -ball.diameter_mm / 4), ball.label, ink,
-               "start", 3);
-  }
+  for (const auto& ball : calibrator.balls)
+    sheet.circle(place(ball.centre_in_calibrator), ball.diameter_mm / 2, steel);
+  for (const auto& ball : calibrator.balls)
+    sheet.text(place(ball.centre_in_calibrator) + ball.diameter_mm * Eigen::Vector2d(0.65, -0.25), ball.label,
+               ink, "start", 3);
   for (const auto& target : calibrator.targets) {
     const Eigen::Vector2d at = place(target.point_in_calibrator);
     sheet.line(at - Eigen::Vector2d(1.5, 1.5), at + Eigen::Vector2d(1.5, 1.5), target_ink);
@@ -158,15 +159,18 @@ std::string drawing_of(const Calibrator& calibrator) {
       (Eigen::Matrix<double, 2, 3>() << 1, 0, 0, 0, 0, -1).finished();
   Eigen::AlignedBox2d above(Eigen::Vector2d::Zero());
   Eigen::AlignedBox2d side(Eigen::Vector2d::Zero());
-  for (const auto& ball : calibrator.balls) {
-    above.extend(from_above * ball.centre_in_calibrator);
-    side.extend(from_side * ball.centre_in_calibrator);
-  }
-  const double left = 30, top = 42, between = 45;
+  const auto extend = [&](const Eigen::Vector3d& point) {
+    above.extend(from_above * point);
+    side.extend(from_side * point);
+  };
+  for (const auto& ball : calibrator.balls) extend(ball.centre_in_calibrator);
+  for (const auto& target : calibrator.targets) extend(target.point_in_calibrator);
+  const double left = 30, top = 46, between = 45;
   const double width = above.sizes().x() + side.sizes().x() + 2 * left + between;
   Sheet sheet(width, std::max(above.sizes().y(), side.sizes().y()) + top + 25);
   sheet.text({left - 10, 12}, calibrator.name, ink, "start", 6);
-  sheet.text({left - 10, 19}, "1 : 1, mm, ball centres", ink, "start", 3.2);
+  sheet.text({left - 10, 19}, "1 : 1, mm; the extents are those of the centres and the origin", ink, "start",
+             3.2);
   draw_view(sheet, calibrator, from_above, above.min(), above.max(), {left, top}, "from above", "x", "y");
   draw_view(sheet, calibrator, from_side, side.min(), side.max(), {left + above.sizes().x() + between, top},
             "from the side", "x", "z");
