@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <map>
 #include <numbers>
 
@@ -55,7 +55,7 @@ struct Picture {
   std::vector<Eigen::Vector2d> exact;  ///< by ball
   int visible = 0;
   bool mirrored = false;
-  double axis_deg = 0;                 ///< between the ray and the calibrator's z
+  double axis_deg = 0;  ///< between the ray and the calibrator's z
 };
 
 const LabellingPrior nominal{.focal_px = 4345, .principal_px = {511.5, 511.5}, .field_radius_px = 504};
@@ -75,7 +75,9 @@ Picture random_picture(const Calibrator& calibrator, const Difficulty& difficult
   const double way = random.uniform(0, 2 * pi);
   view.intrinsics = {picture.mirrored ? -f : f, f, 511.5 + off * std::cos(way), 511.5 + off * std::sin(way)};
   view.camera_from_world.rotation =
-      Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized().matrix();
+      Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal())
+          .normalized()
+          .matrix();
   picture.axis_deg = std::acos(std::abs(view.camera_from_world.rotation(2, 2))) * 180 / pi;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (const auto& ball : calibrator.balls) centre += ball.centre_in_calibrator / calibrator.balls.size();
@@ -85,7 +87,8 @@ Picture random_picture(const Calibrator& calibrator, const Difficulty& difficult
 
   std::vector<int> order(calibrator.balls.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.index(static_cast<std::uint32_t>(i))]);
+  for (std::size_t i = order.size(); i > 1; --i)
+    std::swap(order[i - 1], order[random.index(static_cast<std::uint32_t>(i))]);
   picture.exact.resize(order.size());
   std::vector<bool> shown(order.size(), false);
   for (std::size_t i = 0; i < order.size(); ++i) {
@@ -95,7 +98,8 @@ Picture random_picture(const Calibrator& calibrator, const Difficulty& difficult
                (picture.exact[k] - nominal.principal_px).norm() < nominal.field_radius_px;
   }
   const auto disc = [&](int k) {
-    return bias * f * calibrator.balls[k].diameter_mm / 2 / view.depth(calibrator.balls[k].centre_in_calibrator);
+    return bias * f * calibrator.balls[k].diameter_mm / 2 /
+           view.depth(calibrator.balls[k].centre_in_calibrator);
   };
   for (const int k : order) {
     if (!shown[k]) continue;
@@ -143,8 +147,9 @@ struct Tally {
 };
 
 /// Random views by number of visible balls.
-std::map<int, Tally> monte_carlo(const Calibrator& calibrator, int trials, double noise_px, std::uint64_t seed,
-                                 std::vector<double>* milliseconds = nullptr, bool tell = false) {
+std::map<int, Tally> monte_carlo(const Calibrator& calibrator, int trials, double noise_px,
+                                 std::uint64_t seed, std::vector<double>* milliseconds = nullptr,
+                                 bool tell = false) {
   std::map<int, Tally> tallies;
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream random(seed, 1, trial);
@@ -152,10 +157,10 @@ std::map<int, Tally> monte_carlo(const Calibrator& calibrator, int trials, doubl
                                 .false_blobs = static_cast<int>(random.index(11)),
                                 .noise_px = noise_px};
     const auto picture = random_picture(calibrator, difficulty, random);
-    const auto start = std::chrono::steady_clock::now();
+    const auto start = std::clock();
     const auto labelling = label_balls(calibrator, picture.candidates, nominal);
-    const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-    if (milliseconds && labelling) milliseconds->push_back(spent.count());
+    if (milliseconds && labelling)
+      milliseconds->push_back(1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
     auto& tally = tallies[picture.visible];
     ++tally.views;
     const int wrong = labelling ? wrong_names(*labelling, picture, noise_px) : 0;
@@ -170,7 +175,8 @@ std::map<int, Tally> monte_carlo(const Calibrator& calibrator, int trials, doubl
                     labelling->log_odds, labelling->margin, labelling->rms_px);
       } else {
         std::printf("%s", std::string(code(labelling.error().reason)).c_str());
-        for (const auto& [key, value] : labelling.error().figures) std::printf(" %s=%.1f", key.c_str(), value);
+        for (const auto& [key, value] : labelling.error().figures)
+          std::printf(" %s=%.1f", key.c_str(), value);
         std::printf("\n");
       }
     }
@@ -187,12 +193,14 @@ TEST(LabelBalls, StudyOfTenThousandViews) {
   std::vector<double> ms;
   const auto tallies = monte_carlo(kind == 0 ? helix() : scattered(kind, 3), trials, noise, 1, &ms, true);
   for (const auto& [visible, tally] : tallies) {
-    std::printf("visible %2d: views %5d solved %.2f %% wrong %d", visible, tally.views, 100.0 * tally.solved / tally.views, tally.wrong);
+    std::printf("visible %2d: views %5d solved %.2f %% wrong %d", visible, tally.views,
+                100.0 * tally.solved / tally.views, tally.wrong);
     for (const auto& [reason, n] : tally.refusals) std::printf("  %s %d", reason.c_str(), n);
     std::printf("\n");
   }
   std::sort(ms.begin(), ms.end());
-  std::printf("ms: median %.2f p90 %.2f p99 %.2f max %.2f\n", ms[ms.size() / 2], ms[ms.size() * 9 / 10], ms[ms.size() * 99 / 100], ms.back());
+  std::printf("ms: median %.2f p90 %.2f p99 %.2f max %.2f\n", ms[ms.size() / 2], ms[ms.size() * 9 / 10],
+              ms[ms.size() * 99 / 100], ms.back());
 }
 
 }  // namespace
