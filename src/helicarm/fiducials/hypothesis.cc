@@ -123,17 +123,18 @@ Hypothesis settle(const Scene& scene, const View& rough) {
   h.fit.view = rough;
   h.log_odds = -infinity;
   std::vector<Sighting> sightings;
-  constexpr int most_turns = 8;
+  constexpr int narrowing = 4;
+  constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
-    const bool last_gate = turn >= 2;
-    auto matches = match(scene, h.fit.view, last_gate ? infinity : rough_gate_px(scene) / (1 + 2 * turn),
-                         last_gate ? match_sigmas : infinity);
-    if (last_gate && matches == h.candidate_of_ball && turn > 2) break;
+    const bool narrow = turn >= narrowing;
+    auto matches = narrow ? match(scene, h.fit.view, infinity, match_sigmas)
+                          : match(scene, h.fit.view, rough_gate_px(scene) / (1 + turn), infinity);
+    if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < 4) return h;
-    h.fit = fit_pose(h.fit.view, sightings, scene.camera, last_gate ? 10 : 4);
+    h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? 10 : 5);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);

@@ -14,7 +14,7 @@ struct BallCandidate {
   Eigen::Vector2d uv;  ///< rectified pixels
   double sigma_px;     ///< per axis
   double radius_px;
-  double radius_sigma_px;  ///< random part; the Scene's radius bias is common to all
+  double radius_sigma_px;  ///< without the bias common to all
 };
 
 struct ModelBall {

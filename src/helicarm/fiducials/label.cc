@@ -15,6 +15,7 @@ namespace {
 
 constexpr int least_balls = 6;
 constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
+constexpr double most_deviation = 3.3;     // of chi2, in sigmas: one honest view in 2000
 constexpr std::size_t loose_triples = 30;
 constexpr int challenges = 8;  // triples of the best hypothesis on which rivals are sought
 
@@ -146,7 +147,8 @@ std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, con
   const Hypothesis& best = ranking.front();
   const int dof = 2 * best.matched - 6;
   const Hypothesis loose = loose_best(scene, best, prior, options);
-  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || deviate(best.fit.chi2, dof) > 4.5) {
+  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) ||
+      deviate(best.fit.chi2, dof) > most_deviation) {
     return fail(Reason::calibrator_mismatch,
                 fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
                             std::sqrt(loose.residual2_px2 / loose.matched)),
@@ -178,8 +180,8 @@ Expected<Hypothesis> undisputed(const Scene& scene, const Ranking& ranking, cons
   const double asked =
       options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 3 * std::sqrt(2.0 * dof)));
   drop_doubtful(scene, best);
-  if (count_named(best) < least_balls)
-    return too_few(count_named(best), static_cast<int>(scene.candidates.size()));
+  const int n = static_cast<int>(scene.candidates.size());
+  if (count_named(best) < least_balls) return too_few(count_named(best), n);
   for (const auto& rival : ranking) {
     if (ranking.front().log_odds - rival.log_odds >= asked) break;
     if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
@@ -205,8 +207,8 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   LabelSearch search(scene, focals_to_try(prior));
   explore(search, most_triples, [&](const Hypothesis& h) { return surely(h, options); });
   if (!search.ranking().empty()) challenge(search, challenges);
-  if (auto failure = objection(scene, search.ranking(), prior, options))
-    return tl::unexpected(*std::move(failure));
+  auto failure = objection(scene, search.ranking(), prior, options);
+  if (failure) return tl::unexpected(*std::move(failure));
   const auto best = undisputed(scene, search.ranking(), options);
   if (!best) return tl::unexpected(best.error());
 

@@ -15,19 +15,20 @@ namespace helicarm {
 
 /// What the file says of the camera, in rectified pixels.
 struct LabellingPrior {
-  std::optional<double>
-      focal_px;               ///< source distance over pixel size; empty: anywhere from 4 to 24 field radii
-  double focal_sigma = 0.01;  ///< relative, of focal_px
+  std::optional<double> focal_px;  ///< source distance over pixel size; empty: from 4 to 24 field radii
+  double focal_sigma = 0.01;       ///< relative
   Eigen::Vector2d principal_px;    ///< nominal, the image's centre
   double principal_sigma_px = 30;  ///< per axis
   double field_radius_px;          ///< of the disc in which candidates may lie
-  double radius_bias = 0;          ///< of all candidates' radii, relative; as found in another view, if any
+  /// Of all candidates' radii, relative. What another view's labelling has found, with a sigma of 0.008,
+  /// tells apart the look-alikes of a helix seen along its axis with an end ball hidden.
+  double radius_bias = 0;
   double radius_bias_sigma = 0.03;
 };
 
 struct LabellingOptions {
   double systematic_sigma =
-      3e-4;                     ///< per axis, of the field radius: left by rectification, added to each sigma
+      4e-4;                     ///< left by rectification, in field radii, per axis; adds to each candidate's
   double least_log_odds = 9.2;  ///< ln of the odds asked for, against chance and against any other labelling
 };
 
