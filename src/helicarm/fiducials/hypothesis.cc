@@ -12,8 +12,9 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double radius_sigmas = 4;
 constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or metal is no better known
-constexpr double match_sigmas = 3.5;   // loses one ball in 460
-constexpr double depth_span = 1.4;     // ln of the ratio of the farthest to the nearest distance thinkable
+constexpr double radius_range = 0.2;         // of ln radius: how evenly false blobs are thought to spread
+constexpr double match_sigmas = 3.5;         // loses one ball in 460
+constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the nearest distance thinkable
 
 std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
   std::vector<Sighting> sightings;
@@ -27,30 +28,35 @@ std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& c
 
 struct RadiusVerdict {
   double excess = 0;
-  double chi2 = 0;
+  double log_odds = 0;
 };
 
-/// How well the radii fit the distances, the common bias being known only to its sigma.
+/// How well the radii fit the distances, the common bias being known only to its sigma. Vague radii say
+/// nothing.
 RadiusVerdict radius_verdict(const Scene& scene, const Hypothesis& h) {
   double weight = 0;
   double first = 0;
   double second = 0;
+  double peak = 0;
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     if (h.candidate_of_ball[k] < 0) continue;
     const auto& seen = scene.candidates[h.candidate_of_ball[k]];
-    const double expected = h.fit.view.intrinsics.fy * scene.balls[k].radius_mm / h.fit.view.depth(scene.balls[k].centre);
+    const double expected =
+        h.fit.view.intrinsics.fy * scene.balls[k].radius_mm / h.fit.view.depth(scene.balls[k].centre);
     const double excess = std::log(seen.radius_px / expected) - std::log1p(scene.radius_bias);
     const double sigma = std::max(seen.radius_sigma_px / seen.radius_px, least_radius_sigma);
     weight += 1 / (sigma * sigma);
     first += excess / (sigma * sigma);
     second += excess * excess / (sigma * sigma);
+    peak += std::max(0.0, std::log(radius_range / (sigma * std::sqrt(2 * std::numbers::pi))));
   }
   const double bias_weight = 1 / (scene.radius_bias_sigma * scene.radius_bias_sigma);
-  return {first / weight, second - first * first / (weight + bias_weight)};
+  const double chi2 = second - first * first / (weight + bias_weight);
+  return {first / weight, std::max(0.0, peak - 0.5 * std::log1p(weight / bias_weight)) - 0.5 * chi2};
 }
 
-/// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the field, ln
-/// depth even over its span, any number of balls visible and then any of them, mirrored or not.
+/// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the
+/// field, ln depth even over its span, any number of balls visible and then any of them, mirrored or not.
 double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, const PoseFit& fit) {
   const double n = static_cast<double>(scene.candidates.size());
   const double b = static_cast<double>(scene.balls.size());
@@ -59,7 +65,7 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   const double field_area = std::numbers::pi * scene.field_radius_px * scene.field_radius_px;
   double odds = -0.5 * fit.chi2;
   for (const auto& s : sightings) odds += std::log(field_area / (s.sigma_px * s.sigma_px)) - log_2pi;
-  odds += std::lgamma(n - m + 1) - std::lgamma(n + 1);                                // which candidates, in order
+  odds += std::lgamma(n - m + 1) - std::lgamma(n + 1);  // which candidates, in order
   odds += std::lgamma(m + 1) + std::lgamma(b - m + 1) - std::lgamma(b + 1) - std::log(b + 1);  // which balls
   const double z = fit.view.camera_from_world.translation.z();
   const double per_mm = scene.camera.focal_px / z;
@@ -71,10 +77,12 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
 
 }  // namespace
 
-Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball, double sigmas) {
+Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
+                      double sigmas) {
   const double radius = candidate.radius_px / (1 + scene.radius_bias);
   const double spread = sigmas * std::hypot(candidate.radius_sigma_px, radius * scene.radius_bias_sigma);
-  return {ball.radius_mm / (radius + spread), radius > spread ? ball.radius_mm / (radius - spread) : infinity};
+  return {ball.radius_mm / (radius + spread),
+          radius > spread ? ball.radius_mm / (radius - spread) : infinity};
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas) {
@@ -94,7 +102,8 @@ std::vector<int> match(const Scene& scene, const View& view, double gate_px, dou
       if (distance2 > gate_px * gate_px) continue;
       const double cost = distance2 / (candidate.sigma_px * candidate.sigma_px);
       if (cost > gate_sigmas * gate_sigmas) continue;
-      if (!scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy)) continue;
+      if (!scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
+        continue;
       pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
     }
   }
@@ -114,22 +123,23 @@ Hypothesis settle(const Scene& scene, const View& rough) {
   h.fit.view = rough;
   h.log_odds = -infinity;
   std::vector<Sighting> sightings;
-  constexpr int most_turns = 8;
+  constexpr int narrowing = 4;
+  constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
-    const bool last_gate = turn >= 2;
-    auto matches = match(scene, h.fit.view, last_gate ? infinity : rough_gate_px(scene) / (1 + 2 * turn),
-                         last_gate ? match_sigmas : infinity);
-    if (last_gate && matches == h.candidate_of_ball && turn > 2) break;
+    const bool narrow = turn >= narrowing;
+    auto matches = narrow ? match(scene, h.fit.view, infinity, match_sigmas)
+                          : match(scene, h.fit.view, rough_gate_px(scene) / (1 + turn), infinity);
+    if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < 4) return h;
-    h.fit = fit_pose(h.fit.view, sightings, scene.camera, last_gate ? 10 : 4);
+    h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? 10 : 5);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);
   h.radius_excess = radii.excess;
-  h.log_odds = log_odds(scene, sightings, h.fit) - 0.5 * radii.chi2;
+  h.log_odds = log_odds(scene, sightings, h.fit) + radii.log_odds;
   return h;
 }
 

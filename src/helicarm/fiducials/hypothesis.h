@@ -11,10 +11,10 @@ namespace helicarm {
 
 /// A dark disc that may be a calibrator ball.
 struct BallCandidate {
-  Eigen::Vector2d uv;      ///< rectified pixels
-  double sigma_px;         ///< per axis
+  Eigen::Vector2d uv;  ///< rectified pixels
+  double sigma_px;     ///< per axis
   double radius_px;
-  double radius_sigma_px;  ///< random part; the Scene's radius bias is common to all
+  double radius_sigma_px;  ///< without the bias common to all
 };
 
 struct ModelBall {
@@ -27,8 +27,8 @@ struct Scene {
   std::vector<ModelBall> balls;
   std::vector<BallCandidate> candidates;  ///< sigma_px floored
   CameraPrior camera;
-  double field_radius_px;    ///< of the disc where false blobs may lie
-  double radius_bias;        ///< of all radii found, relative
+  double field_radius_px;  ///< of the disc where false blobs may lie
+  double radius_bias;      ///< of all radii found, relative
   double radius_bias_sigma;
 };
 
@@ -39,7 +39,8 @@ struct Scale {
 
   bool holds(double mm_per_px) const { return finest <= mm_per_px && mm_per_px <= coarsest; }
 };
-Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball, double sigmas);
+Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
+                      double sigmas);
 
 /// A pose and the candidate each ball has under it (-1: none).
 struct Hypothesis {
@@ -48,23 +49,23 @@ struct Hypothesis {
   PoseFit fit;
   double residual2_px2 = 0;  ///< sum of squared distances
   double radius_excess = 0;  ///< weighted mean of ln(radius found / radius expected at the ball's distance)
-  /// Logarithm of the odds that these matches are the calibrator and not chance. With all candidates strewn evenly
-  /// over the field, the odds summed over every hypothesis have expectation 1, so by Markov's inequality
-  /// a sum above e^x comes by accident with a probability below e^-x.
+  /// Logarithm of the odds that these matches are the calibrator and not chance. With all candidates strewn
+  /// evenly over the field, the odds summed over every hypothesis have expectation 1, so by Markov's
+  /// inequality a sum above e^x comes by accident with a probability below e^-x.
   double log_odds = 0;
 
   bool mirrored() const { return fit.view.intrinsics.fx < 0; }
 };
 
-/// Pairs balls and candidates one to one, nearest first, when within `gate_px` and `gate_sigmas` of each other and at
-/// a distance from the source that fits the candidate's radius.
+/// Pairs balls and candidates one to one, nearest first, when within `gate_px` and `gate_sigmas` of each
+/// other and at a distance from the source that fits the candidate's radius.
 std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas);
 
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 
-/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With fewer than
-/// four matches it is worth nothing: log_odds = -infinity.
+/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With fewer
+/// than four matches it is worth nothing: log_odds = -infinity.
 Hypothesis settle(const Scene& scene, const View& rough);
 
 }  // namespace helicarm

@@ -3,15 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <numeric>
-#include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "helicarm/core/random.h"
 #include "helicarm/fiducials/search.h"
 
 namespace helicarm {
@@ -19,10 +15,9 @@ namespace {
 
 constexpr int least_balls = 6;
 constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
-constexpr std::size_t loose_triples = 60;
-constexpr int challenges = 8;              // triples of the best hypothesis on which rivals are sought
-
-using Triple = std::array<int, 3>;
+constexpr double most_deviation = 3.3;     // of chi2, in sigmas: one honest view in 2000
+constexpr std::size_t loose_triples = 30;
+constexpr int challenges = 8;  // triples of the best hypothesis on which rivals are sought
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -30,8 +25,8 @@ Eigen::Vector3d centroid(const Calibrator& calibrator) {
   return sum / static_cast<double>(calibrator.balls.size());
 }
 
-Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
-               const LabellingOptions& options) {
+Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
+               const LabellingPrior& prior, const LabellingOptions& options) {
   Scene scene;
   const Eigen::Vector3d centre = centroid(calibrator);
   for (const auto& ball : calibrator.balls) {
@@ -42,8 +37,8 @@ Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& c
     candidate.sigma_px = std::hypot(candidate.sigma_px, options.systematic_sigma * prior.field_radius_px);
   }
   const double r = prior.field_radius_px;
-  scene.camera = {prior.focal_px.value_or(std::sqrt(4.0 * 24.0) * r), prior.focal_px ? prior.focal_sigma : 0.6,
-                  prior.principal_px, prior.principal_sigma_px};
+  scene.camera = {prior.focal_px.value_or(std::sqrt(4.0 * 24.0) * r),
+                  prior.focal_px ? prior.focal_sigma : 0.6, prior.principal_px, prior.principal_sigma_px};
   scene.field_radius_px = r;
   scene.radius_bias = prior.radius_bias;
   scene.radius_bias_sigma = prior.radius_bias_sigma;
@@ -60,61 +55,12 @@ std::vector<double> focals_to_try(const LabellingPrior& prior) {
   return focals;
 }
 
-template <class T>
-void shuffle(std::vector<T>& items, RandomStream& random) {
-  for (std::size_t i = items.size(); i > 1; --i) std::swap(items[i - 1], items[random.index(static_cast<std::uint32_t>(i))]);
+bool surely(const Hypothesis& h, const LabellingOptions& options) {
+  return h.matched >= least_balls && h.log_odds >= options.least_log_odds;
 }
 
-/// Every candidate in turn, in random company, so that no candidate is left out for long.
-class TripleDealer {
- public:
-  explicit TripleDealer(std::vector<int> items) : items_(std::move(items)), next_(items_.size()) {}
-
-  Triple deal() {
-    if (next_ + 3 > items_.size()) {
-      shuffle(items_, random_);
-      next_ = 0;
-    }
-    next_ += 3;
-    return {items_[next_ - 3], items_[next_ - 2], items_[next_ - 1]};
-  }
-
- private:
-  std::vector<int> items_;
-  std::size_t next_;
-  RandomStream random_{1, 0};
-};
-
-bool recognised(const Ranking& ranking, const LabellingOptions& options) {
-  return !ranking.empty() && ranking.front().matched >= least_balls &&
-         ranking.front().log_odds >= options.least_log_odds;
-}
-
-void explore(LabelSearch& search, std::size_t candidates, std::size_t triples, const LabellingOptions& options) {
-  std::vector<int> all(candidates);
-  std::iota(all.begin(), all.end(), 0);
-  TripleDealer dealer(all);
-  for (std::size_t i = 0; i < triples && !recognised(search.ranking(), options); ++i) {
-    search.try_triple(dealer.deal());
-  }
-}
-
-/// A rival within reach of the best shares all but one or two of its candidates, so it holds several of the disjoint
-/// triples dealt from these.
-void challenge(LabelSearch& search) {
-  std::vector<int> best;
-  do {
-    best = search.ranking().front().candidate_of_ball;
-    std::vector<int> seen;
-    std::copy_if(best.begin(), best.end(), std::back_inserter(seen), [](int i) { return i >= 0; });
-    TripleDealer dealer(seen);
-    for (int done = 0, dealt = 0; done < challenges && dealt < 5 * challenges; ++dealt) {
-      done += search.try_triple(dealer.deal()) ? 1 : 0;
-    }
-  } while (search.ranking().front().candidate_of_ball != best);
-}
-
-/// A ball whose disc another, unnamed ball covers, or one with two candidates in reach, is better left unnamed.
+/// A ball whose disc another, unnamed ball covers, or one with two candidates in reach, is better left
+/// unnamed.
 void drop_doubtful(const Scene& scene, Hypothesis& h) {
   const std::vector<int> named = h.candidate_of_ball;
   for (std::size_t k = 0; k < named.size(); ++k) {
@@ -135,29 +81,26 @@ void drop_doubtful(const Scene& scene, Hypothesis& h) {
   }
 }
 
-/// Takes out of `h` each pair that `rival` contradicts; how many are left.
-int keep_agreed(Hypothesis& h, const Hypothesis& rival) {
-  int left = 0;
+int count_named(const Hypothesis& h) {
+  return static_cast<int>(
+      std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; }));
+}
+
+/// Takes out of `h` each pair that `rival` contradicts.
+void keep_agreed(Hypothesis& h, const Hypothesis& rival) {
   for (std::size_t k = 0; k < h.candidate_of_ball.size(); ++k) {
     int& mine = h.candidate_of_ball[k];
-    if (mine < 0) continue;
-    for (std::size_t j = 0; j < rival.candidate_of_ball.size(); ++j) {
-      const bool same_ball = j == k;
-      if (same_ball ? rival.candidate_of_ball[j] >= 0 && rival.candidate_of_ball[j] != mine
-                    : rival.candidate_of_ball[j] == mine) {
-        mine = -1;
-        break;
-      }
+    for (std::size_t j = 0; j < rival.candidate_of_ball.size() && mine >= 0; ++j) {
+      const int theirs = rival.candidate_of_ball[j];
+      if (theirs >= 0 && (j == k) != (theirs == mine)) mine = -1;
     }
-    left += mine >= 0 ? 1 : 0;
   }
-  return left;
 }
 
 bool contradicts(const Hypothesis& rival, const Hypothesis& h) {
   Hypothesis agreed = h;
-  const auto named = std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; });
-  return rival.mirrored() != h.mirrored() || keep_agreed(agreed, rival) < named;
+  keep_agreed(agreed, rival);
+  return rival.mirrored() != h.mirrored() || count_named(agreed) < count_named(h);
 }
 
 /// Chi-square over its degrees of freedom as a standard normal deviate (Wilson and Hilferty 1931).
@@ -166,33 +109,92 @@ double deviate(double chi2, int dof) {
   return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
 }
 
-/// Log odds of the calibrator with its balls well off their places: above those of `best` when the file is of a
-/// similar but different calibrator, of which some balls happen to fit.
-double loose_log_odds(const Scene& scene, const Hypothesis& best, const LabellingPrior& prior,
+/// The best that the calibrator can do with its balls well off their places: better than `best` when the file
+/// is of a similar but different calibrator, of which a few balls happen to fit.
+Hypothesis loose_best(const Scene& scene, const Hypothesis& best, const LabellingPrior& prior,
                       const LabellingOptions& options) {
   Scene loose = scene;
-  for (auto& candidate : loose.candidates) candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * scene.field_radius_px);
-  const double near_best = settle(loose, best.fit.view).log_odds;
-  const auto unnamed = std::min(scene.candidates.size(), scene.balls.size()) - static_cast<std::size_t>(best.matched);
-  if (unnamed < 2 || near_best > best.log_odds) return near_best;
+  for (auto& candidate : loose.candidates) {
+    candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * scene.field_radius_px);
+  }
+  Hypothesis near_best = settle(loose, best.fit.view);
+  const auto could_match = static_cast<double>(std::min(scene.candidates.size(), scene.balls.size()));
+  if (best.matched >= 0.75 * could_match || near_best.log_odds > best.log_odds) return near_best;
   LabelSearch search(loose, focals_to_try(prior));
-  explore(search, loose.candidates.size(), loose_triples, options);
-  return search.ranking().empty() ? near_best : std::max(near_best, search.ranking().front().log_odds);
+  explore(search, loose_triples, [&](const Hypothesis& h) { return surely(h, options); });
+  if (search.ranking().empty() || search.ranking().front().log_odds < near_best.log_odds) return near_best;
+  return search.ranking().front();
 }
 
-tl::unexpected<Failure> unexplained(const Scene& scene, const Ranking& ranking, const LabellingOptions& options) {
+tl::unexpected<Failure> too_few(int balls, int candidates) {
+  return fail(
+      Reason::too_few_fiducials,
+      fmt::format("only {} balls of the calibrator could be recognised; {} are needed", balls, least_balls),
+      {{"n", balls}, {"candidates", candidates}, {"needed", least_balls}});
+}
+
+/// Why not even the best hypothesis is to be believed, if so.
+std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, const LabellingPrior& prior,
+                                 const LabellingOptions& options) {
   const int n = static_cast<int>(scene.candidates.size());
-  const int matched = ranking.empty() ? 0 : ranking.front().matched;
-  const double odds = ranking.empty() ? -std::numeric_limits<double>::infinity() : ranking.front().log_odds;
-  if (odds >= options.least_log_odds || n < least_balls + 2) {
-    const int seen = odds >= options.least_log_odds ? matched : n;
-    return fail(Reason::too_few_fiducials,
-                fmt::format("only {} balls of the calibrator could be recognised; {} are needed", std::min(seen, matched), least_balls),
-                {{"n", std::min(seen, matched)}, {"candidates", n}, {"needed", least_balls}});
+  if (ranking.empty() || ranking.front().log_odds <= 0) {
+    if (n < least_balls + 2) return too_few(ranking.empty() ? 0 : ranking.front().matched, n).value();
+    return fail(Reason::calibrator_mismatch,
+                fmt::format("no pose of the calibrator explains the {} discs found in the image", n),
+                {{"candidates", n}, {"matched", ranking.empty() ? 0 : ranking.front().matched}})
+        .value();
   }
-  return fail(Reason::calibrator_mismatch,
-              fmt::format("no pose of the calibrator explains the {} discs found in the image", n),
-              {{"candidates", n}, {"best_matched", matched}});
+  const Hypothesis& best = ranking.front();
+  const int dof = 2 * best.matched - 6;
+  const Hypothesis loose = loose_best(scene, best, prior, options);
+  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) ||
+      deviate(best.fit.chi2, dof) > most_deviation) {
+    return fail(Reason::calibrator_mismatch,
+                fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
+                            std::sqrt(loose.residual2_px2 / loose.matched)),
+                {{"matched", best.matched},
+                 {"chi2", best.fit.chi2},
+                 {"dof", dof},
+                 {"log_odds", best.log_odds},
+                 {"matched_loosely", loose.matched},
+                 {"log_odds_loosely", loose.log_odds}})
+        .value();
+  }
+  if (best.matched < least_balls) return too_few(best.matched, n).value();
+  if (best.log_odds < options.least_log_odds) {
+    return fail(Reason::ambiguous_labels,
+                fmt::format("{} of the {} discs fit the calibrator, but chance could do as well",
+                            best.matched, n),
+                {{"matched", best.matched},
+                 {"log_odds", best.log_odds},
+                 {"log_odds_needed", options.least_log_odds}})
+        .value();
+  }
+  return std::nullopt;
+}
+
+/// The best hypothesis less whatever an almost as good one contradicts; refused when too little remains.
+Expected<Hypothesis> undisputed(const Scene& scene, const Ranking& ranking, const LabellingOptions& options) {
+  Hypothesis best = ranking.front();
+  const int dof = 2 * best.matched - 6;
+  const double asked =
+      options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 3 * std::sqrt(2.0 * dof)));
+  drop_doubtful(scene, best);
+  const int n = static_cast<int>(scene.candidates.size());
+  if (count_named(best) < least_balls) return too_few(count_named(best), n);
+  for (const auto& rival : ranking) {
+    if (ranking.front().log_odds - rival.log_odds >= asked) break;
+    if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
+    if (rival.mirrored() != best.mirrored() || count_named(best) < least_balls) {
+      return fail(Reason::ambiguous_labels, "another labelling explains the image almost as well",
+                  {{"matched", best.matched},
+                   {"runner_up_matched", rival.matched},
+                   {"mirror_differs", rival.mirrored() != best.mirrored()},
+                   {"margin", best.log_odds - rival.log_odds},
+                   {"margin_needed", asked}});
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -200,55 +202,31 @@ tl::unexpected<Failure> unexplained(const Scene& scene, const Ranking& ranking, 
 Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
                                 const LabellingPrior& prior, const LabellingOptions& options) {
   const int n = static_cast<int>(candidates.size());
-  if (n < least_balls) {
-    return fail(Reason::too_few_fiducials, fmt::format("only {} balls were found; {} are needed", n, least_balls),
-                {{"n", n}, {"candidates", n}, {"needed", least_balls}});
-  }
+  if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
-  explore(search, candidates.size(), most_triples, options);
-  if (!recognised(search.ranking(), options)) return unexplained(scene, search.ranking(), options);
-  challenge(search);
-
-  Hypothesis best = search.ranking().front();
-  const int dof = 2 * best.matched - 6;
-  const double loose = loose_log_odds(scene, best, prior, options);
-  if (loose > best.log_odds || deviate(best.fit.chi2, dof) > 4.5) {
-    return fail(Reason::calibrator_mismatch,
-                fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
-                            std::sqrt(best.residual2_px2 / best.matched)),
-                {{"matched", best.matched}, {"chi2", best.fit.chi2}, {"dof", dof},
-                 {"log_odds", best.log_odds}, {"log_odds_loose", loose}});
-  }
-
-  drop_doubtful(scene, best);
-  const double asked = options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 3 * std::sqrt(2.0 * dof)));
-  int left = keep_agreed(best, best);
-  for (const auto& rival : search.ranking()) {
-    if (best.log_odds - rival.log_odds >= asked) break;
-    left = rival.mirrored() == best.mirrored() ? keep_agreed(best, rival) : 0;
-    if (left < least_balls) {
-      return fail(Reason::ambiguous_labels, "another labelling explains the image almost as well",
-                  {{"matched", best.matched}, {"runner_up_matched", rival.matched},
-                   {"mirror_differs", rival.mirrored() != best.mirrored()},
-                   {"margin", best.log_odds - rival.log_odds}, {"margin_needed", asked}});
-    }
-  }
+  explore(search, most_triples, [&](const Hypothesis& h) { return surely(h, options); });
+  if (!search.ranking().empty()) challenge(search, challenges);
+  auto failure = objection(scene, search.ranking(), prior, options);
+  if (failure) return tl::unexpected(*std::move(failure));
+  const auto best = undisputed(scene, search.ranking(), options);
+  if (!best) return tl::unexpected(best.error());
 
   Labelling labelling;
-  labelling.candidate_of_ball = best.candidate_of_ball;
-  labelling.view = best.fit.view;
-  labelling.view.camera_from_world.translation -= best.fit.view.camera_from_world.rotation * centroid(calibrator);
-  labelling.mirrored = best.mirrored();
-  labelling.matched = left;
-  labelling.false_blobs = n - best.matched;
-  labelling.rms_px = std::sqrt(best.residual2_px2 / best.matched);
-  labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best.radius_excess) - 1;
-  labelling.log_odds = best.log_odds;
-  labelling.margin = best.log_odds;
+  labelling.candidate_of_ball = best->candidate_of_ball;
+  labelling.view = best->fit.view;
+  labelling.view.camera_from_world.translation -=
+      best->fit.view.camera_from_world.rotation * centroid(calibrator);
+  labelling.mirrored = best->mirrored();
+  labelling.matched = count_named(*best);
+  labelling.false_blobs = n - best->matched;
+  labelling.rms_px = std::sqrt(best->residual2_px2 / best->matched);
+  labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best->radius_excess) - 1;
+  labelling.log_odds = best->log_odds;
+  labelling.margin = best->log_odds;
   for (const auto& rival : search.ranking()) {
-    if (!contradicts(rival, best)) continue;
-    labelling.margin = best.log_odds - std::max(0.0, rival.log_odds);
+    if (!contradicts(rival, *best)) continue;
+    labelling.margin = best->log_odds - std::max(0.0, rival.log_odds);
     labelling.runner_up_matched = rival.matched;
     labelling.runner_up_rms_px = std::sqrt(rival.residual2_px2 / rival.matched);
     break;

@@ -26,12 +26,12 @@ struct Sighting {
 
 struct PoseFit {
   View view;
-  double chi2 = 0;             ///< residuals and the camera's departure from its prior
-  double log_volume = 0;       ///< 0.5 ln det of the covariance of (rotation rad, translation mm, ln f, u0, v0)
+  double chi2 = 0;        ///< residuals and the camera's departure from its prior
+  double log_volume = 0;  ///< 0.5 ln det of the covariance of (rotation rad, translation mm, ln f, u0, v0)
 };
 
-/// The most probable pose, focal length and principal point (square pixels, the mirroring of `start` kept), by
-/// Levenberg-Marquardt from `start`. The covariance is finite only with three or more sightings.
+/// The most probable pose, focal length and principal point (square pixels, the mirroring of `start` kept),
+/// by Levenberg-Marquardt from `start`. The covariance is finite only with three or more sightings.
 PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, const CameraPrior& prior,
                  int most_steps);
 

@@ -65,7 +65,8 @@ TEST(FitPose, GradientVanishesAtTheFit) {
     for (const double way : {-1.0, 1.0}) {
       View turned = fit.view;
       turned.camera_from_world.rotation =
-          Eigen::AngleAxisd(way * 1e-3, Eigen::Vector3d::Unit(axis)).matrix() * turned.camera_from_world.rotation;
+          Eigen::AngleAxisd(way * 1e-3, Eigen::Vector3d::Unit(axis)).matrix() *
+          turned.camera_from_world.rotation;
       EXPECT_GT(fit_pose(turned, seen, prior, 0).chi2, fit.chi2);
       View shifted = fit.view;
       shifted.camera_from_world.translation += way * 0.2 * Eigen::Vector3d::Unit(axis);

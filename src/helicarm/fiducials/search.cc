@@ -4,13 +4,38 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
+
+#include "helicarm/core/random.h"
 
 namespace helicarm {
 namespace {
 
-constexpr double radius_sigmas = 3;     // a true triple lost here is made good by the next
+constexpr double radius_sigmas = 3;    // a true triple lost here is made good by the next
 constexpr std::size_t most_kept = 24;  // hypotheses
+
+/// Every item in turn, in random company, so that none is left out for long.
+class TripleDealer {
+ public:
+  explicit TripleDealer(std::vector<int> items) : items_(std::move(items)), next_(items_.size()) {}
+
+  std::array<int, 3> deal() {
+    if (next_ + 3 > items_.size()) {
+      for (std::size_t i = items_.size(); i > 1; --i) {
+        std::swap(items_[i - 1], items_[random_.index(static_cast<std::uint32_t>(i))]);
+      }
+      next_ = 0;
+    }
+    next_ += 3;
+    return {items_[next_ - 3], items_[next_ - 2], items_[next_ - 1]};
+  }
+
+ private:
+  std::vector<int> items_;
+  std::size_t next_;
+  RandomStream random_{1, 0};
+};
 
 /// The fewest supporters (two or three) that chance gives to less than one pose in fifty.
 int support_needed(const Scene& scene) {
@@ -21,11 +46,39 @@ int support_needed(const Scene& scene) {
 
 }  // namespace
 
+Neighbourhood::Neighbourhood(const Scene& scene) {
+  constexpr int reach = 3;  // cells
+  const double cell_px = rough_gate_px(scene) / reach;
+  Eigen::Array2d low = scene.candidates.front().uv.array();
+  Eigen::Array2d high = low;
+  for (const auto& candidate : scene.candidates) {
+    low = low.min(candidate.uv.array());
+    high = high.max(candidate.uv.array());
+  }
+  low -= (reach + 1) * cell_px;
+  const Eigen::Array2i cells = ((high - low) / cell_px).cast<int>() + reach + 2;
+  left_ = static_cast<float>(low.x());
+  top_ = static_cast<float>(low.y());
+  cells_per_px_ = static_cast<float>(1 / cell_px);
+  columns_ = cells.x();
+  rows_ = cells.y();
+  marked_.assign(static_cast<std::size_t>(columns_) * rows_, 0);
+  for (const auto& candidate : scene.candidates) {
+    const Eigen::Array2i at = ((candidate.uv.array() - low) / cell_px).cast<int>();
+    for (int dy = -reach; dy <= reach; ++dy) {
+      for (int dx = -reach; dx <= reach; ++dx) {
+        if (dx * dx + dy * dy <= reach * reach) marked_[(at.y() + dy) * columns_ + at.x() + dx] = 1;
+      }
+    }
+  }
+}
+
 LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
     : scene_(scene),
       focals_px_(std::move(focals_px)),
       flat_px_(0.04 * scene.field_radius_px),
-      support_(support_needed(scene)) {
+      support_(support_needed(scene)),
+      near_(scene) {
   const int balls = static_cast<int>(scene.balls.size());
   for (int i = 0; i < balls; ++i) {
     for (int j = 0; j < balls; ++j) {
@@ -37,10 +90,10 @@ LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
       }
     }
   }
+  for (const auto& ball : scene.balls) centres_.push_back(ball.centre.homogeneous().cast<float>());
   for (const auto& candidate : scene.candidates) {
-    u_.push_back(static_cast<float>(candidate.uv.x()));
-    v_.push_back(static_cast<float>(candidate.uv.y()));
-    for (const auto& ball : scene.balls) scales_.push_back(scale_by_radius(scene, candidate, ball, radius_sigmas));
+    for (const auto& ball : scene.balls)
+      scales_.push_back(scale_by_radius(scene, candidate, ball, radius_sigmas));
   }
 }
 
@@ -71,9 +124,9 @@ void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_p
     const Scale& s0 = scales[0][triangle.balls[0]];
     const Scale& s1 = scales[1][triangle.balls[1]];
     const Scale& s2 = scales[2][triangle.balls[2]];
-    const auto away = orthography(triangle, a, b, c);
-    const double mm_per_px = 1 / (focal_px * std::sqrt(away.inverse_distance2));
+    const double mm_per_px = 1 / (focal_px * std::sqrt(inverse_distance2(triangle, a, b, c)));
     if (!s0.holds(mm_per_px)) continue;
+    const auto away = orthography(triangle, a, b, c);
     for (const double lean : {1.0, -1.0}) {
       const Orthography start{away.inverse_distance2, lean * away.behind1, lean * away.behind2};
       if (!s1.holds(mm_per_px * (1 + start.behind1)) || !s2.holds(mm_per_px * (1 + start.behind2))) continue;
@@ -92,17 +145,12 @@ bool LabelSearch::supported(const View& rough) const {
   const int best = ranking_.empty() ? 0 : ranking_.front().matched;
   int wanted = 3 + std::max(support_, best / 2 - 2);
   int left = static_cast<int>(scene_.balls.size());
-  const float gate = static_cast<float>(rough_gate_px(scene_));
-  for (const auto& ball : scene_.balls) {
+  Eigen::Matrix4f projection = Eigen::Matrix4f::Zero();
+  projection.topRows<3>() = rough.projection().cast<float>();
+  for (const auto& centre : centres_) {
     if (left-- < wanted) return false;
-    const Eigen::Vector2f uv = rough.project(ball.centre).cast<float>();
-    int near = 0;
-    for (std::size_t i = 0; i < u_.size(); ++i) {
-      const float du = u_[i] - uv.x();
-      const float dv = v_[i] - uv.y();
-      near += du * du + dv * dv < gate * gate ? 1 : 0;
-    }
-    if (near > 0 && --wanted == 0) return true;
+    const Eigen::Vector4f p = projection * centre;
+    if (near_.holds(p.x() / p.z(), p.y() / p.z()) && --wanted == 0) return true;
   }
   return false;
 }
@@ -118,7 +166,8 @@ void LabelSearch::try_pose(const View& rough, double lean) {
 void LabelSearch::keep(Hypothesis hypothesis) {
   if (!std::isfinite(hypothesis.log_odds)) return;
   const auto same = std::find_if(ranking_.begin(), ranking_.end(), [&](const Hypothesis& other) {
-    return other.candidate_of_ball == hypothesis.candidate_of_ball && other.mirrored() == hypothesis.mirrored();
+    return other.candidate_of_ball == hypothesis.candidate_of_ball &&
+           other.mirrored() == hypothesis.mirrored();
   });
   if (same != ranking_.end()) {
     if (same->log_odds >= hypothesis.log_odds) return;
@@ -129,6 +178,30 @@ void LabelSearch::keep(Hypothesis hypothesis) {
                        [](const Hypothesis& p, const Hypothesis& q) { return p.log_odds > q.log_odds; });
   ranking_.insert(place, std::move(hypothesis));
   if (ranking_.size() > most_kept) ranking_.pop_back();
+}
+
+void explore(LabelSearch& search, std::size_t triples,
+             const std::function<bool(const Hypothesis&)>& will_do) {
+  std::vector<int> all(search.scene().candidates.size());
+  std::iota(all.begin(), all.end(), 0);
+  TripleDealer dealer(all);
+  for (std::size_t i = 0; i < triples; ++i) {
+    search.try_triple(dealer.deal());
+    if (!search.ranking().empty() && will_do(search.ranking().front())) return;
+  }
+}
+
+void challenge(LabelSearch& search, int triples) {
+  std::vector<int> best;
+  do {
+    best = search.ranking().front().candidate_of_ball;
+    std::vector<int> seen;
+    std::copy_if(best.begin(), best.end(), std::back_inserter(seen), [](int i) { return i >= 0; });
+    TripleDealer dealer(seen);
+    for (int done = 0, dealt = 0; done < triples && dealt < 5 * triples; ++dealt) {
+      done += search.try_triple(dealer.deal()) ? 1 : 0;
+    }
+  } while (search.ranking().front().candidate_of_ball != best);
 }
 
 }  // namespace helicarm

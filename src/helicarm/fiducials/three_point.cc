@@ -9,7 +9,8 @@
 namespace helicarm {
 namespace {
 
-constexpr double settled = 2e-3;  // of the distance: the next turn would move the points far less than a pixel
+constexpr double settled =
+    2e-3;  // of the distance: the next turn would move the points far less than a pixel
 
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& e1, const Eigen::Vector3d& e2) {
   Eigen::Matrix3d axes;
@@ -30,19 +31,25 @@ std::optional<ModelTriangle> model_triangle(const std::array<int, 3>& balls,
   return ModelTriangle{balls, points[0], frame_of(e1, e2), e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2)};
 }
 
-Orthography orthography(const ModelTriangle& model, double a, double b, double c) {
-  // a + h1^2 = w A, b + h2^2 = w B, c + h1 h2 = w C; the depths h1, h2 eliminated, the larger root is the real one.
+double inverse_distance2(const ModelTriangle& model, double a, double b, double c) {
+  // a + h1^2 = w A, b + h2^2 = w B, c + h1 h2 = w C; the depths h1, h2 eliminated, the larger root is the
+  // real one.
   const double q2 = model.a * model.b - model.c * model.c;
   const double q1 = 0.5 * (model.a * b + a * model.b) - model.c * c;
   const double q0 = a * b - c * c;
-  const double w = (q1 + std::sqrt(std::max(0.0, q1 * q1 - q2 * q0))) / q2;
+  return (q1 + std::sqrt(std::max(0.0, q1 * q1 - q2 * q0))) / q2;
+}
+
+Orthography orthography(const ModelTriangle& model, double a, double b, double c) {
+  const double w = inverse_distance2(model, a, b, c);
   const double h1 = std::sqrt(std::max(0.0, w * model.a - a));
   const double h2 = std::sqrt(std::max(0.0, w * model.b - b));
   return {w, h1, w * model.c < c ? -h2 : h2};
 }
 
 std::optional<RigidTransform> three_point_pose(const ModelTriangle& model,
-                                               const std::array<Eigen::Vector2d, 3>& image, const Orthography& start) {
+                                               const std::array<Eigen::Vector2d, 3>& image,
+                                               const Orthography& start) {
   double w = 0;
   double h1 = start.behind1;
   double h2 = start.behind2;
@@ -55,7 +62,8 @@ std::optional<RigidTransform> three_point_pose(const ModelTriangle& model,
     e2 = (1 + h2) * image[2] - image[0];
     const auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
     const double same_lean = next.behind1 * h1 + next.behind2 * h2 < 0 ? -1 : 1;
-    const double moved = std::max(std::abs(same_lean * next.behind1 - h1), std::abs(same_lean * next.behind2 - h2));
+    const double moved =
+        std::max(std::abs(same_lean * next.behind1 - h1), std::abs(same_lean * next.behind2 - h2));
     w = next.inverse_distance2;
     h1 = same_lean * next.behind1;
     h2 = same_lean * next.behind2;

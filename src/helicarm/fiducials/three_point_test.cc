@@ -48,7 +48,8 @@ TEST(ThreePointPose, FindsTheTruePoseFromExactPoints) {
 TEST(ThreePointPose, GivesAProperRotation) {
   const auto model = model_triangle({0, 1, 2}, {Eigen::Vector3d(0, 0, 0), {50, 0, 5}, {0, 40, -10}});
   ASSERT_TRUE(model);
-  const auto pose = three_point_pose(*model, {Eigen::Vector2d(0, 0), {0.06, 0.01}, {-0.01, 0.05}}, {1e-6, 0.01, 0.01});
+  const auto pose =
+      three_point_pose(*model, {Eigen::Vector2d(0, 0), {0.06, 0.01}, {-0.01, 0.05}}, {1e-6, 0.01, 0.01});
   ASSERT_TRUE(pose);
   EXPECT_NEAR(pose->rotation.determinant(), 1, 1e-12);
   EXPECT_NEAR((pose->rotation * pose->rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 0, 1e-12);
