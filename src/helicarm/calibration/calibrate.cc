@@ -31,9 +31,11 @@ std::vector<PointPair> pairs_of(const std::vector<Fiducial>& fiducials) {
 }
 
 /// The given start, or the homogeneous DLT.
-Expected<View> start_of(const ViewFiducials& view, const std::vector<PointPair>& pairs) {
-  if (!view.start) return dlt_homogeneous(pairs).map([](const DltResult& dlt) { return dlt.view; });
-  return dlt_condition(pairs).map([&](double) { return *view.start; });
+Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<PointPair>& pairs,
+                               const Eigen::Vector3d& centre) {
+  if (view.start) return dlt_condition(pairs).map([&](double) { return centred(*view.start, centre); });
+  return dlt_homogeneous(pairs).map(
+      [&](const DltResult& dlt) { return drawn_to_prior(centred(dlt.view, centre), view.prior); });
 }
 
 Expected<ViewProblem> problem_of(const ViewFiducials& view) {
@@ -47,10 +49,10 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view) {
     observations.push_back({f.centre_in_calibrator, f.uv, f.sigma_px});
     centre += f.centre_in_calibrator;
   }
-  const auto start = start_of(view, pairs_of(view.fiducials));
+  centre /= std::max(1.0, double(observations.size()));
+  const auto start = start_of(view, pairs_of(view.fiducials), centre);
   if (!start) return tl::unexpected<Failure>(start.error());
-  centre /= double(observations.size());
-  return ViewProblem{centred(*start, centre), std::move(observations), view.prior};
+  return ViewProblem{*start, std::move(observations), view.prior};
 }
 
 void mark_rejected(std::vector<Fiducial>& fiducials, std::size_t used_index) {

@@ -78,6 +78,19 @@ TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
   EXPECT_LT((jacobian * parameters_by_step(view) - picture_of(view, point).by_step).norm(), 1e-4);
 }
 
+TEST(DrawnToPrior, TakesTheKnownIntrinsicsAndKeepsThePictures) {
+  const CentredView view = centred(example, centre);
+  const IntrinsicsPrior prior{Belief{6300, 30}, Belief{0.97, 0.01}, PrincipalBelief{{512, 515}, 20}};
+  const CentredView drawn = drawn_to_prior(view, prior);
+  const Intrinsics k = uncentred(drawn).intrinsics;
+  EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
+  EXPECT_NEAR(-k.fx / k.fy, 0.97, 1e-12);
+  EXPECT_NEAR(k.u0, 512, 1e-9);
+  EXPECT_NEAR(k.v0, 515, 1e-9);
+  for (const Eigen::Vector3d& point : {Eigen::Vector3d(-20, 40, 70), {30, 30, 10}})
+    EXPECT_LT((picture_of(drawn, point).pixel - picture_of(view, point).pixel).norm(), 2);
+}
+
 TEST(PriorRows, JacobianAgreesWithDifferences) {
   View other = example;
   other.intrinsics = {6100, 6150, 515, 505, 0};

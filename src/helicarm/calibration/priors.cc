@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "helicarm/geometry/rotation.h"
+
 namespace helicarm {
 namespace {
 
@@ -64,6 +66,22 @@ void add_spread(Rows& rows, const std::vector<Known>& known, Eigen::Index which,
 }
 
 }  // namespace
+
+CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior) {
+  const double magnification = (std::abs(view.ax) + view.ay) / 2;
+  if (prior.aspect) {
+    view.ay = 2 * magnification / (1 + prior.aspect->value);
+    view.ax = std::copysign(prior.aspect->value * view.ay, view.ax);
+  }
+  if (prior.focal_px) view.rho = magnification / prior.focal_px->value;
+  if (!prior.principal_px) return view;
+  const double qx = (view.uc - prior.principal_px->value.x()) * view.rho / view.ax;
+  const double qy = (view.vc - prior.principal_px->value.y()) * view.rho / view.ay;
+  view.rotation = rotation_from_vector({view.qy - qy, qx - view.qx, 0}) * view.rotation;
+  view.qx = qx;
+  view.qy = qy;
+  return view;
+}
 
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
                      const SpreadPrior& spread) {

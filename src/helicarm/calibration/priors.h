@@ -28,6 +28,10 @@ struct IntrinsicsPrior {
   std::optional<PrincipalBelief> principal_px;
 };
 
+/// A start whose intrinsics the balls hardly fix, brought to what is known of them; its pictures change
+/// little.
+CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior);
+
 /// How far the intrinsics of one machine wander from view to view (sag): standard deviation of the difference
 /// of two views, px.
 struct SpreadPrior {

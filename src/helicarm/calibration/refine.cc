@@ -10,7 +10,7 @@
 namespace helicarm {
 namespace {
 
-constexpr int most_iterations = 200;
+constexpr int most_iterations = 1000;
 constexpr double least_gain = 1e-10;  // of chi2, before one last full step
 constexpr double least_damping = 1e-12;
 constexpr double most_damping = 1e12;
