@@ -112,6 +112,18 @@ TEST_F(Compressed, LossyJpegIsClose) {
   expect_close(12, EXS_JPEGProcess2_4, &quality, 64);
 }
 
+TEST_F(Compressed, OddScanHeaderOfASequentialJpegIsMended) {
+  const DJ_RPLossy quality(95);
+  const std::string sound = compress(picture(8).bytes(), EXS_JPEGProcess1, &quality);
+  std::string odd = sound;
+  const std::size_t scan = odd.find("\xFF\xDA");
+  ASSERT_NE(scan, std::string::npos);
+  odd[scan + 8] = 0;
+  const auto exposure = read_dicom(odd, "x.dcm", {});
+  ASSERT_TRUE(exposure) << exposure.error().message;
+  EXPECT_EQ(greatest_difference(*exposure, *read_dicom(sound, "x.dcm", {})), 0);
+}
+
 TEST_F(Compressed, FramesAreFoundByCountAndByOffsetTable) {
   const std::string plain = picture(12, 3).bytes();
   const std::string rle = compress(plain, EXS_RLELossless, nullptr);

@@ -46,7 +46,7 @@ std::string frame_bytes(const DicomOutline& outline, std::size_t frame) {
 }
 
 std::string decompressed(const DicomOutline& outline, int frame) {
-  const std::string bytes = frame_bytes(outline, static_cast<std::size_t>(frame));
+  std::string bytes = frame_bytes(outline, static_cast<std::size_t>(frame));
   if (bytes.empty()) outline.elements.refuse(Reason::truncated, tags::pixel_data, "has an empty frame");
   const std::size_t pixels =
       static_cast<std::size_t>(outline.rows) * static_cast<std::size_t>(outline.columns);
@@ -54,8 +54,8 @@ std::string decompressed(const DicomOutline& outline, int frame) {
   if (outline.elements.transfer_syntax == "1.2.840.10008.1.2.5")
     return value_or_throw(decode_rle(bytes, pixels, outline.bits_allocated / 8, origin));
   const bool lossless = outline.elements.transfer_syntax >= "1.2.840.10008.1.2.4.57";
-  return value_or_throw(
-      decode_jpeg(bytes, lossless, outline.columns, outline.rows, outline.bits_allocated / 8, origin));
+  return value_or_throw(decode_jpeg(std::move(bytes), lossless, outline.columns, outline.rows,
+                                    outline.bits_allocated / 8, origin));
 }
 
 template <class Word>

@@ -35,64 +35,72 @@ bool decode(std::string_view jpeg, std::string& out) {
   return status.good() && !decoder.damaged();
 }
 
-struct FrameHeader {
-  int process = -1;  ///< low half of the SOF marker
-  int precision = 0;
-  int height = 0;
-  int width = 0;
-  int components = 0;
-};
+int byte_at(std::string_view jpeg, std::size_t at) { return static_cast<unsigned char>(jpeg[at]); }
+int word_at(std::string_view jpeg, std::size_t at) { return byte_at(jpeg, at) << 8 | byte_at(jpeg, at + 1); }
 
-/// Walks the marker segments up to the frame header, which DCMTK would believe; process -1 when there is
+bool starts_frame(int marker) {
+  return marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC;
+}
+bool starts_scan(int marker) { return marker == 0xDA; }
+
+/// Walks the marker segments from `at` to the first wanted one, of at least ten bytes; npos when there is
 /// none.
-FrameHeader find_frame_header(std::string_view jpeg) {
-  const auto byte = [&](std::size_t at) { return static_cast<int>(static_cast<unsigned char>(jpeg[at])); };
-  const auto word = [&](std::size_t at) { return byte(at) << 8 | byte(at + 1); };
-  std::size_t at = 2;
-  while (jpeg.size() - at >= 10 && byte(at) == 0xFF) {
-    const int marker = byte(at + 1);
+std::size_t find_segment(std::string_view jpeg, std::size_t at, bool (*wanted)(int)) {
+  while (jpeg.size() - at >= 10 && byte_at(jpeg, at) == 0xFF) {
+    const int marker = byte_at(jpeg, at + 1);
     if (marker == 0xFF) {
       ++at;
       continue;
     }
-    if (marker >= 0xC0 && marker <= 0xCF && marker != 0xC4 && marker != 0xC8 && marker != 0xCC)
-      return {marker & 15, byte(at + 4), word(at + 5), word(at + 7), byte(at + 9)};
-    const auto length = static_cast<std::size_t>(word(at + 2));
+    if (wanted(marker)) return at;
+    const auto length = static_cast<std::size_t>(word_at(jpeg, at + 2));
     const bool has_segment = marker >= 0xC0 && (marker < 0xD0 || marker > 0xDA);
     if (!has_segment || length < 2 || length + 2 > jpeg.size() - at) break;
     at += 2 + length;
   }
-  return {};
+  return std::string_view::npos;
+}
+
+/// A sequential scan can only mean coefficients 0 to 63 in full; some writers leave other figures there.
+void mend_scan_header(std::string& jpeg, std::size_t frame) {
+  const std::size_t scan = find_segment(jpeg, frame, starts_scan);
+  if (scan != std::string::npos && word_at(jpeg, scan + 2) == 8)
+    jpeg.replace(scan + 7, 3, std::string("\0\x3F\0", 3));
 }
 
 }  // namespace
 
-Expected<std::string> decode_jpeg(std::string_view jpeg, bool lossless, int width, int height, int word_bytes,
+Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, int height, int word_bytes,
                                   const std::string& origin) {
   const auto damaged = [&](std::string_view why) {
     return fail(Reason::bad_value, fmt::format("{}: JPEG data: {}", origin, why));
   };
   if (!jpeg.starts_with("\xFF\xD8")) return damaged("no start of an image");
-  const FrameHeader header = find_frame_header(jpeg);
-  if (header.process < 0) return damaged("no frame header");
-  if (lossless ? header.process != 3 : header.process > 1)
-    return damaged(fmt::format("frame type {} does not suit the transfer syntax", header.process));
-  if (header.width != width || header.height != height || header.components != 1)
-    return damaged(fmt::format("{} x {} pixels of {} component(s), must be {} x {} of 1", header.width,
-                               header.height, header.components, width, height));
-  if (header.precision < 2 || header.precision > 8 * word_bytes)
-    return damaged(fmt::format("{} bits a pixel, {} allocated", header.precision, 8 * word_bytes));
+  const std::size_t frame = find_segment(jpeg, 2, starts_frame);
+  if (frame == std::string::npos) return damaged("no frame header");
+  const int process = byte_at(jpeg, frame + 1) & 15, precision = byte_at(jpeg, frame + 4);
+  const int rows = word_at(jpeg, frame + 5), columns = word_at(jpeg, frame + 7),
+            components = byte_at(jpeg, frame + 9);
+  if (lossless ? process != 3 : process > 1)
+    return damaged(fmt::format("frame type {} does not suit the transfer syntax", process));
+  if (columns != width || rows != height || components != 1)
+    return damaged(fmt::format("{} x {} pixels of {} component(s), must be {} x {} of 1", columns, rows,
+                               components, width, height));
+  if (precision < 2 || precision > 8 * word_bytes)
+    return damaged(fmt::format("{} bits a pixel, {} allocated", precision, 8 * word_bytes));
   const auto last = jpeg.find_last_not_of(std::string_view("\0", 1));
-  if (jpeg.substr(0, last + 1).find("\xFF\xD9", last - 2) == std::string_view::npos)
+  if (jpeg.find("\xFF\xD9", last - 2) == std::string::npos)
     return fail(Reason::truncated, fmt::format("{}: the JPEG data has no end", origin));
 
+  if (!lossless) mend_scan_header(jpeg, frame);
+
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  std::string out(pixels * (header.precision > 8 ? 2 : 1), '\0');
-  const bool good = header.precision <= 8    ? decode<DJDecompressIJG8Bit>(jpeg, out)
-                    : header.precision <= 12 ? decode<DJDecompressIJG12Bit>(jpeg, out)
-                                             : decode<DJDecompressIJG16Bit>(jpeg, out);
+  std::string out(pixels * (precision > 8 ? 2 : 1), '\0');
+  const bool good = precision <= 8    ? decode<DJDecompressIJG8Bit>(jpeg, out)
+                    : precision <= 12 ? decode<DJDecompressIJG12Bit>(jpeg, out)
+                                      : decode<DJDecompressIJG16Bit>(jpeg, out);
   if (!good) return damaged("damaged");
-  if (header.precision > 8 || word_bytes == 1) return out;
+  if (precision > 8 || word_bytes == 1) return out;
   std::string wide(2 * pixels, '\0');
   for (std::size_t i = 0; i < pixels; ++i) wide[2 * i] = out[i];
   return wide;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 
 #include "helicarm/core/failure.h"
 
@@ -11,7 +10,7 @@ namespace helicarm {
 /// Decodes one grey JPEG picture (sequential Huffman: baseline or extended; lossless process 14) of known
 /// size into little endian words of `word_bytes` (1 or 2). Refuses: truncated, bad_value (size or process
 /// differ, damaged).
-Expected<std::string> decode_jpeg(std::string_view jpeg, bool lossless, int width, int height, int word_bytes,
+Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, int height, int word_bytes,
                                   const std::string& origin);
 
 }  // namespace helicarm
