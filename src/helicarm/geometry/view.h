@@ -7,6 +7,9 @@
 
 namespace helicarm {
 
+/// 3x4, maps world (mm) to homogeneous pixels.
+using Projection = Eigen::Matrix<double, 3, 4>;
+
 /// Pinhole intrinsics in pixels (Eq. 4: fx = f/dx, fy = f/dy). A mirrored picture has fx < 0.
 struct Intrinsics {
   double fx = 0;
@@ -20,21 +23,23 @@ struct Intrinsics {
   }
 };
 
-/// One calibrated X-ray: K and the pose of the world in the camera (origin at the source, z towards the detector).
-/// The projection matrix is derived, never stored.
+/// One calibrated X-ray: K and the pose of the world in the camera (origin at the source, z towards the
+/// detector). The projection matrix is derived, never stored.
 struct View {
   Intrinsics intrinsics;
   RigidTransform camera_from_world;
 
-  /// 3x4, maps world (mm) to pixels; the third row's first part has unit norm and is positive before the source.
-  Eigen::Matrix<double, 3, 4> projection() const {
-    Eigen::Matrix<double, 3, 4> pose;
+  /// The third row's first part has unit norm and is positive before the source.
+  Projection projection() const {
+    Projection pose;
     pose << camera_from_world.rotation, camera_from_world.translation;
     return intrinsics.matrix() * pose;
   }
 
   /// Distance of a point from the source along the central ray, mm.
-  double depth(const Eigen::Vector3d& point_in_world) const { return (camera_from_world * point_in_world).z(); }
+  double depth(const Eigen::Vector3d& point_in_world) const {
+    return (camera_from_world * point_in_world).z();
+  }
 
   /// Pixel of a point in front of the source (Eq. 6).
   Eigen::Vector2d project(const Eigen::Vector3d& point_in_world) const {

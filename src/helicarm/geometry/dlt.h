@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/geometry/view.h"
+
+namespace helicarm {
+
+/// A point of known place (mm) and its picture (px).
+struct PointPair {
+  Eigen::Vector3d point_in_world;
+  Eigen::Vector2d pixel;
+};
+
+/// A1..A11 of Eq. 6: the rows of the projection are A1..A4, A8..A11 and A5 A6 A7 1.
+using DltFactors = Eigen::Matrix<double, 11, 1>;
+
+Projection projection_from_factors(const DltFactors& factors);
+
+/// Nothing where the world's origin lies in the source's plane (t_z = 0): Eq. 6 divides by t_z.
+std::optional<DltFactors> factors_from_projection(const Projection& projection);
+
+struct DltResult {
+  View view;  ///< all points lie before its source; with skew, the DLT's 11th factor
+  std::optional<DltFactors> factors;
+  double condition = 0;  ///< as `dlt_condition`
+};
+
+/// Condition number of the normalised design matrix: how far the points are from leaving the view
+/// undetermined. Refuses `not_finite` numbers, fewer than 6 points (`too_few_fiducials`) and points in or
+/// near a plane, a line or another critical place (`coplanar_fiducials`), with the condition as figure.
+Expected<double> dlt_condition(std::span<const PointPair> points);
+
+/// The least-squares solution of Eq. 7, unweighted, without any check: at least 6 points in general position.
+DltFactors solve_dlt(std::span<const PointPair> points);
+
+/// Eq. 7 as printed. Refuses as `dlt_condition`; `point_at_infinity` where t_z = 0 makes Eq. 7 singular, and
+/// `behind_source` where no source sees all the points.
+Expected<DltResult> dlt_least_squares(std::span<const PointPair> points);
+
+/// The normalised homogeneous form (Hartley), which has no such singular place.
+Expected<DltResult> dlt_homogeneous(std::span<const PointPair> points);
+
+/// Root mean square distance of the pixels to the projections, px.
+double reprojection_rms(const View& view, std::span<const PointPair> points);
+
+}  // namespace helicarm

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/geometry/import_matrix.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/decomposition.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD carries its pixels along
+constexpr double largest_number = 1e12;
+constexpr int largest_side_px = 16384;
+constexpr std::string_view separators = " \t\r,;[]";
+
+double number_from(std::string_view word, const std::string& where) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
+    throw BadInput(Reason::not_finite, fmt::format("{}: \"{}\" is not finite", where, word));
+  if (error != std::errc() || end != word.data() + word.size())
+    throw BadInput(Reason::bad_value, fmt::format("{}: \"{}\" is not a number", where, word.substr(0, 40)));
+  return value;
+}
+
+std::vector<double> numbers_in(std::string_view line, const std::string& where) {
+  std::vector<double> numbers;
+  for (std::size_t at = line.find_first_not_of(separators); at != std::string_view::npos;) {
+    const std::size_t end = std::min(line.find_first_of(separators, at), line.size());
+    numbers.push_back(number_from(line.substr(at, end - at), where));
+    at = line.find_first_not_of(separators, end);
+  }
+  return numbers;
+}
+
+ImportedMatrix imported(const std::vector<double>& numbers, const std::string& where) {
+  if (numbers.size() != 12)
+    throw BadInput(Reason::bad_size,
+                   fmt::format("{}: {} numbers, a 3x4 matrix has 12", where, numbers.size()));
+  const Projection projection =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(numbers.data());
+  const auto view = decompose(projection, Eigen::Vector3d::Zero());
+  if (!view) throw BadInput(Reason::bad_value, fmt::format("{}: {}", where, view.error().message));
+  return {*view, std::nullopt};
+}
+
+Eigen::Vector2i image_size_from(const std::vector<double>& numbers, const std::string& where) {
+  for (double side : numbers)
+    if (numbers.size() != 2 || side < 1 || side > largest_side_px || side != std::floor(side))
+      throw BadInput(Reason::bad_value, fmt::format("{}: image size is not two whole numbers in 1 to {}",
+                                                    where, largest_side_px));
+  if (numbers.empty()) throw BadInput(Reason::truncated, fmt::format("{}: image size is missing", where));
+  return {int(numbers[0]), int(numbers[1])};
+}
+
+std::string trimmed(const std::string& line) {
+  const auto first = line.find_first_not_of(" \t\r");
+  return first == std::string::npos ? "" : line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
+}
+
+/// The numbers below a section's title, up to the next title.
+std::vector<double> section(const std::string& text, const std::string& title, std::size_t count,
+                            const std::string& origin) {
+  std::istringstream lines(text);
+  std::string line;
+  while (std::getline(lines, line) && trimmed(line) != title) continue;
+  const std::string where = fmt::format("{}: {}", origin, title);
+  std::vector<double> numbers;
+  while (numbers.size() < count && std::getline(lines, line)) {
+    const auto more = numbers_in(line, where);
+    numbers.insert(numbers.end(), more.begin(), more.end());
+  }
+  if (numbers.size() < count)
+    throw BadInput(Reason::truncated,
+                   fmt::format("{}: {} numbers, must be {}", where, numbers.size(), count));
+  if (numbers.size() > count)
+    throw BadInput(Reason::bad_value, fmt::format("{}: a line has too many numbers", where));
+  return numbers;
+}
+
+ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin) {
+  using Rows = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+  const auto k_numbers = section(text, "camera matrix", 9, origin);
+  const auto r_numbers = section(text, "rotation", 9, origin);
+  const auto t_numbers = section(text, "translation", 3, origin);
+  const Eigen::Matrix3d k = Rows(k_numbers.data());
+  if (k(1, 0) != 0 || k(2, 0) != 0 || k(2, 1) != 0 || k(2, 2) != 1 || k(0, 0) == 0 || k(1, 1) == 0)
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format("{}: camera matrix: must be upper triangular with a 1 as its last number", origin));
+  ImportedMatrix result;
+  result.view.intrinsics = {k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)};
+  RigidTransform& pose = result.view.camera_from_world;
+  pose.rotation = Rows(r_numbers.data());
+  pose.translation = Eigen::Map<const Eigen::Vector3d>(t_numbers.data());
+  value_or_throw(rigid_transform_from(pose.matrix(), fmt::format("{}: rotation", origin)));
+  result.image_size = image_size_from(section(text, "image size", 2, origin), origin);
+  return result;
+}
+
+ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin) {
+  std::istringstream lines(text);
+  std::optional<ImportedMatrix> result;
+  std::optional<Eigen::Vector2i> size;
+  constexpr std::string_view matrix_key = "Projection Matrix:=", size_key = "sizes:";
+  for (std::string line; std::getline(lines, line) && !trimmed(line).empty();) {
+    const std::string_view view = line;
+    if (view.starts_with(matrix_key))
+      result = imported(numbers_in(view.substr(matrix_key.size()), origin + ": Projection Matrix"), origin);
+    if (view.starts_with(size_key)) {
+      auto sizes = numbers_in(view.substr(size_key.size()), origin + ": sizes");
+      sizes.resize(std::min<std::size_t>(sizes.size(), 2));
+      size = image_size_from(sizes, origin + ": sizes");
+    }
+  }
+  if (!result)
+    throw BadInput(Reason::unsupported, fmt::format("{}: the header has no \"Projection Matrix\"", origin));
+  result->image_size = size;
+  return *result;
+}
+
+ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin) {
+  Json json = value_or_throw(parse_json(text, origin));
+  if (json.is_array()) json = Json{{"projection", std::move(json)}};
+  JsonReader reader(json, origin);
+  ImportedMatrix result =
+      imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin);
+  if (reader.has("image_size"))
+    result.image_size = image_size_from(reader.numbers("image_size", 2, {1, largest_side_px}), origin);
+  reader.raw("image_size");
+  reader.finish();
+  return result;
+}
+
+ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin) {
+  std::istringstream lines(text);
+  std::vector<double> numbers;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    const auto row = numbers_in(line, origin);
+    if (!row.empty() && row.size() != 4 && row.size() != 12)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: a row of {} numbers, a 3x4 matrix has rows of 4", origin, row.size()));
+    numbers.insert(numbers.end(), row.begin(), row.end());
+  }
+  return imported(numbers, origin);
+}
+
+ImportedMatrix parse(const std::string& text, const std::string& origin) {
+  const auto first = text.find_first_not_of(" \t\r\n");
+  if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
+  if (text.starts_with("NRRD")) return parse_nrrd(text, origin);
+  if (text.find('\0') != std::string::npos)
+    throw BadInput(Reason::unsupported,
+                   fmt::format("{}: neither MayaCam 2, NRRD, JSON nor a text matrix", origin));
+  if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin);
+  if (text[first] == '{' || text.substr(first).starts_with("[[")) return parse_json_matrix(text, origin);
+  return parse_text_matrix(text, origin);
+}
+
+}  // namespace
+
+Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double mm_per_unit) {
+  const auto text = read_file(path, max_bytes);
+  if (!text) return tl::unexpected<Failure>(text.error());
+  return guarded([&] {
+    ImportedMatrix result = parse(*text, path.filename().string());
+    result.view.camera_from_world.translation *= mm_per_unit;
+    return result;
+  });
+}
+
+}  // namespace helicarm

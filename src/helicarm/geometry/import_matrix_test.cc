@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/geometry/import_matrix.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/decomposition.h"
+
+namespace helicarm {
+namespace {
+namespace fs = std::filesystem;
+
+Expected<ImportedMatrix> import_text(const std::string& text, double mm_per_unit = 1) {
+  const fs::path path =
+      fs::temp_directory_path() / ("helicarm_import_" + std::to_string(::getpid()) + ".txt");
+  EXPECT_TRUE(write_file(path, text));
+  auto result = import_matrix(path, mm_per_unit);
+  fs::remove(path);
+  return result;
+}
+
+Reason reason_of(const std::string& text) {
+  const auto result = import_text(text);
+  EXPECT_FALSE(result.has_value()) << text;
+  return result ? Reason::usage : result.error().reason;
+}
+
+const std::string maya_cam =
+    "image size\n1760,1700\n\ncamera matrix\n8000.5,0,794.25\n0,8100.25,866.5\n0,0,1\n\n"
+    "rotation\n0,0,1\n-0.6,-0.8,0\n0.8,-0.6,0\n\ntranslation\n-68.5\n125.25\n136.75\n";
+
+TEST(ImportMatrix, MayaCamIsKeptAsPrinted) {
+  const auto result = import_text(maya_cam, 10);
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  EXPECT_EQ(result->view.intrinsics.fx, 8000.5);
+  EXPECT_EQ(result->view.intrinsics.v0, 866.5);
+  EXPECT_EQ(result->view.camera_from_world.rotation(1, 0), -0.6);
+  EXPECT_EQ(result->view.camera_from_world.translation, Eigen::Vector3d(-685, 1252.5, 1367.5));
+  EXPECT_EQ(*result->image_size, Eigen::Vector2i(1760, 1700));
+}
+
+TEST(ImportMatrix, BrokenMayaCamIsNamed) {
+  EXPECT_EQ(reason_of(maya_cam.substr(0, maya_cam.size() - 8)), Reason::truncated);
+  EXPECT_EQ(reason_of(maya_cam.substr(0, maya_cam.find("rotation"))), Reason::truncated);
+  const auto replaced = [](const std::string& what, const std::string& by) {
+    std::string text = maya_cam;
+    return text.replace(text.find(what), what.size(), by);
+  };
+  EXPECT_EQ(reason_of(replaced("-0.6,-0.8,0", "0.6,0.8,0")), Reason::bad_value);  // a mirror
+  EXPECT_EQ(reason_of(replaced("-0.6,-0.8", "-0.6,-0.7")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced("0,0,1\n\n", "0,1,1\n\n")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced("125.25", "nan")), Reason::not_finite);
+  EXPECT_EQ(reason_of(replaced("125.25", "12x")), Reason::bad_value);
+  EXPECT_EQ(reason_of(replaced("1760,1700", "1760,-1")), Reason::bad_value);
+}
+
+const std::string rows = "-506.148 -0 -3532.97 376726\n-384 -3532.97 -0 285811\n-1 -0 -0 744.3\n";
+
+void expect_matrix(const Expected<ImportedMatrix>& result) {
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  Projection given;
+  given << -506.148, 0, -3532.97, 376726, -384, -3532.97, 0, 285811, -1, 0, 0, 744.3;
+  EXPECT_LT((result->view.projection() - given).norm(), 1e-9 * given.norm());
+  EXPECT_NEAR(result->view.intrinsics.fx, 3532.97, 1e-9);
+}
+
+TEST(ImportMatrix, SameMatrixAsTextJsonAndNrrd) {
+  expect_matrix(import_text(rows));
+  expect_matrix(import_text("# camera\n" + rows));
+  expect_matrix(import_text("[[-506.148,0,-3532.97,376726],[-384,-3532.97,0,285811],[-1,0,0,744.3]]"));
+  const auto json = import_text(R"({"projection": [[-506.148,0,-3532.97,376726],[-384,-3532.97,0,285811],
+                                    [-1,0,0,744.3]], "image_size": [1024, 760]})");
+  expect_matrix(json);
+  EXPECT_EQ(*json->image_size, Eigen::Vector2i(1024, 760));
+  const auto nrrd = import_text(
+      "NRRD0004\ndimension: 2\nsizes: 1024 760\nOriginal Image/Projection Matrix:=[1 2 3 4; 5 6 7 8; 9 8 7 "
+      "6] \n"
+      "Projection Matrix:=[-506.148 -0 -3532.97 376726; -384 -3532.97 -0 285811; -1 -0 -0 744.3] "
+      "\n\n\x01\x02");
+  expect_matrix(nrrd);
+  EXPECT_EQ(*nrrd->image_size, Eigen::Vector2i(1024, 760));
+}
+
+TEST(ImportMatrix, NegativeScaleIsUndoneAndAMirrorKept) {
+  const auto result = import_text("600 0 512 409600\n0 -600 512 409600\n0 0 1 800\n");
+  ASSERT_TRUE(result.has_value());
+  EXPECT_LT(result->view.intrinsics.fx, 0);
+  const auto negated = import_text("-600 0 -512 -409600\n0 600 -512 -409600\n0 0 -1 -800\n");
+  ASSERT_TRUE(negated.has_value());
+  EXPECT_LT((negated->view.projection() - result->view.projection()).norm(), 1e-9);
+}
+
+TEST(ImportMatrix, BadFilesAreNamed) {
+  EXPECT_EQ(reason_of(""), Reason::truncated);
+  EXPECT_EQ(reason_of("1 2 3\n4 5 6\n7 8 9\n"), Reason::bad_size);
+  EXPECT_EQ(reason_of("1 2 3 4\n5 6 7 8\n"), Reason::bad_size);
+  EXPECT_EQ(reason_of("hello\n"), Reason::bad_value);
+  EXPECT_EQ(reason_of(std::string("\x89PNG\0\0", 6)), Reason::unsupported);
+  EXPECT_EQ(reason_of("1 2 3 4\n2 4 6 8\n0 0 1 800\n"), Reason::bad_value);
+  EXPECT_EQ(reason_of("1 2 3 inf\n2 4 6 8\n0 0 1 800\n"), Reason::not_finite);
+  EXPECT_EQ(reason_of("NRRD0004\nsizes: 4 4\n\n"), Reason::unsupported);
+  EXPECT_EQ(reason_of("{\"projection\": 3}"), Reason::bad_value);
+  EXPECT_EQ(reason_of("{\"matrix\": []}"), Reason::bad_value);
+  EXPECT_EQ(import_matrix("/nonexistent/file").error().reason, Reason::missing_file);
+}
+
+}  // namespace
+}  // namespace helicarm

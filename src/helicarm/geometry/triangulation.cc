@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/geometry/triangulation.h"
+
+#include <algorithm>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <fmt/format.h>
+
+#include "helicarm/geometry/ray.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double least_angle_deg = 1;
+constexpr double farthest_mm = 1e5;      // of a point from a source: beyond any room
+constexpr double least_sigma_px = 1e-6;  // an "exact" pixel still has to have a weight
+constexpr int most_iterations = 20;
+
+constexpr double degrees(double radians) { return radians * 180 / std::numbers::pi; }
+
+double largest_gap(std::span<const Sight> sights) {
+  double largest = 0;
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      largest = std::max(largest, gap_between(ray_through(sights[i].view, sights[i].pixel),
+                                              ray_through(sights[j].view, sights[j].pixel)));
+  return largest;
+}
+
+Expected<void> check_place(std::span<const Sight> sights, const Eigen::Vector3d& point) {
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    const View& view = sights[i].view;
+    const double distance = (point - view.source_in_world()).norm();
+    if (!(distance < farthest_mm))
+      return fail(Reason::point_at_infinity,
+                  fmt::format("the rays meet {:.3g} mm from the source, limit {:g}", distance, farthest_mm),
+                  {{"distance_mm", distance}});
+    if (!(view.depth(point) > 0))
+      return fail(Reason::behind_source, "the rays meet behind a source",
+                  {{"depth_mm", view.depth(point)}, {"view_index", double(i)}});
+  }
+  return {};
+}
+
+}  // namespace
+
+Expected<Eigen::Vector3d> intersect_linear(std::span<const Projection> projections,
+                                           std::span<const Eigen::Vector2d> pixels) {
+  Eigen::MatrixX3d left(2 * Eigen::Index(projections.size()), 3);
+  Eigen::VectorXd right(left.rows());
+  for (std::size_t i = 0; i < projections.size(); ++i)
+    for (Eigen::Index axis = 0; axis < 2; ++axis) {
+      const Eigen::RowVector4d equation = pixels[i](axis) * projections[i].row(2) - projections[i].row(axis);
+      left.row(2 * Eigen::Index(i) + axis) = equation.head<3>();
+      right(2 * Eigen::Index(i) + axis) = -equation(3);
+    }
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> qr(left);
+  if (projections.size() < 2 || qr.rank() < 3)
+    return fail(Reason::parallel_rays, "the rays do not fix a point", {{"rank", double(qr.rank())}});
+  return qr.solve(right).eval();
+}
+
+Eigen::Matrix<double, 2, 3> projection_jacobian(const View& view, const Eigen::Vector3d& point_in_world) {
+  const Eigen::Vector3d p = view.camera_from_world * point_in_world;
+  const Intrinsics& k = view.intrinsics;
+  Eigen::Matrix<double, 2, 3> by_camera;
+  by_camera << k.fx, k.skew, -(k.fx * p.x() + k.skew * p.y()) / p.z(),  //
+      0, k.fy, -k.fy * p.y() / p.z();
+  return by_camera / p.z() * view.camera_from_world.rotation;
+}
+
+double widest_angle(std::span<const Sight> sights) {
+  double widest = 0;
+  for (std::size_t i = 0; i < sights.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      widest = std::max(widest, angle_between(ray_through(sights[i].view, sights[i].pixel),
+                                              ray_through(sights[j].view, sights[j].pixel)));
+  return widest;
+}
+
+Expected<Intersection> intersect(std::span<const Sight> sights, const Eigen::MatrixXd& covariance_px2) {
+  const auto n = Eigen::Index(sights.size());
+  if (n < 2)
+    return fail(Reason::not_seen, "the point is seen in fewer than two views", {{"views", double(n)}});
+  const double angle_deg = degrees(widest_angle(sights));
+  if (!(angle_deg >= least_angle_deg))
+    return fail(Reason::parallel_rays,
+                fmt::format("the rays are {:.3g} degrees apart, limit {:g}", angle_deg, least_angle_deg),
+                {{"angle_deg", angle_deg}});
+  std::vector<Projection> projections;
+  std::vector<Eigen::Vector2d> pixels;
+  for (const Sight& sight : sights) {
+    projections.push_back(sight.view.projection());
+    pixels.push_back(sight.pixel);
+  }
+  auto start = intersect_linear(projections, pixels);
+  if (!start) return tl::unexpected<Failure>(start.error());
+  if (auto placed = check_place(sights, *start); !placed) return tl::unexpected<Failure>(placed.error());
+
+  const Eigen::MatrixXd floor = least_sigma_px * least_sigma_px * Eigen::MatrixXd::Identity(2 * n, 2 * n);
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance_px2 + floor);
+  if (root.info() != Eigen::Success)
+    return fail(Reason::bad_value, "the covariance of the pixels is not positive");
+  Intersection result{*start, {}, largest_gap(sights), 0};
+  for (int i = 0; i < most_iterations; ++i) {
+    Eigen::MatrixX3d jacobian(2 * n, 3);
+    Eigen::VectorXd residual(2 * n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const Sight& sight = sights[std::size_t(k)];
+      jacobian.middleRows<2>(2 * k) = projection_jacobian(sight.view, result.point);
+      residual.segment<2>(2 * k) = sight.pixel - sight.view.project(result.point);
+    }
+    root.matrixL().solveInPlace(jacobian);
+    root.matrixL().solveInPlace(residual);
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> qr(jacobian);
+    const Eigen::Vector3d step = qr.solve(residual);
+    result.chi2 = residual.squaredNorm();
+    result.covariance = (jacobian.transpose() * jacobian).inverse();
+    result.point += step;
+    if (auto placed = check_place(sights, result.point); !placed)
+      return tl::unexpected<Failure>(placed.error());
+    if (step.norm() <= 1e-12 * (1 + result.point.norm())) break;
+  }
+  return result;
+}
+
+}  // namespace helicarm
