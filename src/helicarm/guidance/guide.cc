@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 
+#include "helicarm/geometry/triangulation.h"
 #include "helicarm/guidance/traced_point.h"
 
 namespace helicarm {
@@ -26,11 +27,7 @@ constexpr int present = -1;
 Eigen::Matrix3d information_of_ray(const Sighting& sighting, Bone bone,
                                    const Eigen::Vector3d& point_in_bone) {
   const View view = seen_from_bone(sighting.view, *calibrator_from(bone, sighting.poses));
-  const Eigen::Matrix<double, 3, 4> projection = view.projection();
-  const Eigen::Vector3d h = projection * point_in_bone.homogeneous();
-  Eigen::Matrix<double, 2, 3> slope;
-  for (int row = 0; row < 2; ++row)
-    slope.row(row) = (projection.block<1, 3>(row, 0) - h[row] / h[2] * projection.block<1, 3>(2, 0)) / h[2];
+  const Eigen::Matrix<double, 2, 3> slope = projection_jacobian(view, point_in_bone);
   return slope.transpose() * slope / (sighting.sigma_px * sighting.sigma_px);
 }
 
