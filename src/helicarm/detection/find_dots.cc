@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/detection/find_dots.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace helicarm {
+namespace {
+
+/// Noise of a linear picture grows with its root, so the search runs on the root; a logarithmic one stays.
+Image<float> even_noise(const Exposure& exposure) {
+  Image<float> even = exposure.pixels;
+  if (!exposure.acquisition.logarithmic.value_or(false))
+    for (float& grey : even.pixels()) grey = std::sqrt(std::max(0.0f, grey - exposure.lowest));
+  return even;
+}
+
+/// Of dots that lie in one another only the best stays.
+std::vector<Dot> without_doubles(std::vector<Dot> dots) {
+  std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.misfit < b.misfit; });
+  std::vector<Dot> kept;
+  for (const Dot& dot : dots) {
+    const bool taken = std::any_of(kept.begin(), kept.end(), [&](const Dot& other) {
+      return (dot.centre_px - other.centre_px).norm() < 0.6 * std::max(dot.radius_px, other.radius_px);
+    });
+    if (!taken) kept.push_back(dot);
+  }
+  return kept;
+}
+
+std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
+  std::vector<Disc> discs;
+  for (const Dot& other : dots) {
+    const double distance = (other.centre_px - dot.centre_px).norm();
+    if (distance > 0.5 * dot.radius_px && distance < 2.5 * dot.radius_px + 12 + other.radius_px)
+      discs.push_back({other.centre_px, other.radius_px + 1.5});
+  }
+  return discs;
+}
+
+}  // namespace
+
+DotFitOptions fit_options_for(const Exposure& exposure) {
+  DotFitOptions options;
+  options.multiplicative = !exposure.acquisition.logarithmic.value_or(false);
+  options.floor = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);
+  options.ceiling = exposure.highest;
+  return options;
+}
+
+BallProfile estimate_profile(const Exposure& exposure, std::vector<Dot> dots, const DotFitOptions& options) {
+  constexpr std::size_t sample = 12;
+  std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
+  if (dots.size() > sample) dots.resize(sample);
+  const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
+  const auto total = [&](double blur_px, double absorbance) {
+    const BallProfile profile(blur_px / radius, absorbance);
+    double sum = 0;
+    for (const Dot& dot : dots) {
+      const auto fitted = fit_dot(exposure.pixels, dot, profile, {}, options);
+      sum += fitted ? fitted->sigma_px : 1.0;
+    }
+    return sum;
+  };
+  double blur = 1;
+  double absorbance = 2;
+  double best = total(blur, absorbance);
+  const auto climb = [&](double& value, double factor, double low, double high) {
+    for (const double f : {factor, 1 / factor}) {
+      bool better = false;
+      while (value * f >= low && value * f <= high) {
+        const double before = value;
+        value *= f;
+        if (const double now = total(blur, absorbance); now < best) {
+          best = now;
+          better = true;
+        } else {
+          value = before;
+          break;
+        }
+      }
+      if (better) return;
+    }
+  };
+  for (const double factor : {1.4, 1.18}) {
+    climb(blur, factor, 0.3, 0.6 * radius + 0.3);
+    climb(absorbance, factor * factor, 0.1, 60);
+    climb(blur, factor, 0.3, 0.6 * radius + 0.3);
+  }
+  return {blur / radius, absorbance};
+}
+
+std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) {
+  BlobOptions blob_options;
+  blob_options.polarity = options.polarity;
+  blob_options.min_radius_px = options.min_radius_px;
+  blob_options.max_radius_px = options.max_radius_px;
+  const std::vector<Dot> blobs = find_blobs(even_noise(exposure), blob_options);
+  DotFitOptions fit = fit_options_for(exposure);
+  fit.tolerance = 0.1;  // the profile is only a guess so far
+  const double least_contrast = options.min_contrast_share * double(exposure.highest - exposure.lowest);
+  std::vector<BallProfile> profiles;  // by the radius' octave: the blur is about a pixel whatever the size
+  for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5) profiles.emplace_back(1 / radius, 2.0);
+  std::vector<Dot> dots;
+  for (const Dot& blob : blobs) {
+    const auto octave = static_cast<std::size_t>(std::max(0.0, std::round(std::log(blob.radius_px / 1.5) / std::log(1.5))));
+    const auto dot = fit_dot(exposure.pixels, blob, profiles[std::min(octave, profiles.size() - 1)], {}, fit);
+    if (!dot || dot->sigma_px > options.max_sigma_px || dot->misfit > options.max_misfit) continue;
+    if (dot->radius_px < 0.8 * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px) continue;
+    const double contrast = options.polarity == Polarity::dark ? dot->contrast : -dot->contrast;
+    if (contrast < least_contrast) continue;
+    if ((dot->centre_px - blob.centre_px).norm() > 0.8 * blob.radius_px + 1) continue;
+    dots.push_back(*dot);
+  }
+  return without_doubles(std::move(dots));
+}
+
+std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const BallProfile& profile,
+                            const std::vector<Dot>& neighbours, const DotFitOptions& options) {
+  std::vector<Dot> refitted;
+  for (const Dot& dot : dots)
+    if (const auto better = fit_dot(exposure.pixels, dot, profile, discs_beside(dot, neighbours), options))
+      refitted.push_back(*better);
+  return refitted;
+}
+
+}  // namespace helicarm

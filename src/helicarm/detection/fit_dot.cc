@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/detection/fit_dot.h"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace helicarm {
+namespace {
+
+/// Parameters: background b0 bx by bxx bxy byy (patch coordinates in units of the window), contrast, centre, radius.
+constexpr int n_parameters = 10;
+constexpr int n_background = 6;
+using Parameters = Eigen::Matrix<float, n_parameters, 1>;
+using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
+using Vector = Eigen::Matrix<double, n_parameters, 1>;
+
+struct Pixel {
+  float x, y;  ///< from the patch's origin, px
+  float grey;
+  float weight;
+  bool clipped;  ///< the true value is at least `grey`
+};
+
+struct Patch {
+  std::vector<Pixel> pixels;
+  float inverse_window;
+  float scale;  ///< grey values are divided by it
+  bool multiplicative;
+};
+
+/// Value and derivatives at one pixel.
+inline float model(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel,
+                   float* jacobian) {
+  const float x = pixel.x * patch.inverse_window;
+  const float y = pixel.y * patch.inverse_window;
+  const std::array<float, n_background> basis{1, x, y, x * x, x * y, y * y};
+  float background = 0;
+  for (int k = 0; k < n_background; ++k) background += p[k] * basis[static_cast<std::size_t>(k)];
+  const float dx = pixel.x - p[7];
+  const float dy = pixel.y - p[8];
+  const float distance = std::sqrt(dx * dx + dy * dy);
+  const auto [value, slope] = profile.at(distance / p[9]);
+  const float gain = patch.multiplicative ? background : 1.0f;
+  const float shade = patch.multiplicative ? 1 - p[6] * value : 1.0f;
+  for (int k = 0; k < n_background; ++k) jacobian[k] = basis[static_cast<std::size_t>(k)] * shade;
+  jacobian[6] = -gain * value;
+  const float steep = -gain * p[6] * slope / p[9];
+  const float along = distance > 1e-4f ? steep / distance : 0;
+  jacobian[7] = -along * dx;
+  jacobian[8] = -along * dy;
+  jacobian[9] = -steep * distance / p[9];
+  return background - gain * p[6] * value;
+}
+
+struct Sums {
+  Normal normal = Normal::Zero();
+  Vector right = Vector::Zero();
+  double squares = 0;
+  double weight = 0;
+};
+
+Sums accumulate(const Patch& patch, const BallProfile& profile, const Parameters& p, std::vector<float>& residuals) {
+  Sums sums;
+  Eigen::Matrix<float, n_parameters, n_parameters> block = Eigen::Matrix<float, n_parameters, n_parameters>::Zero();
+  alignas(32) float row[n_parameters];
+  for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
+    const Pixel& pixel = patch.pixels[i];
+    const float residual = pixel.grey - model(patch, profile, p, pixel, row);
+    if (pixel.clipped && residual < 0) {
+      residuals[i] = 0;
+      continue;
+    }
+    residuals[i] = residual;
+    const float w = pixel.weight;
+    if (w == 0) continue;
+    for (int a = 0; a < n_parameters; ++a) {
+      const float wa = w * row[a];
+      for (int b = a; b < n_parameters; ++b) block(b, a) += wa * row[b];
+      sums.right[a] += double(wa * residual);
+    }
+    sums.squares += double(w * residual * residual);
+    sums.weight += double(w);
+  }
+  sums.normal = block.cast<double>();
+  for (int a = 0; a < n_parameters; ++a)
+    for (int b = 0; b < a; ++b) sums.normal(b, a) = sums.normal(a, b);
+  return sums;
+}
+
+/// Tukey's weights from the residuals' median absolute deviation, which is taken as `least` at least.
+void reweight(Patch& patch, const std::vector<float>& residuals, float least, std::vector<float>& scratch) {
+  scratch.resize(residuals.size());
+  std::transform(residuals.begin(), residuals.end(), scratch.begin(), [](float r) { return std::abs(r); });
+  auto middle = scratch.begin() + static_cast<std::ptrdiff_t>(scratch.size() / 2);
+  std::nth_element(scratch.begin(), middle, scratch.end());
+  const float sigma = std::max({1.4826f * *middle, least, 1e-6f});
+  const float cut = 4.7f * sigma;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const float t = residuals[i] / cut;
+    patch.pixels[i].weight = std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
+  }
+}
+
+std::optional<Patch> gather(const Image<float>& image, int u, int v, float window, std::span<const Disc> others,
+                            const DotFitOptions& options) {
+  Patch patch;
+  patch.inverse_window = 1 / window;
+  patch.multiplicative = options.multiplicative;
+  const int half = static_cast<int>(std::ceil(window));
+  std::vector<Disc> near;
+  for (const Disc& disc : others)
+    if (std::hypot(disc.centre.x() - u, disc.centre.y() - v) < double(window) + disc.radius) near.push_back(disc);
+  patch.pixels.reserve(static_cast<std::size_t>((2 * half + 1) * (2 * half + 1)));
+  int inside = 0;
+  int open = 0;
+  double sum = 0;
+  for (int y = -half; y <= half; ++y)
+    for (int x = -half; x <= half; ++x) {
+      if (float(x * x + y * y) > window * window) continue;
+      ++inside;
+      if (!image.contains(u + x, v + y)) continue;
+      const float grey = image(u + x, v + y);
+      if (grey <= options.floor) continue;
+      const bool hidden = std::any_of(near.begin(), near.end(), [&](const Disc& disc) {
+        const double dx = u + x - disc.centre.x();
+        const double dy = v + y - disc.centre.y();
+        return dx * dx + dy * dy < disc.radius * disc.radius;
+      });
+      if (hidden) continue;
+      const bool clipped = grey >= options.ceiling;
+      patch.pixels.push_back({float(x), float(y), grey, 1, clipped});
+      open += !clipped;
+      sum += double(grey);
+    }
+  if (open < 30 || double(patch.pixels.size()) < 0.4 * inside) return std::nullopt;
+  patch.scale = std::max(1e-3f, float(std::abs(sum)) / float(patch.pixels.size()));
+  for (Pixel& pixel : patch.pixels) pixel.grey /= patch.scale;
+  return patch;
+}
+
+/// Linear start for background and contrast at the given centre and radius.
+bool solve_linear(const Patch& patch, const BallProfile& profile, Parameters& p) {
+  constexpr int n = n_background + 1;
+  Eigen::Matrix<double, n, n> normal = Eigen::Matrix<double, n, n>::Zero();
+  Eigen::Matrix<double, n, 1> right = Eigen::Matrix<double, n, 1>::Zero();
+  for (const Pixel& pixel : patch.pixels) {
+    const double x = double(pixel.x * patch.inverse_window);
+    const double y = double(pixel.y * patch.inverse_window);
+    const float distance = std::hypot(pixel.x - p[7], pixel.y - p[8]);
+    Eigen::Matrix<double, n, 1> row;
+    row << 1, x, y, x * x, x * y, y * y, -double(profile.at(distance / p[9]).value);
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+    right += double(pixel.grey) * row;
+  }
+  const Eigen::Matrix<double, n, 1> solution = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+  if (!solution.allFinite()) return false;
+  p.head<n>() = solution.cast<float>();
+  if (patch.multiplicative) p[6] /= std::max(0.05f, p[0]);
+  return true;
+}
+
+}  // namespace
+
+std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
+                           std::span<const Disc> others, const DotFitOptions& options) {
+  const int u = static_cast<int>(std::lround(start.centre_px.x()));
+  const int v = static_cast<int>(std::lround(start.centre_px.y()));
+  if (!image.contains(u, v) || !(start.radius_px > 0.5)) return std::nullopt;
+  const float radius = float(start.radius_px);
+  const float window = radius * float(1 + options.margin_share) + float(options.margin_px);
+  auto patch = gather(image, u, v, window, others, options);
+  if (!patch) return std::nullopt;
+
+  Parameters p;
+  p[7] = float(start.centre_px.x() - u);
+  p[8] = float(start.centre_px.y() - v);
+  p[9] = radius;
+  if (!solve_linear(*patch, profile, p)) return std::nullopt;
+
+  std::vector<float> residuals(patch->pixels.size());
+  std::vector<float> scratch;
+  const int free = options.free_radius ? n_parameters : n_parameters - 1;
+  Sums sums = accumulate(*patch, profile, p, residuals);
+  double move = 0;
+  for (int i = 0; i < options.iterations; ++i) {
+    const Vector step = [&] {
+      Vector full = Vector::Zero();
+      full.head(free) = sums.normal.topLeftCorner(free, free).ldlt().solve(sums.right.head(free));
+      return full;
+    }();
+    if (!step.allFinite()) return std::nullopt;
+    move = std::hypot(step[7], step[8]);
+    const double limit = 0.35 * double(radius);
+    const float share = float(std::min(1.0, limit / std::max({move, std::abs(step[9]), 1e-12})));
+    p += share * step.cast<float>();
+    if (!(p[9] > 0.5f * radius && p[9] < 1.8f * radius) || std::hypot(p[7], p[8]) > window) return std::nullopt;
+    accumulate(*patch, profile, p, residuals);
+    const float contrast = std::abs(p[6] * (patch->multiplicative ? p[0] : 1.0f));
+    reweight(*patch, residuals, float(options.tolerance) * contrast, scratch);
+    sums = accumulate(*patch, profile, p, residuals);
+    if (i >= 2 && move < 2e-3) break;
+  }
+  if (move > 0.05) return std::nullopt;
+
+  const double variance = sums.squares / std::max(1.0, sums.weight - free);
+  const Normal inverse = [&] {
+    Normal full = Normal::Zero();
+    full.topLeftCorner(free, free) =
+        sums.normal.topLeftCorner(free, free).ldlt().solve(Eigen::MatrixXd::Identity(free, free));
+    return full;
+  }();
+  const double contrast = double(p[6]) * (patch->multiplicative ? double(p[0]) : 1.0);
+  Dot dot;
+  dot.centre_px = {u + double(p[7]), v + double(p[8])};
+  dot.radius_px = double(p[9]);
+  dot.sigma_px = std::sqrt(std::max(0.0, variance * 0.5 * (inverse(7, 7) + inverse(8, 8))));
+  dot.contrast = contrast * double(patch->scale);
+  double raw_squares = 0;
+  for (float r : residuals) raw_squares += double(r * r);
+  dot.misfit = std::sqrt(raw_squares / double(residuals.size())) / std::max(1e-9, std::abs(contrast));
+  return dot.centre_px.allFinite() && std::isfinite(dot.sigma_px) ? std::optional(dot) : std::nullopt;
+}
+
+}  // namespace helicarm

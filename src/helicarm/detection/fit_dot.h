@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "helicarm/detection/ball_profile.h"
+#include "helicarm/detection/dot.h"
+#include "helicarm/image/image.h"
+
+namespace helicarm {
+
+/// A disc of pixels that a fit leaves out, raw pixels.
+struct Disc {
+  Eigen::Vector2d centre;
+  double radius;
+};
+
+struct DotFitOptions {
+  bool multiplicative = true;   ///< linear grey values: the ball scales its background; logarithmic: it is subtracted
+  bool free_radius = true;      ///< off: the radius of the start is kept
+  double margin_px = 3.5;       ///< ring of background around the dot
+  double margin_share = 0.35;   ///< and as a share of the radius
+  double tolerance = 0.03;      ///< misfit, as a share of the contrast, that the profile itself may cause
+  int iterations = 12;
+  float floor = -1e30f;         ///< pixels at or below are outside the field: left out
+  float ceiling = 1e30f;        ///< pixels at or above are saturated: the model may exceed them freely
+};
+
+/// Fits the image of a ball, on a quadratic background, to the pixels around `start` by robust least squares over
+/// centre, radius, contrast and background. Nothing where the patch is not usable (outside the image, clipped,
+/// no contrast) or the fit does not settle.
+std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
+                           std::span<const Disc> others, const DotFitOptions& options);
+
+}  // namespace helicarm

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/rectification/distortion_map.h"
+
+namespace helicarm {
+
+/// Where a plate dot is on the plate and in the raw picture.
+struct Correspondence {
+  Eigen::Vector2d place_mm;
+  Eigen::Vector2d raw_px;
+  double sigma_px = 0.05;
+};
+
+struct MapOptions {
+  std::optional<int> order;     ///< fixed order, 1..7; otherwise chosen by held-out error
+  int max_order = 7;
+  bool remainder = true;        ///< allow the smooth remainder on top of the polynomial
+  bool reject_outliers = true;
+};
+
+struct MapFit {
+  DistortionMap map;
+  std::vector<bool> used;             ///< per correspondence
+  std::vector<double> residual_px;    ///< per correspondence, distance in raw pixels
+  double px_per_mm = 0;               ///< rectified pixels per plate millimetre
+};
+
+/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder are those of least held-out error, each dot
+/// being predicted by the others (closed form of leave-one-out). plate_not_found below 6 correspondences or when they
+/// do not carry an affine map.
+Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height, const MapOptions& options);
+
+}  // namespace helicarm

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/plate_match.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+namespace helicarm {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+using Eigen::Vector2i;
+using Cell = std::pair<int, int>;
+
+/// Columns are the lattice's axes, in pitches.
+Matrix2d basis(Lattice kind) {
+  Matrix2d axes;
+  axes << lattice_point({1, 0}, kind), lattice_point({0, 1}, kind);
+  return axes;
+}
+
+Vector2i rounded(const Vector2d& p) {
+  return {static_cast<int>(std::lround(p.x())), static_cast<int>(std::lround(p.y()))};
+}
+
+struct PlateLattice {
+  std::vector<Vector2i> indices;
+  double pitch;
+};
+
+/// The plate's own lattice: its dots as indices from the first of them. The dots may be given turned.
+PlateLattice lattice_of(const Plate& plate) {
+  double pitch = plate.pitch_mm.value_or(0);
+  const Vector2d origin = plate.dots_mm.front();
+  Vector2d axis(1e9, 0);
+  for (const Vector2d& p : plate.dots_mm)
+    for (const Vector2d& q : plate.dots_mm)
+      if (const Vector2d d = q - p; &p != &q && d.norm() < axis.norm() - 1e-6) axis = d;
+  if (pitch == 0) pitch = axis.norm();
+  const double sector = plate.lattice == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
+  const double angle = std::atan2(axis.y(), axis.x());
+  const double turn = angle - sector * std::round(angle / sector);
+  const Matrix2d to_index = (Eigen::Rotation2Dd(turn).toRotationMatrix() * basis(plate.lattice) * pitch).inverse();
+  PlateLattice lattice{{}, pitch};
+  for (const Vector2d& p : plate.dots_mm) lattice.indices.push_back(rounded(to_index * (p - origin)));
+  return lattice;
+}
+
+/// All ways a lattice can be laid on itself about a node: first without mirror, smallest turn first.
+std::vector<Eigen::Matrix2i> symmetries(Lattice kind) {
+  const int n = kind == Lattice::square ? 4 : 6;
+  const Matrix2d axes = basis(kind);
+  std::vector<Eigen::Matrix2i> ways;
+  for (const bool mirror : {false, true})
+    for (const int k : {0, 1, -1, 2, -2, 3}) {
+      if (n == 4 && (k == -2 || k == 3)) continue;
+      Matrix2d turn = Eigen::Rotation2Dd(2 * std::numbers::pi * k / n).toRotationMatrix();
+      if (mirror) turn.col(0) *= -1;
+      const Matrix2d in_index = axes.inverse() * turn * axes;
+      ways.push_back(in_index.array().round().cast<int>());
+    }
+  return ways;
+}
+
+}  // namespace
+
+Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const std::vector<Dot>& dots,
+                                            const Plate& plate, const Vector2d& image_centre) {
+  std::vector<PlateDot> matched;
+  if (plate.dots_mm.empty()) {
+    for (const IndexedDot& d : lattice.dots)
+      matched.push_back({d.dot, plate.pitch_mm.value_or(1) * lattice_point(d.index, plate.lattice)});
+    return matched;
+  }
+  const PlateLattice own = lattice_of(plate);
+  std::set<Cell> occupied;
+  for (const Vector2i& i : own.indices) occupied.insert({i.x(), i.y()});
+  Vector2d own_middle = Vector2d::Zero();
+  for (const Vector2i& i : own.indices) own_middle += i.cast<double>() / double(own.indices.size());
+  Vector2d seen_middle = Vector2d::Zero();
+  for (const IndexedDot& d : lattice.dots) seen_middle += d.index.cast<double>() / double(lattice.dots.size());
+  // Where the middle of the plate falls in the picture: an affine map from index to pixel.
+  Eigen::Matrix<double, Eigen::Dynamic, 3> design(lattice.dots.size(), 3);
+  Eigen::MatrixX2d pixels(lattice.dots.size(), 2);
+  for (Eigen::Index r = 0; r < design.rows(); ++r) {
+    const auto& d = lattice.dots[static_cast<std::size_t>(r)];
+    design.row(r) << 1, d.index.x(), d.index.y();
+    pixels.row(r) = dots[d.dot].centre_px.transpose();
+  }
+  const Eigen::Matrix<double, 3, 2> affine = design.colPivHouseholderQr().solve(pixels);
+
+  int best_score = std::numeric_limits<int>::min();
+  double best_distance = 0;
+  Eigen::Matrix2i best_way = Eigen::Matrix2i::Identity();
+  Vector2i best_shift = Vector2i::Zero();
+  int best_hits = 0;
+  for (const Eigen::Matrix2i& way : symmetries(plate.lattice)) {
+    std::set<Cell> shifts;
+    // Every shift that lays one dot on another; on a large plate only those that bring the middles together.
+    const Vector2d about = own_middle - way.cast<double>() * seen_middle;
+    for (std::size_t k = 0; k < 3 * own.indices.size(); ++k) {
+      // Three anchors, for one of them may be a stray.
+      const Vector2i anchor = way * lattice.dots[(1 + k % 3) * lattice.dots.size() / 4].index;
+      const Vector2i shift = own.indices[k / 3] - anchor;
+      if (own.indices.size() < 200 || (shift.cast<double>() - about).norm() < 4) shifts.insert({shift.x(), shift.y()});
+    }
+    for (const Cell& cell : shifts) {
+      const Vector2i shift(cell.first, cell.second);
+      int hits = 0;
+      for (const IndexedDot& d : lattice.dots) {
+        const Vector2i at = way * d.index + shift;
+        hits += occupied.contains({at.x(), at.y()});
+      }
+      // A dot seen where the plate has none counts against, a dot of the plate not seen does not.
+      const int score = 2 * hits - static_cast<int>(lattice.dots.size());
+      const Vector2d middle = way.cast<double>().inverse() * (own_middle - shift.cast<double>());
+      const Vector2d pixel = affine.transpose() * Eigen::Vector3d(1, middle.x(), middle.y());
+      const double distance = (pixel - image_centre).norm();
+      const bool same_way = score == best_score && way == best_way;
+      if (score > best_score || (same_way && distance < best_distance)) {
+        best_score = score;
+        best_distance = distance;
+        best_way = way;
+        best_shift = shift;
+        best_hits = hits;
+      }
+    }
+  }
+  const auto strays = static_cast<int>(lattice.dots.size()) - best_hits;
+  if (10 * strays > 3 * static_cast<int>(lattice.dots.size()))
+    return fail(Reason::plate_mismatch,
+                fmt::format("{} of {} dots on the lattice stand where the plate \"{}\" has none", strays,
+                            lattice.dots.size(), plate.name),
+                {{"strays", strays}, {"indexed", double(lattice.dots.size())}});
+  const auto place_of = [&](const Vector2i& index) -> int {
+    for (std::size_t k = 0; k < own.indices.size(); ++k)
+      if (own.indices[k] == index) return static_cast<int>(k);
+    return -1;
+  };
+  for (const IndexedDot& d : lattice.dots)
+    if (const int k = place_of(best_way * d.index + best_shift); k >= 0)
+      matched.push_back({d.dot, plate.dots_mm[static_cast<std::size_t>(k)]});
+  return matched;
+}
+
+}  // namespace helicarm
