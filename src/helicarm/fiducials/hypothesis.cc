@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/fiducials/hypothesis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace helicarm {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double radius_bias = 0.1;    // relative, of the detector's radii as a whole
+constexpr double radius_sigmas = 4;
+constexpr double match_sigmas = 3.5;   // loses one ball in 460
+constexpr double depth_span = 1.4;     // ln of the ratio of the farthest to the nearest distance thinkable
+
+std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
+  std::vector<Sighting> sightings;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    if (candidate_of_ball[k] < 0) continue;
+    const auto& seen = scene.candidates[candidate_of_ball[k]];
+    sightings.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
+  }
+  return sightings;
+}
+
+/// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the field, ln
+/// depth even over its span, any number of balls visible and then any of them, mirrored or not.
+double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, const PoseFit& fit) {
+  const double n = static_cast<double>(scene.candidates.size());
+  const double b = static_cast<double>(scene.balls.size());
+  const double m = static_cast<double>(sightings.size());
+  const double log_2pi = std::log(2 * std::numbers::pi);
+  double odds = -0.5 * fit.chi2;
+  for (const auto& s : sightings) odds += std::log(scene.field_area_px2 / (s.sigma_px * s.sigma_px)) - log_2pi;
+  odds += std::lgamma(n - m + 1) - std::lgamma(n + 1);                                // which candidates, in order
+  odds += std::lgamma(m + 1) + std::lgamma(b - m + 1) - std::lgamma(b + 1) - std::log(b + 1);  // which balls
+  const double z = fit.view.camera_from_world.translation.z();
+  const double per_mm = scene.camera.focal_px / z;
+  odds += std::log(per_mm * per_mm / scene.field_area_px2 / (z * depth_span));
+  odds -= std::log(8 * std::numbers::pi * std::numbers::pi) + std::numbers::ln2;
+  odds -= std::log(scene.camera.focal_sigma) + 2 * std::log(scene.camera.principal_sigma_px);
+  return odds + fit.log_volume + 3 * log_2pi;
+}
+
+}  // namespace
+
+Scale scale_by_radius(const BallCandidate& candidate, const ModelBall& ball) {
+  const double spread = radius_sigmas * candidate.radius_sigma_px;
+  const double smallest = candidate.radius_px * (1 - radius_bias) - spread;
+  return {ball.radius_mm / (candidate.radius_px * (1 + radius_bias) + spread),
+          smallest > 0 ? ball.radius_mm / smallest : infinity};
+}
+
+std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas) {
+  struct Pair {
+    double cost;
+    int ball;
+    int candidate;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    const double depth = view.depth(scene.balls[k].centre);
+    if (depth <= 0) continue;
+    const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
+    for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
+      const auto& candidate = scene.candidates[i];
+      const double distance2 = (candidate.uv - uv).squaredNorm();
+      if (distance2 > gate_px * gate_px) continue;
+      const double cost = distance2 / (candidate.sigma_px * candidate.sigma_px);
+      if (cost > gate_sigmas * gate_sigmas) continue;
+      if (!scale_by_radius(candidate, scene.balls[k]).holds(depth / view.intrinsics.fy)) continue;
+      pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.cost < q.cost; });
+  std::vector<int> candidate_of_ball(scene.balls.size(), -1);
+  std::vector<bool> taken(scene.candidates.size(), false);
+  for (const auto& pair : pairs) {
+    if (candidate_of_ball[pair.ball] >= 0 || taken[pair.candidate]) continue;
+    candidate_of_ball[pair.ball] = pair.candidate;
+    taken[pair.candidate] = true;
+  }
+  return candidate_of_ball;
+}
+
+Hypothesis settle(const Scene& given, const View& rough, double rough_gate_px, double least_sigma_px) {
+  Scene floored;
+  if (least_sigma_px > 0) {
+    floored = given;
+    for (auto& candidate : floored.candidates) candidate.sigma_px = std::max(candidate.sigma_px, least_sigma_px);
+  }
+  const Scene& scene = least_sigma_px > 0 ? floored : given;
+  Hypothesis h;
+  h.fit.view = rough;
+  h.log_odds = -infinity;
+  std::vector<Sighting> sightings;
+  constexpr int most_turns = 8;
+  for (int turn = 0; turn < most_turns; ++turn) {
+    const bool last_gate = turn >= 2;
+    auto matches = match(scene, h.fit.view, last_gate ? infinity : rough_gate_px / (1 + 2 * turn),
+                         last_gate ? match_sigmas : infinity);
+    if (last_gate && matches == h.candidate_of_ball && turn > 2) break;
+    h.candidate_of_ball = std::move(matches);
+    sightings = sightings_of(scene, h.candidate_of_ball);
+    h.matched = static_cast<int>(sightings.size());
+    if (h.matched < 4) return h;
+    h.fit = fit_pose(h.fit.view, sightings, scene.camera, last_gate ? 10 : 4);
+  }
+  for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
+  h.log_odds = log_odds(scene, sightings, h.fit);
+  return h;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/fiducials/pose_fit.h"
+
+namespace helicarm {
+
+/// A dark disc that may be a calibrator ball.
+struct BallCandidate {
+  Eigen::Vector2d uv;      ///< rectified pixels
+  double sigma_px;         ///< per axis
+  double radius_px;
+  double radius_sigma_px;  ///< random part; a common bias of up to a tenth is allowed for
+};
+
+struct ModelBall {
+  Eigen::Vector3d centre;  ///< mm, from the calibrator's centroid
+  double radius_mm;
+};
+
+/// One X-ray as the labelling sees it.
+struct Scene {
+  std::vector<ModelBall> balls;
+  std::vector<BallCandidate> candidates;  ///< sigma_px floored
+  CameraPrior camera;
+  double field_area_px2;  ///< where false blobs may lie
+
+};
+
+/// Millimetres that a pixel may span at the candidate, if it is this ball, judged by its radius.
+struct Scale {
+  double finest;
+  double coarsest;
+
+  bool holds(double mm_per_px) const { return finest <= mm_per_px && mm_per_px <= coarsest; }
+};
+Scale scale_by_radius(const BallCandidate& candidate, const ModelBall& ball);
+
+/// A pose and the candidate each ball has under it (-1: none).
+struct Hypothesis {
+  std::vector<int> candidate_of_ball;
+  int matched = 0;
+  PoseFit fit;
+  double residual2_px2 = 0;  ///< sum of squared distances
+  /// Logarithm of the odds that these matches are the calibrator and not chance. With all candidates strewn evenly
+  /// over the field, the odds summed over every hypothesis have expectation 1, so by Markov's inequality
+  /// a sum above e^x comes by accident with a probability below e^-x.
+  double log_odds = 0;
+
+  bool mirrored() const { return fit.view.intrinsics.fx < 0; }
+};
+
+/// Pairs balls and candidates one to one, nearest first, when within `gate_px` and `gate_sigmas` of each other and at
+/// a distance from the source that fits the candidate's radius.
+std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas);
+
+/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With
+/// `least_sigma_px` the candidates are taken to be at least that uncertain. A hypothesis of fewer than four matches is
+/// worth nothing and comes back with log_odds = -infinity.
+Hypothesis settle(const Scene& scene, const View& rough, double rough_gate_px, double least_sigma_px = 0);
+
+}  // namespace helicarm
