@@ -24,11 +24,10 @@ class Readings {
 constexpr int present = -1;
 
 /// What one ray says of a point's place: the inverse covariance across the ray, in the bone's frame.
-Eigen::Matrix3d information_of_ray(const Sighting& sighting, Bone bone,
-                                   const Eigen::Vector3d& point_in_bone) {
-  const View view = seen_from_bone(sighting.view, *calibrator_from(bone, sighting.poses));
+Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eigen::Vector3d& point_in_bone) {
+  const View view = seen_from_bone(dated.view, *calibrator_from(bone, dated.poses));
   const Eigen::Matrix<double, 2, 3> slope = projection_jacobian(view, point_in_bone);
-  return slope.transpose() * slope / (sighting.sigma_px * sighting.sigma_px);
+  return slope.transpose() * slope / (dated.sigma_px * dated.sigma_px);
 }
 
 /// The rays met in the bone's frame, each brought there by its own moment's readings: their errors enter with
@@ -36,14 +35,14 @@ Eigen::Matrix3d information_of_ray(const Sighting& sighting, Bone bone,
 TracedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
   std::vector<Eigen::Matrix3d> information;
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const Sighting& sighting : point.sightings) {
-    information.push_back(information_of_ray(sighting, bone, point.point_in_anchor));
+  for (const DatedView& view : point.views) {
+    information.push_back(information_of_ray(view, bone, point.point_in_anchor));
     sum += information.back();
   }
   TracedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}};
   const Eigen::Matrix3d scale = sum.inverse();
-  for (std::size_t i = 0; i < point.sightings.size(); ++i) {
-    const Poses& poses = point.sightings[i].poses;
+  for (std::size_t i = 0; i < point.views.size(); ++i) {
+    const Poses& poses = point.views[i].poses;
     const int moment = static_cast<int>(i);
     TracedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}};
     ray = enter_tracker(std::move(ray), *poses.tracker_from_calibrator,
@@ -65,7 +64,7 @@ View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone
 
 GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
   const Readings readings(noise.samples);
-  const Poses then = point.sightings.empty() ? Poses{} : point.sightings.front().poses;
+  const Poses then = point.views.empty() ? Poses{} : point.views.front().poses;
   GuidedPoint guided;
   const auto put = [&](const TracedPoint& at, auto& place, auto& covariance) {
     place = at.point;

@@ -99,13 +99,13 @@ RigidTransform noisy(const RigidTransform& pose, const TrackerNoise& noise, Rand
 }
 
 /// The point nearest to two rays, in a bone's frame.
-Eigen::Vector3d meet(const std::vector<Sighting>& sightings,
+Eigen::Vector3d meet(const std::vector<DatedView>& views,
                      const std::vector<Eigen::Vector3d>& true_in_calibrator) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < sightings.size(); ++i) {
-    const RigidTransform femur_from_calibrator = calibrator_from(Bone::femur, sightings[i].poses)->inverse();
-    const Eigen::Vector3d source = femur_from_calibrator * sightings[i].view.source_in_world();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const RigidTransform femur_from_calibrator = calibrator_from(Bone::femur, views[i].poses)->inverse();
+    const Eigen::Vector3d source = femur_from_calibrator * views[i].view.source_in_world();
     const Eigen::Vector3d through = femur_from_calibrator * true_in_calibrator[i];
     const Eigen::Vector3d ray = (through - source).normalized();
     const Eigen::Matrix3d across =
@@ -131,10 +131,10 @@ TEST(Guide, CovarianceAgreesWithDrawnReadings) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream stream(7, 1, static_cast<std::uint64_t>(trial));
-    std::vector<Sighting> drawn = point.sightings;
-    for (Sighting& sighting : drawn) {
-      sighting.poses.tracker_from_calibrator = noisy(*sighting.poses.tracker_from_calibrator, noise, stream);
-      sighting.poses.tracker_from_femur = noisy(*sighting.poses.tracker_from_femur, noise, stream);
+    std::vector<DatedView> drawn = point.views;
+    for (DatedView& view : drawn) {
+      view.poses.tracker_from_calibrator = noisy(*view.poses.tracker_from_calibrator, noise, stream);
+      view.poses.tracker_from_femur = noisy(*view.poses.tracker_from_femur, noise, stream);
     }
     const Eigen::Vector3d in_tracker = noisy(tracker_from_femur, noise, stream) * meet(drawn, seen);
     const Eigen::Vector3d error =

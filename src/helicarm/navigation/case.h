@@ -20,7 +20,7 @@ namespace helicarm {
 struct CaseView {
   std::string name;
   std::filesystem::path image;
-  int frame = 0;                                     ///< 1-based; 0: the file has only one
+  std::optional<int> frame;                          ///< 1-based; needed only if the file has several
   std::optional<std::filesystem::path> plate_image;  ///< the plate was shot apart
   std::optional<std::filesystem::path> map;          ///< the distortion is known
   Poses poses;                                       ///< at the moment of the exposure
