@@ -13,26 +13,29 @@
 
 namespace helicarm {
 
-/// What the file says of how the picture was taken. Nothing is invented: absent stays absent. Flips and rotation are
-/// hints; the pixels stay as stored.
+/// What the file says of how the picture was taken. Nothing is invented: absent stays absent. Flips and
+/// rotation are hints; the pixels stay as stored.
 struct Acquisition {
-  std::optional<Eigen::Vector2d> pixel_mm;       ///< detector plane; x: column spacing, y: row spacing
+  std::optional<Eigen::Vector2d> pixel_mm;  ///< detector plane; x: column spacing, y: row spacing
   std::optional<double> source_detector_mm;
   std::optional<double> primary_angle_deg;
   std::optional<double> secondary_angle_deg;
-  bool flip_hint = false;                        ///< the file says that the stored picture is already mirrored
+  bool flip_hint = false;  ///< the file says that the stored picture is already mirrored
   double rotation_hint_deg = 0;
-  std::optional<bool> logarithmic;               ///< grey value is the logarithm of the dose, where the file says
+  std::optional<bool> logarithmic;  ///< grey value is the logarithm of the dose, where the file says
   std::string modality;
-  std::string patient_key;                       ///< digest of patient and study identity: compare, never print
-  std::string instance_key;                      ///< digest of the pixels
+  std::string patient_key;             ///< digest of patient ID and name: compare, never print; may be empty
+  std::string study_key;               ///< digest of the study's UID; empty where the file names none
+  std::string frame_of_reference_key;  ///< likewise
+  std::string instance_key;            ///< digest of the pixels
 };
 
-/// One X-ray as stored. Grey values are the displayed ones: MONOCHROME1 is inverted so that metal is usually dark.
+/// One X-ray as stored. Grey values are the displayed ones: MONOCHROME1 is inverted so that metal is usually
+/// dark.
 struct Exposure {
-  std::string name;                              ///< of the view, e.g. "AP"
+  std::string name;  ///< of the view, e.g. "AP"
   Image<float> pixels;
-  float lowest = 0;                              ///< least and greatest value that the file could have stored
+  float lowest = 0;  ///< least and greatest value that the file could have stored
   float highest = 4095;
   Acquisition acquisition;
   std::vector<Warning> warnings;

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/image/png.h"
+
+#include <algorithm>
+#include <csetjmp>
+#include <cstring>
+#include <vector>
+
+#include <fmt/format.h>
+#include <png.h>
+
+namespace helicarm {
+namespace {
+
+std::string encode(std::uint32_t format, int width, int height, const void* pixels, int stride) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(width);
+  image.height = static_cast<png_uint_32>(height);
+  image.format = format;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+  std::string bytes(size, '\0');
+  if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels, stride, nullptr))
+    throw std::runtime_error(fmt::format("libpng: {}", image.message));
+  bytes.resize(size);
+  return bytes;
+}
+
+/// What libpng's callbacks work on. Nothing here is destroyed while libpng may jump.
+struct Reading {
+  std::string_view rest;
+  bool truncated = false;
+  std::string message;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  png_uint_32 width = 0, height = 0;
+  int bits = 0, colour = 0;
+  std::vector<png_byte> row;
+
+  ~Reading() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+void take(png_structp png, png_bytep out, std::size_t size) {
+  auto& reading = *static_cast<Reading*>(png_get_io_ptr(png));
+  if (size > reading.rest.size()) {
+    reading.truncated = true;
+    png_error(png, "the file ends too early");
+  }
+  std::memcpy(out, reading.rest.data(), size);
+  reading.rest.remove_prefix(size);
+}
+
+[[noreturn]] void on_error(png_structp png, png_const_charp message) {
+  static_cast<Reading*>(png_get_error_ptr(png))->message = message;
+  png_longjmp(png, 1);
+}
+
+void on_warning(png_structp, png_const_charp) {}
+
+bool read_header(Reading& reading) {
+  if (setjmp(png_jmpbuf(reading.png))) return false;
+  png_set_user_limits(reading.png, max_picture_side, max_picture_side);
+  png_set_read_fn(reading.png, &reading, take);
+  png_read_info(reading.png, reading.info);
+  png_get_IHDR(reading.png, reading.info, &reading.width, &reading.height, &reading.bits, &reading.colour,
+               nullptr, nullptr, nullptr);
+  return true;
+}
+
+bool start_rows(Reading& reading) {
+  if (setjmp(png_jmpbuf(reading.png))) return false;
+  if (reading.bits == 16) png_set_swap(reading.png);
+  png_read_update_info(reading.png, reading.info);
+  return true;
+}
+
+bool read_row(Reading& reading) {
+  if (setjmp(png_jmpbuf(reading.png))) return false;
+  png_read_row(reading.png, reading.row.data(), nullptr);
+  return true;
+}
+
+bool read_end(Reading& reading) {
+  if (setjmp(png_jmpbuf(reading.png))) return false;
+  png_read_end(reading.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+std::string encode_png(const Image<std::uint8_t>& grey) {
+  return encode(PNG_FORMAT_GRAY, grey.width(), grey.height(), grey.pixels().data(), grey.width());
+}
+
+std::string encode_png(const Image<std::uint16_t>& grey) {
+  return encode(PNG_FORMAT_LINEAR_Y, grey.width(), grey.height(), grey.pixels().data(), grey.width());
+}
+
+std::string encode_png(const cv::Mat& rgb) {
+  CV_Assert(rgb.type() == CV_8UC3);
+  return encode(PNG_FORMAT_RGB, rgb.cols, rgb.rows, rgb.data, static_cast<int>(rgb.step));
+}
+
+bool is_png(std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
+
+Expected<GreyPicture> decode_png(std::string_view bytes, const std::string& origin) {
+  return guarded([&] {
+    Reading reading{.rest = bytes, .message = {}, .row = {}};
+    const auto check = [&](bool good) {
+      if (!good)
+        throw BadInput(reading.truncated ? Reason::truncated : Reason::bad_value,
+                       fmt::format("{}: PNG: {}", origin, reading.message));
+    };
+    reading.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reading, on_error, on_warning);
+    if (reading.png) reading.info = png_create_info_struct(reading.png);
+    if (!reading.info) throw std::bad_alloc();
+    check(read_header(reading));
+
+    const bool rgb = reading.colour == PNG_COLOR_TYPE_RGB;
+    if (!rgb && reading.colour != PNG_COLOR_TYPE_GRAY)
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: a PNG with a palette or alpha; must be grey", origin));
+    if (reading.bits < 8)
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: {} bits a pixel; must be 8 or 16", origin, reading.bits));
+    if (png_get_interlace_type(reading.png, reading.info) != PNG_INTERLACE_NONE)
+      throw BadInput(Reason::unsupported, fmt::format("{}: an interlaced PNG", origin));
+    const std::size_t channels = rgb ? 3 : 1, word = reading.bits == 16 ? 2 : 1;
+    if (std::size_t{reading.width} * reading.height * word > max_picture_bytes)
+      throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels are more than {} bytes", origin,
+                                                   reading.width, reading.height, max_picture_bytes));
+    check(start_rows(reading));
+
+    GreyPicture picture{{static_cast<int>(reading.width), static_cast<int>(reading.height)}, reading.bits};
+    reading.row.resize(reading.width * channels * word);
+    for (int v = 0; v < picture.pixels.height(); ++v) {
+      check(read_row(reading));
+      for (int u = 0; u < picture.pixels.width(); ++u) {
+        const png_byte* at = reading.row.data() + static_cast<std::size_t>(u) * channels * word;
+        if (rgb && (std::memcmp(at, at + word, word) != 0 || std::memcmp(at, at + 2 * word, word) != 0))
+          throw BadInput(Reason::unsupported, fmt::format("{}: a colour picture; must be grey", origin));
+        std::uint16_t value = *at;
+        if (word == 2) std::memcpy(&value, at, 2);
+        picture.pixels(u, v) = value;
+      }
+    }
+    check(read_end(reading));
+    return picture;
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/dicom_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/xray/dicom_tags.h"
+
+namespace helicarm {
+namespace {
+
+constexpr int max_side = 16384;
+constexpr std::size_t max_frame_bytes = std::size_t{64} << 20;
+
+/// XA, RF, CR, DX (for presentation and processing), secondary capture (single, multi-frame byte and word).
+constexpr std::array<std::string_view, 8> xray_classes = {
+    "1.2.840.10008.5.1.4.1.1.12.1", "1.2.840.10008.5.1.4.1.1.12.2",  "1.2.840.10008.5.1.4.1.1.1",
+    "1.2.840.10008.5.1.4.1.1.1.1",  "1.2.840.10008.5.1.4.1.1.1.1.1", "1.2.840.10008.5.1.4.1.1.7",
+    "1.2.840.10008.5.1.4.1.1.7.2",  "1.2.840.10008.5.1.4.1.1.7.3"};
+
+/// A secondary capture may be of anything; these modalities may be an X-ray.
+constexpr std::array<std::string_view, 9> xray_modalities = {"XA", "RF", "CR", "DX", "DR",
+                                                             "RG", "OT", "SC", ""};
+
+void check_kind(const DicomElements& elements) {
+  const std::string_view sop_class = elements.text(tags::sop_class);
+  if (sop_class.empty() && !elements.find(tags::pixel_data))
+    elements.refuse(Reason::not_an_image, tags::pixel_data, "is missing: the file holds no picture");
+  if (std::ranges::find(xray_classes, sop_class) == xray_classes.end())
+    elements.refuse(
+        Reason::unsupported, tags::sop_class,
+        fmt::format("is {}: not an XA, RF, CR, DX or secondary capture picture", quote(sop_class)));
+  const std::string_view modality = elements.text(tags::modality);
+  if (std::ranges::find(xray_modalities, modality) == xray_modalities.end())
+    elements.refuse(Reason::unsupported, tags::modality, fmt::format("is {}: not an X-ray", quote(modality)));
+  if (elements.text(tags::sop_instance).empty())
+    elements.refuse(Reason::bad_value, tags::sop_instance, "is missing");
+  if (!elements.find(tags::pixel_data)) elements.refuse(Reason::bad_value, tags::pixel_data, "is missing");
+}
+
+int whole(const DicomElements& elements, DicomTag tag, int low, int high, Reason reason = Reason::bad_value) {
+  const auto value = elements.word(tag, "US");
+  if (!value) elements.refuse(Reason::bad_value, tag, "is missing");
+  if (*value < low || *value > high)
+    elements.refuse(reason, tag, fmt::format("is {}, must be {} to {}", *value, low, high));
+  return *value;
+}
+
+void check_photometric(DicomOutline& outline) {
+  const DicomElements& elements = outline.elements;
+  const std::string_view photometric = elements.text(tags::photometric);
+  outline.monochrome1 = photometric == "MONOCHROME1";
+  if (!outline.monochrome1 && photometric != "MONOCHROME2")
+    elements.refuse(Reason::unsupported, tags::photometric,
+                    fmt::format("is {}, must be MONOCHROME1 or MONOCHROME2", quote(photometric)));
+  if (const auto samples = elements.word(tags::samples_per_pixel, "US"); samples != 1)
+    elements.refuse(Reason::unsupported, tags::samples_per_pixel, "is not 1");
+}
+
+void check_bits(DicomOutline& outline) {
+  const DicomElements& elements = outline.elements;
+  outline.bits_allocated = whole(elements, tags::bits_allocated, 8, 16);
+  if (outline.bits_allocated % 8 != 0)
+    elements.refuse(Reason::bad_value, tags::bits_allocated,
+                    fmt::format("is {}, must be 8 or 16", outline.bits_allocated));
+  outline.bits_stored = whole(elements, tags::bits_stored, 8, outline.bits_allocated);
+  whole(elements, tags::high_bit, outline.bits_stored - 1, outline.bits_stored - 1);
+  outline.is_signed = whole(elements, tags::pixel_representation, 0, 1) == 1;
+}
+
+void check_size(DicomOutline& outline) {
+  const DicomElements& elements = outline.elements;
+  outline.rows = whole(elements, tags::rows, 1, max_side, Reason::bad_size);
+  outline.columns = whole(elements, tags::columns, 1, max_side, Reason::bad_size);
+  const double frames = elements.numbers(tags::frames, 1, 1, 100000).value_or(std::vector{1.0})[0];
+  if (frames != std::floor(frames)) elements.refuse(Reason::bad_value, tags::frames, "is not a whole number");
+  outline.frames = static_cast<int>(frames);
+
+  const auto frame_bytes = static_cast<std::size_t>(outline.rows) *
+                           static_cast<std::size_t>(outline.columns) *
+                           static_cast<std::size_t>(outline.bits_allocated / 8);
+  if (frame_bytes > max_frame_bytes)
+    throw BadInput(Reason::bad_size, fmt::format("{}: {} bytes a frame, limit {}", elements.origin,
+                                                 frame_bytes, max_frame_bytes));
+  if (outline.encapsulated()) return;
+  outline.pixel_data = elements.find(tags::pixel_data)->value;
+  const std::size_t needed = frame_bytes * static_cast<std::size_t>(outline.frames);
+  if (outline.pixel_data.size() < needed)
+    elements.refuse(
+        Reason::truncated, tags::pixel_data,
+        fmt::format("has {} bytes, {} x {} pixels in {} frame(s) need {}", outline.pixel_data.size(),
+                    outline.columns, outline.rows, outline.frames, needed));
+}
+
+}  // namespace
+
+Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin) {
+  return guarded([&] {
+    DicomOutline outline;
+    outline.elements = value_or_throw(walk_dicom(bytes, origin));
+    check_kind(outline.elements);
+    check_photometric(outline);
+    check_bits(outline);
+    check_size(outline);
+    return outline;
+  });
+}
+
+}  // namespace helicarm

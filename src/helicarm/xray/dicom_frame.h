@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/image/image.h"
+#include "helicarm/xray/dicom_check.h"
+
+namespace helicarm {
+
+/// Stored values of one frame (0-based, less than `outline.frames`); bits above Bits Stored are dropped. The
+/// matrix is as stored, neither flipped nor turned. Refuses: truncated, bad_value (damaged compressed data).
+Expected<Image<float>> decode_frame(const DicomOutline& outline, int frame);
+
+}  // namespace helicarm

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/xray/dicom_elements.h"
+
+namespace helicarm::tags {
+
+inline constexpr DicomTag meta_length{0x00020000, "File Meta Information Group Length"};
+inline constexpr DicomTag transfer_syntax{0x00020010, "Transfer Syntax UID"};
+inline constexpr DicomTag sop_class{0x00080016, "SOP Class UID"};
+inline constexpr DicomTag sop_instance{0x00080018, "SOP Instance UID"};
+inline constexpr DicomTag modality{0x00080060, "Modality"};
+inline constexpr DicomTag patient_name{0x00100010, "Patient's Name"};
+inline constexpr DicomTag patient_id{0x00100020, "Patient ID"};
+inline constexpr DicomTag source_detector{0x00181110, "Distance Source to Detector"};
+inline constexpr DicomTag imager_pixel_spacing{0x00181164, "Imager Pixel Spacing"};
+inline constexpr DicomTag primary_angle{0x00181510, "Positioner Primary Angle"};
+inline constexpr DicomTag secondary_angle{0x00181511, "Positioner Secondary Angle"};
+inline constexpr DicomTag field_rotation{0x00187032, "Field of View Rotation"};
+inline constexpr DicomTag field_flip{0x00187034, "Field of View Horizontal Flip"};
+inline constexpr DicomTag study{0x0020000D, "Study Instance UID"};
+inline constexpr DicomTag series{0x0020000E, "Series Instance UID"};
+inline constexpr DicomTag frame_of_reference{0x00200052, "Frame of Reference UID"};
+inline constexpr DicomTag samples_per_pixel{0x00280002, "Samples per Pixel"};
+inline constexpr DicomTag photometric{0x00280004, "Photometric Interpretation"};
+inline constexpr DicomTag frames{0x00280008, "Number of Frames"};
+inline constexpr DicomTag rows{0x00280010, "Rows"};
+inline constexpr DicomTag columns{0x00280011, "Columns"};
+inline constexpr DicomTag pixel_spacing{0x00280030, "Pixel Spacing"};
+inline constexpr DicomTag bits_allocated{0x00280100, "Bits Allocated"};
+inline constexpr DicomTag bits_stored{0x00280101, "Bits Stored"};
+inline constexpr DicomTag high_bit{0x00280102, "High Bit"};
+inline constexpr DicomTag pixel_representation{0x00280103, "Pixel Representation"};
+inline constexpr DicomTag intensity_relationship{0x00281040, "Pixel Intensity Relationship"};
+inline constexpr DicomTag intensity_sign{0x00281041, "Pixel Intensity Relationship Sign"};
+inline constexpr DicomTag lut_shape{0x20500020, "Presentation LUT Shape"};
+inline constexpr DicomTag pixel_data{0x7FE00010, "Pixel Data"};
+
+}  // namespace helicarm::tags

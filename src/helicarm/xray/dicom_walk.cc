@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/xray/dicom_elements.h"
+#include "helicarm/xray/dicom_tags.h"
+
+namespace helicarm {
+namespace {
+
+constexpr int max_depth = 64;
+constexpr std::size_t max_elements = 20000;
+constexpr std::size_t max_fragments = 200000;
+constexpr std::uint32_t undefined = 0xFFFFFFFF;
+constexpr std::uint32_t item_tag = 0xFFFEE000, item_end = 0xFFFEE00D, sequence_end = 0xFFFEE0DD;
+constexpr std::size_t meta_start = 132;
+
+constexpr std::string_view short_vrs = "AE AS AT CS DA DS DT FD FL IS LO LT PN SH SL SS ST TM UI UL US";
+constexpr std::string_view long_vrs = "OB OD OF OL OV OW SQ SV UC UN UR UT UV";
+
+bool listed(std::string_view vrs, std::string_view vr) {
+  for (std::size_t i = 0; i < vrs.size(); i += 3)
+    if (vrs.substr(i, 2) == vr) return true;
+  return false;
+}
+
+struct Header {
+  std::uint32_t tag;
+  std::array<char, 2> vr;
+  std::uint32_t length;
+  std::string_view vr_text() const { return {vr.data(), 2}; }
+};
+
+class Walker {
+ public:
+  Walker(std::string_view bytes, DicomElements& into) : bytes_(bytes), into_(into) {}
+
+  void file() {
+    const std::size_t meta_end = meta();
+    at_ = meta_end;
+    encapsulated_ = choose_syntax();
+    const bool explicit_vr = into_.transfer_syntax != "1.2.840.10008.1.2";
+    into_.elements.clear();
+    elements(bytes_.size(), false, explicit_vr, 0);
+    if (into_.find(tags::pixel_data) && encapsulated_ && into_.fragments.empty())
+      into_.refuse(Reason::bad_value, tags::pixel_data,
+                   "is not encapsulated, but the transfer syntax says so");
+    check_uids({tags::sop_class.number, tags::sop_instance.number, tags::study.number, tags::series.number,
+                tags::frame_of_reference.number});
+  }
+
+ private:
+  [[noreturn]] void refuse(Reason reason, std::string_view problem) const {
+    throw BadInput(reason, fmt::format("{}: byte {}: {}", into_.origin, at_, problem));
+  }
+
+  std::uint32_t number(std::size_t size, std::size_t end) {
+    need(size, end);
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < size; ++i)
+      value |= std::uint32_t{static_cast<unsigned char>(bytes_[at_ + i])} << (8 * i);
+    at_ += size;
+    return value;
+  }
+
+  void need(std::size_t size, std::size_t end) const {
+    if (size <= end - at_) return;
+    if (size > bytes_.size() - at_)
+      refuse(Reason::truncated,
+             fmt::format("{} bytes announced, {} left in the file", size, bytes_.size() - at_));
+    refuse(Reason::bad_value,
+           fmt::format("{} bytes announced, {} left in the group or item", size, end - at_));
+  }
+
+  Header header(bool explicit_vr, std::size_t end) {
+    Header header{number(2, end) << 16, {' ', ' '}, 0};
+    header.tag |= number(2, end);
+    if (!explicit_vr || header.tag >> 16 == 0xFFFE) {
+      header.length = number(4, end);
+    } else {
+      need(2, end);
+      header.vr = {bytes_[at_], bytes_[at_ + 1]};
+      at_ += 2;
+      if (listed(short_vrs, header.vr_text())) {
+        header.length = number(2, end);
+      } else if (listed(long_vrs, header.vr_text())) {
+        number(2, end);
+        header.length = number(4, end);
+      } else {
+        refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) has the unknown VR {}", header.tag >> 16,
+                                              header.tag & 0xFFFF, quote(header.vr_text())));
+      }
+    }
+    if (header.length != undefined && header.length % 2 != 0)
+      refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) has the odd length {}", header.tag >> 16,
+                                            header.tag & 0xFFFF, header.length));
+    return header;
+  }
+
+  std::string_view value(std::size_t length, std::size_t end) {
+    need(length, end);
+    at_ += length;
+    return bytes_.substr(at_ - length, length);
+  }
+
+  void keep(const Header& header, std::string_view value) {
+    if (!into_.elements.empty() && header.tag <= into_.elements.back().tag)
+      refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) is given twice or out of order",
+                                            header.tag >> 16, header.tag & 0xFFFF));
+    if (into_.elements.size() == max_elements)
+      refuse(Reason::bad_value, fmt::format("more than {} elements", max_elements));
+    into_.elements.push_back({header.tag, header.vr, value});
+  }
+
+  std::size_t meta() {
+    if (bytes_.size() <= meta_start || bytes_.substr(128, 4) != "DICM")
+      throw BadInput(Reason::not_an_image, fmt::format("{}: not a DICOM file with a preamble", into_.origin));
+    at_ = meta_start;
+    const Header first = header(true, bytes_.size());
+    if (first.tag != tags::meta_length.number || first.vr_text() != "UL" || first.length != 4)
+      refuse(Reason::bad_value, "the meta group does not begin with its length");
+    const std::uint32_t length = number(4, bytes_.size());
+    need(length, bytes_.size());
+    const std::size_t end = at_ + length;
+    while (at_ < end) {
+      const Header next = header(true, end);
+      if (next.tag >> 16 != 2) refuse(Reason::bad_value, "the length of the meta group is wrong");
+      keep(next, value(next.length, end));
+    }
+    check_uids({0x00020002, 0x00020003, tags::transfer_syntax.number});
+    into_.transfer_syntax = uid(into_.find(tags::transfer_syntax));
+    return end;
+  }
+
+  static std::string_view uid(const DicomElement* element) {
+    if (!element) return {};
+    std::string_view text = element->value;
+    if (text.ends_with('\0') || text.ends_with(' ')) text.remove_suffix(1);
+    return text;
+  }
+
+  void check_uids(std::initializer_list<std::uint32_t> tags) const {
+    for (std::uint32_t tag : tags) {
+      const std::string_view text = uid(into_.find({tag, ""}));
+      if (text.size() > 64 || text.find_first_not_of("0123456789.") != std::string_view::npos)
+        into_.refuse(Reason::bad_value, {tag, "UID"},
+                     fmt::format("is {}, must be at most 64 digits and points", quote(text)));
+    }
+  }
+
+  /// Whether the syntax is encapsulated.
+  bool choose_syntax() const {
+    const std::string& syntax = into_.transfer_syntax;
+    if (syntax.empty()) into_.refuse(Reason::bad_value, tags::transfer_syntax, "is missing");
+    if (syntax == "1.2.840.10008.1.2" || syntax == "1.2.840.10008.1.2.1") return false;
+    for (std::string_view known : {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
+                                   "1.2.840.10008.1.2.4.57", "1.2.840.10008.1.2.4.70", "1.2.840.10008.1.2.5"})
+      if (syntax == known) return true;
+    into_.refuse(
+        Reason::unsupported, tags::transfer_syntax,
+        fmt::format("is {}; read are little endian, RLE and JPEG (processes 1, 2, 4 and 14)", syntax));
+  }
+
+  /// Elements up to `end` or, where `delimited`, up to the item's delimiter before it.
+  void elements(std::size_t end, bool delimited, bool explicit_vr, int depth) {
+    while (at_ < end) {
+      const Header next = header(explicit_vr, end);
+      if (delimited && next.tag == item_end) return;
+      if (next.tag >> 16 <= 2 || next.tag >> 16 == 0xFFFE)
+        refuse(Reason::bad_value,
+               fmt::format("({:04X},{:04X}) does not belong here", next.tag >> 16, next.tag & 0xFFFF));
+      const std::size_t start = at_;
+      body(next, end, explicit_vr, depth);
+      if (depth == 0) keep(next, bytes_.substr(start, at_ - start));
+    }
+    if (delimited)
+      refuse(end == bytes_.size() ? Reason::truncated : Reason::bad_value, "an item is not delimited");
+  }
+
+  void body(const Header& next, std::size_t end, bool explicit_vr, int depth) {
+    const std::string_view vr = next.vr_text();
+    if (next.length != undefined) {
+      need(next.length, end);
+      if (vr == "SQ")
+        sequence(at_ + next.length, false, explicit_vr, depth + 1);
+      else
+        at_ += next.length;
+    } else if (next.tag == tags::pixel_data.number && vr != "SQ" && encapsulated_) {
+      pixel_fragments(end, depth);
+    } else if (vr == "SQ" || vr == "UN" || vr == "  ") {
+      sequence(end, true, explicit_vr && vr == "SQ", depth + 1);
+    } else {
+      refuse(Reason::bad_value,
+             fmt::format("({:04X},{:04X}) of VR {} has no length", next.tag >> 16, next.tag & 0xFFFF, vr));
+    }
+  }
+
+  void sequence(std::size_t end, bool delimited, bool explicit_vr, int depth) {
+    if (depth > max_depth)
+      refuse(Reason::bad_value, fmt::format("sequences nested deeper than {}", max_depth));
+    while (at_ < end) {
+      const Header next = header(explicit_vr, end);
+      if (delimited && next.tag == sequence_end) return;
+      if (next.tag != item_tag) refuse(Reason::bad_value, "an item of a sequence was expected");
+      if (next.length != undefined) need(next.length, end);
+      elements(next.length == undefined ? end : at_ + next.length, next.length == undefined, explicit_vr,
+               depth);
+    }
+    if (delimited)
+      refuse(end == bytes_.size() ? Reason::truncated : Reason::bad_value, "a sequence is not delimited");
+  }
+
+  void pixel_fragments(std::size_t end, int depth) {
+    while (true) {
+      const Header next = header(true, end);
+      if (next.tag == sequence_end) return;
+      if (next.tag != item_tag || next.length == undefined)
+        refuse(Reason::bad_value, "a fragment of Pixel Data was expected");
+      const std::string_view fragment = value(next.length, end);
+      if (into_.fragments.size() == max_fragments)
+        refuse(Reason::bad_value, "too many fragments of Pixel Data");
+      if (depth == 0) into_.fragments.push_back(fragment);
+    }
+  }
+
+  std::string_view bytes_;
+  DicomElements& into_;
+  std::size_t at_ = 0;
+  bool encapsulated_ = false;
+};
+
+}  // namespace
+
+Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin) {
+  return guarded([&] {
+    DicomElements found;
+    found.origin = origin;
+    Walker(bytes, found).file();
+    return found;
+  });
+}
+
+}  // namespace helicarm

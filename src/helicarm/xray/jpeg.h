@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// Decodes one grey JPEG picture (sequential Huffman: baseline or extended; lossless process 14) of known
+/// size into little endian words of `word_bytes` (1 or 2). Refuses: truncated, bad_value (size or process
+/// differ, damaged).
+Expected<std::string> decode_jpeg(std::string_view jpeg, bool lossless, int width, int height, int word_bytes,
+                                  const std::string& origin);
+
+}  // namespace helicarm
