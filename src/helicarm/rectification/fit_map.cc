@@ -278,7 +278,9 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   if (!middle_mm.allFinite() || !(px_per_mm > 0)) return too_few();
 
   // Then in rectified pixels: raw scale and no turn at the middle.
-  for (Vector2d& place : places) place = middle + px_per_mm * (turn * (place - middle_mm));
+  fit.rectified_from_plate.linear() = px_per_mm * turn;
+  fit.rectified_from_plate.translation() = middle - px_per_mm * (turn * middle_mm);
+  for (Vector2d& place : places) place = fit.rectified_from_plate * place;
   frame = frame_of(places);
   data = gather(dots, places, frame, fit.used);
   const MatrixX2d knots = thinned(data.points);

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "helicarm/rectification/distortion_map.h"
 
@@ -29,6 +29,7 @@ struct MapFit {
   std::vector<bool> used;             ///< per correspondence
   std::vector<double> residual_px;    ///< per correspondence, distance in raw pixels
   double px_per_mm = 0;               ///< rectified pixels per plate millimetre
+  Eigen::Affine2d rectified_from_plate = Eigen::Affine2d::Identity();  ///< a similarity
 };
 
 /// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder are those of least held-out error, each dot

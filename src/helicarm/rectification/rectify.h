@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "helicarm/detection/blobs.h"
 #include "helicarm/detection/dot.h"
 #include "helicarm/phantom/plate.h"
 #include "helicarm/rectification/distortion_map.h"
@@ -23,7 +24,8 @@ struct Rectification {
   std::optional<int> dots_expected;  ///< nothing for an unbounded lattice
   double raw_mean_px = 0;            ///< distance from raw to rectified over the dots used: the distortion itself
   double raw_max_px = 0;
-  std::vector<Dot> other_dots;       ///< dots of the same polarity that are not the plate's: ball candidates
+  Polarity metal = Polarity::dark;   ///< how metal shows in this picture
+  std::vector<Dot> other_dots;       ///< metal dots that are not the plate's: ball candidates
   std::vector<Warning> warnings;
 };
 

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "helicarm/geometry/view.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom/conical_helix.h"
+
+namespace helicarm {
+
+struct RuleOptions {
+  ConicalHelix helix;
+  double source_detector_mm = 1000;
+  double source_calibrator_mm = 650;  ///< to the mean of the balls
+  double field_mm = 228.6;            ///< diameter of the receiver
+  double range_deg = 5;  ///< of the turns about both axes of the picture over which no ball may hide another
+  double target_radius_mm = 15;  ///< of the ball about the mean of the balls that the targets lie in
+};
+
+enum class Bound { at_most, at_least };
+
+/// One design rule of 2.3.1 or 2.3.4 with the figure that decides it.
+struct RuleFinding {
+  std::string rule;
+  std::string sentence;
+  double figure;
+  Bound bound;
+  double limit;
+  std::string unit;
+  bool passed() const { return bound == Bound::at_most ? figure <= limit : figure >= limit; }
+};
+
+/// Every rule that applies. Those of 2.3.4 that go by label do so only where the balls are named P1 to P12.
+std::vector<RuleFinding> check_rules(const Calibrator& calibrator, const RuleOptions& options = {});
+
+/// The calibrator's mean at the given distance from the source, the beam along +z (AP) or -y (lateral, alpha
+/// = 90 degrees in Eq. 5). Pixels are mm in the detector plane, from the central ray.
+struct DesignViews {
+  View ap;
+  View lateral;
+};
+DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options = {});
+
+/// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative where they
+/// overlap. The source turns about both axes of the picture within `range_deg`.
+double smallest_gap_mm(const Calibrator& calibrator, const View& view, double range_deg);
+
+/// Depth of a point below the nearest face of the balls' convex hull, mm; negative outside.
+double depth_in_hull_mm(const Calibrator& calibrator, const Eigen::Vector3d& point_in_calibrator);
+
+}  // namespace helicarm

@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/rectify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/image/opencv.h"
+#include "helicarm/rectification/lattice.h"
+#include "helicarm/rectification/paper_dots.h"
+#include "helicarm/rectification/plate_match.h"
+#include "helicarm/rectification/usable.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double pitch_tolerance = 0.04;    // measured against expected
+constexpr std::size_t least_dots = 10;
+constexpr double max_ball_radius = 0.04;    // of the picture's width: nothing larger is a ball
+
+/// Pixels per plate millimetre in the middle of the picture, where the file and the plate tell.
+std::optional<double> expected_scale(const Exposure& exposure, const Plate& plate) {
+  const auto& pixel = exposure.acquisition.pixel_mm;
+  if (!pixel) return std::nullopt;
+  const double height = plate.height_above_receiver_mm.value_or(0);
+  const double distance = exposure.acquisition.source_detector_mm.value_or(1000);
+  return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
+}
+
+Polarity opposite(Polarity polarity) { return polarity == Polarity::dark ? Polarity::bright : Polarity::dark; }
+
+DotOptions dot_options(const Exposure& exposure, Polarity polarity) {
+  DotOptions options;
+  options.polarity = polarity;
+  options.max_radius_px = std::max(16.0, max_ball_radius * exposure.pixels.width());
+  return options;
+}
+
+std::vector<Dot> with_radius_near(const std::vector<Dot>& dots, double radius) {
+  std::vector<Dot> near;
+  for (const Dot& dot : dots)
+    if (dot.radius_px > 0.7 * radius && dot.radius_px < 1.35 * radius) near.push_back(dot);
+  return near;
+}
+
+/// The dots as a lattice: of the expected size where that is known, else of the size that gives the largest lattice.
+struct SeenLattice {
+  std::vector<Dot> dots;
+  IndexedLattice lattice;
+};
+
+SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::optional<double> scale) {
+  SeenLattice best;
+  const auto consider = [&](std::vector<Dot> some, std::optional<double> pitch_px) {
+    LatticeOptions options;
+    options.pitch_px = pitch_px;
+    IndexedLattice lattice = index_lattice(some, plate.lattice, options);
+    if (lattice.dots.size() > best.lattice.dots.size()) best = {std::move(some), std::move(lattice)};
+  };
+  if (scale && plate.pitch_mm) {
+    consider(with_radius_near(dots, 0.5 * plate.diameter_mm * *scale), *plate.pitch_mm * *scale);
+    if (best.lattice.dots.size() >= least_dots) return best;
+  }
+  std::vector<double> radii;
+  for (const Dot& dot : dots) radii.push_back(dot.radius_px);
+  std::sort(radii.begin(), radii.end());
+  for (const double q : {0.2, 0.5, 0.8})
+    if (!radii.empty())
+      consider(with_radius_near(dots, radii[static_cast<std::size_t>(q * double(radii.size() - 1))]), std::nullopt);
+  return best;
+}
+
+/// Fits the lattice's dots again with a profile of their own and their neighbours masked.
+void sharpen(const Exposure& exposure, const std::vector<Dot>& all, SeenLattice& seen, DotFitOptions fit) {
+  std::vector<Dot> members;
+  for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
+  const BallProfile profile = estimate_profile(exposure, members, fit);
+  for (const IndexedDot& d : seen.lattice.dots) {
+    const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, profile, all.size() > 500 ? members : all, fit);
+    if (!refitted.empty() && (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
+      seen.dots[d.dot] = refitted[0];
+  }
+}
+
+Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, std::optional<double> scale,
+                           const MapFit& fit) {
+  if (!scale || !plate.pitch_mm) return {};
+  const double ratio = fit.px_per_mm / *scale;
+  if (std::abs(ratio - 1) <= pitch_tolerance) return {};
+  return fail(Reason::plate_mismatch,
+              fmt::format("the plate in the picture has a pitch of {:.2f} mm, \"{}\" says {} mm (tolerance {:.0f} %)",
+                          *plate.pitch_mm * ratio, plate.name, *plate.pitch_mm, 100 * pitch_tolerance),
+              {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
+}
+
+void set_metric(DistortionMap& map, const Exposure& exposure, const Plate& plate, double px_per_mm) {
+  if (!plate.pitch_mm) return;
+  map.rectified_pixel_mm = 1 / px_per_mm;
+  map.rectified_plane = RectifiedPlane::plate;
+  const auto& distance = exposure.acquisition.source_detector_mm;
+  if (!distance || !plate.height_above_receiver_mm) return;
+  *map.rectified_pixel_mm *= *distance / (*distance - *plate.height_above_receiver_mm);
+  map.rectified_plane = RectifiedPlane::detector;
+}
+
+/// Plate dots that the search missed, fitted at the places where the map expects them.
+void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, const BallProfile& profile,
+            const std::vector<Dot>& all, std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
+  if (plate.dots_mm.empty() || plate_dots.empty()) return;
+  double radius = 0;
+  for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
+  DotFitOptions options = fit_options_for(exposure);
+  for (const Vector2d& place : plate.dots_mm) {
+    const bool known = std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
+    if (known) continue;
+    Dot start;
+    start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
+    start.radius_px = radius;
+    const auto dot = refit_dots(exposure, {start}, profile, all, options);
+    if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
+    if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
+    if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
+    if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15) continue;
+    seen.push_back({place, dot[0].centre_px, dot[0].sigma_px});
+    plate_dots.push_back(dot[0]);
+  }
+}
+
+BallProfile profile_of(const Exposure& exposure, const std::vector<Dot>& dots) {
+  return estimate_profile(exposure, dots, fit_options_for(exposure));
+}
+
+bool same_place(const Dot& a, const Dot& b) {
+  return (a.centre_px - b.centre_px).norm() < 0.7 * std::max(a.radius_px, b.radius_px);
+}
+
+std::vector<Dot> without(const std::vector<Dot>& dots, const std::vector<Dot>& taken) {
+  std::vector<Dot> rest;
+  for (const Dot& dot : dots)
+    if (std::none_of(taken.begin(), taken.end(), [&](const Dot& other) { return same_place(dot, other); }))
+      rest.push_back(dot);
+  return rest;
+}
+
+struct Attempt {
+  std::vector<Dot> all;
+  SeenLattice seen;
+};
+
+std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity polarity, Method method,
+                        std::optional<double> scale) {
+  if (method == Method::best) return find_dots(exposure, dot_options(exposure, polarity));
+  const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * exposure.pixels.width();
+  return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.7 * radius, 1.35 * radius);
+}
+
+}  // namespace
+
+Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, const RectificationOptions& options) {
+  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
+  const auto scale = expected_scale(exposure, plate);
+  const Polarity expected = plate.kind == DotKind::balls ? Polarity::dark : Polarity::bright;
+  const int width = exposure.pixels.width();
+  const int height = exposure.pixels.height();
+
+  // Metal is dark and a hole bright, unless the whole picture is inverted.
+  Attempt attempt;
+  Polarity polarity = expected;
+  for (const Polarity trial : {expected, opposite(expected)}) {
+    Attempt now;
+    now.all = search(exposure, plate, trial, options.method, scale);
+    now.seen = seen_lattice(now.all, plate, scale);
+    if (now.seen.lattice.dots.size() > attempt.seen.lattice.dots.size()) {
+      attempt = std::move(now);
+      polarity = trial;
+    }
+    if (attempt.seen.lattice.dots.size() >= least_dots) break;
+  }
+  if (attempt.seen.lattice.dots.size() < least_dots)
+    return fail(Reason::plate_not_found,
+                fmt::format("only {} dots stand on a lattice like that of \"{}\", at least {} are needed",
+                            attempt.seen.lattice.dots.size(), plate.name, least_dots),
+                {{"dots_found", double(attempt.seen.lattice.dots.size())}});
+
+  if (options.method == Method::best) sharpen(exposure, attempt.all, attempt.seen, fit_options_for(exposure));
+  const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
+  const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
+  if (!matched) return tl::unexpected<Failure>(matched.error());
+
+  std::vector<Dot> dots;
+  std::vector<Correspondence> seen;
+  for (const PlateDot& d : *matched) {
+    const Dot& dot = attempt.seen.dots[d.dot];
+    dots.push_back(dot);
+    seen.push_back({d.place_mm, dot.centre_px, dot.sigma_px});
+  }
+  MapOptions map_options;
+  map_options.order = options.method == Method::paper ? std::optional(2) : options.order;
+  map_options.remainder = options.method == Method::best && !options.order;
+  map_options.reject_outliers = true;
+  auto fit = fit_map(seen, width, height, map_options);
+  if (!fit) return tl::unexpected<Failure>(fit.error());
+  if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
+    return tl::unexpected<Failure>(pitch.error());
+  if (options.method == Method::best && dots.size() < plate.dots_mm.size()) {
+    rescue(exposure, plate, *fit, profile_of(exposure, dots), attempt.all, dots, seen);
+    if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
+  }
+
+  Rectification result;
+  result.map = fit->map;
+  set_metric(result.map, exposure, plate, fit->px_per_mm);
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    if (!fit->used[i]) continue;
+    result.plate_dots.push_back(dots[i]);
+    result.residual_px.push_back(fit->residual_px[i]);
+    const double shift = (seen[i].raw_px - fit->map.rectified_from_raw(seen[i].raw_px).value_or(seen[i].raw_px)).norm();
+    result.raw_mean_px += shift;
+    result.raw_max_px = std::max(result.raw_max_px, shift);
+  }
+  result.dots_found = static_cast<int>(result.plate_dots.size());
+  result.raw_mean_px /= std::max(1, result.dots_found);
+  if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
+  result.metal = plate.kind == DotKind::balls ? polarity : opposite(polarity);
+  if (options.method == Method::best && plate.kind == DotKind::balls)
+    result.other_dots = without(attempt.all, result.plate_dots);
+  else
+    result.other_dots = without(find_dots(exposure, dot_options(exposure, result.metal)), result.plate_dots);
+  return result;
+}
+
+Expected<Rectification> without_plate(const Exposure& exposure) {
+  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
+  Rectification result;
+  const auto& pixel = exposure.acquisition.pixel_mm;
+  result.map = identity_map(exposure.pixels.width(), exposure.pixels.height(),
+                            pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
+  result.other_dots = find_dots(exposure, dot_options(exposure, Polarity::dark));
+  return result;
+}
+
+Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map, const std::optional<Plate>& plate) {
+  if (map.width != exposure.pixels.width() || map.height != exposure.pixels.height())
+    return fail(Reason::plate_mismatch, fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width,
+                                                    map.height, exposure.pixels.width(), exposure.pixels.height()));
+  auto result = without_plate(exposure);
+  if (!result) return result;
+  result->map = map;
+  if (!plate || plate->kind == DotKind::holes) return result;
+  // A plate in the picture tells whether the map still holds: rectified, its dots must stand on a lattice.
+  const SeenLattice seen = seen_lattice(result->other_dots, *plate, expected_scale(exposure, *plate));
+  if (seen.lattice.dots.size() < least_dots) return result;
+  std::vector<Correspondence> dots;
+  std::vector<Dot> members;
+  for (const IndexedDot& d : seen.lattice.dots) {
+    const Dot& dot = seen.dots[d.dot];
+    members.push_back(dot);
+    if (const auto uv = map.rectified_from_raw(dot.centre_px))
+      dots.push_back({lattice_point(d.index, plate->lattice), *uv, dot.sigma_px});
+  }
+  MapOptions straight;
+  straight.order = 1;
+  straight.remainder = false;
+  const auto fit = fit_map(dots, map.width, map.height, straight);
+  const double limit = std::max(0.5, 3 * map.held_out_rms_px);
+  if (fit && fit->map.residual_rms_px > limit)
+    return fail(Reason::plate_mismatch,
+                fmt::format("the map does not fit the plate in the picture: its rectified dots are {:.2f} px rms off a "
+                            "lattice, limit {:.2f}",
+                            fit->map.residual_rms_px, limit),
+                {{"residual_rms_px", fit->map.residual_rms_px}});
+  result->other_dots = without(result->other_dots, members);
+  return result;
+}
+
+Image<float> resample(const Exposure& exposure, const DistortionMap& map) {
+  if (map.is_identity()) return exposure.pixels;
+  // The map is smooth: exact at every 8th pixel, bilinear between.
+  constexpr int step = 8;
+  const int width = exposure.pixels.width();
+  const int height = exposure.pixels.height();
+  cv::Mat coarse((height - 1) / step + 2, (width - 1) / step + 2, CV_32FC2);
+  for (int j = 0; j < coarse.rows; ++j)
+    for (int i = 0; i < coarse.cols; ++i) {
+      const Vector2d raw = map.raw_from_rectified(Vector2d(i * step, j * step));
+      coarse.at<cv::Vec2f>(j, i) = {float(raw.x()), float(raw.y())};
+    }
+  const cv::Matx23f enlarge(1.f / step, 0, 0, 0, 1.f / step, 0);
+  cv::Mat places;
+  cv::warpAffine(coarse, places, enlarge, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  Image<float> rectified(width, height);
+  cv::Mat target = as_mat(rectified);
+  cv::remap(as_mat(exposure.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, double(exposure.lowest));
+  return rectified;
+}
+
+}  // namespace helicarm

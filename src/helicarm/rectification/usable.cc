@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/usable.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace helicarm {
+namespace {
+
+constexpr double least_range = 0.01;       // of block means, as a share of the grey scale
+constexpr double most_saturated = 0.9;     // of the field
+
+/// Means of blocks of 16 x 16 pixels: noise averages out, structure stays.
+std::vector<float> block_means(const Image<float>& image) {
+  constexpr int side = 16;
+  std::vector<float> means;
+  for (int v = 0; v + side <= image.height(); v += side)
+    for (int u = 0; u + side <= image.width(); u += side) {
+      float sum = 0;
+      for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) sum += image(u + x, v + y);
+      means.push_back(sum / (side * side));
+    }
+  return means;
+}
+
+}  // namespace
+
+double saturated_share(const Exposure& exposure) {
+  const float black = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);
+  std::size_t field = 0;
+  std::size_t clipped = 0;
+  for (const float grey : exposure.pixels.pixels()) {
+    field += grey > black;
+    clipped += grey >= exposure.highest;
+  }
+  return field == 0 ? 0 : double(clipped) / double(field);
+}
+
+Expected<void> check_usable(const Exposure& exposure) {
+  std::vector<float> means = block_means(exposure.pixels);
+  if (means.size() < 9)
+    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few to hold a calibrator", exposure.pixels.width(),
+                                              exposure.pixels.height()));
+  std::sort(means.begin(), means.end());
+  const double share = saturated_share(exposure);
+  if (share > most_saturated && means.back() > exposure.lowest)
+    return fail(Reason::saturated, fmt::format("{:.0f} % of the field is clipped at the highest grey value", 100 * share),
+                {{"saturated_share", share}});
+  const auto at = [&](double q) { return double(means[static_cast<std::size_t>(q * double(means.size() - 1))]); };
+  const double range = (at(0.99) - at(0.01)) / double(exposure.highest - exposure.lowest);
+  if (range < least_range)
+    return fail(Reason::blank_image, fmt::format("the picture is blank: its grey values span {:.2f} % of the scale", 100 * range),
+                {{"grey_range", range}});
+  return {};
+}
+
+}  // namespace helicarm
