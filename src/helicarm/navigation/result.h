@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -64,7 +65,9 @@ struct Result {
   Eigen::MatrixXd joint_covariance;  ///< of all views' parameters, 10 each; as CalibratedView::covariance
   std::vector<PointResult> points;
   Accuracy accuracy;
-  std::vector<Tunnel> tunnels;
+  std::vector<std::pair<std::size_t, std::size_t>> tunnel_ends;  ///< start and end among `points`, as planned
+  std::vector<Tunnel> tunnels;                                   ///< those whose ends are located
+  std::vector<ToolLine> tool_lines;
   std::vector<Verification> verifications;
   Timing timing_ms;
 };
