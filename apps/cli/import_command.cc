@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "import_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm::cli {
+namespace {
+
+Json json_of(const ImportedMatrix& imported) {
+  const View& view = imported.view;
+  Json json;
+  json["K"] = json_rows(view.intrinsics.matrix());
+  json["R"] = json_rows(view.camera_from_world.rotation);
+  json["t"] = json_list(view.camera_from_world.translation);
+  json["projection"] = json_rows(view.projection());
+  json["image_size"] = nullptr;
+  if (const auto& size = imported.image_size) json["image_size"] = {size->x(), size->y()};
+  return json;
+}
+
+void print_table(const ImportedMatrix& imported, std::ostream& out) {
+  const Eigen::IOFormat rows(8, 0, "  ", "\n", "  ");
+  const View& view = imported.view;
+  out << "K (px)\n"
+      << view.intrinsics.matrix().format(rows) << "\nR\n"
+      << view.camera_from_world.rotation.format(rows) << "\nt (mm)\n"
+      << view.camera_from_world.translation.transpose().format(rows) << '\n';
+  if (const auto& size = imported.image_size)
+    out << fmt::format("image size {} x {}\n", size->x(), size->y());
+}
+
+}  // namespace
+
+CommandResult import_command(const ImportArguments& arguments, Console& console) {
+  if (arguments.unit != "mm" && arguments.unit != "cm")
+    return fail(Reason::usage, fmt::format("--unit: \"{}\" is neither mm nor cm", arguments.unit));
+  const auto imported = import_matrix(arguments.file, arguments.unit == "cm" ? 10 : 1);
+  if (!imported) return tl::unexpected<Failure>(imported.error());
+  if (console.json)
+    console.out << json_of(*imported).dump(2) << '\n';
+  else
+    print_table(*imported, console.out);
+  return {};
+}
+
+}  // namespace helicarm::cli

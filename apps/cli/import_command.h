@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "command.h"
+
+namespace helicarm::cli {
+
+struct ImportArguments {
+  std::filesystem::path file;
+  std::string unit = "mm";  ///< of lengths in the file: mm or cm
+};
+
+/// A projection made by another program, in mm and in this program's conventions.
+CommandResult import_command(const ImportArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "import_command.h"
+
+#include <sstream>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+
+namespace helicarm::cli {
+namespace {
+namespace fs = std::filesystem;
+
+TEST(ImportCommand, CentimetresBecomeMillimetres) {
+  const fs::path path = fs::temp_directory_path() / fmt::format("helicarm_import_command_{}.txt", ::getpid());
+  ASSERT_TRUE(write_file(path, "6000 0 512 40960\n0 6000 500 40000\n0 0 1 80\n"));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = true;
+  const auto imported = import_command({path, "cm"}, console);
+  const auto refused = import_command({path, "inch"}, console);
+  fs::remove(path);
+  ASSERT_TRUE(imported.has_value());
+  const Json json = *parse_json(out.str(), "out");
+  EXPECT_NEAR(json["t"][2].get<double>(), 800, 1e-9);
+  EXPECT_NEAR(json["K"][0][0].get<double>(), 6000, 1e-9);
+  EXPECT_NEAR(json["projection"][2][3].get<double>(), 800, 1e-9);
+  EXPECT_TRUE(json["image_size"].is_null());
+  EXPECT_EQ(refused.error().reason, Reason::usage);
+}
+
+}  // namespace
+}  // namespace helicarm::cli

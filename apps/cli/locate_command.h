@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "command.h"
+
+namespace helicarm::cli {
+
+struct LocateArguments {
+  std::filesystem::path calibration;  ///< a result.json
+  std::filesystem::path picks;        ///< CSV: name,view,u_px,v_px[,sigma_px]
+  bool raw = false;                   ///< picks are raw pixels, not rectified ones
+};
+
+/// Points in the calibrator's frame from their pictures in views that were calibrated before.
+CommandResult locate_command(const LocateArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

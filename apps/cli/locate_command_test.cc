@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "locate_command.h"
+
+#include <sstream>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/rectification/distortion_map.h"
+
+namespace helicarm::cli {
+namespace {
+namespace fs = std::filesystem;
+
+View view_at(double alpha) {
+  return {{6000, 6000, 512, 500, 0}, {rotation_from_euler(alpha, 0, 0), {0, 0, 800}}};
+}
+
+Json result_json() {
+  Json views = Json::array();
+  for (const auto& [name, alpha] : {std::pair{"AP", 0.0}, {"LAT", 1.5}}) {
+    Json view{{"name", name}};
+    view["rectification"] = {{"map", to_json(identity_map(1024, 1024, std::nullopt))}};
+    view["projection"] = json_rows(view_at(alpha).projection());
+    view["camera_from_calibrator"] = json_rows(view_at(alpha).camera_from_world.matrix());
+    views.push_back(view);
+  }
+  return {{"format", "helicarm-result/1"}, {"status", "ok"}, {"views", views}};
+}
+
+struct Answer {
+  CommandResult result;
+  Json json;
+};
+
+Answer locate_in(const Json& calibration, const std::string& picks, bool raw = false) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_locate_{}", ::getpid());
+  EXPECT_TRUE(write_file(folder / "result.json", calibration.dump()));
+  EXPECT_TRUE(write_file(folder / "picks.csv", picks));
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = true;
+  auto result = locate_command({folder / "result.json", folder / "picks.csv", raw}, console);
+  fs::remove_all(folder);
+  Json json = result ? *parse_json(out.str(), "out") : Json();
+  return {std::move(result), std::move(json)};
+}
+
+std::string picks_of(const Eigen::Vector3d& point) {
+  const Eigen::Vector2d a = view_at(0).project(point), b = view_at(1.5).project(point);
+  return fmt::format("name,view,u_px,v_px,sigma_px\nT,AP,{},{},0.3\nT,LAT,{},{},0.3\nlonely,AP,5,5,\n", a.x(),
+                     a.y(), b.x(), b.y());
+}
+
+TEST(LocateCommand, PointsAndReasonsComeInTheOrderOfThePicks) {
+  for (bool raw : {false, true}) {
+    const Answer answer = locate_in(result_json(), picks_of({10, 20, 30}), raw);
+    ASSERT_TRUE(answer.result.has_value()) << answer.result.error().message;
+    const Json& points = answer.json["points"];
+    ASSERT_EQ(points.size(), 2u);
+    EXPECT_NEAR(points[0]["xyz_mm"][2].get<double>(), 30, 1e-6);
+    EXPECT_EQ(points[0]["views"], (Json{"AP", "LAT"}));
+    EXPECT_TRUE(points[0]["reason"].is_null());
+    EXPECT_TRUE(points[1]["xyz_mm"].is_null());
+    EXPECT_EQ(points[1]["reason"], "not_seen");
+  }
+}
+
+TEST(LocateCommand, CovarianceOfTheCalibrationWidensThatOfThePoint) {
+  Json calibrated = result_json();
+  calibrated["calibration"]["joint_covariance"] = json_rows(1e-6 * Eigen::MatrixXd::Identity(20, 20));
+  const double with =
+      locate_in(calibrated, picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
+  const double without =
+      locate_in(result_json(), picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
+  EXPECT_GT(with, 2 * without);
+  calibrated["calibration"]["joint_covariance"] = json_rows(Eigen::MatrixXd::Identity(10, 10));
+  EXPECT_EQ(locate_in(calibrated, picks_of({10, 20, 30})).result.error().reason, Reason::bad_value);
+}
+
+TEST(LocateCommand, BadInputIsNamed) {
+  const auto reason_of = [](const Json& calibration, const std::string& picks) {
+    return locate_in(calibration, picks).result.error().reason;
+  };
+  EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px\nT,PA,1,2\n"), Reason::bad_value);
+  EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px\nT,AP,1,2\nT,AP,3,4\n"), Reason::name_clash);
+  EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px,sigma_px\nT,AP,1,2,-1\n"), Reason::bad_value);
+  Json refused = result_json();
+  refused["status"] = "refused";
+  EXPECT_EQ(reason_of(refused, picks_of({0, 0, 0})), Reason::bad_value);
+  Json scaled = result_json();
+  scaled["views"][0]["camera_from_calibrator"][0][0] = 3;
+  EXPECT_EQ(reason_of(scaled, picks_of({0, 0, 0})), Reason::bad_value);
+}
+
+}  // namespace
+}  // namespace helicarm::cli

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "solve_command.h"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/calibration/calibrate.h"
+#include "helicarm/core/csv.h"
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm::cli {
+namespace {
+
+struct Solution {
+  View view;
+  std::optional<DltFactors> dlt;
+  std::optional<Eigen::MatrixXd> covariance;
+  double condition = 0;
+};
+
+std::vector<Fiducial> points_from(const CsvTable& table) {
+  std::vector<Fiducial> points;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto number = [&](const char* column) { return table.number(row, column); };
+    Fiducial point{table.text(row, "label"), {number("x_mm"), number("y_mm"), number("z_mm")}};
+    point.status = FiducialStatus::used;
+    point.uv = {number("u_px"), number("v_px")};
+    point.sigma_px = table.has("sigma_px") ? number("sigma_px") : 1;
+    if (!(point.sigma_px > 0))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("row {}: sigma_px: {} must be positive", row + 1, point.sigma_px));
+    points.push_back(point);
+  }
+  return points;
+}
+
+Expected<Solution> most_likely(const std::vector<Fiducial>& points, bool sigmas_given) {
+  CalibrationOptions options;
+  options.rejection_probability = 0;
+  options.largest_rms_px = std::numeric_limits<double>::infinity();
+  const auto result = calibrate({{"", points}}, options);
+  if (!result) return tl::unexpected<Failure>(result.error());
+  const CalibratedView& view = result->views.front();
+  const double scale = sigmas_given ? 1 : result->chi2 / result->dof / result->variance_scale;
+  return Solution{view.view, view.dlt, result->joint_covariance * scale, view.condition};
+}
+
+Expected<Solution> solve(const std::string& method, const std::vector<Fiducial>& points,
+                         const std::vector<PointPair>& pairs, bool sigmas_given) {
+  if (method == "ml") return most_likely(points, sigmas_given);
+  if (method != "dlt" && method != "homogeneous")
+    return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: dlt, homogeneous, ml", method));
+  const auto result = method == "dlt" ? dlt_least_squares(pairs) : dlt_homogeneous(pairs);
+  return result.map([](const DltResult& dlt) {
+    return Solution{dlt.view, dlt.factors, std::nullopt, dlt.condition};
+  });
+}
+
+Json json_of(const Solution& solution, double rms_px) {
+  Json json;
+  json["dlt"] = solution.dlt ? json_list(*solution.dlt) : Json();
+  json["projection"] = json_rows(solution.view.projection());
+  json["intrinsics"] = intrinsics_json(solution.view.intrinsics, std::nullopt);
+  json["camera_from_world"] = json_rows(solution.view.camera_from_world.matrix());
+  json["covariance"] = solution.covariance ? json_rows(*solution.covariance) : Json();
+  json["reprojection_rms_px"] = rms_px;
+  json["condition"] = solution.condition;
+  return json;
+}
+
+void print_table(const Solution& solution, double rms_px, const std::vector<Fiducial>& points,
+                 std::ostream& out) {
+  const Intrinsics& k = solution.view.intrinsics;
+  const RigidTransform& pose = solution.view.camera_from_world;
+  const EulerAngles angles = euler_from_rotation(pose.rotation);
+  const Eigen::Vector3d source = solution.view.source_in_world();
+  const double degrees = 180 / std::acos(-1.0);
+  const auto sigma = [&](Eigen::Index i) {
+    return solution.covariance ? fmt::format(" +- {:.3g}", std::sqrt((*solution.covariance)(i, i))) : "";
+  };
+  out << fmt::format("focal length   fx {:.3f}{} px, fy {:.3f}{} px, skew {:.3f} px\n", k.fx, sigma(0), k.fy,
+                     sigma(1), k.skew)
+      << fmt::format("central ray    u0 {:.3f}{} px, v0 {:.3f}{} px\n", k.u0, sigma(2), k.v0, sigma(3))
+      << fmt::format("angles (Eq. 5) alpha {:.4f}, beta {:.4f}, gamma {:.4f} deg{}\n", angles.alpha * degrees,
+                     angles.beta * degrees, angles.gamma * degrees, angles.gimbal_locked ? " (locked)" : "")
+      << fmt::format("translation    {:.4f} {:.4f} {:.4f} mm\n", pose.translation.x(), pose.translation.y(),
+                     pose.translation.z())
+      << fmt::format("source         {:.4f} {:.4f} {:.4f} mm\n", source.x(), source.y(), source.z())
+      << fmt::format("condition      {:.3g}\nreprojection   {:.4g} px rms over {} points\n",
+                     solution.condition, rms_px, points.size());
+  for (const Fiducial& point : points)
+    out << fmt::format("  {:<12} {:.4g} px\n", point.label,
+                       (solution.view.project(point.centre_in_calibrator) - point.uv).norm());
+}
+
+}  // namespace
+
+CommandResult solve_command(const SolveArguments& arguments, Console& console) {
+  const auto table =
+      read_csv(arguments.points, {"label", "x_mm", "y_mm", "z_mm", "u_px", "v_px"}, {"sigma_px"});
+  if (!table) return tl::unexpected<Failure>(table.error());
+  const auto points = guarded([&] { return points_from(*table); });
+  if (!points) return tl::unexpected<Failure>(points.error());
+  std::vector<PointPair> pairs;
+  for (const Fiducial& point : *points) pairs.push_back({point.centre_in_calibrator, point.uv});
+  const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
+  if (!solution) return tl::unexpected<Failure>(solution.error());
+  const double rms_px = reprojection_rms(solution->view, pairs);
+  if (console.json)
+    console.out << json_of(*solution, rms_px).dump(2) << '\n';
+  else
+    print_table(*solution, rms_px, *points, console.out);
+  return {};
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/calibrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "helicarm/calibration/outliers.h"
+#include "helicarm/geometry/ray.h"
+
+namespace helicarm {
+namespace {
+
+constexpr std::size_t least_fiducials = 6;
+constexpr std::size_t comfortable_fiducials = 8;
+constexpr double least_rho = 1e-8;   // 1 / mm: a source 100 km away
+constexpr double belied_sigmas = 3;  // standard deviations of chi2 beyond which the sigmas are not believed
+
+tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
+  failure.view = view;
+  return tl::unexpected<Failure>(std::move(failure));
+}
+
+std::vector<PointPair> pairs_of(const std::vector<Fiducial>& fiducials) {
+  std::vector<PointPair> pairs;
+  for (const Fiducial& f : fiducials)
+    if (f.status == FiducialStatus::used) pairs.push_back({f.centre_in_calibrator, f.uv});
+  return pairs;
+}
+
+/// The given start, or the homogeneous DLT.
+Expected<View> start_of(const ViewFiducials& view, const std::vector<PointPair>& pairs) {
+  if (!view.start) return dlt_homogeneous(pairs).map([](const DltResult& dlt) { return dlt.view; });
+  return dlt_condition(pairs).map([&](double) { return *view.start; });
+}
+
+Expected<ViewProblem> problem_of(const ViewFiducials& view) {
+  std::vector<Observation> observations;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (const Fiducial& f : view.fiducials) {
+    if (f.status != FiducialStatus::used) continue;
+    if (!(f.sigma_px > 0) || !std::isfinite(f.sigma_px))
+      return fail(Reason::bad_value,
+                  fmt::format("ball {}: sigma {} px must be positive", f.label, f.sigma_px));
+    observations.push_back({f.centre_in_calibrator, f.uv, f.sigma_px});
+    centre += f.centre_in_calibrator;
+  }
+  const auto start = start_of(view, pairs_of(view.fiducials));
+  if (!start) return tl::unexpected<Failure>(start.error());
+  centre /= double(observations.size());
+  return ViewProblem{centred(*start, centre), std::move(observations), view.prior};
+}
+
+void mark_rejected(std::vector<Fiducial>& fiducials, std::size_t used_index) {
+  const auto is_candidate = [](const Fiducial& f) {
+    return f.status == FiducialStatus::used || f.status == FiducialStatus::rejected;
+  };
+  for (Fiducial& f : fiducials)
+    if (is_candidate(f) && used_index-- == 0) f.status = FiducialStatus::rejected;
+}
+
+/// What is found the same way however the view was calibrated; `residual_too_large` where labels must be
+/// wrong.
+Expected<CalibratedView> described(const std::string& name, const View& view,
+                                   std::vector<Fiducial>& fiducials, const CalibrationOptions& options) {
+  const auto pairs = pairs_of(fiducials);
+  const auto condition = dlt_condition(pairs);
+  if (!condition) return in_view(condition.error(), name);
+  CalibratedView result{name, view, factors_from_projection(view.projection())};
+  result.condition = *condition;
+  result.reprojection_rms_px = reprojection_rms(view, pairs);
+  double largest_sigma = 0;
+  for (Fiducial& f : fiducials) {
+    if (f.status != FiducialStatus::used && f.status != FiducialStatus::rejected) continue;
+    f.residual_px = (f.uv - view.project(f.centre_in_calibrator)).norm();
+    if (f.status != FiducialStatus::used) continue;
+    largest_sigma = std::max(largest_sigma, f.sigma_px);
+    if (f.sigma_px > 0) result.chi2 += std::pow(f.residual_px / f.sigma_px, 2);
+  }
+  const double limit = std::max(options.largest_rms_px, 3 * largest_sigma);
+  if (!(result.reprojection_rms_px <= limit))
+    return in_view(
+        {Reason::residual_too_large,
+         fmt::format("the balls miss their pictures by {:.3g} px rms, limit {:g}: labels, calibrator or "
+                     "rectification are wrong",
+                     result.reprojection_rms_px, limit),
+         {},
+         {{"reprojection_rms_px", result.reprojection_rms_px}, {"limit_px", limit}}},
+        name);
+  return result;
+}
+
+void warn_of_few(CalibrationResult& result) {
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    const double n = double(pairs_of(result.fiducials[i]).size());
+    if (n < comfortable_fiducials)
+      result.warnings.push_back({Reason::few_fiducials,
+                                 fmt::format("only {} balls are used", n),
+                                 result.views[i].name,
+                                 {{"n", n}}});
+  }
+}
+
+/// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
+double excess_of(double chi2, int dof) {
+  const double width = 2.0 / (9 * dof);
+  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
+}
+
+void rescale_if_belied(CalibrationResult& result) {
+  if (result.dof < 1 || excess_of(result.chi2, result.dof) < belied_sigmas) return;
+  result.variance_scale = result.chi2 / result.dof;
+  result.joint_covariance *= result.variance_scale;
+  for (CalibratedView& view : result.views) view.covariance *= result.variance_scale;
+  result.warnings.push_back(
+      {Reason::residual_too_large,
+       fmt::format(
+           "the balls' residuals are {:.2g} times what their sigmas allow: all predicted errors are enlarged",
+           std::sqrt(result.variance_scale)),
+       {},
+       {{"chi2", result.chi2}, {"dof", double(result.dof)}}});
+}
+
+/// A joint fit that failed names no view: a start that misses its own balls tells which one is at fault.
+tl::unexpected<Failure> blame(const std::vector<ViewFiducials>& views,
+                              const std::vector<ViewProblem>& problems, const Failure& failure,
+                              const CalibrationOptions& options) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto fiducials = views[i].fiducials;
+    const auto start = described(views[i].name, uncentred(problems[i].start), fiducials, options);
+    if (!start) return tl::unexpected<Failure>(start.error());
+  }
+  return tl::unexpected<Failure>(failure);
+}
+
+}  // namespace
+
+Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
+                                      const CalibrationOptions& options) {
+  std::vector<ViewProblem> problems;
+  CalibrationResult result;
+  for (const ViewFiducials& view : views) {
+    auto problem = problem_of(view);
+    if (!problem) return in_view(problem.error(), view.name);
+    problems.push_back(*std::move(problem));
+    result.fiducials.push_back(view.fiducials);
+  }
+  const auto clean =
+      refine_without_outliers(problems, options.spread, options.rejection_probability, least_fiducials);
+  if (!clean) return blame(views, problems, clean.error(), options);
+  const Refinement& fit = clean->fit;
+  result.chi2 = fit.chi2;
+  result.dof = fit.dof;
+  const auto n = Eigen::Index(views.size());
+  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(10 * n, 10 * n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    by_step.block<10, 10>(10 * i, 10 * i) = parameters_by_step(fit.views[std::size_t(i)]);
+  result.joint_covariance = by_step * fit.covariance * by_step.transpose();
+  for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
+
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto view = described(views[i].name, uncentred(fit.views[i]), result.fiducials[i], options);
+    if (!view) return tl::unexpected<Failure>(view.error());
+    const double rho = fit.views[i].rho;
+    if (!(rho > least_rho))
+      return in_view(
+          {Reason::uncertain, "the balls do not tell how far the X-ray source is", {}, {{"per_mm", rho}}},
+          views[i].name);
+    const Eigen::Index rows = 2 * Eigen::Index(clean->problems[i].observations.size());
+    const auto j = fit.jacobian.middleRows(row, rows);
+    view->dof = int(std::lround(double(rows) - (j * fit.covariance * j.transpose()).trace()));
+    view->covariance = result.joint_covariance.block<10, 10>(10 * Eigen::Index(i), 10 * Eigen::Index(i));
+    result.views.push_back(*std::move(view));
+    row += rows;
+  }
+  rescale_if_belied(result);
+  warn_of_few(result);
+  return result;
+}
+
+Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& views,
+                                            const CalibrationOptions& options) {
+  CalibrationResult result;
+  for (const ViewFiducials& view : views) {
+    const auto pairs = pairs_of(view.fiducials);
+    const auto dlt = dlt_least_squares(pairs);
+    if (!dlt) return in_view(dlt.error(), view.name);
+    result.fiducials.push_back(view.fiducials);
+    auto calibrated = described(view.name, dlt->view, result.fiducials.back(), options);
+    if (!calibrated) return tl::unexpected<Failure>(calibrated.error());
+    calibrated->dlt = dlt->factors;
+    calibrated->dof = 2 * int(pairs.size()) - 11;
+    result.chi2 += calibrated->chi2;
+    result.dof += calibrated->dof;
+    result.views.push_back(*std::move(calibrated));
+  }
+  warn_of_few(result);
+  return result;
+}
+
+Expected<void> check_views_apart(std::span<const CalibratedView> views,
+                                 const Eigen::Vector3d& point_in_calibrator, double least_deg) {
+  double widest_deg = 0;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Ray a = ray_through(views[i].view, views[i].view.project(point_in_calibrator));
+      const Ray b = ray_through(views[j].view, views[j].view.project(point_in_calibrator));
+      widest_deg = std::max(widest_deg, angle_between(a, b) * 180 / std::numbers::pi);
+    }
+  if (widest_deg >= least_deg) return {};
+  return fail(
+      Reason::views_too_close,
+      fmt::format("the views are {:.3g} degrees apart, at least {:g} are needed", widest_deg, least_deg),
+      {{"angle_deg", widest_deg}, {"limit_deg", least_deg}});
+}
+
+}  // namespace helicarm

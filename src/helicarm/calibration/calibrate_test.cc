@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/calibrate.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+/// The views of 2.3.3: f = 900 mm, 0.15 mm pixels, 800 mm from the source, seen about the calibrator's
+/// middle.
+View paper_view(double alpha) {
+  const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
+  return {{6000, 6000, 512, 512, 0},
+          {rotation, Eigen::Vector3d(0, 0, 800) - rotation * Eigen::Vector3d(0, 0, 40)}};
+}
+
+ViewFiducials pictured(const std::string& name, const View& view, double sigma, RandomStream& random,
+                       int n = 12) {
+  ViewFiducials result{name, {}};
+  for (int k = 0; k < n; ++k) {
+    const double t = std::numbers::pi / 6 + k * 6 * std::numbers::pi / 12;
+    const double radius = 60 * std::exp(-t / 31.529);
+    Fiducial f{fmt::format("P{}", k + 1), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
+    f.status = FiducialStatus::used;
+    f.sigma_px = sigma;
+    f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+    result.fiducials.push_back(f);
+  }
+  return result;
+}
+
+std::vector<ViewFiducials> pair_of_views(double sigma, std::uint64_t trial) {
+  RandomStream random(11, 0, trial);
+  return {pictured("AP", paper_view(0), sigma, random),
+          pictured("LAT", paper_view(std::numbers::pi / 2), sigma, random)};
+}
+
+TEST(Calibrate, NearlyExactPicturesGiveTheViewsBack) {
+  auto views = pair_of_views(1e-6, 0);
+  const auto result = calibrate(views, {});
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  EXPECT_NEAR(result->views[0].view.intrinsics.fx, 6000, 1e-2);
+  EXPECT_NEAR(result->views[1].view.camera_from_world.translation.z(), 800, 1e-2);
+  EXPECT_LT(result->views[1].reprojection_rms_px, 1e-5);
+  EXPECT_TRUE(result->warnings.empty());
+}
+
+TEST(Calibrate, MirroredViewKeepsItsHand) {
+  RandomStream random(12, 0);
+  View mirrored = paper_view(0.4);
+  mirrored.intrinsics.fx *= -1;
+  const auto result = calibrate({pictured("AP", mirrored, 0.1, random)}, {});
+  ASSERT_TRUE(result.has_value());
+  EXPECT_LT(result->views[0].view.intrinsics.fx, -5000);
+  EXPECT_GT(result->views[0].view.camera_from_world.rotation.determinant(), 0);
+}
+
+TEST(Calibrate, ParametersScatterAsTheirJointCovarianceSays) {
+  CalibrationOptions options;
+  options.rejection_probability = 0;
+  const int trials = 400;
+  double distance2 = 0, chi2 = 0, dof = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    auto views = pair_of_views(0.2, std::uint64_t(trial));
+    RandomStream random(13, 0, std::uint64_t(trial));
+    const double f = 6000 + 5 * random.normal();
+    for (auto& view : views) view.prior = {Belief{f, 5}, Belief{1, 1e-3}, std::nullopt};
+    for (auto& view : views) view.prior.aspect->value += 1e-3 * random.normal();
+    views[1].prior.focal_px->value = 6000 + 5 * random.normal();
+    const auto result = calibrate(views, options);
+    ASSERT_TRUE(result.has_value());
+    Eigen::VectorXd error(20);
+    for (int i = 0; i < 2; ++i) {
+      const View& view = result->views[std::size_t(i)].view;
+      const View truth = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
+      const Intrinsics& k = view.intrinsics;
+      error.segment<10>(10 * i) << k.fx - 6000, k.fy - 6000, k.u0 - 512, k.v0 - 512,
+          vector_from_rotation(view.camera_from_world.rotation *
+                               truth.camera_from_world.rotation.transpose()),
+          view.camera_from_world.translation - truth.camera_from_world.translation;
+    }
+    distance2 += error.dot(result->joint_covariance.ldlt().solve(error)) / trials;
+    chi2 += result->chi2 / trials;
+    dof += double(result->dof) / trials;
+  }
+  EXPECT_NEAR(distance2, 20, 1.2);
+  EXPECT_NEAR(chi2 / dof, 1, 0.04);
+}
+
+TEST(Calibrate, ConvergesWithoutAnyPriorInTheNoiseOfThePaper) {
+  int done = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    RandomStream random(14, 0, std::uint64_t(trial));
+    done += calibrate({pictured("AP", paper_view(0), 2.34, random)}, {}).has_value();
+  }
+  EXPECT_GE(done, 198);
+}
+
+TEST(Calibrate, FalseBallsAreRejectedAndOnlyThey) {
+  for (const auto& wrong : {std::vector<int>{3}, {3, 7}, {1, 2, 10}})
+    for (double off : {2.0, 12.0}) {
+      auto views = pair_of_views(0.1, 5);
+      for (int k : wrong)
+        views[1].fiducials[std::size_t(k)].uv += off * Eigen::Vector2d(0.6, k % 2 ? 0.8 : -0.8);
+      const auto result = calibrate(views, {});
+      ASSERT_TRUE(result.has_value()) << result.error().message;
+      for (int v = 0; v < 2; ++v)
+        for (int k = 0; k < 12; ++k) {
+          const bool is_wrong = v == 1 && std::find(wrong.begin(), wrong.end(), k) != wrong.end();
+          EXPECT_EQ(result->fiducials[std::size_t(v)][std::size_t(k)].status == FiducialStatus::rejected,
+                    is_wrong)
+              << wrong.size() << " balls off by " << off << ": view " << v << " ball " << k;
+        }
+      EXPECT_LT(result->views[1].reprojection_rms_px, 0.2);
+    }
+}
+
+TEST(Calibrate, OneBallFarOffIsRejected) {
+  auto views = pair_of_views(0.1, 6);
+  views[0].fiducials[4].uv += Eigen::Vector2d(90, -40);
+  const auto result = calibrate(views, {});
+  ASSERT_TRUE(result.has_value()) << result.error().message;
+  EXPECT_EQ(result->fiducials[0][4].status, FiducialStatus::rejected);
+  EXPECT_NEAR(result->fiducials[0][4].residual_px, 98, 3);
+}
+
+TEST(Calibrate, GoodBallsAreKept) {
+  int rejected = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    auto views = pair_of_views(0.3, std::uint64_t(trial));
+    for (auto& view : views)
+      for (auto& f : view.fiducials)
+        f.sigma_px = trial % 2 ? 0.15 : 0.3;  // even where sigma is half the truth
+    const auto result = calibrate(views, {});
+    ASSERT_TRUE(result.has_value());
+    for (const auto& fiducials : result->fiducials)
+      for (const auto& f : fiducials) rejected += f.status == FiducialStatus::rejected;
+  }
+  EXPECT_LE(rejected, 1);
+}
+
+TEST(Calibrate, BeliedSigmasEnlargeTheCovarianceAndWarn) {
+  auto views = pair_of_views(0.5, 1);
+  for (auto& view : views)
+    for (auto& f : view.fiducials) f.sigma_px = 0.1;
+  const auto result = calibrate(views, {});
+  ASSERT_TRUE(result.has_value());
+  EXPECT_NEAR(result->variance_scale, 25, 15);
+  ASSERT_EQ(result->warnings.size(), 1u);
+  EXPECT_EQ(result->warnings[0].reason, Reason::residual_too_large);
+}
+
+TEST(Calibrate, SixBallsAreEnoughFiveAreNot) {
+  RandomStream random(15, 0);
+  auto view = pictured("AP", paper_view(0.3), 0.1, random, 7);
+  view.fiducials[2].status = FiducialStatus::occluded;
+  const auto six = calibrate({view}, {});
+  ASSERT_TRUE(six.has_value()) << six.error().message;
+  EXPECT_EQ(six->warnings.at(0).reason, Reason::few_fiducials);
+  view.fiducials[4].status = FiducialStatus::outside;
+  const auto five = calibrate({view}, {});
+  ASSERT_FALSE(five.has_value());
+  EXPECT_EQ(five.error().reason, Reason::too_few_fiducials);
+  EXPECT_EQ(five.error().view, "AP");
+  EXPECT_EQ(five.error().figures.at("n"), 5);
+}
+
+TEST(Calibrate, CoplanarBallsWrongLabelsAndZeroSigmaAreRefused) {
+  auto flat = pair_of_views(0.1, 2);
+  for (auto& f : flat[0].fiducials) f.centre_in_calibrator.z() = 0;
+  EXPECT_EQ(calibrate(flat, {}).error().reason, Reason::coplanar_fiducials);
+  auto shifted = pair_of_views(0.1, 2);
+  for (std::size_t k = 0; k + 1 < 12; ++k)
+    std::swap(shifted[1].fiducials[k].uv, shifted[1].fiducials[k + 1].uv);
+  const auto refused = calibrate(shifted, {});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().reason, Reason::residual_too_large) << refused.error().message;
+  EXPECT_EQ(refused.error().view, "LAT");
+  auto blind = pair_of_views(0.1, 2);
+  blind[0].fiducials[0].sigma_px = 0;
+  EXPECT_EQ(calibrate(blind, {}).error().reason, Reason::bad_value);
+}
+
+TEST(CalibratePaper, IsTheDltOfEachView) {
+  const auto views = pair_of_views(0.5, 3);
+  const auto result = calibrate_paper(views, {});
+  ASSERT_TRUE(result.has_value());
+  std::vector<PointPair> pairs;
+  for (const auto& f : views[1].fiducials) pairs.push_back({f.centre_in_calibrator, f.uv});
+  EXPECT_EQ(*result->views[1].dlt, solve_dlt(pairs));
+  EXPECT_EQ(result->views[1].dof, 13);
+  EXPECT_EQ(result->joint_covariance.size(), 0);
+}
+
+TEST(CheckViewsApart, AngleIsThatOfLines) {
+  const auto views_at = [](double degrees) {
+    return std::vector<CalibratedView>{{"AP", paper_view(0), {}},
+                                       {"LAT", paper_view(degrees * std::numbers::pi / 180), {}}};
+  };
+  EXPECT_TRUE(check_views_apart(views_at(90), {0, 0, 40}).has_value());
+  EXPECT_TRUE(check_views_apart(views_at(31), {0, 0, 40}).has_value());
+  for (double degrees : {0.0, 29.0, 170.0}) {
+    const auto refused = check_views_apart(views_at(degrees), {0, 0, 40});
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error().reason, Reason::views_too_close);
+  }
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/centred_view.h"
+
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/triangulation.h"
+
+namespace helicarm {
+
+CentredView centred(const View& view, const Eigen::Vector3d& centre) {
+  const Intrinsics& k = view.intrinsics;
+  const Eigen::Vector3d c = view.camera_from_world * centre;
+  const double rho = 1 / c.z();
+  const double qx = c.x() * rho, qy = c.y() * rho;
+  return {centre,
+          view.camera_from_world.rotation,
+          k.fx * rho,
+          k.fy * rho,
+          k.u0 + k.fx * qx,
+          k.v0 + k.fy * qy,
+          rho,
+          qx,
+          qy};
+}
+
+View uncentred(const CentredView& c) {
+  const double fx = c.ax / c.rho, fy = c.ay / c.rho;
+  const Eigen::Vector3d centre_in_camera = Eigen::Vector3d(c.qx, c.qy, 1) / c.rho;
+  return {{fx, fy, c.uc - fx * c.qx, c.vc - fy * c.qy, 0},
+          {c.rotation, centre_in_camera - c.rotation * c.centre}};
+}
+
+CentredView moved(const CentredView& view, const ViewStep& step) {
+  CentredView next = view;
+  next.ax += step(0);
+  next.ay += step(1);
+  next.uc += step(2);
+  next.vc += step(3);
+  next.rotation = nearest_rotation(rotation_from_vector(step.segment<3>(4)) * view.rotation);
+  next.rho += step(7);
+  next.qx += step(8);
+  next.qy += step(9);
+  return next;
+}
+
+Picture picture_of(const CentredView& c, const Eigen::Vector3d& point_in_world) {
+  const Eigen::Vector3d d = c.rotation * (point_in_world - c.centre);
+  const double depth = 1 + c.rho * d.z();
+  const double gx = (d.x() - c.qx * d.z()) / depth;
+  const double gy = (d.y() - c.qy * d.z()) / depth;
+  Eigen::Matrix<double, 2, 3> by_d;
+  by_d << c.ax, 0, -c.ax * (c.qx + c.rho * gx),  //
+      0, c.ay, -c.ay * (c.qy + c.rho * gy);
+  Picture picture{{c.uc + c.ax * gx, c.vc + c.ay * gy}, Eigen::Matrix<double, 2, 10>::Zero(), depth};
+  picture.by_step.diagonal<0>() << gx, gy;
+  picture.by_step.diagonal<2>() << 1, 1;
+  picture.by_step.middleCols<3>(4) = -by_d / depth * cross_matrix(d);
+  picture.by_step.col(7) = -d.z() / depth * Eigen::Vector2d(c.ax * gx, c.ay * gy);
+  picture.by_step.diagonal<8>() << -c.ax * d.z() / depth, -c.ay * d.z() / depth;
+  return picture;
+}
+
+Eigen::Matrix<double, 10, 10> parameters_by_step(const CentredView& c) {
+  const double depth = 1 / c.rho;
+  const Eigen::Vector3d q(c.qx, c.qy, 1);
+  Eigen::Matrix<double, 10, 10> m = Eigen::Matrix<double, 10, 10>::Zero();
+  m.topLeftCorner<2, 2>().diagonal().setConstant(depth);  // fx, fy
+  m.block<2, 1>(0, 7) = -depth * depth * Eigen::Vector2d(c.ax, c.ay);
+  m.block<2, 2>(2, 0).diagonal() = -depth * q.head<2>();  // u0, v0
+  m.block<2, 2>(2, 2).setIdentity();
+  m.block<2, 1>(2, 7) = depth * depth * Eigen::Vector2d(c.ax * c.qx, c.ay * c.qy);
+  m.block<2, 2>(2, 8).diagonal() = -depth * Eigen::Vector2d(c.ax, c.ay);
+  m.block<3, 3>(4, 4).setIdentity();                          // rotation
+  m.block<3, 3>(7, 4) = cross_matrix(c.rotation * c.centre);  // translation
+  m.block<3, 1>(7, 7) = -depth * depth * q;
+  m.block<2, 2>(7, 8).diagonal().setConstant(depth);
+  return m;
+}
+
+Eigen::Matrix<double, 2, 10> pixel_by_parameters(const View& view, const Eigen::Vector3d& point_in_world) {
+  const RigidTransform& pose = view.camera_from_world;
+  const Eigen::Vector3d p = pose * point_in_world;
+  const Eigen::Matrix<double, 2, 3> by_camera =
+      projection_jacobian(view, point_in_world) * pose.rotation.transpose();
+  Eigen::Matrix<double, 2, 10> m = Eigen::Matrix<double, 2, 10>::Zero();
+  m.diagonal<0>() << p.x() / p.z(), p.y() / p.z();
+  m.diagonal<2>() << 1, 1;
+  m.middleCols<3>(4) = -by_camera * cross_matrix(pose.rotation * point_in_world);
+  m.rightCols<3>() = by_camera;
+  return m;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "helicarm/geometry/view.h"
+
+namespace helicarm {
+
+/// A view without skew, written about the centre of its fiducials: with d = R (x - centre),
+///   u = uc + ax (dx - qx dz) / (1 + dz rho),   v = vc + ay (dy - qy dz) / (1 + dz rho).
+/// In fx, u0 and t the fiducials hardly tell a far source with a long focus from a near one; here that doubt
+/// is all in rho (one over the depth of the centre), and the fit is nearly linear.
+struct CentredView {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< in the world, mm
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< camera_from_world
+  double ax = 0, ay = 0;                                   ///< magnification, px / mm
+  double uc = 0, vc = 0;                                   ///< picture of the centre, px
+  double rho = 0;                                          ///< 1 / mm
+  double qx = 0, qy = 0;  ///< tangent of the centre's angle off the central ray
+};
+
+/// Small changes of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy).
+using ViewStep = Eigen::Matrix<double, 10, 1>;
+
+CentredView centred(const View& view, const Eigen::Vector3d& centre);
+View uncentred(const CentredView& view);
+CentredView moved(const CentredView& view, const ViewStep& step);
+
+struct Picture {
+  Eigen::Vector2d pixel;
+  Eigen::Matrix<double, 2, 10> by_step;
+  double relative_depth;  ///< over that of the centre; positive before the source
+};
+Picture picture_of(const CentredView& view, const Eigen::Vector3d& point_in_world);
+
+/// d (fx, fy, u0, v0, rotation vector, translation) / d step: the parameters of `CalibratedView::covariance`.
+Eigen::Matrix<double, 10, 10> parameters_by_step(const CentredView& view);
+
+/// d pixel / d (fx, fy, u0, v0, rotation vector, translation) of a plain view.
+Eigen::Matrix<double, 2, 10> pixel_by_parameters(const View& view, const Eigen::Vector3d& point_in_world);
+
+}  // namespace helicarm

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/calibration/priors.h"
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// A ball's place (mm) and picture (px), with the picture's standard deviation per axis.
+struct Observation {
+  Eigen::Vector3d point_in_world;
+  Eigen::Vector2d pixel;
+  double sigma_px;
+};
+
+struct ViewProblem {
+  CentredView start;
+  std::vector<Observation> observations;
+  IntrinsicsPrior prior;
+};
+
+/// The fit of all views at once. Rows are the observations' u and v, view by view, then the priors, each over
+/// its standard deviation.
+struct Refinement {
+  std::vector<CentredView> views;
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd jacobian;    ///< by the steps of all views
+  Eigen::MatrixXd covariance;  ///< of the steps, the sigmas taken at their word
+  double chi2 = 0;
+  int dof = 0;
+};
+
+/// Maximum likelihood by Levenberg and Marquardt's method. `uncertain` where the observations do not fix the
+/// views.
+Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const SpreadPrior& spread);
+
+}  // namespace helicarm

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/saved_calibration.h"
+
+#include "helicarm/geometry/decomposition.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+constexpr Range any_number{-1e15, 1e15};
+
+template <int Rows, int Columns>
+Eigen::Matrix<double, Rows, Columns> matrix_from(JsonReader& reader, const char* key) {
+  const auto numbers = reader.matrix(key, Rows, Columns, any_number);
+  return Eigen::Map<const Eigen::Matrix<double, Rows, Columns, Eigen::RowMajor>>(numbers.data());
+}
+
+CalibratedView view_from(JsonReader& reader) {
+  CalibratedView view;
+  view.name = reader.text("name");
+  const auto pose = value_or_throw(rigid_transform_from(matrix_from<4, 4>(reader, "camera_from_calibrator"),
+                                                        reader.where() + ": camera_from_calibrator"));
+  const Projection projection = matrix_from<3, 4>(reader, "projection");
+  const auto decomposed = decompose(projection, pose.inverse() * Eigen::Vector3d::UnitZ());
+  if (!decomposed) reader.refuse(Reason::bad_value, "projection", decomposed.error().message);
+  view.view = *decomposed;
+  view.dlt = factors_from_projection(projection);
+  return view;
+}
+
+std::optional<DistortionMap> map_from(JsonReader& reader) {
+  if (!reader.has("rectification")) return std::nullopt;
+  JsonReader rectification = reader.object("rectification");
+  if (!rectification.has("map")) return std::nullopt;
+  return value_or_throw(distortion_map_from_json(rectification.raw("map"), rectification.where() + ": map"));
+}
+
+}  // namespace
+
+Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    reader.choice("format", {"helicarm-result/1"});
+    if (reader.choice("status", {"ok", "refused"}) != 0)
+      reader.refuse(Reason::bad_value, "status", "this result was refused: it holds no calibration");
+    SavedCalibration saved;
+    for (JsonReader& view : reader.objects("views", true, 100)) {
+      saved.views.push_back(view_from(view));
+      saved.maps.push_back(map_from(view));
+    }
+    if (reader.has("calibration")) {
+      JsonReader calibration = reader.object("calibration");
+      const auto n = 10 * saved.views.size();
+      if (calibration.has("joint_covariance"))
+        saved.joint_covariance =
+            Eigen::Map<const Eigen::MatrixXd>(calibration.matrix("joint_covariance", n, n, any_number).data(),
+                                              Eigen::Index(n), Eigen::Index(n));
+    }
+    return saved;
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/localization/accuracy.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+TEST(StatisticsOf, KnowsItsNumbers) {
+  const std::vector<double> errors{3, 4};
+  const Statistics s = statistics_of(errors);
+  EXPECT_EQ(s.mean, 3.5);
+  EXPECT_EQ(s.rms, std::sqrt(12.5));
+  EXPECT_EQ(s.max, 4);
+  EXPECT_EQ(s.min, 3);
+  EXPECT_EQ(s.n, 2);
+  EXPECT_EQ(statistics_of({}).n, 0);
+}
+
+std::vector<ViewFiducials> balls_seen(double sigma, std::uint64_t trial) {
+  std::vector<ViewFiducials> views;
+  RandomStream random(31, 0, trial);
+  for (double alpha : {0.0, 1.5}) {
+    const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
+    const View view{{6000, 6000, 512, 512, 0}, {rotation, {0, 0, 800}}};
+    ViewFiducials seen{fmt::format("{}", alpha), {}};
+    for (int k = 0; k < 12; ++k) {
+      const double t = 0.5 + k * 1.57;
+      Fiducial f{fmt::format("P{}", k), {50 * std::cos(t), 50 * std::sin(t), 4 * t - 40}};
+      f.status = FiducialStatus::used;
+      f.sigma_px = sigma;
+      f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+      seen.fiducials.push_back(f);
+    }
+    views.push_back(seen);
+  }
+  return views;
+}
+
+TEST(FiducialLocalizationError, IsThatOfTheNoiseHoweverManyParametersWereFitted) {
+  const double sigma = 0.4;
+  for (auto method : {calibrate, calibrate_paper}) {
+    double mean = 0, rms2 = 0;
+    const int trials = 200;
+    for (int trial = 0; trial < trials; ++trial) {
+      const auto result = method(balls_seen(sigma, std::uint64_t(trial)), {});
+      ASSERT_TRUE(result.has_value());
+      const Statistics fle = fiducial_localization_error(*result);
+      mean += fle.mean / trials;
+      rms2 += fle.rms * fle.rms / trials;
+    }
+    EXPECT_NEAR(mean, sigma * std::sqrt(std::acos(-1) / 2), 0.02);  // of a Rayleigh distribution
+    EXPECT_NEAR(std::sqrt(rms2), sigma * std::sqrt(2.0), 0.02);
+  }
+}
+
+TEST(FiducialRegistrationError, BallsOfOneViewOnlyAreLeftOut) {
+  auto views = balls_seen(0.4, 0);
+  views[0].fiducials[3].status = FiducialStatus::occluded;
+  const auto result = calibrate(views, {});
+  ASSERT_TRUE(result.has_value());
+  const Statistics fre = fiducial_registration_error(*result);
+  EXPECT_EQ(fre.n, 11);
+  EXPECT_GT(fre.rms, 0.01);
+  EXPECT_LT(fre.rms, 0.2);
+}
+
+}  // namespace
+}  // namespace helicarm

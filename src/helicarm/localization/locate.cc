@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/localization/locate.h"
+
+#include <cmath>
+
+#include "helicarm/calibration/centred_view.h"
+#include "helicarm/geometry/triangulation.h"
+
+namespace helicarm {
+namespace {
+
+/// What the calibration's own errors do to the pictures of a point, px^2 (2n x 2n).
+Eigen::MatrixXd calibration_noise(const Eigen::Vector3d& point_in_anchor,
+                                  std::span<const PointPicture> pictures, const Calibration& calibration) {
+  const auto n = 2 * Eigen::Index(pictures.size());
+  const Eigen::Index columns = calibration.joint_covariance.cols();
+  if (columns == 0) return Eigen::MatrixXd::Zero(n, n);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(n, columns);
+  for (Eigen::Index i = 0; 2 * i < n; ++i) {
+    const PointPicture& picture = pictures[std::size_t(i)];
+    jacobian.block<2, 10>(2 * i, 10 * Eigen::Index(picture.view)) = pixel_by_parameters(
+        calibration.views[picture.view].view, picture.calibrator_from_anchor * point_in_anchor);
+  }
+  return jacobian * calibration.joint_covariance * jacobian.transpose();
+}
+
+}  // namespace
+
+double LocatedPoint::predicted_rms_mm() const { return std::sqrt(covariance_in_anchor.trace()); }
+
+Expected<LocatedPoint> locate(const std::string& name, PointSource source,
+                              std::span<const PointPicture> pictures, const Calibration& calibration) {
+  std::vector<Sight> sights;
+  LocatedPoint located{name, source, {}, {}};
+  const auto n = 2 * Eigen::Index(pictures.size());
+  Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
+  for (const PointPicture& picture : pictures) {
+    const CalibratedView& seen = calibration.views[picture.view];
+    const auto at = 2 * Eigen::Index(sights.size());
+    noise.block<2, 2>(at, at) = picture.covariance_px2;
+    sights.push_back(
+        {{seen.view.intrinsics, seen.view.camera_from_world * picture.calibrator_from_anchor}, picture.uv});
+    located.views.push_back(seen.name);
+  }
+  auto found = intersect(sights, noise);
+  if (found && calibration.joint_covariance.size() > 0)
+    found = intersect(sights, noise + calibration_noise(found->point, pictures, calibration));
+  if (!found) return tl::unexpected<Failure>(found.error());
+  located.point_in_anchor = found->point;
+  located.covariance_in_anchor = found->covariance;
+  located.ray_gap_mm = found->ray_gap_mm;
+  located.chi2 = found->chi2;
+  return located;
+}
+
+Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
+                                             const Calibration& calibration) {
+  std::vector<PointPicture> pictures;
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    const View& view = calibration.views[i].view;
+    if (!(view.depth(point_in_calibrator) > 0))
+      return fail(Reason::behind_source, "the point lies behind a source");
+    pictures.push_back(
+        {i, view.project(point_in_calibrator), sigma_px * sigma_px * Eigen::Matrix2d::Identity()});
+  }
+  return locate("", PointSource::pick, pictures, calibration).map([](const LocatedPoint& point) {
+    return point.covariance_in_anchor;
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/calibration/calibrated_view.h"
+#include "helicarm/core/failure.h"
+#include "helicarm/geometry/rigid_transform.h"
+
+namespace helicarm {
+
+/// The picture of a point in one of the calibrated views.
+struct PointPicture {
+  std::size_t view;                            ///< index into the calibration
+  Eigen::Vector2d uv;                          ///< rectified px
+  Eigen::Matrix2d covariance_px2;              ///< zero: exact
+  RigidTransform calibrator_from_anchor = {};  ///< at the moment of this picture; see LocatedPoint
+};
+
+enum class PointSource { pick, target };
+
+/// A point found in space. Its anchor is the frame in which it rests between the pictures: the calibrator, or
+/// a bone that moves.
+struct LocatedPoint {
+  std::string name;
+  PointSource source = PointSource::pick;
+  Eigen::Vector3d point_in_anchor;       ///< mm
+  Eigen::Matrix3d covariance_in_anchor;  ///< mm^2, of pixels and calibration
+  double ray_gap_mm = 0;
+  double chi2 = 0;  ///< 2n - 3 degrees of freedom
+  std::vector<std::string> views = {};
+
+  double predicted_rms_mm() const;
+};
+
+/// Least reprojection error over n >= 2 views, each pixel weighted by its own noise and by the calibration's.
+/// Refuses as `intersect`.
+Expected<LocatedPoint> locate(const std::string& name, PointSource source,
+                              std::span<const PointPicture> pictures, const Calibration& calibration);
+
+/// Covariance (mm^2) of a point that would be seen in all views with a given noise per axis: the predicted
+/// TRE is the root of its trace. Refuses as `locate`, `behind_source` where a view cannot see it.
+Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
+                                             const Calibration& calibration);
+
+}  // namespace helicarm

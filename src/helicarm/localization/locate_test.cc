@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/localization/locate.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/calibration/calibrate.h"
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+View paper_view(double alpha) {
+  const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
+  return {{6000, 6000, 512, 512, 0},
+          {rotation, Eigen::Vector3d(0, 0, 800) - rotation * Eigen::Vector3d(0, 0, 40)}};
+}
+
+const std::vector<View> truth{paper_view(0), paper_view(std::numbers::pi / 2)};
+const Eigen::Vector3d target(12, -20, 55);
+
+/// Twelve balls in each view, as in 2.3.3, and what the maker says of the machine.
+Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
+  std::vector<ViewFiducials> views;
+  for (const View& view : truth) {
+    ViewFiducials seen{fmt::format("V{}", views.size()), {}};
+    seen.prior = {std::nullopt, Belief{1, 0.001}, std::nullopt};
+    for (int k = 0; k < 12; ++k) {
+      const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);
+      Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
+      f.status = FiducialStatus::used;
+      f.sigma_px = sigma;
+      f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+      seen.fiducials.push_back(f);
+    }
+    views.push_back(seen);
+  }
+  CalibrationOptions options;
+  options.rejection_probability = 0;
+  options.spread = {std::nullopt, 1.0};
+  return calibrate(views, options);
+}
+
+std::vector<PointPicture> pictures_of(const Eigen::Vector3d& point, double sigma, RandomStream& random) {
+  std::vector<PointPicture> pictures;
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    pictures.push_back({i,
+                        truth[i].project(point) + sigma * Eigen::Vector2d(random.normal(), random.normal()),
+                        sigma * sigma * Eigen::Matrix2d::Identity()});
+  return pictures;
+}
+
+TEST(Locate, EllipsoidsCoverAndErrorsReachThePredictedSize) {
+  for (const auto& [ball_sigma, pixel_sigma] : {std::pair{0.5, 0.5}, {0.5, 0.0}}) {
+    const int trials = 2000;
+    int covered = 0;
+    double error2 = 0, predicted2 = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      RandomStream random(21, 0, std::uint64_t(trial));
+      const auto calibration = noisy_calibration(ball_sigma, random);
+      ASSERT_TRUE(calibration.has_value());
+      const auto point =
+          locate("T", PointSource::target, pictures_of(target, pixel_sigma, random), *calibration);
+      ASSERT_TRUE(point.has_value());
+      const Eigen::Vector3d error = point->point_in_anchor - target;
+      covered += error.dot(point->covariance_in_anchor.ldlt().solve(error)) < 7.8147;  // chi2, 3 dof, 95 %
+      error2 += error.squaredNorm() / trials;
+      predicted2 += point->covariance_in_anchor.trace() / trials;
+    }
+    EXPECT_GT(double(covered) / trials, 0.94);
+    EXPECT_LT(double(covered) / trials, 0.965);
+    EXPECT_NEAR(std::sqrt(error2 / predicted2), 1, 0.05);
+  }
+}
+
+Calibration exact_calibration() { return {{{"AP", truth[0], {}}, {"LAT", truth[1], {}}}, {}}; }
+
+TEST(Locate, ExactPicksInAnExactCalibration) {
+  RandomStream random(22, 0);
+  const auto point = locate("T", PointSource::pick, pictures_of(target, 0, random), exact_calibration());
+  ASSERT_TRUE(point.has_value());
+  EXPECT_LT((point->point_in_anchor - target).norm(), 1e-9);
+  EXPECT_EQ(point->views, (std::vector<std::string>{"AP", "LAT"}));
+}
+
+TEST(Locate, PointThatMovesWithABoneIsFoundInTheBone) {
+  const Eigen::Vector3d in_bone(3, 4, 5);
+  std::vector<PointPicture> pictures;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const RigidTransform pose{rotation_from_euler(0.1 + 0.2 * double(i), 0.3, 0), {5, 10.0 * double(i), 40}};
+    pictures.push_back({i, truth[i].project(pose * in_bone), Eigen::Matrix2d::Identity(), pose});
+  }
+  const auto point = locate("T", PointSource::pick, pictures, exact_calibration());
+  ASSERT_TRUE(point.has_value());
+  EXPECT_LT((point->point_in_anchor - in_bone).norm(), 1e-9);
+}
+
+TEST(Locate, OneViewIsNotEnough) {
+  RandomStream random(23, 0);
+  auto pictures = pictures_of(target, 1, random);
+  pictures.pop_back();
+  EXPECT_EQ(locate("T", PointSource::pick, pictures, exact_calibration()).error().reason, Reason::not_seen);
+}
+
+TEST(PredictCovariance, IsThatOfALocatedPointAndGrowsAwayFromTheBalls) {
+  RandomStream random(24, 0);
+  const auto calibration = noisy_calibration(0.5, random);
+  ASSERT_TRUE(calibration.has_value());
+  const auto near = predict_covariance({0, 0, 40}, 0.5, *calibration);
+  const auto far = predict_covariance({90, 0, 40}, 0.5, *calibration);
+  ASSERT_TRUE(near && far);
+  EXPECT_GT(far->trace(), near->trace());
+  EXPECT_FALSE(predict_covariance({0, 0, -2000}, 0.5, *calibration).has_value());
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/localization/located_point_json.h"
+
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm {
+
+Json point_json(const std::string& name, PointSource source, Reason reason) {
+  Json json;
+  json["name"] = name;
+  json["source"] = source == PointSource::pick ? "pick" : "target";
+  json["xyz_mm"] = nullptr;
+  json["frame"] = "calibrator";
+  for (const char* key : {"covariance_mm2", "ray_gap_mm", "predicted_mm"}) json[key] = nullptr;
+  json["views"] = Json::array();
+  json["reason"] = code(reason);
+  for (const char* key : {"in_femur", "in_tibia", "in_tool"}) json[key] = nullptr;
+  return json;
+}
+
+Json point_json(const LocatedPoint& point) {
+  Json json = point_json(point.name, point.source, Reason::not_seen);
+  json["xyz_mm"] = json_list(point.point_in_anchor);
+  json["covariance_mm2"] = json_rows(point.covariance_in_anchor);
+  json["ray_gap_mm"] = point.ray_gap_mm;
+  json["predicted_mm"] = point.predicted_rms_mm();
+  json["views"] = point.views;
+  json["reason"] = nullptr;
+  return json;
+}
+
+}  // namespace helicarm

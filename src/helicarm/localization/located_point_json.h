@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "helicarm/core/json.h"
+#include "helicarm/localization/locate.h"
+
+namespace helicarm {
+
+/// One of a result's "points", in the calibrator's frame; the places in bones and tool are null until
+/// guidance fills them.
+Json point_json(const LocatedPoint& located_in_calibrator);
+
+/// A point that was not located, and why.
+Json point_json(const std::string& name, PointSource source, Reason reason);
+
+}  // namespace helicarm
