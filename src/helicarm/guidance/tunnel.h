@@ -17,7 +17,7 @@ struct Tunnel {
   std::optional<Eigen::Vector3d> start_in_tool;  ///< mm
   std::optional<Eigen::Vector3d> end_in_tool;
   std::optional<Eigen::Vector3d> axis_in_tool;  ///< unit, from start to end
-  double length_mm = 0;
+  std::optional<double> length_mm;
 };
 
 inline constexpr double shortest_tunnel_mm = 1;

@@ -17,7 +17,7 @@ TEST(PlanTunnel, AxisRunsFromStartToEnd) {
   const auto tunnel = plan_tunnel("femur", point_at(40, true), point_at(10, true));
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_EQ(*tunnel->axis_in_tool, Eigen::Vector3d(-1, 0, 0));
-  EXPECT_DOUBLE_EQ(tunnel->length_mm, 30);
+  EXPECT_DOUBLE_EQ(*tunnel->length_mm, 30);
 }
 
 TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsKnown) {
@@ -25,7 +25,7 @@ TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsKnown) {
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_FALSE(tunnel->start_in_tool);
   EXPECT_FALSE(tunnel->axis_in_tool);
-  EXPECT_DOUBLE_EQ(tunnel->length_mm, 30);
+  EXPECT_DOUBLE_EQ(*tunnel->length_mm, 30);
 }
 
 TEST(PlanTunnel, EntryAtExitIsRefused) {

@@ -1,27 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/navigation/accuracy.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "helicarm/core/random.h"
 
 namespace helicarm {
 namespace {
-
-TEST(StatisticsOf, KnownValues) {
-  const std::vector<double> values = {3, 4, 5};
-  const auto s = statistics_of(values);
-  ASSERT_TRUE(s);
-  EXPECT_DOUBLE_EQ(s->mean, 4);
-  EXPECT_DOUBLE_EQ(s->rms, std::sqrt(50 / 3.0));
-  EXPECT_EQ(s->max, 5);
-  EXPECT_EQ(s->min, 3);
-  EXPECT_EQ(s->n, 3u);
-}
-
-TEST(StatisticsOf, NoValuesHaveNone) { EXPECT_FALSE(statistics_of({})); }
 
 TEST(LengthAt95, OneTwoAndThreeEqualAxes) {
   const auto length = [](double x, double y, double z) {
@@ -43,25 +28,6 @@ TEST(LengthAt95, UnequalAxesHoldNinetyFivePercent) {
     within += sigma.cwiseProduct(Eigen::Vector3d(stream.normal(), stream.normal(), stream.normal())).norm() <=
               limit;
   EXPECT_NEAR(within / double(trials), 0.95, 0.006);
-}
-
-TEST(EstimateLocalizationError, ScalesResidualsByTheDegreesOfFreedom) {
-  Fiducial used{"P1", Eigen::Vector3d::Zero()};
-  used.status = FiducialStatus::used;
-  used.residual_px = 0.1;
-  Fiducial rejected = used;
-  rejected.status = FiducialStatus::rejected;
-  std::vector<Fiducial> of_view(12, used);
-  of_view.push_back(rejected);
-  const std::vector<std::vector<Fiducial>> fiducials = {of_view, of_view};
-  CalibratedView view;
-  view.dof = 14;
-  const std::vector<CalibratedView> views = {view, view};
-  const auto error = estimate_localization_error(fiducials, views);
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->n, 24u);
-  EXPECT_NEAR(error->rms, std::sqrt(2 * 24 * 0.01 / 28), 1e-12);
-  EXPECT_NEAR(error->mean, error->rms * std::sqrt(std::numbers::pi) / 2, 1e-12);
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ std::string_view name_of(FiducialStatus status) {
 
 Json json_of(const Rectification& rectification) {
   const DistortionMap& map = rectification.map;
-  const bool fitted = !rectification.plate_dots.empty();
+  const bool fitted = !map.is_identity();
   const auto if_fitted = [&](double value) { return fitted ? number(value) : Json(nullptr); };
   return {{"model", map.model},
           {"dots_found", rectification.dots_found},
@@ -142,15 +142,14 @@ Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
   return json;
 }
 
-Json json_of(const std::optional<Statistics>& s) {
-  if (!s) return nullptr;
-  return {{"mean", s->mean}, {"rms", s->rms}, {"max", s->max}, {"min", s->min}, {"n", s->n}};
+Json json_of(const Statistics& s) {
+  if (s.n == 0) return nullptr;
+  return {{"mean", s.mean}, {"rms", s.rms}, {"max", s.max}, {"min", s.min}, {"n", s.n}};
 }
 
 Json json_of(const Accuracy& accuracy) {
   Json json;
-  const auto& fle = accuracy.fle_px;
-  json["fle_px"] = fle ? Json({{"mean", fle->mean}, {"rms", fle->rms}, {"n", fle->n}}) : Json(nullptr);
+  json["fle_px"] = json_of(accuracy.fle_px);
   json["fre_mm"] = json_of(accuracy.fre_mm);
   json["tre_mm"] = json_of(accuracy.tre_mm);
   json["targets"] = Json::array();
@@ -167,25 +166,29 @@ Json json_of(const Tunnel& tunnel) {
           {"start_in_tool", optional_vector(tunnel.start_in_tool)},
           {"end_in_tool", optional_vector(tunnel.end_in_tool)},
           {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
-          {"length_mm", tunnel.length_mm}};
+          {"length_mm", optional_number(tunnel.length_mm)}};
 }
 
 Json json_of(const Verification& verification, const std::vector<ViewResult>& views) {
-  const auto per_view = [&](const LineError& error) {
+  const auto per_view = [&](const std::optional<LineError>& error) {
     Json json = Json::object();
     for (std::size_t i = 0; i < views.size(); ++i)
-      json[views[i].name] = optional_number(error.per_view_px[i]);
+      json[views[i].name] = error ? optional_number(error->per_view_px[i]) : Json(nullptr);
     return json;
   };
-  return {{"name", verification.name},
-          {"start_px", per_view(verification.start)},
-          {"end_px", per_view(verification.end)},
-          {"err_start_px", verification.start.combined_px},
-          {"err_end_px", verification.end.combined_px},
-          {"err_start_mm", verification.start.combined_mm},
-          {"err_end_mm", verification.end.combined_mm},
-          {"distance_start_mm", verification.start.distance_mm},
-          {"distance_end_mm", verification.end.distance_mm}};
+  const auto& [name, start, end] = verification;
+  const auto figure = [](const std::optional<LineError>& error, double LineError::*which) {
+    return error ? number((*error).*which) : Json(nullptr);
+  };
+  return {{"name", name},
+          {"start_px", per_view(start)},
+          {"end_px", per_view(end)},
+          {"err_start_px", figure(start, &LineError::combined_px)},
+          {"err_end_px", figure(end, &LineError::combined_px)},
+          {"err_start_mm", figure(start, &LineError::combined_mm)},
+          {"err_end_mm", figure(end, &LineError::combined_mm)},
+          {"distance_start_mm", figure(start, &LineError::distance_mm)},
+          {"distance_end_mm", figure(end, &LineError::distance_mm)}};
 }
 
 Json json_of(const Timing& timing) {

@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -38,8 +37,6 @@ struct ViewResult {
   std::optional<CalibratedView> calibrated;
 };
 
-enum class PointSource { pick, target };
-
 /// One pick or check target: where it was seen and where it is, or why it could not be located.
 struct PointResult {
   std::string name;
@@ -49,6 +46,12 @@ struct PointResult {
   std::optional<GuidedPoint> place;
   double ray_gap_mm = 0;
   std::optional<Failure> reason;  ///< of an absent place
+};
+
+/// A planned tunnel's start and end, as indices among the points.
+struct TunnelEnds {
+  std::size_t start;
+  std::size_t end;
 };
 
 /// Wall clock of each stage, ms; nothing where it was not reached.
@@ -65,8 +68,8 @@ struct Result {
   Eigen::MatrixXd joint_covariance;  ///< of all views' parameters, 10 each; as CalibratedView::covariance
   std::vector<PointResult> points;
   Accuracy accuracy;
-  std::vector<std::pair<std::size_t, std::size_t>> tunnel_ends;  ///< start and end among `points`, as planned
-  std::vector<Tunnel> tunnels;                                   ///< those whose ends are located
+  std::vector<TunnelEnds> tunnel_ends;
+  std::vector<Tunnel> tunnels;
   std::vector<ToolLine> tool_lines;
   std::vector<Verification> verifications;
   Timing timing_ms;

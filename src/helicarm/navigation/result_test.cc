@@ -34,7 +34,7 @@ TEST(ResultJson, HoldsEveryKeyOfTheContract) {
   point.place = GuidedPoint{};
   result.points.push_back(point);
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
-  result.verifications.push_back({"drill", {{1.0, {}}, 1, 2, 3}, {{1.0, {}}, 1, 2, 3}});
+  result.verifications.push_back({"drill", LineError{{1.0, {}}, 1, 2, 3}, LineError{{1.0, {}}, 1, 2, 3}});
   const Json json = to_json(result);
 
   expect_keys(json, {"format", "status", "failure", "warnings", "views", "points", "accuracy", "tunnels",

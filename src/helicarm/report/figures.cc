@@ -16,7 +16,8 @@ namespace {
 
 using Pixel = Eigen::Vector2d;
 
-/// Collects SVG elements; `unit` is about a thousandth of the picture's width, so that strokes look alike at any size.
+/// Collects SVG elements; `unit` is about a thousandth of the picture's width, so that strokes look alike at
+/// any size.
 class Drawing {
  public:
   explicit Drawing(double unit) : unit_(unit) {}
@@ -26,7 +27,8 @@ class Drawing {
     put(R"(<circle class="{}" cx="{:.2f}" cy="{:.2f}" r="{:.2f}"/>)", kind, at.x(), at.y(), radius * unit_);
   }
   void line(std::string_view kind, const Pixel& a, const Pixel& b) {
-    put(R"(<line class="{}" x1="{:.2f}" y1="{:.2f}" x2="{:.2f}" y2="{:.2f}"/>)", kind, a.x(), a.y(), b.x(), b.y());
+    put(R"(<line class="{}" x1="{:.2f}" y1="{:.2f}" x2="{:.2f}" y2="{:.2f}"/>)", kind, a.x(), a.y(), b.x(),
+        b.y());
   }
   void arrow(std::string_view kind, const Pixel& from, const Pixel& to) {
     line(kind, from, to);
@@ -44,8 +46,8 @@ class Drawing {
     line(kind, at - b, at + b);
   }
   void text(std::string_view kind, const Pixel& at, std::string_view words) {
-    put(R"(<text class="{}" x="{:.2f}" y="{:.2f}" font-size="{:.1f}">{}</text>)", kind, at.x(), at.y(), 15 * unit_,
-        escaped(words));
+    put(R"(<text class="{}" x="{:.2f}" y="{:.2f}" font-size="{:.1f}">{}</text>)", kind, at.x(), at.y(),
+        15 * unit_, escaped(words));
   }
   template <class... Args>
   void put(fmt::format_string<Args...> format, Args&&... args) {
@@ -102,7 +104,8 @@ void draw_fiducials(Drawing& drawing, const ViewResult& view, int height) {
       drawing.arrow("residual", fiducial.uv, fiducial.uv + magnification * residual);
     }
   }
-  if (calibrated && largest > 0) scale_bar(drawing, height, round_below(largest), magnification, "residuals:");
+  if (calibrated && largest > 0)
+    scale_bar(drawing, height, round_below(largest), magnification, "residuals:");
 }
 
 void draw_points(Drawing& drawing, const Result& result, std::size_t view) {
@@ -133,8 +136,8 @@ std::string view_figure(const Result& result, std::size_t index) {
   if (!view.exposure) return {};
   const Image<std::uint8_t> picture = rectified_picture(view);
   Drawing drawing(unit_of(view));
-  drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)", picture.width(),
-              picture.height(), base64(encode_png(picture)));
+  drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)",
+              picture.width(), picture.height(), base64(encode_png(picture)));
   if (view.rectification) draw_dots(drawing, view);
   if (view.found) draw_fiducials(drawing, view, picture.height());
   draw_points(drawing, result, index);
@@ -161,8 +164,7 @@ std::string distortion_figure(const ViewResult& view) {
   Drawing drawing(map.width / 1024.0);
   const double magnification = std::max(round_below(1.2 * cell.minCoeff() / largest), 1.0);
   drawing.put(R"(<rect class="frame" x="-0.5" y="-0.5" width="{}" height="{}"/>)", map.width, map.height);
-  for (const auto& [at, displacement] : field)
-    drawing.arrow("field", at, at + magnification * displacement);
+  for (const auto& [at, displacement] : field) drawing.arrow("field", at, at + magnification * displacement);
   scale_bar(drawing, map.height, round_below(largest), magnification, "distortion:");
   return drawing.svg("Distortion of " + view.name, map.width, map.height);
 }

@@ -8,7 +8,8 @@
 
 namespace helicarm {
 
-/// Text made safe for HTML and SVG content and attributes: markup is escaped, control characters are replaced.
+/// Text made safe for HTML and SVG content and attributes: markup is escaped, control characters are
+/// replaced.
 std::string escaped(std::string_view text);
 
 std::string base64(std::string_view bytes);

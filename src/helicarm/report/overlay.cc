@@ -30,8 +30,8 @@ class Canvas {
     cv::cvtColor(as_mat(grey), picture_, cv::COLOR_GRAY2RGB);
   }
   void circle(const Eigen::Vector2d& at, double radius, const cv::Scalar& colour) {
-    cv::circle(picture_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1, cv::LINE_AA,
-               shift);
+    cv::circle(picture_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1,
+               cv::LINE_AA, shift);
   }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const cv::Scalar& colour) {
     cv::line(picture_, fixed_point(a), fixed_point(b), colour, 1, cv::LINE_AA, shift);

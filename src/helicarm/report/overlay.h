@@ -7,7 +7,8 @@
 
 namespace helicarm {
 
-/// The rectified picture of a view as PNG, with balls and labels, points, planned tunnels and tool lines drawn in.
+/// The rectified picture of a view as PNG, with balls and labels, points, planned tunnels and tool lines
+/// drawn in.
 std::string overlay_png(const Result& result, std::size_t view);
 
 /// NAME_overlay.png; view3_overlay.png and the like where a name does not suit a file.

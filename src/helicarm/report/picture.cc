@@ -8,7 +8,8 @@ namespace helicarm {
 
 Image<std::uint8_t> rectified_picture(const ViewResult& view) {
   const bool as_stored = !view.rectification || view.rectification->map.is_identity();
-  const Image<float> picture = as_stored ? view.exposure->pixels : resample(*view.exposure, view.rectification->map);
+  const Image<float> picture =
+      as_stored ? view.exposure->pixels : resample(*view.exposure, view.rectification->map);
   // The bare rim of the field would claim the window's ends: only what differs from it sets the window.
   std::vector<float> values;
   for (float value : picture.pixels())

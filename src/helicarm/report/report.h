@@ -8,7 +8,8 @@
 
 namespace helicarm {
 
-/// The whole report as one HTML page: pictures inside, nothing loaded from elsewhere, no identity of the patient.
+/// The whole report as one HTML page: pictures inside, nothing loaded from elsewhere, no identity of the
+/// patient.
 std::string report_html(const Result& result);
 
 /// Writes report.html and NAME_overlay.png for every view into `folder`.

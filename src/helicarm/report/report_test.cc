@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/report/report.h"
 
-#include <gtest/gtest.h>
-
 #include <set>
 #include <string>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include "helicarm/report/overlay.h"
 
@@ -34,13 +34,15 @@ Result full_result() {
     view.calibrated->view = {{400, 400, 20, 20.1, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
     result.views.push_back(std::move(view));
   }
-  PointResult seen{nasty, PointSource::pick, {}, {SeenPoint{{1, 2}, {3, 4}, 0.1}, {}}, GuidedPoint{}, 0.2, {}};
-  PointResult lost{"T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, nasty, "", {}}};
+  PointResult seen{nasty, PointSource::pick, {}, {SeenPoint{{1, 2}, {3, 4}, 0.1}, {}}, GuidedPoint{}, 0.2,
+                   {}};
+  PointResult lost{
+      "T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, nasty, "", {}}};
   result.points = {seen, lost};
   result.tunnel_ends = {{0, 0}};
   result.tunnels.push_back({nasty, {}, {}, {}, 30});
   result.tool_lines.push_back({nasty, nasty, {0, 0, 0}, {0, 10, 0}});
-  result.verifications.push_back({nasty, {{1.0, {}}, 1, 2, 3}, {{1.0, {}}, 1, 2, 3}});
+  result.verifications.push_back({nasty, LineError{{1.0, {}}, 1, 2, 3}, LineError{{1.0, {}}, 1, 2, 3}});
   result.warnings.push_back({Reason::few_fiducials, nasty, nasty, {}});
   result.accuracy.fre_mm = {0.1, 0.1, 0.2, 0.05, 12};
   result.accuracy.targets.push_back({nasty, 0.1, 0.1, 0.2});

@@ -13,11 +13,13 @@ namespace helicarm {
 namespace {
 
 std::string headed(std::string_view heading, const std::string& content) {
-  return content.empty() ? std::string{} : fmt::format("<section><h2>{}</h2>\n{}</section>\n", heading, content);
+  return content.empty() ? std::string{}
+                         : fmt::format("<section><h2>{}</h2>\n{}</section>\n", heading, content);
 }
 
 std::string card(const std::string& value, std::string_view unit, std::string_view what) {
-  return fmt::format("<div class=\"card\"><b>{} <small>{}</small></b><span>{}</span></div>\n", value, unit, what);
+  return fmt::format("<div class=\"card\"><b>{} <small>{}</small></b><span>{}</span></div>\n", value, unit,
+                     what);
 }
 
 std::string coordinates(const std::optional<Eigen::Vector3d>& point) {
@@ -26,7 +28,8 @@ std::string coordinates(const std::optional<Eigen::Vector3d>& point) {
 
 std::string message_of(const Failure& failure) {
   const std::string view = failure.view.empty() ? std::string{} : escaped(failure.view) + ": ";
-  return fmt::format("{}{} <span class=\"soft\">({})</span>", view, escaped(failure.message), code(failure.reason));
+  return fmt::format("{}{} <span class=\"soft\">({})</span>", view, escaped(failure.message),
+                     code(failure.reason));
 }
 
 double largest_error_95(const Result& result) {
@@ -38,7 +41,8 @@ double largest_error_95(const Result& result) {
 
 /// A bar as long as the error, on the scale of the largest.
 std::string error_bar(double error, double largest) {
-  return fmt::format("<span class=\"error\" style=\"width:{:.2f}rem\"></span>", largest > 0 ? 8 * error / largest : 0);
+  return fmt::format("<span class=\"error\" style=\"width:{:.2f}rem\"></span>",
+                     largest > 0 ? 8 * error / largest : 0);
 }
 
 std::string status_cell(const Fiducial& fiducial) {
@@ -47,11 +51,10 @@ std::string status_cell(const Fiducial& fiducial) {
   return fiducial.status == FiducialStatus::used ? word : fmt::format("<span class=\"bad\">{}</span>", word);
 }
 
-std::string statistics_row(HtmlTable& table, std::string_view what, const std::optional<Statistics>& s) {
-  if (s)
-    table.row({std::string(what), fixed(s->mean, 3), fixed(s->rms, 3), fixed(s->max, 3), fixed(s->min, 3),
-               std::to_string(s->n)});
-  return {};
+void statistics_row(HtmlTable& table, std::string_view what, const Statistics& s) {
+  if (s.n > 0)
+    table.row({std::string(what), fixed(s.mean, 3), fixed(s.rms, 3), fixed(s.max, 3), fixed(s.min, 3),
+               std::to_string(s.n)});
 }
 
 }  // namespace
@@ -59,17 +62,20 @@ std::string statistics_row(HtmlTable& table, std::string_view what, const std::o
 std::string summary_section(const Result& result) {
   std::string html;
   if (result.failure)
-    html += fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure));
+    html +=
+        fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure));
   else
     html += "<p><span class=\"state ok\">measured</span></p>\n";
   const Accuracy& accuracy = result.accuracy;
   std::string cards;
-  if (accuracy.fre_mm) cards += card(fixed(accuracy.fre_mm->mean, 3), "mm", "fiducial registration error, mean");
-  if (accuracy.tre_mm) {
-    cards += card(fixed(accuracy.tre_mm->mean, 3), "mm", "target registration error, mean");
-    cards += card(fixed(accuracy.tre_mm->max, 3), "mm", "target registration error, largest");
+  if (accuracy.fre_mm.n)
+    cards += card(fixed(accuracy.fre_mm.mean, 3), "mm", "fiducial registration error, mean");
+  if (accuracy.tre_mm.n) {
+    cards += card(fixed(accuracy.tre_mm.mean, 3), "mm", "target registration error, mean");
+    cards += card(fixed(accuracy.tre_mm.max, 3), "mm", "target registration error, largest");
   }
-  if (accuracy.fle_px) cards += card(fixed(accuracy.fle_px->rms, 3), "px", "fiducial localization error, rms");
+  if (accuracy.fle_px.n)
+    cards += card(fixed(accuracy.fle_px.rms, 3), "px", "fiducial localization error, rms");
   if (const double largest = largest_error_95(result); largest > 0)
     cards += card(fixed(largest, 3), "mm", "least certain point, predicted at 95 %");
   if (!cards.empty()) html += "<div class=\"cards\">\n" + cards + "</div>\n";
@@ -89,21 +95,23 @@ std::string views_section(const Result& result) {
     html += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", figure, caption);
   }
   if (html.empty()) return {};
-  return headed("The X-rays, rectified",
-                "<div class=\"views\">\n" + html +
-                    "</div>\n<p class=\"soft\">Green: balls used, with their residuals as orange arrows. Red crosses: "
-                    "false blobs. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: tool.</p>\n");
+  return headed(
+      "The X-rays, rectified",
+      "<div class=\"views\">\n" + html +
+          "</div>\n<p class=\"soft\">Green: balls used, with their residuals as orange arrows. Red crosses: "
+          "false blobs. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: tool.</p>\n");
 }
 
 std::string points_section(const Result& result) {
-  HtmlTable table({"Point", "Kind", "In calibrator, mm", "#&#963; x", "#&#963; y", "#&#963; z", "#Error at 95 %, mm", "",
-                   "#Ray gap, mm"});
+  HtmlTable table({"Point", "Kind", "In calibrator, mm", "#&#963; x", "#&#963; y", "#&#963; z",
+                   "#Error at 95 %, mm", "", "#Ray gap, mm"});
   const double largest = largest_error_95(result);
   for (const PointResult& point : result.points) {
     const std::string kind = point.source == PointSource::pick ? "pick" : "target";
     if (!point.place) {
       const std::string why = point.reason ? message_of(*point.reason) : std::string("–");
-      table.row({escaped(point.name), kind, "<span class=\"bad\">" + why + "</span>", "–", "–", "–", "–", "", "–"});
+      table.row(
+          {escaped(point.name), kind, "<span class=\"bad\">" + why + "</span>", "–", "–", "–", "–", "", "–"});
       continue;
     }
     const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
@@ -144,8 +152,9 @@ std::string guidance_section(const Result& result) {
   HtmlTable lines({"Tool line", "End", "#Eq. 17, px", "#Eq. 17, mm", "#In space, mm"});
   for (const Verification& verification : result.verifications)
     for (const auto& [end, error] : {std::pair{"start", &verification.start}, {"end", &verification.end}})
-      lines.row({escaped(verification.name), end, fixed(error->combined_px, 2), fixed(error->combined_mm, 2),
-                 fixed(error->distance_mm, 2)});
+      if (*error)
+        lines.row({escaped(verification.name), end, fixed((*error)->combined_px, 2),
+                   fixed((*error)->combined_mm, 2), fixed((*error)->distance_mm, 2)});
   if (!lines.empty()) html += headed("Verification", lines.html());
   return html;
 }
@@ -156,7 +165,8 @@ std::string fiducials_section(const Result& result) {
     if (!view.found) continue;
     HtmlTable table({"Ball", "Status", "#u raw", "#v raw", "#u", "#v", "#&#963;, px", "#Residual, px"});
     for (const Fiducial& fiducial : view.found->fiducials) {
-      const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+      const bool seen =
+          fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
       const auto if_seen = [&](double value, int digits) {
         return seen ? fixed(value, digits) : std::string("–");
       };
@@ -180,12 +190,13 @@ std::string rectification_section(const Result& result) {
     table.row({escaped(view.name), escaped(r.map.model),
                r.dots_expected ? fmt::format("{} of {}", r.dots_found, *r.dots_expected)
                                : std::to_string(r.dots_found),
-               fixed(r.map.residual_rms_px, 3), fixed(r.map.residual_max_px, 3), fixed(r.map.held_out_rms_px, 3),
-               fixed(r.raw_mean_px, 2), fixed(r.raw_max_px, 2)});
+               fixed(r.map.residual_rms_px, 3), fixed(r.map.residual_max_px, 3),
+               fixed(r.map.held_out_rms_px, 3), fixed(r.raw_mean_px, 2), fixed(r.raw_max_px, 2)});
     if (const std::string figure = distortion_figure(view); !figure.empty())
-      figures += fmt::format("<figure class=\"plain\">{}<figcaption>Distortion in {}: from the rectified to the raw "
-                             "place.</figcaption></figure>\n",
-                             figure, escaped(view.name));
+      figures += fmt::format(
+          "<figure class=\"plain\">{}<figcaption>Distortion in {}: from the rectified to the raw "
+          "place.</figcaption></figure>\n",
+          figure, escaped(view.name));
   }
   if (table.empty()) return {};
   return headed("Rectification", table.html() + "<div class=\"views\">\n" + figures + "</div>\n");

@@ -43,8 +43,7 @@ Expected<LineError> distance_to_line(const std::vector<View>& views, const Plann
                   fmt::format("tool line \"{}\" reaches behind the source", line.name));
     const Eigen::Vector2d a = view.project(line.p1_in_calibrator);  // Eq. 6
     const Eigen::Vector2d b = view.project(line.p2_in_calibrator);
-    if ((b - a).norm() < least_image_length_px)
-      return fail(Reason::bad_value, fmt::format("tool line \"{}\" is seen end on", line.name));
+    if ((b - a).norm() < least_image_length_px) continue;
     const Eigen::Vector2d off = foot_on_line(*point.uv[i], a, b) - *point.uv[i];
     const double depth = view.depth(point.point_in_calibrator);
     const Eigen::Vector2d off_mm{depth * off.x() / view.intrinsics.fx, depth * off.y() / view.intrinsics.fy};
@@ -55,15 +54,6 @@ Expected<LineError> distance_to_line(const std::vector<View>& views, const Plann
   error.combined_px = std::sqrt(sum_px);  // Eq. 17
   error.combined_mm = std::sqrt(sum_mm);
   return error;
-}
-
-Expected<Verification> verify(const std::vector<View>& views, const PlannedPoint& start,
-                              const PlannedPoint& end, const ToolLine& line) {
-  auto at_start = distance_to_line(views, start, line);
-  if (!at_start) return tl::unexpected<Failure>(at_start.error());
-  auto at_end = distance_to_line(views, end, line);
-  if (!at_end) return tl::unexpected<Failure>(at_end.error());
-  return Verification{line.name, *at_start, *at_end};
 }
 
 }  // namespace helicarm

@@ -34,22 +34,20 @@ struct LineError {
   double distance_mm = 0;  ///< in space
 };
 
+/// A tool line against its tunnel; an end that is not located is absent.
 struct Verification {
   std::string name;
-  LineError start;
-  LineError end;
+  std::optional<LineError> start;
+  std::optional<LineError> end;
 };
 
 /// Foot of the perpendicular from `point` on the line through `a` and `b`.
 Eigen::Vector2d foot_on_line(const Eigen::Vector2d& point, const Eigen::Vector2d& a,
                              const Eigen::Vector2d& b);
 
-/// Eq. 17 for one point. `behind_source` where an end of the line cannot be projected, `bad_value` where the
-/// line runs along a ray and is a point in that view.
+/// Eq. 17 for one point. A view that sees the line end on is left out. Refuses `behind_source` where an end
+/// of the line cannot be projected.
 Expected<LineError> distance_to_line(const std::vector<View>& views, const PlannedPoint& point,
                                      const ToolLine& line);
-
-Expected<Verification> verify(const std::vector<View>& views, const PlannedPoint& start,
-                              const PlannedPoint& end, const ToolLine& line);
 
 }  // namespace helicarm

@@ -22,7 +22,7 @@ PlannedPoint seen_in_both(const Eigen::Vector3d& point) {
 
 const ToolLine along_y{"femur", "femur", {0, -20, 0}, {0, 30, 0}};
 
-TEST(Verify, OffsetsOfOneAxisShowInTheViewThatSeesThem) {
+TEST(DistanceToLine, OffsetsOfOneAxisShowInTheViewThatSeesThem) {
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({0, 5, 2}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(*error->per_view_px[0], 0, 1e-9);
@@ -32,7 +32,7 @@ TEST(Verify, OffsetsOfOneAxisShowInTheViewThatSeesThem) {
   EXPECT_NEAR(error->distance_mm, 2, 1e-12);
 }
 
-TEST(Verify, TwoViewsCombineAsTheRootOfTheSumOfSquares) {
+TEST(DistanceToLine, TwoViewsCombineAsTheRootOfTheSumOfSquares) {
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(error->distance_mm, 5, 1e-12);
@@ -41,14 +41,14 @@ TEST(Verify, TwoViewsCombineAsTheRootOfTheSumOfSquares) {
   EXPECT_NEAR(error->combined_mm, 5, 1e-9);
 }
 
-TEST(Verify, PointOnTheLineBeyondItsEndsHasNoError) {
+TEST(DistanceToLine, PointOnTheLineBeyondItsEndsHasNoError) {
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({0, 90, 0}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(error->combined_px, 0, 1e-9);
   EXPECT_NEAR(error->distance_mm, 0, 1e-12);
 }
 
-TEST(Verify, ViewThatDidNotSeeThePointIsLeftOut) {
+TEST(DistanceToLine, ViewThatDidNotSeeThePointIsLeftOut) {
   PlannedPoint point = seen_in_both({3, 0, 4});
   point.uv[1].reset();
   const auto error = distance_to_line({frontal(), lateral()}, point, along_y);
@@ -57,14 +57,16 @@ TEST(Verify, ViewThatDidNotSeeThePointIsLeftOut) {
   EXPECT_NEAR(error->combined_mm, 3, 1e-9);
 }
 
-TEST(Verify, LineSeenEndOnIsRefused) {
+TEST(DistanceToLine, ViewThatSeesTheLineEndOnIsLeftOut) {
   const ToolLine along_z{"femur", "femur", {0, 0, -20}, {0, 0, 30}};
-  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), along_z);
-  ASSERT_FALSE(error.has_value());
-  EXPECT_EQ(error.error().reason, Reason::bad_value);
+  const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 4, 0}), along_z);
+  ASSERT_TRUE(error.has_value());
+  EXPECT_FALSE(error->per_view_px[0]);
+  EXPECT_NEAR(error->combined_mm, 4, 1e-9);
+  EXPECT_NEAR(error->distance_mm, 5, 1e-12);
 }
 
-TEST(Verify, LineBehindTheSourceIsRefused) {
+TEST(DistanceToLine, LineBehindTheSourceIsRefused) {
   const ToolLine behind{"femur", "femur", {0, 0, -900}, {0, 30, 0}};
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), behind);
   ASSERT_FALSE(error.has_value());
