@@ -43,19 +43,21 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
 
 DotFitOptions fit_options_for(const Exposure& exposure) {
   DotFitOptions options;
-  options.multiplicative = !exposure.acquisition.logarithmic.value_or(false);
   options.floor = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);
   options.ceiling = exposure.highest;
   return options;
 }
 
-BallProfile estimate_profile(const Exposure& exposure, std::vector<Dot> dots, const DotFitOptions& options) {
-  constexpr std::size_t sample = 12;
+DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
+  constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
-  const auto total = [&](double blur_px, double absorbance) {
-    const BallProfile profile(blur_px / radius, absorbance);
+  const DotFitOptions options = fit_options_for(exposure);
+  double blur = 1;
+  double absorbance = 2;
+  const auto total = [&] {
+    const BallProfile profile(blur / radius, absorbance);
     double sum = 0;
     for (const Dot& dot : dots) {
       const auto fitted = fit_dot(exposure.pixels, dot, profile, {}, options);
@@ -63,32 +65,31 @@ BallProfile estimate_profile(const Exposure& exposure, std::vector<Dot> dots, co
     }
     return sum;
   };
-  double blur = 1;
-  double absorbance = 2;
-  double best = total(blur, absorbance);
-  const auto climb = [&](double& value, double factor, double low, double high) {
-    for (const double f : {factor, 1 / factor}) {
+  double best = total();
+  const auto try_values = [&](double& value, auto next, double low, double high) {
+    for (const double direction : {1.0, -1.0}) {
       bool better = false;
-      while (value * f >= low && value * f <= high) {
+      while (true) {
         const double before = value;
-        value *= f;
-        if (const double now = total(blur, absorbance); now < best) {
-          best = now;
-          better = true;
-        } else {
+        value = next(value, direction);
+        const double now = value >= low && value <= high ? total() : best;
+        if (now >= best) {
           value = before;
           break;
         }
+        best = now;
+        better = true;
       }
       if (better) return;
     }
   };
-  for (const double factor : {1.4, 1.18}) {
-    climb(blur, factor, 0.3, 0.6 * radius + 0.3);
-    climb(absorbance, factor * factor, 0.1, 60);
-    climb(blur, factor, 0.3, 0.6 * radius + 0.3);
+  for (const double factor : {1.5, 1.2}) {
+    const auto scaled = [&](double x, double d) { return x * std::pow(factor, d); };
+    const auto scaled_twice = [&](double x, double d) { return x * std::pow(factor * factor, d); };
+    try_values(blur, scaled, 0.3, 0.6 * radius + 0.3);
+    try_values(absorbance, scaled_twice, 0.1, 60);
   }
-  return {blur / radius, absorbance};
+  return {BallProfile(blur / radius, absorbance), options};
 }
 
 std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) {
@@ -98,7 +99,9 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   blob_options.max_radius_px = options.max_radius_px;
   const std::vector<Dot> blobs = find_blobs(even_noise(exposure), blob_options);
   DotFitOptions fit = fit_options_for(exposure);
-  fit.tolerance = 0.1;  // the profile is only a guess so far
+  fit.tolerance = 0.1;  // the profile is only a guess so far, and so is the place
+  fit.margin_share = 0.35;
+  fit.margin_px = 3.5;
   const double least_contrast = options.min_contrast_share * double(exposure.highest - exposure.lowest);
   std::vector<BallProfile> profiles;  // by the radius' octave: the blur is about a pixel whatever the size
   for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5) profiles.emplace_back(1 / radius, 2.0);
@@ -116,11 +119,11 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   return without_doubles(std::move(dots));
 }
 
-std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const BallProfile& profile,
-                            const std::vector<Dot>& neighbours, const DotFitOptions& options) {
+std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const DotLook& look,
+                            const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
-    if (const auto better = fit_dot(exposure.pixels, dot, profile, discs_beside(dot, neighbours), options))
+    if (const auto better = fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options))
       refitted.push_back(*better);
   return refitted;
 }

@@ -19,17 +19,23 @@ struct DotOptions {
   double min_contrast_share = 0.012;  ///< contrast over the picture's range of grey values
 };
 
-/// How the grey values of one exposure are to be fitted: linear or logarithmic, and where they are clipped.
+/// Fit options for one exposure: where its grey values are clipped.
 DotFitOptions fit_options_for(const Exposure& exposure);
 
-/// The profile that best fits the given dots of one size (blur and absorbance by least misfit).
-BallProfile estimate_profile(const Exposure& exposure, std::vector<Dot> dots, const DotFitOptions& options);
+/// How dots of one size and make look in one exposure.
+struct DotLook {
+  BallProfile profile;
+  DotFitOptions options;
+};
+
+/// The look that fits the given dots of one size best: blur and absorbance of least total sigma.
+DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots);
 
 /// All round dots of one polarity, each with the fitted sub-pixel centre, its standard deviation and its radius.
 std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options);
 
-/// Fits every dot again with the profile made for its size and with its neighbours masked.
-std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const BallProfile& profile,
-                            const std::vector<Dot>& neighbours, const DotFitOptions& options);
+/// Fits every dot again with the look of its kind and with its neighbours masked; those that fail are left out.
+std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const DotLook& look,
+                            const std::vector<Dot>& neighbours);
 
 }  // namespace helicarm

@@ -11,8 +11,9 @@
 namespace helicarm {
 namespace {
 
-/// Parameters: background b0 bx by bxx bxy byy (patch coordinates in units of the window), contrast, centre, radius.
-constexpr int n_parameters = 10;
+/// Parameters: background b0 bx by bxx bxy byy (patch coordinates in units of the window), contrast, centre, hidden share,
+/// radius.
+constexpr int n_parameters = 11;
 constexpr int n_background = 6;
 using Parameters = Eigen::Matrix<float, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
@@ -29,7 +30,6 @@ struct Patch {
   std::vector<Pixel> pixels;
   float inverse_window;
   float scale;  ///< grey values are divided by it
-  bool multiplicative;
 };
 
 /// Value and derivatives at one pixel.
@@ -43,17 +43,20 @@ inline float model(const Patch& patch, const BallProfile& profile, const Paramet
   const float dx = pixel.x - p[7];
   const float dy = pixel.y - p[8];
   const float distance = std::sqrt(dx * dx + dy * dy);
-  const auto [value, slope] = profile.at(distance / p[9]);
-  const float gain = patch.multiplicative ? background : 1.0f;
-  const float shade = patch.multiplicative ? 1 - p[6] * value : 1.0f;
-  for (int k = 0; k < n_background; ++k) jacobian[k] = basis[static_cast<std::size_t>(k)] * shade;
-  jacobian[6] = -gain * value;
-  const float steep = -gain * p[6] * slope / p[9];
+  const auto [value, slope] = profile.at(distance / p[10]);
+  const float slant = p[1] * x + p[2] * y;
+  const float height = p[6] + p[9] * slant;
+  for (int k = 0; k < n_background; ++k) jacobian[k] = basis[static_cast<std::size_t>(k)];
+  jacobian[1] -= p[9] * x * value;
+  jacobian[2] -= p[9] * y * value;
+  jacobian[6] = -value;
+  const float steep = -height * slope / p[10];
   const float along = distance > 1e-4f ? steep / distance : 0;
   jacobian[7] = -along * dx;
   jacobian[8] = -along * dy;
-  jacobian[9] = -steep * distance / p[9];
-  return background - gain * p[6] * value;
+  jacobian[9] = -slant * value;
+  jacobian[10] = -steep * distance / p[10];
+  return background - height * value;
 }
 
 struct Sums {
@@ -109,7 +112,6 @@ std::optional<Patch> gather(const Image<float>& image, int u, int v, float windo
                             const DotFitOptions& options) {
   Patch patch;
   patch.inverse_window = 1 / window;
-  patch.multiplicative = options.multiplicative;
   const int half = static_cast<int>(std::ceil(window));
   std::vector<Disc> near;
   for (const Disc& disc : others)
@@ -152,14 +154,13 @@ bool solve_linear(const Patch& patch, const BallProfile& profile, Parameters& p)
     const double y = double(pixel.y * patch.inverse_window);
     const float distance = std::hypot(pixel.x - p[7], pixel.y - p[8]);
     Eigen::Matrix<double, n, 1> row;
-    row << 1, x, y, x * x, x * y, y * y, -double(profile.at(distance / p[9]).value);
+    row << 1, x, y, x * x, x * y, y * y, -double(profile.at(distance / p[10]).value);
     normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
     right += double(pixel.grey) * row;
   }
   const Eigen::Matrix<double, n, 1> solution = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
   if (!solution.allFinite()) return false;
   p.head<n>() = solution.cast<float>();
-  if (patch.multiplicative) p[6] /= std::max(0.05f, p[0]);
   return true;
 }
 
@@ -178,45 +179,54 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
   Parameters p;
   p[7] = float(start.centre_px.x() - u);
   p[8] = float(start.centre_px.y() - v);
-  p[9] = radius;
+  p[9] = float(options.hidden_share);
+  p[10] = radius;
   if (!solve_linear(*patch, profile, p)) return std::nullopt;
 
   std::vector<float> residuals(patch->pixels.size());
   std::vector<float> scratch;
+  const auto noise = [&](const Sums& s) { return s.squares / std::max(1.0, s.weight - n_parameters); };
   const int free = options.free_radius ? n_parameters : n_parameters - 1;
   Sums sums = accumulate(*patch, profile, p, residuals);
   double move = 0;
   for (int i = 0; i < options.iterations; ++i) {
     const Vector step = [&] {
       Vector full = Vector::Zero();
-      full.head(free) = sums.normal.topLeftCorner(free, free).ldlt().solve(sums.right.head(free));
+      const double pull = noise(sums) / (options.hidden_sigma * options.hidden_sigma);
+      Normal normal = sums.normal;
+      Vector right = sums.right;
+      normal(9, 9) += pull;
+      right[9] += pull * (options.hidden_share - double(p[9]));
+      full.head(free) = normal.topLeftCorner(free, free).ldlt().solve(right.head(free));
       return full;
     }();
     if (!step.allFinite()) return std::nullopt;
     move = std::hypot(step[7], step[8]);
     const double limit = 0.35 * double(radius);
-    const float share = float(std::min(1.0, limit / std::max({move, std::abs(step[9]), 1e-12})));
+    const float share = float(std::min(1.0, limit / std::max({move, std::abs(step[10]), 1e-12})));
     p += share * step.cast<float>();
-    if (!(p[9] > 0.5f * radius && p[9] < 1.8f * radius) || std::hypot(p[7], p[8]) > window) return std::nullopt;
+    if (!(p[10] > 0.5f * radius && p[10] < 1.8f * radius) || std::hypot(p[7], p[8]) > window) return std::nullopt;
     accumulate(*patch, profile, p, residuals);
-    const float contrast = std::abs(p[6] * (patch->multiplicative ? p[0] : 1.0f));
-    reweight(*patch, residuals, float(options.tolerance) * contrast, scratch);
+    // Outliers are told from a rough start only by and by.
+    const double tolerance = std::max(options.tolerance, 0.3 * std::pow(0.5, i));
+    reweight(*patch, residuals, float(tolerance) * std::abs(p[6]), scratch);
     sums = accumulate(*patch, profile, p, residuals);
-    if (i >= 2 && move < 2e-3) break;
+    if (i >= 4 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
 
-  const double variance = sums.squares / std::max(1.0, sums.weight - free);
+  const double variance = noise(sums);
+  sums.normal(9, 9) += variance / (options.hidden_sigma * options.hidden_sigma);
   const Normal inverse = [&] {
     Normal full = Normal::Zero();
     full.topLeftCorner(free, free) =
         sums.normal.topLeftCorner(free, free).ldlt().solve(Eigen::MatrixXd::Identity(free, free));
     return full;
   }();
-  const double contrast = double(p[6]) * (patch->multiplicative ? double(p[0]) : 1.0);
+  const double contrast = double(p[6]);
   Dot dot;
   dot.centre_px = {u + double(p[7]), v + double(p[8])};
-  dot.radius_px = double(p[9]);
+  dot.radius_px = double(p[10]);
   dot.sigma_px = std::sqrt(std::max(0.0, variance * 0.5 * (inverse(7, 7) + inverse(8, 8))));
   dot.contrast = contrast * double(patch->scale);
   double raw_squares = 0;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <vector>
+#include <span>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/detection/fit_dot.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/distortion_map.h"
@@ -18,13 +19,15 @@ struct SeenPoint {
   double sigma_px;         ///< per axis, rectified
 };
 
-/// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts it.
-/// target_not_found, not_seen (outside the picture).
+/// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts it: the
+/// absorption of the solid itself, drawn for this view, is shifted until it fits the pixels. `others` are discs to leave
+/// out. target_not_found; not_seen when it falls outside the picture.
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                const CalibratorTarget& target);
+                                const CalibratorTarget& target, std::span<const Disc> others);
 
-/// The ball nearest to a click (picks with "snap": "ball"), its centre corrected for perspective and distortion.
-Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const Eigen::Vector2d& click_raw,
-                                 std::optional<double> diameter_px);
+/// The image of the centre of the ball nearest to a click (picks with "snap": "ball"). The ball is taken to be at
+/// `depth_mm` from the source. target_not_found where no such ball is within its own radius of the click.
+Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view, double depth_mm,
+                                 const Eigen::Vector2d& click_raw, double diameter_mm);
 
 }  // namespace helicarm

@@ -10,8 +10,8 @@ namespace helicarm {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double radius_bias = 0.1;    // relative, of the detector's radii as a whole
 constexpr double radius_sigmas = 4;
+constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or metal is no better known
 constexpr double match_sigmas = 3.5;   // loses one ball in 460
 constexpr double depth_span = 1.4;     // ln of the ratio of the farthest to the nearest distance thinkable
 
@@ -25,6 +25,30 @@ std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& c
   return sightings;
 }
 
+struct RadiusVerdict {
+  double excess = 0;
+  double chi2 = 0;
+};
+
+/// How well the radii fit the distances, the common bias being known only to its sigma.
+RadiusVerdict radius_verdict(const Scene& scene, const Hypothesis& h) {
+  double weight = 0;
+  double first = 0;
+  double second = 0;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    if (h.candidate_of_ball[k] < 0) continue;
+    const auto& seen = scene.candidates[h.candidate_of_ball[k]];
+    const double expected = h.fit.view.intrinsics.fy * scene.balls[k].radius_mm / h.fit.view.depth(scene.balls[k].centre);
+    const double excess = std::log(seen.radius_px / expected) - std::log1p(scene.radius_bias);
+    const double sigma = std::max(seen.radius_sigma_px / seen.radius_px, least_radius_sigma);
+    weight += 1 / (sigma * sigma);
+    first += excess / (sigma * sigma);
+    second += excess * excess / (sigma * sigma);
+  }
+  const double bias_weight = 1 / (scene.radius_bias_sigma * scene.radius_bias_sigma);
+  return {first / weight, second - first * first / (weight + bias_weight)};
+}
+
 /// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the field, ln
 /// depth even over its span, any number of balls visible and then any of them, mirrored or not.
 double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, const PoseFit& fit) {
@@ -32,13 +56,14 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   const double b = static_cast<double>(scene.balls.size());
   const double m = static_cast<double>(sightings.size());
   const double log_2pi = std::log(2 * std::numbers::pi);
+  const double field_area = std::numbers::pi * scene.field_radius_px * scene.field_radius_px;
   double odds = -0.5 * fit.chi2;
-  for (const auto& s : sightings) odds += std::log(scene.field_area_px2 / (s.sigma_px * s.sigma_px)) - log_2pi;
+  for (const auto& s : sightings) odds += std::log(field_area / (s.sigma_px * s.sigma_px)) - log_2pi;
   odds += std::lgamma(n - m + 1) - std::lgamma(n + 1);                                // which candidates, in order
   odds += std::lgamma(m + 1) + std::lgamma(b - m + 1) - std::lgamma(b + 1) - std::log(b + 1);  // which balls
   const double z = fit.view.camera_from_world.translation.z();
   const double per_mm = scene.camera.focal_px / z;
-  odds += std::log(per_mm * per_mm / scene.field_area_px2 / (z * depth_span));
+  odds += std::log(per_mm * per_mm / field_area / (z * depth_span));
   odds -= std::log(8 * std::numbers::pi * std::numbers::pi) + std::numbers::ln2;
   odds -= std::log(scene.camera.focal_sigma) + 2 * std::log(scene.camera.principal_sigma_px);
   return odds + fit.log_volume + 3 * log_2pi;
@@ -46,11 +71,10 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
 
 }  // namespace
 
-Scale scale_by_radius(const BallCandidate& candidate, const ModelBall& ball) {
-  const double spread = radius_sigmas * candidate.radius_sigma_px;
-  const double smallest = candidate.radius_px * (1 - radius_bias) - spread;
-  return {ball.radius_mm / (candidate.radius_px * (1 + radius_bias) + spread),
-          smallest > 0 ? ball.radius_mm / smallest : infinity};
+Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball, double sigmas) {
+  const double radius = candidate.radius_px / (1 + scene.radius_bias);
+  const double spread = sigmas * std::hypot(candidate.radius_sigma_px, radius * scene.radius_bias_sigma);
+  return {ball.radius_mm / (radius + spread), radius > spread ? ball.radius_mm / (radius - spread) : infinity};
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas) {
@@ -70,7 +94,7 @@ std::vector<int> match(const Scene& scene, const View& view, double gate_px, dou
       if (distance2 > gate_px * gate_px) continue;
       const double cost = distance2 / (candidate.sigma_px * candidate.sigma_px);
       if (cost > gate_sigmas * gate_sigmas) continue;
-      if (!scale_by_radius(candidate, scene.balls[k]).holds(depth / view.intrinsics.fy)) continue;
+      if (!scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy)) continue;
       pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
     }
   }
@@ -85,13 +109,7 @@ std::vector<int> match(const Scene& scene, const View& view, double gate_px, dou
   return candidate_of_ball;
 }
 
-Hypothesis settle(const Scene& given, const View& rough, double rough_gate_px, double least_sigma_px) {
-  Scene floored;
-  if (least_sigma_px > 0) {
-    floored = given;
-    for (auto& candidate : floored.candidates) candidate.sigma_px = std::max(candidate.sigma_px, least_sigma_px);
-  }
-  const Scene& scene = least_sigma_px > 0 ? floored : given;
+Hypothesis settle(const Scene& scene, const View& rough) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
@@ -99,7 +117,7 @@ Hypothesis settle(const Scene& given, const View& rough, double rough_gate_px, d
   constexpr int most_turns = 8;
   for (int turn = 0; turn < most_turns; ++turn) {
     const bool last_gate = turn >= 2;
-    auto matches = match(scene, h.fit.view, last_gate ? infinity : rough_gate_px / (1 + 2 * turn),
+    auto matches = match(scene, h.fit.view, last_gate ? infinity : rough_gate_px(scene) / (1 + 2 * turn),
                          last_gate ? match_sigmas : infinity);
     if (last_gate && matches == h.candidate_of_ball && turn > 2) break;
     h.candidate_of_ball = std::move(matches);
@@ -109,7 +127,9 @@ Hypothesis settle(const Scene& given, const View& rough, double rough_gate_px, d
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, last_gate ? 10 : 4);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
-  h.log_odds = log_odds(scene, sightings, h.fit);
+  const auto radii = radius_verdict(scene, h);
+  h.radius_excess = radii.excess;
+  h.log_odds = log_odds(scene, sightings, h.fit) - 0.5 * radii.chi2;
   return h;
 }
 

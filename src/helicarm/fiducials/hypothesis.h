@@ -14,7 +14,7 @@ struct BallCandidate {
   Eigen::Vector2d uv;      ///< rectified pixels
   double sigma_px;         ///< per axis
   double radius_px;
-  double radius_sigma_px;  ///< random part; a common bias of up to a tenth is allowed for
+  double radius_sigma_px;  ///< random part; the Scene's radius bias is common to all
 };
 
 struct ModelBall {
@@ -27,18 +27,19 @@ struct Scene {
   std::vector<ModelBall> balls;
   std::vector<BallCandidate> candidates;  ///< sigma_px floored
   CameraPrior camera;
-  double field_area_px2;  ///< where false blobs may lie
-
+  double field_radius_px;    ///< of the disc where false blobs may lie
+  double radius_bias;        ///< of all radii found, relative
+  double radius_bias_sigma;
 };
 
-/// Millimetres that a pixel may span at the candidate, if it is this ball, judged by its radius.
+/// Millimetres that a pixel may span at a candidate, if it is this ball, judged by its radius.
 struct Scale {
   double finest;
   double coarsest;
 
   bool holds(double mm_per_px) const { return finest <= mm_per_px && mm_per_px <= coarsest; }
 };
-Scale scale_by_radius(const BallCandidate& candidate, const ModelBall& ball);
+Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball, double sigmas);
 
 /// A pose and the candidate each ball has under it (-1: none).
 struct Hypothesis {
@@ -46,6 +47,7 @@ struct Hypothesis {
   int matched = 0;
   PoseFit fit;
   double residual2_px2 = 0;  ///< sum of squared distances
+  double radius_excess = 0;  ///< weighted mean of ln(radius found / radius expected at the ball's distance)
   /// Logarithm of the odds that these matches are the calibrator and not chance. With all candidates strewn evenly
   /// over the field, the odds summed over every hypothesis have expectation 1, so by Markov's inequality
   /// a sum above e^x comes by accident with a probability below e^-x.
@@ -58,9 +60,11 @@ struct Hypothesis {
 /// a distance from the source that fits the candidate's radius.
 std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas);
 
-/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With
-/// `least_sigma_px` the candidates are taken to be at least that uncertain. A hypothesis of fewer than four matches is
-/// worth nothing and comes back with log_odds = -infinity.
-Hypothesis settle(const Scene& scene, const View& rough, double rough_gate_px, double least_sigma_px = 0);
+/// How far a pose from three points may err at the others.
+inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
+
+/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With fewer than
+/// four matches it is worth nothing: log_odds = -infinity.
+Hypothesis settle(const Scene& scene, const View& rough);
 
 }  // namespace helicarm

@@ -19,6 +19,7 @@ namespace {
 
 constexpr int least_balls = 6;
 constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
+constexpr std::size_t loose_triples = 60;
 constexpr int challenges = 8;              // triples of the best hypothesis on which rivals are sought
 
 using Triple = std::array<int, 3>;
@@ -38,12 +39,14 @@ Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& c
   }
   scene.candidates = candidates;
   for (auto& candidate : scene.candidates) {
-    candidate.sigma_px = std::hypot(candidate.sigma_px, options.systematic_sigma_px);
+    candidate.sigma_px = std::hypot(candidate.sigma_px, options.systematic_sigma * prior.field_radius_px);
   }
   const double r = prior.field_radius_px;
   scene.camera = {prior.focal_px.value_or(std::sqrt(4.0 * 24.0) * r), prior.focal_px ? prior.focal_sigma : 0.6,
                   prior.principal_px, prior.principal_sigma_px};
-  scene.field_area_px2 = std::numbers::pi * r * r;
+  scene.field_radius_px = r;
+  scene.radius_bias = prior.radius_bias;
+  scene.radius_bias_sigma = prior.radius_bias_sigma;
   return scene;
 }
 
@@ -87,11 +90,11 @@ bool recognised(const Ranking& ranking, const LabellingOptions& options) {
          ranking.front().log_odds >= options.least_log_odds;
 }
 
-void explore(LabelSearch& search, std::size_t candidates, const LabellingOptions& options) {
+void explore(LabelSearch& search, std::size_t candidates, std::size_t triples, const LabellingOptions& options) {
   std::vector<int> all(candidates);
   std::iota(all.begin(), all.end(), 0);
   TripleDealer dealer(all);
-  for (std::size_t i = 0; i < most_triples && !recognised(search.ranking(), options); ++i) {
+  for (std::size_t i = 0; i < triples && !recognised(search.ranking(), options); ++i) {
     search.try_triple(dealer.deal());
   }
 }
@@ -163,6 +166,20 @@ double deviate(double chi2, int dof) {
   return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
 }
 
+/// Log odds of the calibrator with its balls well off their places: above those of `best` when the file is of a
+/// similar but different calibrator, of which some balls happen to fit.
+double loose_log_odds(const Scene& scene, const Hypothesis& best, const LabellingPrior& prior,
+                      const LabellingOptions& options) {
+  Scene loose = scene;
+  for (auto& candidate : loose.candidates) candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * scene.field_radius_px);
+  const double near_best = settle(loose, best.fit.view).log_odds;
+  const auto unnamed = std::min(scene.candidates.size(), scene.balls.size()) - static_cast<std::size_t>(best.matched);
+  if (unnamed < 2 || near_best > best.log_odds) return near_best;
+  LabelSearch search(loose, focals_to_try(prior));
+  explore(search, loose.candidates.size(), loose_triples, options);
+  return search.ranking().empty() ? near_best : std::max(near_best, search.ranking().front().log_odds);
+}
+
 tl::unexpected<Failure> unexplained(const Scene& scene, const Ranking& ranking, const LabellingOptions& options) {
   const int n = static_cast<int>(scene.candidates.size());
   const int matched = ranking.empty() ? 0 : ranking.front().matched;
@@ -188,24 +205,24 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
                 {{"n", n}, {"candidates", n}, {"needed", least_balls}});
   }
   const Scene scene = scene_of(calibrator, candidates, prior, options);
-  LabelSearch search(scene, focals_to_try(prior), prior.field_radius_px);
-  explore(search, candidates.size(), options);
+  LabelSearch search(scene, focals_to_try(prior));
+  explore(search, candidates.size(), most_triples, options);
   if (!recognised(search.ranking(), options)) return unexplained(scene, search.ranking(), options);
   challenge(search);
 
   Hypothesis best = search.ranking().front();
   const int dof = 2 * best.matched - 6;
-  const Hypothesis loose = settle(scene, best.fit.view, 0.03 * prior.field_radius_px, 0.006 * prior.field_radius_px);
-  if (loose.log_odds > best.log_odds || deviate(best.fit.chi2, dof) > 4.5) {
+  const double loose = loose_log_odds(scene, best, prior, options);
+  if (loose > best.log_odds || deviate(best.fit.chi2, dof) > 4.5) {
     return fail(Reason::calibrator_mismatch,
                 fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
                             std::sqrt(best.residual2_px2 / best.matched)),
                 {{"matched", best.matched}, {"chi2", best.fit.chi2}, {"dof", dof},
-                 {"log_odds", best.log_odds}, {"log_odds_loose", loose.log_odds}});
+                 {"log_odds", best.log_odds}, {"log_odds_loose", loose}});
   }
 
   drop_doubtful(scene, best);
-  const double asked = options.least_log_odds * std::max(1.0, best.fit.chi2 / dof);
+  const double asked = options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 3 * std::sqrt(2.0 * dof)));
   int left = keep_agreed(best, best);
   for (const auto& rival : search.ranking()) {
     if (best.log_odds - rival.log_odds >= asked) break;
@@ -226,6 +243,7 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   labelling.matched = left;
   labelling.false_blobs = n - best.matched;
   labelling.rms_px = std::sqrt(best.residual2_px2 / best.matched);
+  labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best.radius_excess) - 1;
   labelling.log_odds = best.log_odds;
   labelling.margin = best.log_odds;
   for (const auto& rival : search.ranking()) {

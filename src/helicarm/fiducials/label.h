@@ -20,11 +20,13 @@ struct LabellingPrior {
   Eigen::Vector2d principal_px;        ///< nominal, the image's centre
   double principal_sigma_px = 30;      ///< per axis
   double field_radius_px;              ///< of the disc in which candidates may lie
+  double radius_bias = 0;              ///< of all candidates' radii, relative; as found in another view, if any
+  double radius_bias_sigma = 0.03;
 };
 
 struct LabellingOptions {
-  double systematic_sigma_px = 0.2;  ///< per axis, left by rectification; added in squares to each candidate's sigma
-  double least_log_odds = 11.5;      ///< ln of the odds asked for, against chance and against any other labelling
+  double systematic_sigma = 3e-4;  ///< per axis, of the field radius: left by rectification, added to each sigma
+  double least_log_odds = 9.2;     ///< ln of the odds asked for, against chance and against any other labelling
 };
 
 struct Labelling {
@@ -34,6 +36,7 @@ struct Labelling {
   int matched = 0;
   int false_blobs = 0;                 ///< candidates that are no ball
   double rms_px = 0;                   ///< distance between candidate and projection
+  double radius_bias = 0;              ///< found, relative; known to about one per cent
   double log_odds = 0;                 ///< against chance
   double margin = 0;                   ///< log odds against the best other labelling
   int runner_up_matched = 0;

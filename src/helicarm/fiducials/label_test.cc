@@ -155,14 +155,14 @@ std::map<int, Tally> monte_carlo(const Calibrator& calibrator, int trials, doubl
     const auto start = std::chrono::steady_clock::now();
     const auto labelling = label_balls(calibrator, picture.candidates, nominal);
     const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
-    if (milliseconds) milliseconds->push_back(spent.count());
+    if (milliseconds && labelling) milliseconds->push_back(spent.count());
     auto& tally = tallies[picture.visible];
     ++tally.views;
     const int wrong = labelling ? wrong_names(*labelling, picture, noise_px) : 0;
     tally.wrong += wrong > 0;
     tally.solved += labelling && wrong == 0;
     if (!labelling) ++tally.refusals[std::string(code(labelling.error().reason))];
-    if (tell && (wrong > 0 || (!labelling && picture.visible >= 8))) {
+    if (tell && (wrong > 0 || (!labelling && picture.visible >= 6))) {
       std::printf("trial %d: %zu candidates, %d visible, axis %.0f deg, ", trial, picture.candidates.size(),
                   picture.visible, picture.axis_deg);
       if (labelling) {

@@ -4,30 +4,28 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <utility>
 
 namespace helicarm {
 namespace {
 
-constexpr double relief = 0.15;        // depth of a triangle over its distance, for the first look at its scale
+constexpr double radius_sigmas = 3;     // a true triple lost here is made good by the next
 constexpr std::size_t most_kept = 24;  // hypotheses
 
 /// The fewest supporters (two or three) that chance gives to less than one pose in fifty.
-int support_needed(const Scene& scene, double gate_px) {
-  const double others = static_cast<double>(scene.balls.size() * scene.candidates.size());
-  const double mean = others * std::numbers::pi * gate_px * gate_px / scene.field_area_px2;
+int support_needed(const Scene& scene) {
+  const double gate = rough_gate_px(scene) / scene.field_radius_px;
+  const double mean = static_cast<double>(scene.balls.size() * scene.candidates.size()) * gate * gate;
   return 1 - std::exp(-mean) * (1 + mean) < 0.02 ? 2 : 3;
 }
 
 }  // namespace
 
-LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px, double field_radius_px)
+LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
     : scene_(scene),
       focals_px_(std::move(focals_px)),
-      flat_px_(0.04 * field_radius_px),
-      gate_px_(0.025 * field_radius_px),
-      support_(support_needed(scene, gate_px_)) {
+      flat_px_(0.04 * scene.field_radius_px),
+      support_(support_needed(scene)) {
   const int balls = static_cast<int>(scene.balls.size());
   for (int i = 0; i < balls; ++i) {
     for (int j = 0; j < balls; ++j) {
@@ -42,7 +40,7 @@ LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px, doub
   for (const auto& candidate : scene.candidates) {
     u_.push_back(static_cast<float>(candidate.uv.x()));
     v_.push_back(static_cast<float>(candidate.uv.y()));
-    for (const auto& ball : scene.balls) scales_.push_back(scale_by_radius(candidate, ball));
+    for (const auto& ball : scene.balls) scales_.push_back(scale_by_radius(scene, candidate, ball, radius_sigmas));
   }
 }
 
@@ -73,18 +71,15 @@ void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_p
     const Scale& s0 = scales[0][triangle.balls[0]];
     const Scale& s1 = scales[1][triangle.balls[1]];
     const Scale& s2 = scales[2][triangle.balls[2]];
-    const double farthest = focal_px * std::min({s0.coarsest, s1.coarsest, s2.coarsest}) * (1 + relief);
-    const double nearest = focal_px * std::max({s0.finest, s1.finest, s2.finest}) * (1 - relief);
-    const double w = orthographic_scale(triangle, a, b, c);
-    if (w * nearest * nearest > 1 || w * farthest * farthest < 1) continue;
-    for (const auto* image : {&upright, &mirrored}) {
-      for (const double lean : {1.0, -1.0}) {
-        const auto pose = three_point_pose(triangle, *image, lean);
+    const auto away = orthography(triangle, a, b, c);
+    const double mm_per_px = 1 / (focal_px * std::sqrt(away.inverse_distance2));
+    if (!s0.holds(mm_per_px)) continue;
+    for (const double lean : {1.0, -1.0}) {
+      const Orthography start{away.inverse_distance2, lean * away.behind1, lean * away.behind2};
+      if (!s1.holds(mm_per_px * (1 + start.behind1)) || !s2.holds(mm_per_px * (1 + start.behind2))) continue;
+      for (const auto* image : {&upright, &mirrored}) {
+        const auto pose = three_point_pose(triangle, *image, start);
         if (!pose) continue;
-        const auto fits = [&](const Scale& scale, int corner) {
-          return scale.holds((*pose * scene_.balls[triangle.balls[corner]].centre).z() / focal_px);
-        };
-        if (!fits(s0, 0) || !fits(s1, 1) || !fits(s2, 2)) continue;
         const Eigen::Vector2d& centre = scene_.camera.principal_px;
         const double fx = image == &mirrored ? -focal_px : focal_px;
         try_pose(View{{fx, focal_px, centre.x(), centre.y()}, *pose}, lean);
@@ -97,7 +92,7 @@ bool LabelSearch::supported(const View& rough) const {
   const int best = ranking_.empty() ? 0 : ranking_.front().matched;
   int wanted = 3 + std::max(support_, best / 2 - 2);
   int left = static_cast<int>(scene_.balls.size());
-  const float gate2 = static_cast<float>(gate_px_ * gate_px_);
+  const float gate = static_cast<float>(rough_gate_px(scene_));
   for (const auto& ball : scene_.balls) {
     if (left-- < wanted) return false;
     const Eigen::Vector2f uv = rough.project(ball.centre).cast<float>();
@@ -105,7 +100,7 @@ bool LabelSearch::supported(const View& rough) const {
     for (std::size_t i = 0; i < u_.size(); ++i) {
       const float du = u_[i] - uv.x();
       const float dv = v_[i] - uv.y();
-      near += du * du + dv * dv < gate2 ? 1 : 0;
+      near += du * du + dv * dv < gate * gate ? 1 : 0;
     }
     if (near > 0 && --wanted == 0) return true;
   }
@@ -114,10 +109,10 @@ bool LabelSearch::supported(const View& rough) const {
 
 void LabelSearch::try_pose(const View& rough, double lean) {
   if (!supported(rough)) return;
-  auto key = match(scene_, rough, gate_px_, std::numeric_limits<double>::infinity());
+  auto key = match(scene_, rough, rough_gate_px(scene_), std::numeric_limits<double>::infinity());
   key.push_back(rough.intrinsics.fx < 0 ? -1 : 1);
   key.push_back(lean < 0 ? -1 : 1);
-  if (tried_.insert(std::move(key)).second) keep(settle(scene_, rough, gate_px_));
+  if (tried_.insert(std::move(key)).second) keep(settle(scene_, rough));
 }
 
 void LabelSearch::keep(Hypothesis hypothesis) {

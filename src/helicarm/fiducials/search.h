@@ -18,7 +18,7 @@ using Ranking = std::vector<Hypothesis>;
 class LabelSearch {
  public:
   /// `focals_px`: the focal lengths at which poses are tried. The scene must outlive the search.
-  LabelSearch(const Scene& scene, std::vector<double> focals_px, double field_radius_px);
+  LabelSearch(const Scene& scene, std::vector<double> focals_px);
 
   /// False, and nothing done, when the three lie too nearly in a line.
   bool try_triple(const std::array<int, 3>& candidates);
@@ -34,7 +34,6 @@ class LabelSearch {
   const Scene& scene_;
   std::vector<double> focals_px_;
   double flat_px_;  ///< least height of an image triangle
-  double gate_px_;  ///< how far a pose from three points may err at the others
   int support_;     ///< candidates asked for beyond the three
   std::vector<ModelTriangle> triangles_;
   std::vector<Scale> scales_;  ///< candidate by ball

@@ -9,6 +9,8 @@
 namespace helicarm {
 namespace {
 
+constexpr double settled = 2e-3;  // of the distance: the next turn would move the points far less than a pixel
+
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& e1, const Eigen::Vector3d& e2) {
   Eigen::Matrix3d axes;
   axes.col(0) = e1.normalized();
@@ -28,40 +30,36 @@ std::optional<ModelTriangle> model_triangle(const std::array<int, 3>& balls,
   return ModelTriangle{balls, points[0], frame_of(e1, e2), e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2)};
 }
 
-double orthographic_scale(const ModelTriangle& model, double a, double b, double c) {
+Orthography orthography(const ModelTriangle& model, double a, double b, double c) {
   // a + h1^2 = w A, b + h2^2 = w B, c + h1 h2 = w C; the depths h1, h2 eliminated, the larger root is the real one.
   const double q2 = model.a * model.b - model.c * model.c;
   const double q1 = 0.5 * (model.a * b + a * model.b) - model.c * c;
   const double q0 = a * b - c * c;
-  return (q1 + std::sqrt(std::max(0.0, q1 * q1 - q2 * q0))) / q2;
+  const double w = (q1 + std::sqrt(std::max(0.0, q1 * q1 - q2 * q0))) / q2;
+  const double h1 = std::sqrt(std::max(0.0, w * model.a - a));
+  const double h2 = std::sqrt(std::max(0.0, w * model.b - b));
+  return {w, h1, w * model.c < c ? -h2 : h2};
 }
 
 std::optional<RigidTransform> three_point_pose(const ModelTriangle& model,
-                                               const std::array<Eigen::Vector2d, 3>& image, double lean) {
-  double h1 = 0;  // depths past the first ball's, in units of that
-  double h2 = 0;
+                                               const std::array<Eigen::Vector2d, 3>& image, const Orthography& start) {
   double w = 0;
+  double h1 = start.behind1;
+  double h2 = start.behind2;
   Eigen::Vector2d e1;
   Eigen::Vector2d e2;
-  bool first_leads = true;
+  constexpr int most_turns = 12;
   for (int turn = 0;; ++turn) {
+    if (turn == most_turns || !(std::max(std::abs(h1), std::abs(h2)) < 0.7)) return std::nullopt;
     e1 = (1 + h1) * image[1] - image[0];
     e2 = (1 + h2) * image[2] - image[0];
-    const double a = e1.squaredNorm();
-    const double b = e2.squaredNorm();
-    const double c = e1.dot(e2);
-    w = orthographic_scale(model, a, b, c);
-    const double s1 = std::sqrt(std::max(0.0, w * model.a - a));
-    const double s2 = std::sqrt(std::max(0.0, w * model.b - b));
-    if (turn == 0) first_leads = s1 > s2;
-    const double same = w * model.c - c < 0 ? -1 : 1;
-    const double before1 = h1;
-    const double before2 = h2;
-    h1 = lean * s1 * (first_leads ? 1 : same);
-    h2 = lean * s2 * (first_leads ? same : 1);
-    if (!(std::max(std::abs(h1), std::abs(h2)) < 0.7)) return std::nullopt;
-    if (std::max(std::abs(h1 - before1), std::abs(h2 - before2)) < 2e-4) break;
-    if (turn == 12) return std::nullopt;
+    const auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
+    const double same_lean = next.behind1 * h1 + next.behind2 * h2 < 0 ? -1 : 1;
+    const double moved = std::max(std::abs(same_lean * next.behind1 - h1), std::abs(same_lean * next.behind2 - h2));
+    w = next.inverse_distance2;
+    h1 = same_lean * next.behind1;
+    h2 = same_lean * next.behind2;
+    if (moved < settled) break;
   }
   const double depth = 1 / std::sqrt(w);
   const Eigen::Vector3d corner(image[0].x(), image[0].y(), 1);

@@ -21,15 +21,22 @@ struct ModelTriangle {
 /// Nothing when the balls are nearly in a line (height under a twentieth of the longest edge).
 std::optional<ModelTriangle> model_triangle(const std::array<int, 3>& balls, const std::array<Eigen::Vector3d, 3>& points);
 
-/// Square of the inverse distance (1/mm^2) at which scaled orthography shows the triangle as the edges with the same
-/// products a, b, c in normalised coordinates (Alter 1994). There is always just one such distance.
-double orthographic_scale(const ModelTriangle& model, double a, double b, double c);
+/// Distance of a triangle seen in scaled orthography, and how far the other two corners lie behind the first.
+struct Orthography {
+  double inverse_distance2;  ///< 1/mm^2
+  double behind1;            ///< in units of the distance
+  double behind2;
+};
 
-/// Pose of a triangle from its three normalised image points x/z, y/z: scaled orthography, repeated with the points
-/// put at their depths until the depths stand still, which makes it exact (as POSIT, DeMenthon and Davis 1995).
-/// Seen from afar a triangle has two poses, leaning to the source or away: `lean` (+1 or -1) says which.
+/// The triangle seen as the image edges with products a, b, c in normalised coordinates (Alter 1994). There is always
+/// one such distance and two ways to lean, to the source or away; this one has behind1 >= 0.
+Orthography orthography(const ModelTriangle& model, double a, double b, double c);
+
+/// Pose of a triangle from its normalised image points x/z, y/z: scaled orthography, repeated from `start` with the
+/// points put at their depths until these stand still, which makes it exact (the idea of POSIT, DeMenthon and Davis
+/// 1995). The two leans lead to the two poses that a triangle has when seen from afar.
 /// Nothing where the repetition does not settle.
 std::optional<RigidTransform> three_point_pose(const ModelTriangle& model, const std::array<Eigen::Vector2d, 3>& image,
-                                               double lean);
+                                               const Orthography& start);
 
 }  // namespace helicarm

@@ -32,8 +32,11 @@ TEST(ThreePointPose, FindsTheTruePoseFromExactPoints) {
     std::array<Eigen::Vector2d, 3> image;
     for (int i = 0; i < 3; ++i) image[i] = (truth * points[i]).hnormalized();
     double error = 1e9;
-    for (const double lean : {1.0, -1.0}) {
-      const auto pose = three_point_pose(*model, image, lean);
+    const Eigen::Vector2d e1 = image[1] - image[0];
+    const Eigen::Vector2d e2 = image[2] - image[0];
+    const auto away = orthography(*model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
+    for (const auto& start : {away, Orthography{away.inverse_distance2, -away.behind1, -away.behind2}}) {
+      const auto pose = three_point_pose(*model, image, start);
       if (pose) error = std::min(error, (pose->matrix() - truth.matrix()).norm());
     }
     solved += error < 3;  // mm: a poor triangle magnifies where the repetition stops
@@ -45,7 +48,7 @@ TEST(ThreePointPose, FindsTheTruePoseFromExactPoints) {
 TEST(ThreePointPose, GivesAProperRotation) {
   const auto model = model_triangle({0, 1, 2}, {Eigen::Vector3d(0, 0, 0), {50, 0, 5}, {0, 40, -10}});
   ASSERT_TRUE(model);
-  const auto pose = three_point_pose(*model, {Eigen::Vector2d(0, 0), {0.06, 0.01}, {-0.01, 0.05}}, 1);
+  const auto pose = three_point_pose(*model, {Eigen::Vector2d(0, 0), {0.06, 0.01}, {-0.01, 0.05}}, {1e-6, 0.01, 0.01});
   ASSERT_TRUE(pose);
   EXPECT_NEAR(pose->rotation.determinant(), 1, 1e-12);
   EXPECT_NEAR((pose->rotation * pose->rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 0, 1e-12);

@@ -77,12 +77,12 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Fits the lattice's dots again with a profile of their own and their neighbours masked.
-void sharpen(const Exposure& exposure, const std::vector<Dot>& all, SeenLattice& seen, DotFitOptions fit) {
+void sharpen(const Exposure& exposure, const std::vector<Dot>& all, SeenLattice& seen) {
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
-  const BallProfile profile = estimate_profile(exposure, members, fit);
+  const DotLook look = estimate_look(exposure, members);
   for (const IndexedDot& d : seen.lattice.dots) {
-    const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, profile, all.size() > 500 ? members : all, fit);
+    const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
     if (!refitted.empty() && (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
   }
@@ -110,19 +110,18 @@ void set_metric(DistortionMap& map, const Exposure& exposure, const Plate& plate
 }
 
 /// Plate dots that the search missed, fitted at the places where the map expects them.
-void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, const BallProfile& profile,
+void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, const DotLook& look,
             const std::vector<Dot>& all, std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
   for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
-  DotFitOptions options = fit_options_for(exposure);
   for (const Vector2d& place : plate.dots_mm) {
     const bool known = std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
     if (known) continue;
     Dot start;
     start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
     start.radius_px = radius;
-    const auto dot = refit_dots(exposure, {start}, profile, all, options);
+    const auto dot = refit_dots(exposure, {start}, look, all);
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
     if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
@@ -130,10 +129,6 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
     seen.push_back({place, dot[0].centre_px, dot[0].sigma_px});
     plate_dots.push_back(dot[0]);
   }
-}
-
-BallProfile profile_of(const Exposure& exposure, const std::vector<Dot>& dots) {
-  return estimate_profile(exposure, dots, fit_options_for(exposure));
 }
 
 bool same_place(const Dot& a, const Dot& b) {
@@ -188,7 +183,7 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, co
                             attempt.seen.lattice.dots.size(), plate.name, least_dots),
                 {{"dots_found", double(attempt.seen.lattice.dots.size())}});
 
-  if (options.method == Method::best) sharpen(exposure, attempt.all, attempt.seen, fit_options_for(exposure));
+  if (options.method == Method::best) sharpen(exposure, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -209,7 +204,7 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, co
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
   if (options.method == Method::best && dots.size() < plate.dots_mm.size()) {
-    rescue(exposure, plate, *fit, profile_of(exposure, dots), attempt.all, dots, seen);
+    rescue(exposure, plate, *fit, estimate_look(exposure, dots), attempt.all, dots, seen);
     if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
   }
 

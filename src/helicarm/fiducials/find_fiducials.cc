@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/fiducials/find_fiducials.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/centre_offset.h"
+#include "helicarm/fiducials/label.h"
+#include "helicarm/rectification/paper_dots.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr std::size_t max_candidates = 30;
+constexpr double paper_sigma_px = 1.5;   // what a quadratic leaves of the distortion
+constexpr double best_sigma_px = 0.2;
+constexpr double sigma_floor_px = 0.02;
+constexpr double rescue_reach_px = 4;
+
+struct RadiusRange {
+  double low;
+  double high;
+  bool holds(double radius) const { return low <= radius && radius <= high; }
+};
+
+/// Radii that a ball of the calibrator can have: it stands somewhere between the receiver and half way to the source.
+RadiusRange radii_of(const Calibrator& calibrator, const DistortionMap& map) {
+  double least = 1e9;
+  double most = 0;
+  for (const CalibratorBall& ball : calibrator.balls) {
+    least = std::min(least, 0.5 * ball.diameter_mm);
+    most = std::max(most, 0.5 * ball.diameter_mm);
+  }
+  if (!map.rectified_pixel_mm) return {2, 1e9};
+  return {1.03 * least / *map.rectified_pixel_mm, 2.7 * most / *map.rectified_pixel_mm};
+}
+
+/// Dots that may be balls of the calibrator, the clearest first.
+std::vector<Dot> plausible_balls(const Rectification& rectification, const Calibrator& calibrator) {
+  const RadiusRange radii = radii_of(calibrator, rectification.map);
+  std::vector<Dot> balls;
+  for (const Dot& dot : rectification.other_dots)
+    if (radii.holds(dot.radius_px) && dot.sigma_px < 0.5 && rectification.map.rectified_from_raw(dot.centre_px))
+      balls.push_back(dot);
+  const auto clarity = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
+  std::stable_sort(balls.begin(), balls.end(), [&](const Dot& a, const Dot& b) { return clarity(a) > clarity(b); });
+  if (balls.size() > max_candidates) balls.resize(max_candidates);
+  return balls;
+}
+
+LabellingPrior prior_of(const Exposure& exposure, const DistortionMap& map) {
+  LabellingPrior prior;
+  const auto& distance = exposure.acquisition.source_detector_mm;
+  if (distance && map.rectified_pixel_mm && map.rectified_plane == RectifiedPlane::detector)
+    prior.focal_px = *distance / *map.rectified_pixel_mm;
+  prior.principal_px = {0.5 * (exposure.pixels.width() - 1), 0.5 * (exposure.pixels.height() - 1)};
+  prior.principal_sigma_px = 0.03 * exposure.pixels.width();
+  prior.field_radius_px = 0.5 * std::hypot(exposure.pixels.width(), exposure.pixels.height());
+  return prior;
+}
+
+double predicted_radius(const View& view, const CalibratorBall& ball) {
+  return 0.5 * ball.diameter_mm * std::abs(view.intrinsics.fy) / view.depth(ball.centre_in_calibrator);
+}
+
+/// The named balls fitted with a profile of their own, and the others looked for where the pose puts them.
+class BallFitter {
+ public:
+  BallFitter(const Exposure& exposure, const Rectification& rectification, const std::vector<Dot>& named)
+      : exposure_(exposure),
+        look_(estimate_look(exposure, named)),
+        neighbours_(rectification.other_dots) {
+    neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
+    std::vector<double> contrasts;
+    for (const Dot& dot : named) contrasts.push_back(dot.contrast);
+    std::sort(contrasts.begin(), contrasts.end());
+    typical_contrast_ = contrasts[contrasts.size() / 2];
+  }
+
+  std::optional<Dot> fit(const Dot& start) const {
+    const auto fitted = refit_dots(exposure_, {start}, look_, neighbours_);
+    return fitted.empty() ? std::nullopt : std::optional(fitted.front());
+  }
+
+  /// A ball at its predicted place, or nothing where the pixels do not show one.
+  std::optional<Dot> rescue(const Vector2d& raw, double radius) const {
+    Dot start;
+    start.centre_px = raw;
+    start.radius_px = radius;
+    const auto dot = fit(start);
+    if (!dot || (dot->centre_px - raw).norm() > rescue_reach_px || dot->sigma_px > 0.4) return std::nullopt;
+    if (std::abs(dot->radius_px / radius - 1) > 0.12 || dot->misfit > 0.35) return std::nullopt;
+    if (dot->contrast * typical_contrast_ < 0 || std::abs(dot->contrast) < 0.25 * std::abs(typical_contrast_))
+      return std::nullopt;
+    return dot;
+  }
+
+  bool is_black(const Vector2d& raw) const {
+    return exposure_.pixels(static_cast<int>(std::lround(raw.x())), static_cast<int>(std::lround(raw.y()))) <=
+           look_.options.floor;
+  }
+
+ private:
+  const Exposure& exposure_;
+  DotLook look_;
+  std::vector<Dot> neighbours_;
+  double typical_contrast_ = 0;
+};
+
+bool inside(const Exposure& exposure, const Vector2d& raw, double margin) {
+  return raw.x() >= margin && raw.y() >= margin && raw.x() <= exposure.pixels.width() - 1 - margin &&
+         raw.y() <= exposure.pixels.height() - 1 - margin;
+}
+
+/// Why a ball that the pose puts here was not seen.
+FiducialStatus absence(const Exposure& exposure, const BallFitter& fitter, const Vector2d& raw, double radius,
+                       const std::vector<Dot>& named) {
+  if (!inside(exposure, raw, 0.5 * radius) || fitter.is_black(raw)) return FiducialStatus::outside;
+  const bool behind = std::any_of(named.begin(), named.end(), [&](const Dot& other) {
+    return (other.centre_px - raw).norm() < 1.2 * other.radius_px;
+  });
+  return behind ? FiducialStatus::occluded : FiducialStatus::not_found;
+}
+
+void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, const View& view, double diameter_mm) {
+  const Eigen::Vector3d& centre = fiducial.centre_in_calibrator;
+  const Vector2d raw = dot.centre_px - blob_offset(map, view, view.project(centre), view.depth(centre), diameter_mm);
+  const auto uv = map.rectified_from_raw(raw);
+  if (!uv) return;
+  fiducial.status = FiducialStatus::used;
+  fiducial.uv_raw = raw;
+  fiducial.uv = *uv;
+  const double map_sigma = map.sigma_px(*uv);
+  fiducial.sigma_px =
+      std::sqrt(dot.sigma_px * dot.sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
+}
+
+/// In the paper's mode a ball lies where the Hough transform sees its circle.
+std::vector<Dot> hough_circles(const Exposure& exposure, const std::vector<Dot>& named) {
+  double least = 1e9;
+  double most = 0;
+  for (const Dot& dot : named) {
+    least = std::min(least, dot.radius_px);
+    most = std::max(most, dot.radius_px);
+  }
+  return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.8 * least, 1.2 * most);
+}
+
+std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) {
+  for (const Dot& circle : circles)
+    if ((circle.centre_px - dot.centre_px).norm() < 0.3 * dot.radius_px) return circle;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
+                                        const Calibrator& calibrator, Method method) {
+  const DistortionMap& map = rectification.map;
+  const std::vector<Dot> balls = plausible_balls(rectification, calibrator);
+  std::vector<BallCandidate> candidates;
+  for (const Dot& ball : balls) {
+    const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
+    candidates.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1});
+  }
+  LabellingOptions labelling_options;
+  labelling_options.systematic_sigma_px = method == Method::paper ? paper_sigma_px : best_sigma_px;
+  const auto labelling = label_balls(calibrator, candidates, prior_of(exposure, map), labelling_options);
+  if (!labelling) return tl::unexpected<Failure>(labelling.error());
+
+  FoundFiducials found;
+  found.view = labelling->view;
+  found.mirrored = labelling->mirrored;
+  found.ambiguity = labelling->margin;
+  std::vector<Dot> named;
+  for (const int candidate : labelling->candidate_of_ball)
+    if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
+  const BallFitter fitter(exposure, rectification, named);
+  const std::vector<Dot> circles = method == Method::paper ? hough_circles(exposure, named) : std::vector<Dot>{};
+
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const CalibratorBall& ball = calibrator.balls[k];
+    Fiducial fiducial;
+    fiducial.label = ball.label;
+    fiducial.centre_in_calibrator = ball.centre_in_calibrator;
+    const double radius = predicted_radius(found.view, ball);
+    const Vector2d raw = map.raw_from_rectified(found.view.project(ball.centre_in_calibrator));
+    const int candidate = labelling->candidate_of_ball[k];
+    std::optional<Dot> dot;
+    if (candidate >= 0)
+      dot = fitter.fit(balls[static_cast<std::size_t>(candidate)]);
+    else if (inside(exposure, raw, 2))
+      dot = fitter.rescue(raw, radius);
+    if (dot && method == Method::paper) dot = circle_near(circles, *dot);
+    if (dot)
+      set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
+    if (fiducial.status != FiducialStatus::used) fiducial.status = absence(exposure, fitter, raw, radius, named);
+    found.fiducials.push_back(fiducial);
+  }
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    const auto& taken = labelling->candidate_of_ball;
+    if (std::find(taken.begin(), taken.end(), static_cast<int>(i)) == taken.end()) found.false_blobs.push_back(balls[i]);
+  }
+  return found;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/fiducials/find_target.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/centre_offset.h"
+#include "helicarm/fiducials/solid_template.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double max_shift_px = 8;
+constexpr double sigma_floor_px = 0.03;
+
+/// Background b0 bx by bxx bxy byy, contrast, shift.
+constexpr int n_parameters = 9;
+using Vector = Eigen::Matrix<double, n_parameters, 1>;
+using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
+
+struct Pixel {
+  Vector2d offset;  ///< rectified, from the predicted image of the target's point
+  double grey;
+  double weight;
+};
+
+/// raw -> rectified by a biquadratic through 3 x 3 exact points: the map is smooth and a patch is small.
+class LocalInverse {
+ public:
+  static std::optional<LocalInverse> make(const DistortionMap& map, const Vector2d& raw, double half) {
+    LocalInverse inverse(raw, half);
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i) {
+        const auto uv = map.rectified_from_raw(raw + half * Vector2d(i - 1, j - 1));
+        if (!uv) return std::nullopt;
+        inverse.nodes_[static_cast<std::size_t>(3 * j + i)] = *uv;
+      }
+    return inverse;
+  }
+  Vector2d operator()(const Vector2d& raw) const {
+    const Vector2d t = (raw - middle_) / half_;
+    const auto basis = [](double x) { return std::array{0.5 * x * (x - 1), 1 - x * x, 0.5 * x * (x + 1)}; };
+    const auto bx = basis(t.x());
+    const auto by = basis(t.y());
+    Vector2d sum = Vector2d::Zero();
+    for (std::size_t j = 0; j < 3; ++j)
+      for (std::size_t i = 0; i < 3; ++i) sum += by[j] * bx[i] * nodes_[3 * j + i];
+    return sum;
+  }
+
+ private:
+  LocalInverse(const Vector2d& middle, double half) : middle_(middle), half_(half) {}
+  Vector2d middle_;
+  double half_;
+  std::array<Vector2d, 9> nodes_;
+};
+
+struct Fit {
+  Vector2d shift = Vector2d::Zero();
+  double contrast = 0;
+  double sigma_px = 0;
+  double noise = 0;
+  double misfit = 0;
+};
+
+struct Patch {
+  std::vector<Pixel> pixels;
+  double window;
+};
+
+struct Sums {
+  Normal normal = Normal::Zero();
+  Vector right = Vector::Zero();
+  double squares = 0;
+  double weight = 0;
+};
+
+Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p, std::vector<double>& residuals) {
+  Sums sums;
+  for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
+    const Pixel& pixel = patch.pixels[i];
+    const double x = pixel.offset.x() / patch.window;
+    const double y = pixel.offset.y() / patch.window;
+    const auto [value, slope] = shade.at(pixel.offset - p.tail<2>());
+    Vector row;
+    row << 1, x, y, x * x, x * y, y * y, -value, p[6] * slope;
+    residuals[i] = pixel.grey - (row.head<6>().dot(p.head<6>()) - p[6] * value);
+    sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, pixel.weight);
+    sums.right += pixel.weight * residuals[i] * row;
+    sums.squares += pixel.weight * residuals[i] * residuals[i];
+    sums.weight += pixel.weight;
+  }
+  return sums;
+}
+
+void reweight(Patch& patch, const std::vector<double>& residuals, double least) {
+  std::vector<double> sizes(residuals.size());
+  std::transform(residuals.begin(), residuals.end(), sizes.begin(), [](double r) { return std::abs(r); });
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  const double cut = 4.7 * std::max(1.4826 * *middle, least);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    const double t = residuals[i] / cut;
+    patch.pixels[i].weight = std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
+  }
+}
+
+std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
+  std::vector<double> residuals(patch.pixels.size());
+  Vector p = Vector::Zero();
+  Sums sums = accumulate(patch, shade, p, residuals);
+  const Eigen::Matrix<double, 7, 1> start =
+      sums.normal.topLeftCorner<7, 7>().selfadjointView<Eigen::Lower>().ldlt().solve(sums.right.head<7>());
+  if (!start.allFinite()) return std::nullopt;
+  p.head<7>() = start;
+  double move = 0;
+  for (int i = 0; i < 15; ++i) {
+    accumulate(patch, shade, p, residuals);
+    reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[6]));
+    sums = accumulate(patch, shade, p, residuals);
+    Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
+    if (!step.allFinite()) return std::nullopt;
+    move = step.tail<2>().norm();
+    if (move > 2) step.tail<2>() *= 2 / move;
+    p += step;
+    if (p.tail<2>().norm() > max_shift_px) return std::nullopt;
+    if (i >= 5 && move < 2e-3) break;
+  }
+  if (move > 0.05) return std::nullopt;
+  const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
+  const Normal inverse = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
+  double squares = 0;
+  for (const double r : residuals) squares += r * r;
+  Fit fit;
+  fit.shift = p.tail<2>();
+  fit.contrast = p[6];
+  fit.sigma_px = std::sqrt(std::max(0.0, 0.5 * variance * (inverse(7, 7) + inverse(8, 8))));
+  fit.noise = std::sqrt(variance);
+  fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
+  return fit;
+}
+
+Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre, double half_width,
+                       std::span<const Disc> others, const std::string& name) {
+  const auto not_seen = [&] {
+    return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
+  };
+  const Vector2d raw = map.raw_from_rectified(centre);
+  if (!raw.allFinite() || !exposure.pixels.contains(static_cast<int>(raw.x()), static_cast<int>(raw.y())))
+    return not_seen();
+  const auto inverse = LocalInverse::make(map, raw, half_width);
+  if (!inverse) return not_seen();
+  const DotFitOptions limits = fit_options_for(exposure);
+  Patch patch{{}, half_width};
+  const int half = static_cast<int>(std::ceil(half_width));
+  const int u0 = static_cast<int>(std::lround(raw.x()));
+  const int v0 = static_cast<int>(std::lround(raw.y()));
+  int inside = 0;
+  for (int v = v0 - half; v <= v0 + half; ++v)
+    for (int u = u0 - half; u <= u0 + half; ++u) {
+      const Vector2d offset = (*inverse)(Vector2d(u, v)) - centre;
+      if (offset.norm() > half_width) continue;
+      ++inside;
+      if (!exposure.pixels.contains(u, v)) continue;
+      const float grey = exposure.pixels(u, v);
+      if (grey <= limits.floor || grey >= limits.ceiling) continue;
+      const bool hidden = std::any_of(others.begin(), others.end(), [&](const Disc& disc) {
+        return (disc.centre - Vector2d(u, v)).squaredNorm() < disc.radius * disc.radius;
+      });
+      if (!hidden) patch.pixels.push_back({offset, double(grey), 1});
+    }
+  if (2 * patch.pixels.size() < static_cast<std::size_t>(inside) || patch.pixels.size() < 40) return not_seen();
+  return patch;
+}
+
+}  // namespace
+
+Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
+                                const CalibratorTarget& target, std::span<const Disc> others) {
+  const double depth = view.depth(target.point_in_calibrator);
+  if (!(depth > 0)) return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
+  const double px_per_mm = std::abs(view.intrinsics.fy) / depth;
+  const Vector2d centre = view.project(target.point_in_calibrator);
+  // Enough of a wire to tell its direction, but short of its far end (a wire of unknown length has 10 mm at least).
+  const double reach_mm = target.kind == TargetKind::ball ? 0.55 * target.diameter_mm
+                          : target.kind == TargetKind::cross ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
+                                                             : 2.5 * target.diameter_mm;
+  const double half_width = reach_mm * px_per_mm + 2.5;
+  const auto patch = gather(exposure, map, centre, half_width, others, target.name);
+  if (!patch) return tl::unexpected<Failure>(patch.error());
+  const PathPicture picture = picture_of_target(target, view, half_width + max_shift_px);
+  std::optional<Fit> best;
+  const auto consider = [&](double attenuation, double blur) {
+    const auto fit = fit_template(*patch, SolidTemplate(picture, attenuation, blur));
+    const bool better = fit && (!best || fit->noise < best->noise);
+    if (better) best = fit;
+    return better;
+  };
+  consider(0.25, 1.0);
+  const double attenuation = consider(0.7, 1.0) ? 0.7 : 0.25;
+  if (!consider(attenuation, 0.7)) consider(attenuation, 1.4);
+  if (!best || std::abs(best->contrast) < 4 * best->noise || best->misfit > 0.4 || best->sigma_px > 1)
+    return fail(Reason::target_not_found, fmt::format("{}: is not to be seen where the view puts it", target.name));
+  const Vector2d uv = centre + best->shift;
+  const double map_sigma = map.sigma_px(uv);
+  return SeenPoint{map.raw_from_rectified(uv), uv,
+                   std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+}
+
+Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view, double depth_mm,
+                                 const Vector2d& click_raw, double diameter_mm) {
+  Dot start;
+  start.radius_px = 0.5 * diameter_mm * std::abs(view.intrinsics.fy) / depth_mm;
+  const double reach = std::max(5.0, start.radius_px);
+  const BallProfile profile(0.9 / start.radius_px, 3);
+  DotFitOptions options = fit_options_for(exposure);
+  DotFitOptions wide = options;
+  wide.tolerance = 0.1;
+  wide.margin_share = 0.35;
+  wide.margin_px = 3.5;
+  std::optional<Dot> best;
+  for (const double r : {0.0, 0.5})
+    for (int k = 0; k < (r > 0 ? 6 : 1); ++k) {
+      start.centre_px = click_raw + r * start.radius_px * Vector2d(std::cos(1.0472 * k), std::sin(1.0472 * k));
+      const auto rough = fit_dot(exposure.pixels, start, profile, {}, wide);
+      if (!rough || (rough->centre_px - click_raw).norm() > reach) continue;
+      if (std::abs(rough->radius_px / start.radius_px - 1) > 0.3 || rough->misfit > 0.35) continue;
+      const auto fine = fit_dot(exposure.pixels, *rough, profile, {}, options);
+      const Dot& dot = fine ? *fine : *rough;
+      if (!best || dot.misfit < best->misfit) best = dot;
+    }
+  if (!best)
+    return fail(Reason::target_not_found,
+                fmt::format("no ball of {} mm within {:.0f} px of ({:.1f}, {:.1f})", diameter_mm, reach, click_raw.x(),
+                            click_raw.y()));
+  const auto rough_uv = map.rectified_from_raw(best->centre_px);
+  if (!rough_uv) return fail(Reason::not_seen, "the click lies outside the rectified field");
+  const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
+  const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
+  const double map_sigma = map.sigma_px(uv);
+  return SeenPoint{raw, uv,
+                   std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+}
+
+}  // namespace helicarm

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "helicarm/geometry/view.h"
+#include "helicarm/image/image.h"
+#include "helicarm/phantom/calibrator.h"
+
+namespace helicarm {
+
+/// Length of a straight line inside a target's metal, mm. `along` is a unit vector. Wires are as long as the file says,
+/// or without end; a line's end is flat.
+double path_in_target(const CalibratorTarget& target, const Eigen::Vector3d& point, const Eigen::Vector3d& along);
+
+/// Paths through a target's metal (mm) on a grid of rectified pixels about the image of its point.
+struct PathPicture {
+  static constexpr int per_pixel = 2;  ///< grid steps in a pixel
+  Image<float> path_mm;
+  int middle;                          ///< grid index of the point's image
+};
+
+PathPicture picture_of_target(const CalibratorTarget& target, const View& view, double half_width_px);
+
+/// The share of the rays that a target absorbs, 1 - exp(-attenuation x path), blurred.
+class SolidTemplate {
+ public:
+  SolidTemplate(const PathPicture& picture, double attenuation_per_mm, double blur_px);
+
+  struct Sample {
+    double value;
+    Eigen::Vector2d slope;  ///< d value / d offset
+  };
+  /// At an offset (rectified px) from the image of the target's point; nought outside.
+  Sample at(const Eigen::Vector2d& offset) const;
+
+ private:
+  Image<float> shade_;
+  int middle_;
+};
+
+}  // namespace helicarm

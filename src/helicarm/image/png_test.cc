@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/image/png.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include "helicarm/core/random.h"
+
+namespace helicarm {
+namespace {
+
+template <class T>
+Image<T> noise(int width, int height) {
+  Image<T> image(width, height);
+  RandomStream random(1, 1);
+  for (T& pixel : image.pixels()) pixel = static_cast<T>(random.bits());
+  return image;
+}
+
+std::string_view reason(std::string_view bytes) {
+  const auto picture = decode_png(bytes, "x.png");
+  return picture ? "ok" : code(picture.error().reason);
+}
+
+std::string encoded(std::uint32_t format, int channels) {
+  const std::string pixels(static_cast<std::size_t>(16 * channels), 'x');
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = image.height = 4;
+  image.format = format;
+  image.colormap_entries = 2;
+  const std::string indices(16, '\1'), colours(2 * 3, 'c');
+  const bool palette = format & PNG_FORMAT_FLAG_COLORMAP;
+  png_alloc_size_t size = 4096;
+  std::string bytes(size, '\0');
+  png_image_write_to_memory(&image, bytes.data(), &size, 0, palette ? indices.data() : pixels.data(), 0,
+                            colours.data());
+  bytes.resize(size);
+  return bytes;
+}
+
+TEST(Png, GreyComesBackExactly) {
+  const auto wide = noise<std::uint16_t>(37, 21);
+  const auto narrow = noise<std::uint8_t>(37, 21);
+  const auto wide_back = decode_png(encode_png(wide), "x.png");
+  const auto narrow_back = decode_png(encode_png(narrow), "x.png");
+  ASSERT_TRUE(wide_back) << wide_back.error().message;
+  EXPECT_EQ(wide_back->bits, 16);
+  EXPECT_TRUE(std::ranges::equal(wide_back->pixels.pixels(), wide.pixels()));
+  EXPECT_EQ(narrow_back->bits, 8);
+  EXPECT_TRUE(std::ranges::equal(narrow_back->pixels.pixels(), narrow.pixels()));
+}
+
+TEST(Png, EqualColoursAreGrey) {
+  cv::Mat rgb(5, 6, CV_8UC3, cv::Scalar(7, 7, 7));
+  ASSERT_TRUE(decode_png(encode_png(rgb), "x.png"));
+  EXPECT_EQ(decode_png(encode_png(rgb), "x.png")->pixels(5, 4), 7);
+  rgb.at<cv::Vec3b>(4, 5) = {7, 7, 8};
+  EXPECT_EQ(reason(encode_png(rgb)), "unsupported");
+}
+
+TEST(Png, PaletteAndAlphaAreRefused) {
+  EXPECT_EQ(reason(encoded(PNG_FORMAT_RGBA, 4)), "unsupported");
+  EXPECT_EQ(reason(encoded(PNG_FORMAT_GA, 2)), "unsupported");
+  EXPECT_EQ(reason(encoded(PNG_FORMAT_RGB_COLORMAP, 1)), "unsupported");
+}
+
+TEST(Png, EveryTruncationIsRefused) {
+  const std::string whole = encode_png(noise<std::uint8_t>(20, 20));
+  for (std::size_t size = 8; size < whole.size(); ++size)
+    EXPECT_EQ(reason(std::string_view(whole).substr(0, size)), "truncated") << size;
+}
+
+TEST(Png, MutationsNeverCrash) {
+  const std::string whole = encode_png(noise<std::uint16_t>(20, 20));
+  RandomStream random(2, 1);
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::string bytes = whole;
+    bytes[random.index(static_cast<std::uint32_t>(whole.size()))] = static_cast<char>(random.bits());
+    const auto picture = decode_png(bytes, "x.png");
+    if (picture) {
+      EXPECT_FALSE(picture->pixels.empty());
+    }
+  }
+}
+
+TEST(Png, HugeHeaderIsRefusedBeforeItIsBelieved) {
+  std::string bytes = encode_png(noise<std::uint8_t>(4, 4));
+  bytes.replace(16, 8, std::string("\x7F\xFF\xFF\xFF\x7F\xFF\xFF\xFF", 8));
+  EXPECT_NE(reason(bytes), "ok");
+}
+
+}  // namespace
+}  // namespace helicarm

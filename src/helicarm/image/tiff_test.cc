@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/image/tiff.h"
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+#include <tiffio.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/random.h"
+
+namespace helicarm {
+namespace {
+namespace fs = std::filesystem;
+
+struct Kind {
+  int bits = 8;
+  int channels = 1;
+  int photometric = PHOTOMETRIC_MINISBLACK;
+  int compression = COMPRESSION_NONE;
+  int format = SAMPLEFORMAT_UINT;
+};
+
+/// 5 x 3 samples of value 10 * column + row in every channel.
+std::string encoded(Kind kind) {
+  const fs::path path = fs::temp_directory_path() / ("helicarm_tiff_" + std::to_string(::getpid()) + ".tif");
+  TIFF* tiff = TIFFOpen(path.c_str(), "w");
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 5);
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 3);
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, kind.bits);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, kind.channels);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, kind.photometric);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, kind.compression);
+  TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, kind.format);
+  TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+  if (kind.photometric == PHOTOMETRIC_PALETTE) {
+    std::vector<std::uint16_t> map(256, 0);
+    TIFFSetField(tiff, TIFFTAG_COLORMAP, map.data(), map.data(), map.data());
+  }
+  for (std::uint32_t v = 0; v < 3; ++v) {
+    std::string row;
+    for (unsigned u = 0; u < 5; ++u)
+      for (int c = 0; c < kind.channels; ++c) {
+        row += static_cast<char>(10 * u + v);
+        row.append(static_cast<std::size_t>(kind.bits / 8 - 1), '\0');
+      }
+    TIFFWriteScanline(tiff, row.data(), v);
+  }
+  TIFFClose(tiff);
+  const std::string bytes = *read_file(path, 1 << 20);
+  fs::remove(path);
+  return bytes;
+}
+
+std::string_view reason(const Kind& kind) {
+  const auto picture = decode_tiff(encoded(kind), 0, "x.tif");
+  return picture ? "ok" : code(picture.error().reason);
+}
+
+TEST(Tiff, GreyComesBackExactly) {
+  for (int bits : {8, 16})
+    for (int compression :
+         {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE})
+      for (int channels : {1, 3}) {
+        const std::string bytes =
+            encoded({bits, channels, channels == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK, compression});
+        ASSERT_TRUE(is_tiff(bytes));
+        const auto picture = decode_tiff(bytes, 0, "x.tif");
+        ASSERT_TRUE(picture) << picture.error().message;
+        EXPECT_EQ(picture->bits, bits);
+        EXPECT_EQ(picture->pixels(4, 2), 42);
+      }
+}
+
+TEST(Tiff, WhiteIsZeroIsInverted) {
+  EXPECT_EQ(decode_tiff(encoded({.photometric = PHOTOMETRIC_MINISWHITE}), 0, "x.tif")->pixels(4, 2),
+            255 - 42);
+}
+
+TEST(Tiff, OtherKindsAreRefused) {
+  EXPECT_EQ(reason({.photometric = PHOTOMETRIC_PALETTE}), "unsupported");
+  EXPECT_EQ(reason({.channels = 4, .photometric = PHOTOMETRIC_RGB}), "unsupported");
+  EXPECT_EQ(reason({.bits = 32, .format = SAMPLEFORMAT_IEEEFP}), "unsupported");
+  EXPECT_EQ(reason({.bits = 16, .format = SAMPLEFORMAT_INT}), "unsupported");
+}
+
+TEST(Tiff, MutationsAndTruncationsNeverCrash) {
+  RandomStream random(2, 1);
+  for (int compression : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_ADOBE_DEFLATE}) {
+    const std::string whole = encoded({.bits = 16, .compression = compression});
+    for (int trial = 0; trial < 1000; ++trial) {
+      std::string bytes = whole;
+      bytes[8 + random.index(static_cast<std::uint32_t>(whole.size()) - 8)] =
+          static_cast<char>(random.bits());
+      if (random.index(4) == 0) bytes.resize(8 + random.index(static_cast<std::uint32_t>(whole.size()) - 8));
+      const auto picture = decode_tiff(bytes, 0, "x.tif");
+      if (picture) {
+        EXPECT_FALSE(picture->pixels.empty());
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compressed transfer syntaxes, encoded by DCMTK, and their damage.
+#include <chrono>
+#include <cmath>
+#include <memory>
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dcistrmb.h>
+#include <dcmtk/dcmdata/dcostrmb.h>
+#include <dcmtk/dcmdata/dcrleerg.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djencode.h>
+#include <dcmtk/dcmjpeg/djrplol.h>
+#include <dcmtk/dcmjpeg/djrploss.h>
+#include <dcmtk/oflog/oflog.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/read_dicom.h"
+
+namespace helicarm {
+namespace {
+
+constexpr int width = 40, height = 30;
+
+class Compressed : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    // Without DCMTK's habit of stretching the grey values before lossy compression.
+    DJEncoderRegistration::registerCodecs(ECC_lossyYCbCr, EUC_default, OFFalse, 0, 0, 0, OFTrue, ESS_444,
+                                          OFFalse, OFFalse, 0, 0, 0, 0, 0, 0, 0, 0, OFFalse);
+    DcmRLEEncoderRegistration::registerCodecs();
+  }
+  static void TearDownTestSuite() {
+    DJEncoderRegistration::cleanup();
+    DcmRLEEncoderRegistration::cleanup();
+  }
+};
+
+/// A smooth picture of `bits` bits.
+DicomBuilder picture(int bits, int frames = 1) {
+  std::string bytes;
+  for (int f = 0; f < frames; ++f)
+    for (int v = 0; v < height; ++v)
+      for (int u = 0; u < width; ++u) {
+        const double value = 0.5 + 0.4 * std::sin(0.2 * u + f) * std::cos(0.1 * v);
+        bytes += DicomBuilder::number(static_cast<int>(value * ((1 << bits) - 1)), bits > 8 ? 2 : 1);
+      }
+  return DicomBuilder()
+      .text(0x00280008, "IS", std::to_string(frames))
+      .word(0x00280010, height)
+      .word(0x00280011, width)
+      .word(0x00280100, bits > 8 ? 16 : 8)
+      .word(0x00280101, bits)
+      .word(0x00280102, bits - 1)
+      .raw(0x7FE00010, bits > 8 ? "OW" : "OB", bytes);
+}
+
+std::string compress(const std::string& bytes, E_TransferSyntax syntax,
+                     const DcmRepresentationParameter* how) {
+  DcmInputBufferStream in;
+  in.setBuffer(bytes.data(), static_cast<offile_off_t>(bytes.size()));
+  in.setEos();
+  DcmFileFormat file;
+  EXPECT_TRUE(file.read(in).good());
+  file.loadAllDataIntoMemory();
+  EXPECT_TRUE(file.getDataset()->chooseRepresentation(syntax, how).good());
+  std::string out(1 << 20, '\0');
+  DcmOutputBufferStream stream(out.data(), static_cast<offile_off_t>(out.size()));
+  file.transferInit();
+  EXPECT_TRUE(file.write(stream, syntax, EET_ExplicitLength, nullptr).good());
+  file.transferEnd();
+  void* written = nullptr;
+  offile_off_t size = 0;
+  stream.flushBuffer(written, size);
+  out.resize(static_cast<std::size_t>(size));
+  return out;
+}
+
+float greatest_difference(const Exposure& a, const Exposure& b) {
+  float difference = 0;
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u)
+      difference = std::max(difference, std::abs(a.pixels(u, v) - b.pixels(u, v)));
+  return difference;
+}
+
+void expect_close(int bits, E_TransferSyntax syntax, const DcmRepresentationParameter* how, float tolerance) {
+  const std::string plain = picture(bits).bytes();
+  const auto compressed = read_dicom(compress(plain, syntax, how), "x.dcm", {});
+  ASSERT_TRUE(compressed) << bits << ": " << compressed.error().message;
+  EXPECT_LE(greatest_difference(*compressed, *read_dicom(plain, "x.dcm", {})), tolerance) << bits;
+}
+
+TEST_F(Compressed, RleIsExact) {
+  for (int bits : {8, 12, 16}) expect_close(bits, EXS_RLELossless, nullptr, 0);
+}
+
+TEST_F(Compressed, LosslessJpegIsExact) {
+  const DJ_RPLossless first_order(1, 0), fourth(4, 0);
+  for (int bits : {8, 10, 12, 16}) {
+    expect_close(bits, EXS_JPEGProcess14SV1, &first_order, 0);
+    expect_close(bits, EXS_JPEGProcess14, &fourth, 0);
+  }
+}
+
+TEST_F(Compressed, LossyJpegIsClose) {
+  const DJ_RPLossy quality(95);
+  expect_close(8, EXS_JPEGProcess1, &quality, 4);
+  expect_close(12, EXS_JPEGProcess2_4, &quality, 64);
+}
+
+TEST_F(Compressed, FramesAreFoundByCountAndByOffsetTable) {
+  const std::string plain = picture(12, 3).bytes();
+  const std::string rle = compress(plain, EXS_RLELossless, nullptr);
+  const DJ_RPLossless first_order(1, 0);
+  const std::string jpeg = compress(plain, EXS_JPEGProcess14SV1, &first_order);
+  for (int frame = 1; frame <= 3; ++frame) {
+    const auto expected = read_dicom(plain, "x.dcm", frame);
+    for (const std::string* file : {&rle, &jpeg}) {
+      const auto exposure = read_dicom(*file, "x.dcm", frame);
+      ASSERT_TRUE(exposure) << exposure.error().message;
+      EXPECT_EQ(exposure->acquisition.instance_key, expected->acquisition.instance_key);
+    }
+  }
+}
+
+TEST_F(Compressed, FrameSplitOverFragments) {
+  // One segment: 24 literal pixels, then a run of 24; two such frames in four fragments.
+  const auto segment = [](char value) {
+    return std::string(1, 23) + std::string(24, value) + '\xE9' + value;
+  };
+  const auto frame = [&](char value) {
+    return DicomBuilder::number(1, 4) + DicomBuilder::number(64, 4) + std::string(56, '\0') + segment(value);
+  };
+  const std::string one = frame('a'), two = frame('b') + '\0';
+  const std::string padded = one + '\0';
+  const std::vector<std::string> pieces = {padded.substr(0, 70), padded.substr(70), two.substr(0, 30),
+                                           two.substr(30)};
+  const int second = static_cast<int>(8 + pieces[0].size() + 8 + pieces[1].size());
+  auto builder = DicomBuilder()
+                     .syntax("1.2.840.10008.1.2.5")
+                     .text(0x00280008, "IS", "2")
+                     .word(0x00280100, 8)
+                     .word(0x00280101, 8)
+                     .word(0x00280102, 7);
+  const auto with_table = DicomBuilder(builder)
+                              .fragments(pieces, DicomBuilder::number(0, 4) + DicomBuilder::number(second, 4))
+                              .bytes();
+  ASSERT_TRUE(read_dicom(with_table, "x.dcm", 2)) << read_dicom(with_table, "x.dcm", 2).error().message;
+  EXPECT_EQ(read_dicom(with_table, "x.dcm", 1)->pixels(7, 5), 'a');
+  EXPECT_EQ(read_dicom(with_table, "x.dcm", 2)->pixels(0, 0), 'b');
+  EXPECT_EQ(read_dicom(builder.fragments(pieces).bytes(), "x.dcm", 1).error().reason, Reason::bad_value);
+}
+
+TEST_F(Compressed, DamageIsRefusedQuickly) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto jpeg = [](const std::string& stream) {
+    return read_dicom(DicomBuilder().syntax("1.2.840.10008.1.2.4.70").fragments({stream}).bytes(), "x.dcm",
+                      {});
+  };
+  const std::string head = "\xFF\xD8";
+  const std::string frame_header = std::string("\xFF\xC3\x00\x0B\x0C\x00\x06\x00\x08\x01\x01\x11\x00", 13);
+  const std::string other_size = std::string("\xFF\xC3\x00\x0B\x0C\xFF\xFF\xFF\xFF\x01\x01\x11\x00", 13);
+  std::string temporary_markers = head;
+  for (int i = 0; i < 10000; ++i) temporary_markers += "\xFF\x01";
+  for (const std::string& stream :
+       {std::string("raw pixels"), head, head + frame_header, head + frame_header + "\xFF\xD9",
+        head + other_size + "\xFF\xD9", temporary_markers + "\xFF\xD9", head + std::string(1000, '\xFF')}) {
+    const auto exposure = jpeg(stream);
+    ASSERT_FALSE(exposure);
+    EXPECT_TRUE(exposure.error().reason == Reason::bad_value || exposure.error().reason == Reason::truncated);
+  }
+  const auto rle = [](const std::string& frame) {
+    return read_dicom(DicomBuilder().syntax("1.2.840.10008.1.2.5").fragments({frame}).bytes(), "x.dcm", {});
+  };
+  EXPECT_FALSE(rle(std::string(10, 'x')));
+  EXPECT_FALSE(rle(DicomBuilder::number(2, 4) + DicomBuilder::number(64, 4) +
+                   DicomBuilder::number(0x7FFFFFFF, 4) + std::string(100, '\0')));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
+}
+
+TEST_F(Compressed, MutationsNeverCrash) {
+  const DJ_RPLossless first_order(1, 0);
+  const DJ_RPLossy quality(90);
+  const std::vector<std::string> files = {picture(12).bytes(),
+                                          compress(picture(12).bytes(), EXS_RLELossless, nullptr),
+                                          compress(picture(12).bytes(), EXS_JPEGProcess14SV1, &first_order),
+                                          compress(picture(8).bytes(), EXS_JPEGProcess1, &quality)};
+  RandomStream random(11, 1);
+  for (const std::string& file : files)
+    for (int trial = 0; trial < 1500; ++trial) {
+      std::string bytes = file;
+      const auto size = static_cast<std::uint32_t>(bytes.size());
+      for (std::uint32_t flips = 1 + random.index(3); flips > 0; --flips)
+        bytes[132 + random.index(size - 132)] = static_cast<char>(random.bits());
+      if (random.index(4) == 0) bytes.resize(random.index(size));
+      const auto exposure = read_dicom(bytes, "x.dcm", {});
+      if (exposure) {
+        EXPECT_FALSE(exposure->pixels.empty());
+      } else {
+        EXPECT_EQ(exit_code(exposure.error().reason), 2);
+      }
+    }
+}
+
+}  // namespace
+}  // namespace helicarm

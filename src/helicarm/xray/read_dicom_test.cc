@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/read_dicom.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/polarity.h"
+
+namespace helicarm {
+namespace {
+
+Expected<Exposure> read(const DicomBuilder& builder, std::optional<int> frame = {}) {
+  return read_dicom(builder.bytes(), "x.dcm", frame);
+}
+
+std::string_view reason(const DicomBuilder& builder, std::optional<int> frame = {}) {
+  const auto exposure = read(builder, frame);
+  return exposure ? "ok" : code(exposure.error().reason);
+}
+
+bool warned(const Exposure& exposure, Reason reason) {
+  return std::ranges::any_of(exposure.warnings, [&](const Warning& w) { return w.reason == reason; });
+}
+
+DicomBuilder sign(DicomBuilder builder, int sign) { return builder.word(0x00281041, sign, "SS"); }
+
+TEST(ReadDicom, ValuesAndTags) {
+  const auto exposure = read(DicomBuilder().text(0x00181510, "DS", "-12.5").text(0x00181511, "DS", "+3"));
+  ASSERT_TRUE(exposure) << exposure.error().message;
+  EXPECT_EQ(exposure->pixels(0, 0), 100);
+  EXPECT_EQ(exposure->pixels(3, 2), 100 + 2 * 8 + 3);
+  EXPECT_EQ(exposure->lowest, 0);
+  EXPECT_EQ(exposure->highest, 4095);
+  const Acquisition& a = exposure->acquisition;
+  EXPECT_EQ(*a.pixel_mm, Eigen::Vector2d(0.2, 0.3));
+  EXPECT_EQ(a.source_detector_mm, 1000);
+  EXPECT_EQ(a.primary_angle_deg, -12.5);
+  EXPECT_EQ(a.secondary_angle_deg, 3);
+  EXPECT_FALSE(a.flip_hint);
+  EXPECT_FALSE(a.logarithmic.has_value());
+  EXPECT_TRUE(exposure->warnings.empty());
+}
+
+TEST(ReadDicom, FlipRotationAndRelationshipAreHints) {
+  const auto exposure = read(DicomBuilder()
+                                 .text(0x00187034, "CS", "YES")
+                                 .text(0x00187032, "DS", "90")
+                                 .text(0x00281040, "CS", "LOG"));
+  EXPECT_TRUE(exposure->acquisition.flip_hint);
+  EXPECT_EQ(exposure->acquisition.rotation_hint_deg, 90);
+  EXPECT_EQ(exposure->acquisition.logarithmic, true);
+  EXPECT_EQ(exposure->pixels(0, 0), 100);
+  EXPECT_EQ(reason(DicomBuilder().text(0x00187034, "CS", "MAYBE")), "bad_value");
+}
+
+TEST(ReadDicom, ImplicitSyntaxGivesTheSame) {
+  const auto plain = read(DicomBuilder());
+  const auto implicit = read(DicomBuilder().syntax("1.2.840.10008.1.2"));
+  ASSERT_TRUE(implicit) << implicit.error().message;
+  EXPECT_EQ(implicit->acquisition.instance_key, plain->acquisition.instance_key);
+}
+
+TEST(ReadDicom, SignedValuesAndStrayHighBits) {
+  std::vector<std::uint16_t> values(48, 0);
+  values[0] = 0x0FFF;  // -1 in twelve bits
+  values[1] = 0x0800;
+  values[2] = 0xF005;  // an overlay above the stored bits
+  const auto exposure = read(DicomBuilder().word(0x00280103, 1).pixels(values));
+  ASSERT_TRUE(exposure);
+  EXPECT_EQ(exposure->pixels(0, 0), -1);
+  EXPECT_EQ(exposure->pixels(1, 0), -2048);
+  EXPECT_EQ(exposure->pixels(2, 0), 5);
+  EXPECT_EQ(exposure->lowest, -2048);
+  EXPECT_EQ(exposure->highest, 2047);
+}
+
+TEST(ReadDicom, SenselessSpacingAndDistanceAreRefused) {
+  for (const char* spacing : {"0\\0", "-0.3\\-0.3", "NaN\\NaN", "1e400\\1e400", "0,30\\0,30", "0.3",
+                              "0.2\\0.2\\0.2", "inf\\0.3", "0.3\\", "5\\5", "0.3 0.3"}) {
+    const auto exposure = read(DicomBuilder().text(0x00181164, "DS", spacing));
+    ASSERT_FALSE(exposure) << spacing;
+    EXPECT_EQ(exposure.error().reason, Reason::bad_value);
+    EXPECT_NE(exposure.error().message.find("(0018,1164)"), std::string::npos) << exposure.error().message;
+  }
+  for (const char* distance : {"0", "1", "1e9", "-1000", "nan"})
+    EXPECT_EQ(reason(DicomBuilder().text(0x00181110, "DS", distance)), "bad_value") << distance;
+}
+
+TEST(ReadDicom, AbsentSpacingStaysAbsent) {
+  const auto exposure =
+      read(DicomBuilder().erase(0x00181164).erase(0x00181110).text(0x00280030, "DS", "0.3\\0.3"));
+  ASSERT_TRUE(exposure);
+  EXPECT_FALSE(exposure->acquisition.pixel_mm);
+  EXPECT_FALSE(exposure->acquisition.source_detector_mm);
+  EXPECT_TRUE(warned(*exposure, Reason::spacing_missing));
+}
+
+TEST(ReadDicom, ImagerSpacingWinsOverADifferingPixelSpacing) {
+  const auto exposure = read(DicomBuilder().text(0x00280030, "DS", "0.15\\0.15"));
+  EXPECT_EQ(exposure->acquisition.pixel_mm->y(), 0.3);
+  EXPECT_TRUE(warned(*exposure, Reason::tag_disagrees));
+}
+
+TEST(ReadDicom, SeveralFramesNeedAFrame) {
+  std::vector<std::uint16_t> values(96, 1);
+  std::fill(values.begin() + 48, values.end(), std::uint16_t{2});
+  const auto cine = DicomBuilder().text(0x00280008, "IS", "2").pixels(values);
+  const auto unsaid = read(cine);
+  ASSERT_FALSE(unsaid);
+  EXPECT_EQ(unsaid.error().reason, Reason::bad_value);
+  EXPECT_NE(unsaid.error().message.find("2 frames"), std::string::npos);
+  EXPECT_EQ(read(cine, 1)->pixels(0, 0), 1);
+  EXPECT_EQ(read(cine, 2)->pixels(7, 5), 2);
+  EXPECT_EQ(reason(cine, 3), "bad_value");
+  EXPECT_EQ(reason(cine, 0), "bad_value");
+  EXPECT_EQ(reason(DicomBuilder(), 1), "ok");
+}
+
+TEST(ReadDicom, OnePictureStoredInManyWays) {
+  std::vector<std::uint16_t> dark, inverse;
+  for (int i = 0; i < 48; ++i) {
+    dark.push_back(static_cast<std::uint16_t>(i * 80));
+    inverse.push_back(static_cast<std::uint16_t>(4095 - i * 80));
+  }
+  const auto key = [](const DicomBuilder& builder) { return read(builder)->acquisition.instance_key; };
+  const DicomBuilder plain = DicomBuilder().pixels(dark), turned = DicomBuilder().pixels(inverse);
+  DicomBuilder monochrome1 = DicomBuilder(turned).text(0x00280004, "CS", "MONOCHROME1");
+  const std::string expected = key(plain);
+  EXPECT_EQ(key(sign(plain, 1)), expected);
+  EXPECT_EQ(key(monochrome1), expected);
+  EXPECT_EQ(key(DicomBuilder(turned).text(0x20500020, "CS", "INVERSE")), expected);
+  EXPECT_EQ(key(DicomBuilder(monochrome1).text(0x20500020, "CS", "INVERSE")), expected);
+  EXPECT_EQ(key(sign(turned, -1)), expected);
+  EXPECT_EQ(key(sign(monochrome1, -1)), expected);
+  EXPECT_EQ(reason(sign(plain, 2)), "bad_value");
+}
+
+/// Balls of value 20 on a noisy ground of 200, or the other way round.
+DicomBuilder balls(bool bright) {
+  constexpr int side = 200;
+  RandomStream random(7, 1);
+  std::string bytes;
+  for (int v = 0; v < side; ++v)
+    for (int u = 0; u < side; ++u) {
+      const int du = u % 50 - 25, dv = v % 50 - 25;
+      const int value = (du * du + dv * dv <= 2 ? 20 : 200) + static_cast<int>(random.index(9));
+      bytes += static_cast<char>(bright ? 255 - value : value);
+    }
+  return DicomBuilder()
+      .word(0x00280010, side)
+      .word(0x00280011, side)
+      .word(0x00280100, 8)
+      .word(0x00280101, 8)
+      .word(0x00280102, 7)
+      .raw(0x7FE00010, "OB", bytes);
+}
+
+TEST(ReadDicom, PictureDecidesWhereTheTagsAreAtOdds) {
+  const std::string expected = read(balls(false))->acquisition.instance_key;
+  const auto monochrome1 = [](DicomBuilder b) { return b.text(0x00280004, "CS", "MONOCHROME1"); };
+  // Right for a radiograph: metal stored low and shown white.
+  EXPECT_EQ(read(sign(monochrome1(balls(false)), 1))->acquisition.instance_key, expected);
+  // A careless writer's: values turned and MONOCHROME1 set, the sign forgotten.
+  const auto careless = read(sign(monochrome1(balls(true)), 1));
+  EXPECT_EQ(careless->acquisition.instance_key, expected);
+  EXPECT_TRUE(warned(*careless, Reason::tag_disagrees));
+  EXPECT_EQ(read(balls(true))->acquisition.instance_key, expected);
+  // A sign that nothing contradicts is believed.
+  EXPECT_NE(read(sign(balls(true), 1))->acquisition.instance_key, expected);
+}
+
+TEST(ReadDicom, NoiseAndEdgesDoNotDecidePolarity) {
+  RandomStream random(3, 1);
+  Image<float> noise(300, 300), edge(300, 300);
+  for (float& p : noise.pixels()) p = static_cast<float>(random.normal());
+  for (int v = 0; v < 300; ++v)
+    for (int u = 0; u < 300; ++u)
+      edge(u, v) = (u - 150) * (u - 150) + (v - 150) * (v - 150) < 120 * 120 ? 1.0f : 0.0f;
+  EXPECT_FALSE(metal_looks_bright(noise).has_value());
+  EXPECT_FALSE(metal_looks_bright(edge).has_value());
+  EXPECT_FALSE(metal_looks_bright(Image<float>(2, 2)).has_value());
+}
+
+TEST(ReadDicom, KeysTellPatientsStudiesAndPicturesApart) {
+  const auto one = read(DicomBuilder().text(0x0020000D, "UI", "1.2"))->acquisition;
+  const auto other =
+      read(DicomBuilder().text(0x00100020, "LO", "2").text(0x0020000D, "UI", "1.3"))->acquisition;
+  EXPECT_NE(one.patient_key, other.patient_key);
+  EXPECT_NE(one.study_key, other.study_key);
+  EXPECT_EQ(one.instance_key, other.instance_key);
+  EXPECT_TRUE(one.frame_of_reference_key.empty());
+  EXPECT_EQ(one.patient_key.find("ANON"), std::string::npos);
+  EXPECT_TRUE(read(DicomBuilder().erase(0x00100010).erase(0x00100020))->acquisition.patient_key.empty());
+}
+
+TEST(ReadDicom, HostilePatientNameDoesNoHarm) {
+  const std::string name = "<script>%n\x1b[31m\xff\xfe" + std::string(10000, 'A');
+  const auto exposure = read(DicomBuilder().text(0x00100010, "PN", name));
+  ASSERT_TRUE(exposure);
+  EXPECT_EQ(exposure->acquisition.patient_key.size(), 32u);
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/uid.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <system_error>
+
+#include <sys/random.h>
+
+namespace helicarm {
+namespace {
+
+using Words = std::array<std::uint32_t, 4>;  // most significant first
+
+std::string uid_of(Words words) {
+  words[1] = (words[1] & 0xFFFF0FFFu) | 0x4000u;      // version 4: random
+  words[2] = (words[2] & 0x3FFFFFFFu) | 0x80000000u;  // RFC 4122 variant
+  std::string digits;
+  while (std::ranges::any_of(words, [](std::uint32_t w) { return w != 0; })) {
+    std::uint64_t rest = 0;
+    for (std::uint32_t& word : words) {
+      rest = rest << 32 | word;
+      word = static_cast<std::uint32_t>(rest / 10);
+      rest %= 10;
+    }
+    digits += static_cast<char>('0' + rest);
+  }
+  std::ranges::reverse(digits);
+  return "2.25." + digits;
+}
+
+}  // namespace
+
+std::string make_uid() {
+  Words words;
+  if (::getrandom(words.data(), sizeof words, 0) != sizeof words)
+    throw std::system_error(errno, std::generic_category(), "getrandom");
+  return uid_of(words);
+}
+
+std::string make_uid(RandomStream& random) {
+  Words words;
+  for (std::uint32_t& word : words) word = random.bits();
+  return uid_of(words);
+}
+
+}  // namespace helicarm
