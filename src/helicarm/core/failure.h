@@ -96,7 +96,12 @@ class BadInput : public std::exception {
 template <class F>
 auto guarded(F&& parse) -> Expected<std::invoke_result_t<F>> {
   try {
-    return std::forward<F>(parse)();
+    if constexpr (std::is_void_v<std::invoke_result_t<F>>) {
+      std::forward<F>(parse)();
+      return {};
+    } else {
+      return std::forward<F>(parse)();
+    }
   } catch (const BadInput& bad) {
     return tl::unexpected<Failure>(bad.failure());
   }

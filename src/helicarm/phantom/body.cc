@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom/body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+namespace {
+
+using Polygon = std::vector<Eigen::Vector2d>;
+
+/// Exact signed distance to a polygon, negative inside.
+double polygon_distance(const Polygon& polygon, const Eigen::Vector2d& p) {
+  double nearest = INFINITY;
+  bool inside = false;
+  for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
+    const Eigen::Vector2d edge = polygon[j] - polygon[i];
+    const Eigen::Vector2d from = p - polygon[i];
+    nearest =
+        std::min(nearest, (from - edge * std::clamp(from.dot(edge) / edge.squaredNorm(), 0.0, 1.0)).norm());
+    if ((polygon[i].y() > p.y()) != (polygon[j].y() > p.y()) && from.x() < edge.x() * from.y() / edge.y())
+      inside = !inside;
+  }
+  return inside ? -nearest : nearest;
+}
+
+/// The outer cone and what follows from it.
+struct Cone {
+  explicit Cone(const BodyOptions& options)
+      : base(options.base_diameter_mm / 2),
+        slope((options.base_diameter_mm - options.top_diameter_mm) / 2 / options.height_mm) {}
+
+  double radius(double z) const { return base - slope * z; }
+  double secant() const { return std::hypot(1, slope); }
+  /// Below the outer surface, along its normal.
+  double depth(const Eigen::Vector3d& p) const { return (radius(p.z()) - p.head<2>().norm()) / secant(); }
+  Eigen::Vector3d normal(double azimuth) const {
+    return Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), slope) / secant();
+  }
+  Eigen::Vector3d surface(double azimuth, double z) const {
+    return {radius(z) * std::cos(azimuth), radius(z) * std::sin(azimuth), z};
+  }
+
+  double base;
+  double slope;
+};
+
+/// Half of the body's section in (distance from the axis, z); it crosses the axis so that no edge lies there.
+Polygon section(const Cone& cone, const BodyOptions& options) {
+  const double bottom = -options.flange_depth_mm;
+  const double flange_top = bottom + std::min(options.wall_mm, options.flange_depth_mm);
+  const double rim = cone.radius(bottom) + options.flange_width_mm;
+  const double ceiling = options.height_mm - options.wall_mm;
+  const auto inner = [&](double z) { return cone.radius(z) - options.wall_mm * cone.secant(); };
+  return {{inner(bottom), bottom},
+          {rim, bottom},
+          {rim, flange_top},
+          {cone.radius(flange_top), flange_top},
+          {cone.radius(options.height_mm), options.height_mm},
+          {-10, options.height_mm},
+          {-10, ceiling},
+          {inner(ceiling), ceiling}};
+}
+
+/// A flat square on the outer surface at half height, thick enough to meet the curved wall at its edges.
+struct Facet {
+  Eigen::Vector3d centre;
+  Eigen::Matrix3d axes;  ///< columns: across, up the slope, outward
+  Eigen::Vector3d half;
+
+  double distance(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d q = (axes.transpose() * (p - centre)).cwiseAbs() - half;
+    return q.cwiseMax(0).norm() + std::min(q.maxCoeff(), 0.0);
+  }
+};
+
+Facet facet_at(const Cone& cone, const BodyOptions& options, double azimuth) {
+  const double half_side = options.facet_side_mm / 2;
+  const double sagitta = half_side * half_side / (2 * cone.radius(options.height_mm / 2 + half_side));
+  const double proud = 0.8;
+  const Eigen::Vector3d outward = cone.normal(azimuth);
+  const Eigen::Vector3d across(-std::sin(azimuth), std::cos(azimuth), 0);
+  const double half_thickness = (proud + sagitta + 0.7) / 2;
+  Facet facet;
+  facet.centre = cone.surface(azimuth, options.height_mm / 2) + (proud - half_thickness) * outward;
+  facet.axes << across, outward.cross(across), outward;
+  facet.half = {half_side, half_side, half_thickness};
+  return facet;
+}
+
+/// A slot of the outer surface where the plane through two balls and the outward direction between them meets
+/// it.
+struct Groove {
+  Eigen::Vector3d start, end, across, outward;
+
+  double distance(const Eigen::Vector3d& p, const Cone& cone, const BodyOptions& options) const {
+    const Eigen::Vector3d chord = end - start;
+    const double along = (p - start).dot(chord) / chord.squaredNorm();
+    const double beyond = (std::abs(along - 0.5) - 0.5) * chord.norm();
+    const double inward = -(p - (start + end) / 2).dot(outward);
+    return std::max({std::abs((p - start).dot(across)) - options.groove_width_mm / 2,
+                     cone.depth(p) - options.groove_depth_mm, beyond, inward - 5});
+  }
+};
+
+std::vector<Groove> grooves_of(const Calibrator& calibrator) {
+  std::map<std::string, Eigen::Vector3d> places;
+  for (const auto& ball : calibrator.balls) places[ball.label] = ball.centre_in_calibrator;
+  std::vector<Groove> grooves;
+  // The lines of 2.3.4 (4); a straight one up the cone runs by way of its middle ball.
+  for (const auto& [from, to] : {std::pair{"P3", "P7"},
+                                 {"P7", "P11"},
+                                 {"P4", "P8"},
+                                 {"P8", "P12"},
+                                 {"P1", "P2"},
+                                 {"P5", "P6"},
+                                 {"P9", "P10"}}) {
+    if (!places.count(from) || !places.count(to)) continue;
+    const Eigen::Vector3d start = places[from], end = places[to], middle = (start + end) / 2;
+    const Eigen::Vector3d outward = Eigen::Vector3d(middle.x(), middle.y(), 0).normalized();
+    grooves.push_back({start, end, (end - start).cross(outward).normalized(), outward});
+  }
+  return grooves;
+}
+
+double pocket_distance(const CalibratorBall& ball, const Eigen::Vector3d& outward, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d from = p - ball.centre_in_calibrator;
+  return (from - outward * std::clamp(from.dot(outward), 0.0, 20.0)).norm() - ball.diameter_mm / 2;
+}
+
+double azimuth_of(const Eigen::Vector3d& p) { return std::atan2(p.y(), p.x()); }
+
+}  // namespace
+
+SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& options) {
+  const Cone cone(options);
+  std::vector<Facet> facets;
+  for (int k = 0; k < 4; ++k)  // halfway between the columns of balls
+    facets.push_back(facet_at(
+        cone, options,
+        azimuth_of(calibrator.balls.front().centre_in_calibrator) + std::numbers::pi * (0.25 + 0.5 * k)));
+  return [=, balls = calibrator.balls, profile = section(cone, options),
+          grooves = grooves_of(calibrator)](const Eigen::Vector3d& p) {
+    double distance = polygon_distance(profile, {p.head<2>().norm(), p.z()});
+    if (std::abs(distance) > 25) return distance;
+    for (const auto& ball : balls)
+      distance = std::min(
+          distance, (p - ball.centre_in_calibrator).norm() - ball.diameter_mm / 2 - options.wall_mm / 2);
+    for (const auto& facet : facets) distance = std::min(distance, facet.distance(p));
+    for (const auto& groove : grooves) distance = std::max(distance, -groove.distance(p, cone, options));
+    for (const auto& ball : balls)
+      distance =
+          std::max(distance, -pocket_distance(ball, cone.normal(azimuth_of(ball.centre_in_calibrator)), p));
+    return distance;
+  };
+}
+
+Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options) {
+  if (!(options.step_mm >= 0.2 && options.step_mm <= 3))
+    return fail(Reason::bad_value, fmt::format("step_mm: {} is outside 0.2 to 3", options.step_mm));
+  const Cone cone(options);
+  for (const auto& ball : calibrator.balls) {
+    const double depth = cone.depth(ball.centre_in_calibrator);
+    const double z = ball.centre_in_calibrator.z();
+    if (depth < -ball.diameter_mm / 4 || depth > options.wall_mm + ball.diameter_mm / 2 || z < 0 ||
+        z > options.height_mm)
+      return fail(
+          Reason::bad_value,
+          fmt::format("{}: ball {} lies {:.2f} mm below the cone's surface at z = {:.2f} mm: off the wall",
+                      calibrator.name, ball.label, depth, z),
+          {{"depth_mm", depth}, {"z_mm", z}});
+  }
+  const double reach = cone.radius(-options.flange_depth_mm) + options.flange_width_mm + 2 * options.step_mm;
+  const Eigen::AlignedBox3d box(
+      Eigen::Vector3d(-reach, -reach, -options.flange_depth_mm - 2 * options.step_mm),
+      Eigen::Vector3d(reach, reach, options.height_mm + 2 * options.step_mm));
+  return surface_of(body_distance(calibrator, options), box, options.step_mm);
+}
+
+}  // namespace helicarm
