@@ -72,7 +72,7 @@ TEST(LocateCommand, PointsAndReasonsComeInTheOrderOfThePicks) {
 
 TEST(LocateCommand, CovarianceOfTheCalibrationWidensThatOfThePoint) {
   Json calibrated = result_json();
-  calibrated["calibration"]["joint_covariance"] = json_rows(1e-6 * Eigen::MatrixXd::Identity(20, 20));
+  calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(20, 20));
   const double with =
       locate_in(calibrated, picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
   const double without =
