@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "command.h"
+
+namespace helicarm::cli {
+
+/// `helicarm simulate DIR`: a case with known truth, drawn from `console.seed`.
+struct SimulateArguments {
+  std::filesystem::path folder;
+  std::string kind = "accuracy";  ///< accuracy, tunnels or flat
+  int size = 1024;                ///< 512 or 1024 pixels a side
+  int bits = 12;                  ///< 8, 12 or 16
+  bool knee = true;
+  /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
+  std::vector<std::string> faults;
+};
+
+CommandResult simulate_command(const SimulateArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

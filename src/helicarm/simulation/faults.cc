@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/faults.h"
+
+#include "helicarm/core/random.h"
+#include "helicarm/simulation/streams.h"
+
+namespace helicarm::simulation {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double wire_radius_mm = 1;
+
+/// A K-wire that crosses a ball's shadow in this view, 15 mm nearer the source.
+Body wire_over(const Vector3d& ball, const Shot& shot, RandomStream& random) {
+  const Vector3d towards_source = (shot.view.source_in_world() - ball).normalized();
+  const Vector3d middle = ball + 15 * towards_source;
+  const Vector3d across = towards_source.unitOrthogonal();
+  const Vector3d axis = Eigen::AngleAxisd(random.uniform(0, EIGEN_PI), towards_source) * across;
+  return steel("wire", {cylinder(middle - 50 * axis, middle + 100 * axis, wire_radius_mm)});
+}
+
+/// A cancellous screw: thread's core and head.
+Body screw(const Vector3d& tip, const Vector3d& axis, double length) {
+  const Vector3d neck = tip + length * axis;
+  return steel("screw", {cylinder(tip, neck, 2.2), frustum(neck, neck + 4 * axis, 2.2, 4)});
+}
+
+}  // namespace
+
+Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator,
+                  const std::vector<Shot>& shots, const RigidTransform& calibrator_from_knee) {
+  RandomStream random(options.seed, stream::faults);
+  Scene scene;
+  if (options.has(Fault::decoys))
+    for (int i = 0; i < 2; ++i) {
+      const Vector3d place(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(5, 70));
+      scene.push_back(steel("decoy", {sphere(place, 2)}));
+    }
+  if (options.has(Fault::wires))
+    for (const Shot& shot : shots) {
+      const auto chosen = random.index(static_cast<std::uint32_t>(calibrator.balls.size()));
+      scene.push_back(wire_over(calibrator.balls[chosen].centre_in_calibrator, shot, random));
+    }
+  if (options.has(Fault::screws)) {
+    scene.push_back(
+        moved(screw({16, 14, -10}, Vector3d(0.05, -1, 0.1).normalized(), 42), calibrator_from_knee));
+    scene.push_back(
+        moved(screw({34, 10, -12}, Vector3d(-0.02, -1, 0.3).normalized(), 36), calibrator_from_knee));
+  }
+  return scene;
+}
+
+Scene shutter_leaves(const SimulationOptions& options, const Shot& shot) {
+  if (!options.has(Fault::shutters)) return {};
+  RandomStream random(options.seed, stream::faults, shot.name == "AP" ? 1 : 2);
+  const double field_mm = 0.5 * shot.pixel_mm() * shot.detector.width;
+  constexpr double depth_mm = 100;
+  const double scale = depth_mm / shot.f_mm;
+  const RigidTransform world_from_camera = shot.view.camera_from_world.inverse();
+  const double reach = field_mm * scale * 2;
+  Scene leaves;
+  for (int side : {-1, 1}) {
+    // The leaf's inner edge lies at 55 to 70 % of the half field.
+    const double edge = side * random.uniform(0.55, 0.7) * field_mm * scale;
+    Body leaf{"shutter", {box({edge + side * reach, 0, depth_mm}, {reach, reach, 1})}, {}};
+    leaf.attenuation.setConstant(1.8);  // 2 mm of it let 2.7 % through
+    leaves.push_back(moved(leaf, world_from_camera));
+  }
+  return leaves;
+}
+
+}  // namespace helicarm::simulation

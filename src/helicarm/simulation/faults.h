@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/simulation/c_arm.h"
+#include "helicarm/simulation/scene.h"
+
+namespace helicarm::simulation {
+
+/// Metal that does not belong to the calibrator, as the options ask; in the calibrator's frame, for both
+/// views.
+Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator,
+                  const std::vector<Shot>& shots, const RigidTransform& calibrator_from_knee);
+
+/// Collimator leaves that cut a part of this view's field off.
+Scene shutter_leaves(const SimulationOptions& options, const Shot& shot);
+
+}  // namespace helicarm::simulation

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/geometry/rigid_transform.h"
+
+namespace helicarm::simulation {
+
+inline constexpr double tunnel_ball_mm = 3;
+
+/// A ball at a tunnel's end, and where it truly is in every frame.
+struct TunnelPoint {
+  std::string name;  ///< FS, FE, TS, TE
+  std::string bone;  ///< femur or tibia
+  Eigen::Vector3d in_calibrator;
+  Eigen::Vector3d in_bone;
+  Eigen::Vector3d in_tool;
+};
+
+/// A line that the tool has drilled or will drill, and how far it truly misses the tunnel's ends.
+struct ToolLine {
+  std::string name;
+  std::string start;
+  std::string end;
+  Eigen::Vector3d p1_in_calibrator;
+  Eigen::Vector3d p2_in_calibrator;
+  double start_error_mm;
+  double end_error_mm;
+};
+
+/// An ACL navigation: the tracker's true and read poses ("calibrator", "femur", "tibia", "tool") and the
+/// tunnels.
+struct NavigationTruth {
+  double sigma_mm = 0.12;  ///< of a reading, per axis
+  double sigma_deg = 0.05;
+  std::map<std::string, RigidTransform> tracker_from;  ///< true
+  std::map<std::string, RigidTransform> read;          ///< one reading serves both views and now
+  std::vector<TunnelPoint> points;
+  std::vector<ToolLine> lines;
+};
+
+NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& calibrator_from_knee);
+
+/// Distance of a point from the straight line through two others.
+double distance_to_line(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
+
+}  // namespace helicarm::simulation

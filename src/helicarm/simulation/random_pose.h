@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rigid_transform.h"
+
+namespace helicarm::simulation {
+
+/// A rotation of normal spread (deg) and a shift of normal spread (mm) per axis.
+RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm);
+
+/// A rotation drawn evenly from all.
+Eigen::Matrix3d random_rotation(RandomStream& random);
+
+}  // namespace helicarm::simulation

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/render_view.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace helicarm::simulation {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double f_mm = 1000;
+constexpr double depth_mm = 650;
+
+/// A small receiver, looking along z from the origin; the scene's middle is 650 mm away.
+VirtualDetector small_detector() {
+  VirtualDetector detector;
+  detector.width = 128;
+  detector.height = 96;
+  detector.pixel_mm = 0.2;
+  return detector;
+}
+
+View straight_view(const VirtualDetector& detector) {
+  const double f_px = f_mm / detector.pixel_mm;
+  return {{f_px, f_px, 63.3, 47.6}, {Eigen::Matrix3d::Identity(), {0, 0, depth_mm}}};
+}
+
+/// All three lines attenuate alike, so that the logarithm of the signal is the path.
+Body grey(Solid solid, double per_mm, bool metal = false) {
+  return {"grey", {std::move(solid)}, Attenuation::Constant(per_mm), metal};
+}
+
+double path(const Image<float>& picture, int u, int v, double per_mm) {
+  return -std::log(picture(u, v)) / per_mm;
+}
+
+TEST(RenderView, EmptySceneIsTheOpenBeam) {
+  const VirtualDetector detector = small_detector();
+  for (float pixel : render_view({}, detector, straight_view(detector), 1).pixels())
+    EXPECT_FLOAT_EQ(pixel, 1);
+}
+
+TEST(RenderView, BallsChordFollowsTheClosedFormFromCentreToEdge) {
+  const VirtualDetector detector = small_detector();
+  const View view = straight_view(detector);
+  const Image<float> picture = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
+  for (int u = 0; u < detector.width; ++u) {
+    const Vector3d ray((u - view.intrinsics.u0) / view.intrinsics.fx,
+                       (48 - view.intrinsics.v0) / view.intrinsics.fy, 1);
+    const double miss = Vector3d(0, 0, depth_mm).cross(ray).norm() / ray.norm();
+    EXPECT_NEAR(path(picture, u, 48, 0.02), 2 * std::sqrt(std::max(0.0, 25 - miss * miss)), 1e-4);
+  }
+}
+
+TEST(RenderView, AbsorbedMassOfABallIsItsVolume) {
+  const VirtualDetector detector = small_detector();
+  const View view = straight_view(detector);
+  constexpr double radius = 4;
+  const Image<float> picture = render_view({grey(sphere({0, 0, 0}, radius), 0.05, true)}, detector, view, 1);
+  double sum = 0;
+  for (int v = 0; v < detector.height; ++v)
+    for (int u = 0; u < detector.width; ++u) sum += path(picture, u, v, 0.05);
+  const double magnification = f_mm / depth_mm;
+  const double volume = sum * std::pow(detector.pixel_mm / magnification, 2);
+  EXPECT_NEAR(volume / (4.0 / 3.0 * EIGEN_PI * std::pow(radius, 3)), 1, 1e-3);
+}
+
+TEST(RenderView, SteelBallsCentroidIsTheCentreOfItsProjectedEllipse) {
+  VirtualDetector detector = small_detector();
+  View view = straight_view(detector);
+  view.intrinsics.u0 = -400;  // the ball is seen 5 degrees off the axis
+  constexpr double radius = 2;
+  const Vector3d centre((63.4 + 400) / view.intrinsics.fx * depth_mm, 0.31, 0);
+  const Image<float> picture = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
+  // The shadow's outline is the conic K (c c' - (c.c - r^2) I) K', whose centre follows from its dual's last
+  // column.
+  const Vector3d c = view.camera_from_world * centre;
+  const Eigen::Matrix3d k = view.intrinsics.matrix();
+  const Eigen::Matrix3d dual =
+      k * (c * c.transpose() - radius * radius * Eigen::Matrix3d::Identity()) * k.transpose();
+  const Vector2d ellipse = dual.col(2).head<2>() / dual(2, 2);
+  Vector2d sum(0, 0);
+  double weight = 0;
+  for (int v = 0; v < detector.height; ++v)
+    for (int u = 0; u < detector.width; ++u) {
+      const double dark = 1 - picture(u, v);
+      sum += dark * Vector2d(u, v);
+      weight += dark;
+    }
+  EXPECT_LT((sum / weight - ellipse).norm(), 0.005);
+}
+
+TEST(RenderView, DistortionMovesTheBallToWhereItsInverseSays) {
+  VirtualDetector detector = small_detector();
+  detector.distortion.centre_px = {60, 50};
+  detector.distortion.radius_px = 64;
+  detector.distortion.k1 = -0.03;
+  detector.distortion.shift_px = {4, -3};
+  const View view = straight_view(detector);
+  const Vector3d centre(2.1, -1.3, 0);
+  const Image<float> picture = render_view({grey(sphere(centre, 1), 3, true)}, detector, view, 1);
+  Vector2d sum(0, 0);
+  double weight = 0;
+  for (int v = 0; v < detector.height; ++v)
+    for (int u = 0; u < detector.width; ++u) {
+      sum += (1 - picture(u, v)) * Vector2d(u, v);
+      weight += 1 - picture(u, v);
+    }
+  EXPECT_LT((sum / weight - detector.distortion.raw_from_ideal(view.project(centre))).norm(), 0.1);
+}
+
+TEST(RenderView, NestedShellIsItsTwoChordsDifference) {
+  const VirtualDetector detector = small_detector();
+  const Scene shell = {grey(sphere({0, 0, 0}, 6), 0.05), grey(sphere({0, 0, 0}, 5), -0.05)};
+  const View view = straight_view(detector);
+  EXPECT_NEAR(transmission(shell, view.source_in_world(), {0, 0, 1}), std::exp(-0.05 * 2), 1e-12);
+  EXPECT_NEAR(render_view(shell, detector, view, 1)(63, 48), std::exp(-0.05 * 2), 1e-4);
+}
+
+TEST(RenderView, RoundFieldIsBlackOutsideAndWholeInside) {
+  VirtualDetector detector = small_detector();
+  detector.distortion.centre_px = {64, 48};
+  detector.field_radius_px = 40;
+  const Image<float> picture = render_view({}, detector, straight_view(detector), 1);
+  EXPECT_EQ(picture(64 + 42, 48), 0);
+  EXPECT_EQ(picture(0, 0), 0);
+  EXPECT_EQ(picture(64 + 38, 48), 1);
+  double area = 0;
+  for (float pixel : picture.pixels()) area += pixel;
+  EXPECT_NEAR(area, EIGEN_PI * 40 * 40, 10);
+}
+
+TEST(RenderView, ThreadsDoNotChangeABit) {
+  VirtualDetector detector = small_detector();
+  const Scene scene = {steel("ball", {sphere({1, 2, 3}, 2)}),
+                       grey(cylinder({-20, 3, 1}, {20, -4, 9}, 6), 0.03)};
+  const View view = straight_view(detector);
+  const Image<float> one = render_view(scene, detector, view, 1);
+  const Image<float> two = render_view(scene, detector, view, 2);
+  EXPECT_TRUE(std::equal(one.pixels().begin(), one.pixels().end(), two.pixels().begin()));
+}
+
+}  // namespace
+}  // namespace helicarm::simulation

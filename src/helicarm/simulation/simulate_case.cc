@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/simulate_case.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/simulation/calibrator_body.h"
+#include "helicarm/simulation/faults.h"
+#include "helicarm/simulation/knee.h"
+#include "helicarm/simulation/random_pose.h"
+#include "helicarm/simulation/streams.h"
+
+namespace helicarm::simulation {
+namespace {
+
+using Eigen::Vector2d;
+
+Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
+  if (options.size != 512 && options.size != 1024)
+    return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));
+  if (options.bits != 8 && options.bits != 12 && options.bits != 16)
+    return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 12 and 16", options.bits));
+  for (const std::string& lost : options.lost_balls)
+    if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
+                     [&](const CalibratorBall& ball) { return ball.label == lost; }))
+      return fail(Reason::bad_value, fmt::format("lost ball \"{}\" is none of {}'s", lost, calibrator.name));
+  return {};
+}
+
+/// Within 3 px of the ball's centre, to a tenth of a pixel as a mouse on a zoomed picture gives it.
+Click click(const TruePoint& point, RandomStream& random) {
+  const double distance = 3 * std::sqrt(random.uniform());
+  const double angle = random.uniform(0, 2 * EIGEN_PI);
+  const Vector2d raw = point.raw + distance * Vector2d(std::cos(angle), std::sin(angle));
+  return {point.name, (raw * 10).array().round().matrix() / 10};
+}
+
+SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const Shot& shot,
+                        std::uint32_t number) {
+  const SimulationOptions& options = room.options;
+  Scene scene = patient;
+  if (room.plate)
+    for (const Body& dot : plate_body(*room.plate, shot.camera_from_plate, shot.view)) scene.push_back(dot);
+  for (const Body& leaf : shutter_leaves(options, shot)) scene.push_back(leaf);
+
+  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads);
+  SimulatedView view;
+  view.shot = shot;
+  view.pixels = develop(signal, shot.imaging, options.seed, stream::noise + 2 * number, options.threads);
+  if (shot.mirrored) view.pixels = mirrored(view.pixels);
+
+  for (const CalibratorBall& ball : room.calibrator.balls)
+    view.balls.push_back(true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, shot));
+  for (const CalibratorTarget& target : room.calibrator.targets)
+    view.targets.push_back(
+        true_point(target.name, target.point_in_calibrator, target.diameter_mm, scene, shot));
+  if (room.plate) {
+    const RigidTransform world_from_plate = shot.view.camera_from_world.inverse() * shot.camera_from_plate;
+    for (std::size_t i = 0; i < room.plate->dots_mm.size(); ++i) {
+      const Vector2d& dot = room.plate->dots_mm[i];
+      view.plate_dots.push_back(true_point(plate_dot_name(i),
+                                           world_from_plate * Eigen::Vector3d(dot.x(), dot.y(), 0),
+                                           room.plate->diameter_mm, scene, shot));
+    }
+  }
+  if (room.navigation) {
+    RandomStream random(options.seed, stream::clicks, number);
+    for (const TunnelPoint& point : room.navigation->points) {
+      view.tunnel_points.push_back(true_point(point.name, point.in_calibrator, tunnel_ball_mm, scene, shot));
+      view.clicks.push_back(click(view.tunnel_points.back(), random));
+    }
+  }
+  return view;
+}
+
+}  // namespace
+
+Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
+  SimulatedCase room;
+  room.options = options;
+  room.calibrator = udcsc();
+  if (const auto checked = check(options, room.calibrator); !checked)
+    return tl::unexpected<Failure>(checked.error());
+  const bool tunnels = options.kind == CaseKind::tunnels;
+  if (!tunnels) room.calibrator.targets = check_targets(room.calibrator);
+  if (options.kind != CaseKind::flat) room.plate = plate48();
+
+  RandomStream random(options.seed, stream::patient);
+  const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
+  RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
+  patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
+  const RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
+
+  const double plate_height = room.plate ? *room.plate->height_above_receiver_mm : 0;
+  const std::vector<Shot> shots = take_stand(options, plate_height, calibrator_from_patient);
+  Scene patient = calibrator_body(room.calibrator);
+  std::erase_if(patient, [&](const Body& body) {
+    return std::find(options.lost_balls.begin(), options.lost_balls.end(), body.name) !=
+           options.lost_balls.end();
+  });
+  if (options.knee)
+    for (const Body& body : knee_body()) patient.push_back(moved(body, calibrator_from_knee));
+  for (const Body& body : stray_metal(options, room.calibrator, shots, calibrator_from_knee))
+    patient.push_back(body);
+  if (tunnels) {
+    room.navigation = set_up_navigation(options.seed, calibrator_from_knee);
+    for (const TunnelPoint& point : room.navigation->points)
+      patient.push_back(steel(point.name, {sphere(point.in_calibrator, tunnel_ball_mm / 2)}));
+  }
+  for (std::size_t i = 0; i < shots.size(); ++i)
+    room.views.push_back(take_view(room, patient, shots[i], static_cast<std::uint32_t>(i)));
+  return room;
+}
+
+}  // namespace helicarm::simulation

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/image/image.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom/plate.h"
+#include "helicarm/simulation/navigation_truth.h"
+#include "helicarm/simulation/simulation_options.h"
+#include "helicarm/simulation/truth.h"
+
+namespace helicarm::simulation {
+
+/// A surgeon's click near a tunnel's ball, raw pixels.
+struct Click {
+  std::string point;
+  Eigen::Vector2d raw;
+};
+
+/// One stored picture and everything that is true of it.
+struct SimulatedView {
+  Shot shot;
+  Image<std::uint16_t> pixels;
+  std::vector<TruePoint> balls;
+  std::vector<TruePoint> targets;
+  std::vector<TruePoint> tunnel_points;
+  std::vector<TruePoint> plate_dots;
+  std::vector<Click> clicks;
+};
+
+struct SimulatedCase {
+  SimulationOptions options;
+  Calibrator calibrator;
+  std::optional<Plate> plate;
+  std::vector<SimulatedView> views;
+  std::optional<NavigationTruth> navigation;
+};
+
+/// A whole case from its options: the same bytes for the same seed. Refuses (bad_value) an unknown size,
+/// depth or ball.
+Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
+
+}  // namespace helicarm::simulation

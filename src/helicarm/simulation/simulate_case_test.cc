@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/simulate_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/simulation/knee.h"
+
+namespace helicarm::simulation {
+namespace {
+
+using Eigen::Vector2d;
+
+SimulationOptions small(CaseKind kind) {
+  SimulationOptions options;
+  options.seed = 11;
+  options.kind = kind;
+  options.size = 512;
+  options.knee = false;
+  return options;
+}
+
+bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
+  return std::equal(a.pixels().begin(), a.pixels().end(), b.pixels().begin(), b.pixels().end());
+}
+
+/// Centroid of what is darker than half way between the middle and the rim of a round window.
+Vector2d dark_centroid(const Image<std::uint16_t>& picture, const Vector2d& near, int half) {
+  const int u0 = static_cast<int>(std::lround(near.x()));
+  const int v0 = static_cast<int>(std::lround(near.y()));
+  const double threshold = 0.5 * (picture(u0, v0) + picture(u0 + half, v0 + half));
+  Vector2d sum(0, 0);
+  double weight = 0;
+  for (int v = v0 - half; v <= v0 + half; ++v)
+    for (int u = u0 - half; u <= u0 + half; ++u) {
+      if (std::hypot(u - near.x(), v - near.y()) > half) continue;
+      const double dark = std::max(0.0, threshold - picture(u, v));
+      sum += dark * Vector2d(u, v);
+      weight += dark;
+    }
+  return sum / weight;
+}
+
+TEST(SimulateCase, SameSeedSameBytesWhateverTheThreads) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  options.knee = true;
+  options.threads = 1;
+  const SimulatedCase one = *simulate_case(options);
+  options.threads = 2;
+  const SimulatedCase two = *simulate_case(options);
+  options.seed = 12;
+  const SimulatedCase other = *simulate_case(options);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_TRUE(same(one.views[i].pixels, two.views[i].pixels));
+    EXPECT_FALSE(same(one.views[i].pixels, other.views[i].pixels));
+  }
+}
+
+TEST(SimulateCase, ClearBallsAreDarkWhereTheTruthPutsThem) {
+  for (CaseKind kind : {CaseKind::accuracy, CaseKind::flat}) {
+    const SimulatedCase simulated = *simulate_case(small(kind));
+    for (const SimulatedView& view : simulated.views) {
+      int clear = 0;
+      for (const TruePoint& ball : view.balls) {
+        if (ball.visibility != Visibility::clear) continue;
+        ++clear;
+        EXPECT_LT((dark_centroid(view.pixels, ball.raw, 8) - ball.raw).norm(), 0.3)
+            << view.shot.name << ball.name;
+      }
+      EXPECT_GE(clear, 8);
+    }
+  }
+}
+
+TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreSeen) {
+  const SimulatedCase simulated = *simulate_case(small(CaseKind::accuracy));
+  for (const SimulatedView& view : simulated.views) {
+    ASSERT_EQ(view.plate_dots.size(), 48u);
+    for (const TruePoint& dot : view.plate_dots) {
+      EXPECT_NEAR(view.shot.view.depth(dot.in_calibrator), view.shot.f_mm - 15, 1e-9);
+      if (dot.visibility != Visibility::clear) continue;
+      EXPECT_LT((dark_centroid(view.pixels, dot.raw, 4) - dot.raw).norm(), 0.5);
+    }
+  }
+}
+
+TEST(SimulateCase, StandKeepsItsPromisesForManySeeds) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SimulationOptions options;
+    options.seed = seed;
+    const std::vector<Shot> shots = take_stand(options, 15, {});
+    const Eigen::Vector3d ap = shots[0].view.camera_from_world.rotation.row(2);
+    const Eigen::Vector3d lateral = shots[1].view.camera_from_world.rotation.row(2);
+    EXPECT_NEAR(std::acos(ap.dot(lateral)) * 180 / EIGEN_PI, 90, 5.2);
+    const auto principal = [](const Shot& shot) {
+      return Vector2d(shot.view.intrinsics.u0, shot.view.intrinsics.v0);
+    };
+    EXPECT_LE((principal(shots[0]) - principal(shots[1])).norm(), 25);
+    EXPECT_LE(std::abs(shots[0].f_mm - shots[1].f_mm), 2);
+    for (const Shot& shot : shots) {
+      EXPECT_NEAR(shot.view.camera_from_world.rotation.determinant(), 1, 1e-12);
+      EXPECT_LE((principal(shot) - Vector2d(511.5, 511.5)).norm() * shot.detector.pixel_mm, 12);
+      EXPECT_LE(std::abs(shot.f_mm - shot.nominal_f_mm), 5);
+    }
+  }
+}
+
+TEST(SimulateCase, MirroredViewFlipsPictureAndTruthTogether) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  const SimulatedCase plain = *simulate_case(options);
+  options.faults = {Fault::mirrored};
+  const SimulatedCase flipped = *simulate_case(options);
+  EXPECT_TRUE(same(plain.views[0].pixels, flipped.views[0].pixels));
+  EXPECT_TRUE(same(mirrored(plain.views[1].pixels), flipped.views[1].pixels));
+  EXPECT_LT(flipped.views[1].shot.stored_view().intrinsics.fx, 0);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const TruePoint& before = plain.views[1].balls[i];
+    const TruePoint& after = flipped.views[1].balls[i];
+    EXPECT_NEAR(before.raw.x() + after.raw.x(), 511, 1e-9);
+    EXPECT_NEAR(before.ideal.x() + after.ideal.x(), 511, 1e-9);
+    EXPECT_NEAR(before.ideal.y(), after.ideal.y(), 1e-9);
+  }
+}
+
+TEST(SimulateCase, FaultsShowInTheTruth) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  options.lost_balls = {"P3"};
+  options.faults = {Fault::wires, Fault::shutters, Fault::saturated};
+  const SimulatedCase simulated = *simulate_case(options);
+  std::map<Visibility, int> seen;
+  for (const SimulatedView& view : simulated.views) {
+    EXPECT_EQ(view.balls[2].visibility, Visibility::absent);
+    for (const TruePoint& ball : view.balls) ++seen[ball.visibility];
+    for (const TruePoint& dot : view.plate_dots) ++seen[dot.visibility];
+    EXPECT_GT(std::count(view.pixels.pixels().begin(), view.pixels.pixels().end(), 4095), 10000);
+  }
+  EXPECT_EQ(seen[Visibility::absent], 2);
+  EXPECT_GE(seen[Visibility::hidden], 2);
+  EXPECT_GE(seen[Visibility::outside], 6);
+}
+
+TEST(SimulateCase, TunnelPointsAgreeInEveryFrame) {
+  const SimulatedCase simulated = *simulate_case(small(CaseKind::tunnels));
+  const NavigationTruth& truth = *simulated.navigation;
+  for (const TunnelPoint& point : truth.points) {
+    const Eigen::Vector3d in_tracker = truth.tracker_from.at("calibrator") * point.in_calibrator;
+    EXPECT_LT((truth.tracker_from.at(point.bone) * point.in_bone - in_tracker).norm(), 1e-9);
+    EXPECT_LT((truth.tracker_from.at("tool") * point.in_tool - in_tracker).norm(), 1e-9);
+  }
+  for (const auto& [frame, pose] : truth.tracker_from) {
+    const RigidTransform error = pose.inverse() * truth.read.at(frame);
+    EXPECT_GT(error.translation.norm(), 0);
+    EXPECT_LT(error.translation.norm(), 0.12 * 5);
+  }
+  for (const ToolLine& line : truth.lines) EXPECT_LT(line.start_error_mm, 3);
+  for (const SimulatedView& view : simulated.views)
+    for (std::size_t i = 0; i < view.clicks.size(); ++i)
+      EXPECT_LT((view.clicks[i].raw - view.tunnel_points[i].raw).norm(), 3.1);
+}
+
+TEST(SimulateCase, TunnelsRunInsideTheirBones) {
+  const Scene knee = knee_body();
+  const auto inside = [&](const char* bone, const Eigen::Vector3d& point) {
+    return std::any_of(knee.begin(), knee.end(), [&](const Body& body) {
+      return body.name == bone &&
+             std::any_of(body.solids.begin(), body.solids.end(), [&](const Solid& solid) {
+               const Interval part = solid.intersect(point, {0, 0, 1});
+               return part.enter < 0 && part.leave > 0;
+             });
+    });
+  };
+  for (double t : {0.05, 0.5, 0.95}) {
+    EXPECT_TRUE(inside("femur", femoral_tunnel().start * (1 - t) + femoral_tunnel().end * t)) << t;
+    EXPECT_TRUE(inside("tibia", tibial_tunnel().start * (1 - t) + tibial_tunnel().end * t)) << t;
+  }
+}
+
+TEST(SimulateCase, UnknownSizeDepthAndBallAreRefusedByName) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  options.size = 640;
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+  options = small(CaseKind::accuracy);
+  options.bits = 10;
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+  options = small(CaseKind::accuracy);
+  options.lost_balls = {"P99"};
+  EXPECT_THAT(simulate_case(options).error().message, testing::HasSubstr("P99"));
+}
+
+}  // namespace
+}  // namespace helicarm::simulation

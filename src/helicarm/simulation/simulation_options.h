@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm::simulation {
+
+enum class CaseKind {
+  accuracy,  ///< the paper's 3.2: intensifier, plate, five check targets
+  tunnels,   ///< an ACL navigation: intensifier, plate, balls at the tunnels' ends, tracker and tool
+  flat       ///< as accuracy, with a flat panel: no plate, no distortion
+};
+
+enum class Fault {
+  decoys,     ///< two stray balls of the calibrator's size
+  wires,      ///< a K-wire over a ball in each view
+  screws,     ///< two screws in the tibia
+  low_dose,   ///< a twentieth of the quanta
+  shutters,   ///< collimator leaves inside the field
+  mirrored,   ///< the lateral view is stored mirrored, and tagged so
+  saturated,  ///< the open beam is beyond white
+};
+
+/// The words for them on the command line and in truth.json; an unknown one is a `usage` failure.
+std::string_view word(CaseKind kind);
+std::string_view word(Fault fault);
+Expected<CaseKind> case_kind(std::string_view word);
+Expected<Fault> fault(std::string_view word);
+
+struct SimulationOptions {
+  std::uint64_t seed = 1;
+  CaseKind kind = CaseKind::accuracy;
+  int size = 1024;  ///< 512 or 1024 pixels a side
+  int bits = 12;    ///< 8, 12 or 16
+  bool knee = true;
+  std::vector<Fault> faults;
+  std::vector<std::string> lost_balls;  ///< labels of balls that fell out of the calibrator
+  unsigned threads = 0;
+
+  bool has(Fault fault) const;
+};
+
+}  // namespace helicarm::simulation

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+/// What each random stream of a simulated case is used for.
+namespace helicarm::simulation::stream {
+
+inline constexpr std::uint32_t c_arm = 1000;
+inline constexpr std::uint32_t patient = 1001;
+inline constexpr std::uint32_t faults = 1002;
+inline constexpr std::uint32_t tracker = 1003;
+inline constexpr std::uint32_t clicks = 1004;
+inline constexpr std::uint32_t uids = 1005;
+inline constexpr std::uint32_t noise = 1010;  ///< and the next: two per view
+
+}  // namespace helicarm::simulation::stream

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/truth_json.h"
+
+#include <algorithm>
+
+namespace helicarm::simulation {
+namespace {
+
+const char* word(Visibility visibility) {
+  switch (visibility) {
+    case Visibility::clear:
+      return "clear";
+    case Visibility::hidden:
+      return "hidden";
+    case Visibility::outside:
+      return "outside";
+    case Visibility::absent:
+      return "absent";
+  }
+  return "";
+}
+
+Json points_json(const std::vector<TruePoint>& points) {
+  Json list = Json::array();
+  for (const TruePoint& point : points)
+    list.push_back({{"name", point.name},
+                    {"xyz_mm", vector_json(point.in_calibrator)},
+                    {"ideal", vector_json(point.ideal)},
+                    {"raw", vector_json(point.raw)},
+                    {"visibility", word(point.visibility)}});
+  return list;
+}
+
+Json distortion_json(const VirtualDetector& detector) {
+  const IntensifierDistortion& distortion = detector.distortion;
+  Json bumps = Json::array();
+  for (const DistortionBump& bump : distortion.bumps)
+    bumps.push_back({{"centre_px", vector_json(bump.centre_px)},
+                     {"sigma_px", bump.sigma_px},
+                     {"shift_px", vector_json(bump.shift_px)}});
+  return {{"centre_px", vector_json(distortion.centre_px)},
+          {"radius_px", distortion.radius_px},
+          {"k1", distortion.k1},
+          {"k2", distortion.k2},
+          {"s_rotation_rad", distortion.s_rotation},
+          {"shift_px", vector_json(distortion.shift_px)},
+          {"bumps", bumps}};
+}
+
+Json view_json(const SimulatedView& view) {
+  const Shot& shot = view.shot;
+  const View stored = shot.stored_view();
+  Json json = {{"name", shot.name},
+               {"image_size", {shot.detector.width, shot.detector.height}},
+               {"mirrored", shot.mirrored},
+               {"camera",
+                {{"f_mm", shot.f_mm},
+                 {"pixel_mm", shot.detector.pixel_mm},
+                 {"K", matrix_json(stored.intrinsics.matrix())},
+                 {"camera_from_calibrator", matrix_json(stored.camera_from_world.matrix())},
+                 {"projection", matrix_json(stored.projection())}}},
+               {"field_radius_px", nullptr},
+               {"distortion", distortion_json(shot.detector)},
+               {"balls", points_json(view.balls)},
+               {"targets", points_json(view.targets)},
+               {"tunnel_points", points_json(view.tunnel_points)},
+               {"plate", points_json(view.plate_dots)}};
+  if (shot.detector.field_radius_px) json["field_radius_px"] = *shot.detector.field_radius_px;
+  return json;
+}
+
+/// Distances in ideal pixels of the tunnel's true ends from the tool line's image.
+Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const Shot& shot) {
+  const View view = shot.stored_view();
+  const auto flat = [&](const Eigen::Vector3d& point) {
+    const Eigen::Vector2d pixel = view.project(point);
+    return Eigen::Vector3d(pixel.x(), pixel.y(), 0);
+  };
+  const auto error = [&](const std::string& name) {
+    const auto point = std::find_if(truth.points.begin(), truth.points.end(),
+                                    [&](const TunnelPoint& each) { return each.name == name; });
+    return distance_to_line(flat(point->in_calibrator), flat(line.p1_in_calibrator),
+                            flat(line.p2_in_calibrator));
+  };
+  return {{"start", error(line.start)}, {"end", error(line.end)}};
+}
+
+Json navigation_json(const SimulatedCase& simulated) {
+  const NavigationTruth& truth = *simulated.navigation;
+  Json json;
+  for (const auto& [frame, pose] : truth.tracker_from)
+    json["poses"]["tracker_from_" + frame] = matrix_json(pose.matrix());
+  for (const TunnelPoint& point : truth.points)
+    json["points"].push_back({{"name", point.name},
+                              {"bone", point.bone},
+                              {"in_calibrator", vector_json(point.in_calibrator)},
+                              {"in_bone", vector_json(point.in_bone)},
+                              {"in_tool", vector_json(point.in_tool)}});
+  for (const ToolLine& line : truth.lines) {
+    Json entry = {{"name", line.name},
+                  {"start", line.start},
+                  {"end", line.end},
+                  {"start_error_mm", line.start_error_mm},
+                  {"end_error_mm", line.end_error_mm}};
+    for (const SimulatedView& view : simulated.views)
+      entry["error_px"][view.shot.name] = line_errors_px(line, truth, view.shot);
+    json["tool_lines"].push_back(entry);
+  }
+  return json;
+}
+
+}  // namespace
+
+Json vector_json(const Eigen::VectorXd& vector) { return std::vector<double>(vector.begin(), vector.end()); }
+
+Json matrix_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) rows.push_back(vector_json(matrix.row(row)));
+  return rows;
+}
+
+Json truth_json(const SimulatedCase& simulated) {
+  Json json = {{"format", "helicarm-truth/1"},
+               {"kind", word(simulated.options.kind)},
+               {"seed", simulated.options.seed},
+               {"knee", simulated.options.knee},
+               {"faults", Json::array()},
+               {"lost_balls", simulated.options.lost_balls},
+               {"note",
+                "ideal: pixels without distortion; raw: stored pixels. distortion maps raw to ideal before "
+                "any mirroring "
+                "(u -> width - 1 - u)"},
+               {"views", Json::array()}};
+  for (Fault fault : simulated.options.faults) json["faults"].push_back(word(fault));
+  for (const SimulatedView& view : simulated.views) json["views"].push_back(view_json(view));
+  for (const CalibratorTarget& target : simulated.calibrator.targets)
+    json["targets_in_calibrator"][target.name] = vector_json(target.point_in_calibrator);
+  if (simulated.navigation) json["navigation"] = navigation_json(simulated);
+  return json;
+}
+
+}  // namespace helicarm::simulation

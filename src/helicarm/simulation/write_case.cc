@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/write_case.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/simulation/streams.h"
+#include "helicarm/simulation/truth_json.h"
+#include "helicarm/xray/uid.h"
+#include "helicarm/xray/write_dicom.h"
+
+namespace helicarm::simulation {
+namespace {
+
+constexpr const char* truth_file = "truth.json";
+constexpr const char* plate_file = "plate.json";
+
+/// The seed alone decides, so that a case is written alike each time.
+std::string uid(std::uint64_t seed, std::uint64_t item) {
+  RandomStream random(seed, stream::uids, item);
+  return make_uid(random);
+}
+
+DerivedImage dicom(const SimulatedCase& simulated, std::size_t number) {
+  const SimulatedView& view = simulated.views[number];
+  const Shot& shot = view.shot;
+  DerivedImage image;
+  image.pixels = view.pixels;
+  image.bits_stored = simulated.options.bits;
+  image.acquisition.pixel_mm = Eigen::Vector2d::Constant(shot.detector.pixel_mm);
+  image.acquisition.source_detector_mm = shot.nominal_f_mm;
+  image.acquisition.primary_angle_deg = shot.primary_angle_deg;
+  image.acquisition.secondary_angle_deg = shot.secondary_angle_deg;
+  image.acquisition.flip_hint = shot.mirrored;
+  image.acquisition.logarithmic = shot.imaging.logarithmic;
+  image.acquisition.modality = "XA";
+  image.derived = false;
+  image.series_description = shot.name;
+  image.patient_name = "SIMULATED";
+  image.patient_id = fmt::format("SIM{}", simulated.options.seed);
+  image.study_uid = uid(simulated.options.seed, 0);
+  image.series_uid = uid(simulated.options.seed, 1 + 2 * number);
+  image.instance_uid = uid(simulated.options.seed, 2 + 2 * number);
+  return image;
+}
+
+Json poses_json(const NavigationTruth& truth, std::initializer_list<const char*> frames) {
+  Json poses;
+  for (const char* frame : frames)
+    poses[std::string("tracker_from_") + frame] = matrix_json(truth.read.at(frame).matrix());
+  return poses;
+}
+
+void add_navigation(Json& json, const SimulatedCase& simulated) {
+  const NavigationTruth& truth = *simulated.navigation;
+  for (Json& view : json["views"]) view["poses"] = poses_json(truth, {"calibrator", "femur", "tibia"});
+  json["poses_now"] = poses_json(truth, {"femur", "tibia", "tool"});
+  json["tracker"] = {{"sigma_mm", truth.sigma_mm}, {"sigma_deg", truth.sigma_deg}, {"samples", "shared"}};
+  for (const SimulatedView& view : simulated.views)
+    for (std::size_t i = 0; i < view.clicks.size(); ++i)
+      json["picks"].push_back({{"name", view.clicks[i].point},
+                               {"view", view.shot.name},
+                               {"uv", vector_json(view.clicks[i].raw)},
+                               {"snap", "ball"},
+                               {"diameter_mm", tunnel_ball_mm},
+                               {"moves_with", truth.points[i].bone}});
+  for (const ToolLine& line : truth.lines) {
+    json["tunnels"].push_back({{"name", line.name}, {"start", line.start}, {"end", line.end}});
+    json["tool_lines"].push_back({{"name", line.name},
+                                  {"tunnel", line.name},
+                                  {"p1_in_calibrator", vector_json(line.p1_in_calibrator)},
+                                  {"p2_in_calibrator", vector_json(line.p2_in_calibrator)}});
+  }
+}
+
+Expected<void> write_json(const std::filesystem::path& path, const Json& json) {
+  return write_file(path, json.dump(2) + "\n");
+}
+
+}  // namespace
+
+Json case_json(const SimulatedCase& simulated) {
+  Json json = {{"format", "helicarm-case/1"},
+               {"calibrator", "calibrator.json"},
+               {"plate", simulated.plate ? Json(plate_file) : Json(nullptr)},
+               {"views", Json::array()}};
+  for (const SimulatedView& view : simulated.views)
+    json["views"].push_back({{"name", view.shot.name}, {"image", view.shot.name + ".dcm"}});
+  if (simulated.navigation) add_navigation(json, simulated);
+  return json;
+}
+
+Expected<void> check_case_folder(const std::filesystem::path& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (!fs::exists(folder, error)) return {};
+  if (!fs::is_directory(folder, error))
+    return fail(Reason::cannot_write, fmt::format("{}: is not a folder", folder.string()));
+  if (fs::is_empty(folder, error)) return {};
+  const auto truth = read_json(folder / truth_file);
+  if (truth && truth->is_object() && truth->value("format", Json()) == "helicarm-truth/1") return {};
+  return fail(
+      Reason::cannot_write,
+      fmt::format("{}: holds files that are no earlier simulation; not overwritten", folder.string()));
+}
+
+Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCase& simulated) {
+  if (auto free = check_case_folder(folder); !free) return free;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), error.message()));
+  return guarded([&] {
+    // The truth goes first: it marks the folder as a simulation should the rest be cut short.
+    value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
+    for (std::size_t i = 0; i < simulated.views.size(); ++i)
+      value_or_throw(write_dicom(folder / (simulated.views[i].shot.name + ".dcm"), dicom(simulated, i)));
+    value_or_throw(write_json(folder / "calibrator.json", to_json(simulated.calibrator)));
+    if (simulated.plate)
+      value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
+    else
+      std::filesystem::remove(folder / plate_file, error);
+    value_or_throw(write_json(folder / "case.json", case_json(simulated)));
+  });
+}
+
+}  // namespace helicarm::simulation

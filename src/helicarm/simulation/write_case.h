@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "helicarm/core/json.h"
+#include "helicarm/simulation/simulate_case.h"
+
+namespace helicarm::simulation {
+
+/// case.json as docs/formats.md describes it.
+Json case_json(const SimulatedCase& simulated);
+
+/// Refuses (cannot_write) a folder that holds anything but an earlier simulation.
+Expected<void> check_case_folder(const std::filesystem::path& folder);
+
+/// Writes AP.dcm, LAT.dcm, calibrator.json, plate.json, case.json and truth.json; each file whole or not at
+/// all.
+Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCase& simulated);
+
+}  // namespace helicarm::simulation

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/simulation/write_case.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/simulation/truth_json.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm::simulation {
+namespace {
+
+namespace fs = std::filesystem;
+
+class WriteCase : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) /
+              ("write_case_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  static SimulatedCase simulated(CaseKind kind, int bits) {
+    SimulationOptions options;
+    options.seed = 4;
+    options.kind = kind;
+    options.size = 512;
+    options.bits = bits;
+    options.knee = false;
+    options.faults = {Fault::mirrored};
+    return *simulate_case(options);
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(WriteCase, DicomComesBackWithItsPixelsAndTags) {
+  for (int bits : {8, 12, 16}) {
+    const SimulatedCase room = simulated(CaseKind::tunnels, bits);
+    ASSERT_TRUE(write_case(folder_, room));
+    for (const SimulatedView& view : room.views) {
+      const auto exposure = read_exposure(folder_ / (view.shot.name + ".dcm"), view.shot.name, {});
+      ASSERT_TRUE(exposure) << exposure.error().message;
+      EXPECT_TRUE(std::equal(view.pixels.pixels().begin(), view.pixels.pixels().end(),
+                             exposure->pixels.pixels().begin(), exposure->pixels.pixels().end()));
+      EXPECT_EQ(exposure->highest, (1 << bits) - 1);
+      EXPECT_NEAR(exposure->acquisition.pixel_mm->x(), 235.0 / 512, 1e-9);
+      EXPECT_EQ(exposure->acquisition.source_detector_mm, 997);
+      EXPECT_EQ(exposure->acquisition.flip_hint, view.shot.mirrored);
+    }
+  }
+}
+
+TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
+  const SimulatedCase room = simulated(CaseKind::accuracy, 12);
+  ASSERT_TRUE(write_case(folder_, room));
+  const auto calibrator = read_calibrator(folder_ / "calibrator.json");
+  ASSERT_TRUE(calibrator) << calibrator.error().message;
+  EXPECT_EQ(calibrator->balls.size(), 12u);
+  EXPECT_EQ(calibrator->targets.size(), 5u);
+  const auto plate = read_plate(folder_ / "plate.json");
+  ASSERT_TRUE(plate) << plate.error().message;
+  EXPECT_EQ(plate->dots_mm.size(), 48u);
+}
+
+TEST_F(WriteCase, TruthProjectsTheBallsOntoTheirIdealPixels) {
+  const SimulatedCase room = simulated(CaseKind::accuracy, 12);
+  const Json truth = truth_json(room);
+  EXPECT_EQ(truth["format"], "helicarm-truth/1");
+  for (const Json& view : truth["views"])
+    for (const Json& ball : view["balls"]) {
+      Eigen::Vector3d image = Eigen::Vector3d::Zero();
+      for (std::size_t row = 0; row < 3; ++row) {
+        const Json& p = view["camera"]["projection"][row];
+        for (std::size_t i = 0; i < 3; ++i)
+          image[static_cast<int>(row)] += p[i].get<double>() * ball["xyz_mm"][i].get<double>();
+        image[static_cast<int>(row)] += p[3].get<double>();
+      }
+      EXPECT_NEAR(image.x() / image.z(), ball["ideal"][0].get<double>(), 1e-9);
+      EXPECT_NEAR(image.y() / image.z(), ball["ideal"][1].get<double>(), 1e-9);
+    }
+}
+
+TEST_F(WriteCase, TunnelCaseHoldsPosesPicksTunnelsAndLines) {
+  const Json json = case_json(simulated(CaseKind::tunnels, 12));
+  EXPECT_EQ(json["picks"].size(), 8u);
+  EXPECT_EQ(json["tunnels"].size(), 2u);
+  EXPECT_EQ(json["tool_lines"].size(), 2u);
+  EXPECT_TRUE(json["poses_now"].contains("tracker_from_tool"));
+  EXPECT_EQ(json["views"][0]["poses"]["tracker_from_femur"], json["poses_now"]["tracker_from_femur"]);
+}
+
+TEST_F(WriteCase, EarlierSimulationIsReplacedWithNothingLeftOver) {
+  ASSERT_TRUE(write_case(folder_, simulated(CaseKind::accuracy, 12)));
+  ASSERT_TRUE(write_case(folder_, simulated(CaseKind::flat, 16)));
+  EXPECT_FALSE(fs::exists(folder_ / "plate.json"));
+  EXPECT_TRUE((*read_json(folder_ / "case.json"))["plate"].is_null());
+}
+
+TEST_F(WriteCase, StrangersFilesAreNotOverwritten) {
+  fs::create_directories(folder_);
+  ASSERT_TRUE(write_file(folder_ / "case.json", "{}"));
+  const auto written = write_case(folder_, simulated(CaseKind::accuracy, 12));
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().reason, Reason::cannot_write);
+  EXPECT_EQ(*read_file(folder_ / "case.json", 100), "{}");
+}
+
+}  // namespace
+}  // namespace helicarm::simulation
