@@ -23,8 +23,9 @@ using Eigen::Vector2d;
 constexpr double max_shift_px = 8;
 constexpr double sigma_floor_px = 0.03;
 
-/// Background b0 bx by bxx bxy byy, contrast, shift.
-constexpr int n_parameters = 9;
+/// A cubic background, contrast, shift.
+constexpr int n_background = 10;
+constexpr int n_parameters = n_background + 3;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
@@ -93,8 +94,9 @@ Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
     const double y = pixel.offset.y() / patch.window;
     const auto [value, slope] = shade.at(pixel.offset - p.tail<2>());
     Vector row;
-    row << 1, x, y, x * x, x * y, y * y, -value, p[6] * slope;
-    residuals[i] = pixel.grey - (row.head<6>().dot(p.head<6>()) - p[6] * value);
+    const double contrast = p[n_background];
+    row << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y, -value, contrast * slope;
+    residuals[i] = pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) - contrast * value);
     sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, pixel.weight);
     sums.right += pixel.weight * residuals[i] * row;
     sums.squares += pixel.weight * residuals[i] * residuals[i];
@@ -119,14 +121,15 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   std::vector<double> residuals(patch.pixels.size());
   Vector p = Vector::Zero();
   Sums sums = accumulate(patch, shade, p, residuals);
-  const Eigen::Matrix<double, 7, 1> start =
-      sums.normal.topLeftCorner<7, 7>().selfadjointView<Eigen::Lower>().ldlt().solve(sums.right.head<7>());
+  constexpr int linear = n_background + 1;
+  const Eigen::Matrix<double, linear, 1> start =
+      sums.normal.topLeftCorner<linear, linear>().selfadjointView<Eigen::Lower>().ldlt().solve(sums.right.head<linear>());
   if (!start.allFinite()) return std::nullopt;
-  p.head<7>() = start;
+  p.head<linear>() = start;
   double move = 0;
   for (int i = 0; i < 15; ++i) {
     accumulate(patch, shade, p, residuals);
-    reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[6]));
+    reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
     sums = accumulate(patch, shade, p, residuals);
     Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
@@ -143,15 +146,17 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   for (const double r : residuals) squares += r * r;
   Fit fit;
   fit.shift = p.tail<2>();
-  fit.contrast = p[6];
-  fit.sigma_px = std::sqrt(std::max(0.0, 0.5 * variance * (inverse(7, 7) + inverse(8, 8))));
+  fit.contrast = p[n_background];
+  fit.sigma_px = std::sqrt(std::max(0.0, 0.5 * variance * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;
 }
 
+/// The pixels within a few pixels of the metal: further off the background is another one.
 Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre, double half_width,
-                       std::span<const Disc> others, const std::string& name) {
+                       const PathPicture& picture, std::span<const Disc> others, const std::string& name) {
+  const SolidTemplate neighbourhood(picture, 1, 2.5);
   const auto not_seen = [&] {
     return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
   };
@@ -169,7 +174,7 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
   for (int v = v0 - half; v <= v0 + half; ++v)
     for (int u = u0 - half; u <= u0 + half; ++u) {
       const Vector2d offset = (*inverse)(Vector2d(u, v)) - centre;
-      if (offset.norm() > half_width) continue;
+      if (offset.norm() > half_width || neighbourhood.at(offset).value < 0.01) continue;
       ++inside;
       if (!exposure.pixels.contains(u, v)) continue;
       const float grey = exposure.pixels(u, v);
@@ -196,9 +201,9 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
                           : target.kind == TargetKind::cross ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
                                                              : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
-  const auto patch = gather(exposure, map, centre, half_width, others, target.name);
-  if (!patch) return tl::unexpected<Failure>(patch.error());
   const PathPicture picture = picture_of_target(target, view, half_width + max_shift_px);
+  const auto patch = gather(exposure, map, centre, half_width, picture, others, target.name);
+  if (!patch) return tl::unexpected<Failure>(patch.error());
   std::optional<Fit> best;
   const auto consider = [&](double attenuation, double blur) {
     const auto fit = fit_template(*patch, SolidTemplate(picture, attenuation, blur));
