@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/guidance/guide.h"
+
+#include <Eigen/LU>
+
+#include "helicarm/geometry/triangulation.h"
+#include "helicarm/guidance/traced_point.h"
+
+namespace helicarm {
+namespace {
+
+Marker marker_of(Bone bone) { return bone == Bone::femur ? Marker::femur : Marker::tibia; }
+
+/// Names the readings: each moment's own, or one for all moments. The present is moment -1.
+class Readings {
+ public:
+  explicit Readings(Samples samples) : samples_(samples) {}
+  Reading at(Marker marker, int moment) const { return {marker, samples_ == Samples::shared ? 0 : moment}; }
+
+ private:
+  Samples samples_;
+};
+
+constexpr int present = -1;
+
+/// What one ray says of a point's place: the inverse covariance across the ray, in the bone's frame.
+Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eigen::Vector3d& point_in_bone) {
+  const View view = seen_from_bone(dated.view, *calibrator_from(bone, dated.poses));
+  const Eigen::Matrix<double, 2, 3> slope = projection_jacobian(view, point_in_bone);
+  return slope.transpose() * slope / (dated.sigma_px * dated.sigma_px);
+}
+
+/// The rays met in the bone's frame, each brought there by its own moment's readings: their errors enter with
+/// the weight that each ray has in the intersection.
+TracedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
+  std::vector<Eigen::Matrix3d> information;
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (const DatedView& view : point.views) {
+    information.push_back(information_of_ray(view, bone, point.point_in_anchor));
+    sum += information.back();
+  }
+  TracedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}};
+  const Eigen::Matrix3d scale = sum.inverse();
+  for (std::size_t i = 0; i < point.views.size(); ++i) {
+    const Poses& poses = point.views[i].poses;
+    const int moment = static_cast<int>(i);
+    TracedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}};
+    ray = enter_tracker(std::move(ray), *poses.tracker_from_calibrator,
+                        readings.at(Marker::calibrator, moment));
+    ray = leave_tracker(std::move(ray), *poses.tracker_from(bone), readings.at(marker_of(bone), moment));
+    for (const auto& [reading, effect] : ray.by_reading) {
+      auto& total = met.by_reading.try_emplace(reading, Eigen::Matrix<double, 3, 6>::Zero()).first->second;
+      total += scale * information[i] * effect;
+    }
+  }
+  return met;
+}
+
+}  // namespace
+
+View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone) {
+  return {view.intrinsics, view.camera_from_world * calibrator_from_bone};
+}
+
+GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
+  const Readings readings(noise.samples);
+  const Poses then = point.views.empty() ? Poses{} : point.views.front().poses;
+  GuidedPoint guided;
+  const auto put = [&](const TracedPoint& at, auto& place, auto& covariance) {
+    place = at.point;
+    covariance = at.total_covariance(noise);
+  };
+
+  std::optional<TracedPoint> in_tracker_then;
+  std::optional<TracedPoint> in_tracker_now;
+  if (point.anchor) {
+    const TracedPoint in_bone = met_in_bone(point, *point.anchor, readings);
+    const Marker marker = marker_of(*point.anchor);
+    in_tracker_then = enter_tracker(in_bone, *then.tracker_from(*point.anchor), readings.at(marker, 0));
+    put(leave_tracker(*in_tracker_then, *then.tracker_from_calibrator, readings.at(Marker::calibrator, 0)),
+        guided.in_calibrator, guided.covariance_in_calibrator);
+    if (const auto& tracker_from_bone = now.tracker_from(*point.anchor))
+      in_tracker_now = enter_tracker(in_bone, *tracker_from_bone, readings.at(marker, present));
+  } else {
+    const TracedPoint in_calibrator{point.point_in_anchor, point.covariance_in_anchor, {}};
+    put(in_calibrator, guided.in_calibrator, guided.covariance_in_calibrator);
+    if (then.tracker_from_calibrator)
+      in_tracker_then =
+          enter_tracker(in_calibrator, *then.tracker_from_calibrator, readings.at(Marker::calibrator, 0));
+    in_tracker_now = in_tracker_then;
+  }
+
+  if (in_tracker_then && then.tracker_from_femur)
+    put(leave_tracker(*in_tracker_then, *then.tracker_from_femur, readings.at(Marker::femur, 0)),
+        guided.in_femur, guided.covariance_in_femur);
+  if (in_tracker_then && then.tracker_from_tibia)
+    put(leave_tracker(*in_tracker_then, *then.tracker_from_tibia, readings.at(Marker::tibia, 0)),
+        guided.in_tibia, guided.covariance_in_tibia);
+  if (in_tracker_now && now.tracker_from_tool)
+    put(leave_tracker(*in_tracker_now, *now.tracker_from_tool, readings.at(Marker::tool, present)),
+        guided.in_tool, guided.covariance_in_tool);
+  return guided;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/guidance/traced_point.h"
+
+#include <numbers>
+
+namespace helicarm {
+namespace {
+
+using Effect = Eigen::Matrix<double, 3, 6>;
+
+/// tau + omega x p
+Effect effect_of_motion(const Eigen::Vector3d& p) {
+  Effect effect;
+  effect << 1, 0, 0, 0, p.z(), -p.y(),  //
+      0, 1, 0, -p.z(), 0, p.x(),        //
+      0, 0, 1, p.y(), -p.x(), 0;
+  return effect;
+}
+
+Effect& effect_at(TracedPoint& point, Reading reading) {
+  return point.by_reading.try_emplace(reading, Effect::Zero()).first->second;
+}
+
+TracedPoint turned(TracedPoint point, const Eigen::Matrix3d& rotation) {
+  point.covariance = rotation * point.covariance * rotation.transpose();
+  for (auto& [reading, effect] : point.by_reading) effect = rotation * effect;
+  return point;
+}
+
+}  // namespace
+
+Eigen::Matrix3d TracedPoint::total_covariance(const TrackerNoise& noise) const {
+  const double sigma_rad = noise.sigma_deg * std::numbers::pi / 180;
+  Eigen::Vector<double, 6> variances;
+  variances << Eigen::Vector3d::Constant(noise.sigma_mm * noise.sigma_mm),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  Eigen::Matrix3d total = covariance;
+  for (const auto& [reading, effect] : by_reading)
+    total += effect * variances.asDiagonal() * effect.transpose();
+  return total;
+}
+
+TracedPoint enter_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading) {
+  effect_at(point, reading) += effect_of_motion(point.point);
+  point.point = tracker_from_marker * point.point;
+  return turned(std::move(point), tracker_from_marker.rotation);
+}
+
+TracedPoint leave_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading) {
+  point.point = tracker_from_marker.inverse() * point.point;
+  point = turned(std::move(point), tracker_from_marker.rotation.transpose());
+  effect_at(point, reading) -= effect_of_motion(point.point);
+  return point;
+}
+
+}  // namespace helicarm

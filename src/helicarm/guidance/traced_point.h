@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "helicarm/guidance/poses.h"
+
+namespace helicarm {
+
+enum class Marker { calibrator, femur, tibia, tool };
+
+/// One reading of one marker: two points that went through the same reading share its error.
+using Reading = std::pair<Marker, int>;
+
+/// A point on its way through the frames, with the first-order effect of every tracker reading on it. A
+/// measured pose is the true one times a small motion (shift tau, turn omega) about the marker's own origin.
+struct TracedPoint {
+  Eigen::Vector3d point;
+  Eigen::Matrix3d covariance;                                 ///< from the X-rays
+  std::map<Reading, Eigen::Matrix<double, 3, 6>> by_reading;  ///< d point / d (tau, omega)
+
+  Eigen::Matrix3d total_covariance(const TrackerNoise& noise) const;
+};
+
+/// From a marker's frame to the tracker's.
+TracedPoint enter_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading);
+
+/// From the tracker's frame to a marker's.
+TracedPoint leave_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading);
+
+}  // namespace helicarm

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/case.h"
+
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t least_views = 2;
+constexpr std::size_t most_views = 50;
+constexpr std::size_t most_picks = 1000;
+constexpr Range pixel_range{-0.5, 65535};
+constexpr Range place_range{-10000, 10000};
+constexpr Range pose_range{-100000, 100000};
+
+template <class T, class Name>
+const T* find_named(const std::vector<T>& all, const std::string& name, Name name_of) {
+  const auto found = std::ranges::find(all, name, name_of);
+  return found == all.end() ? nullptr : &*found;
+}
+
+std::string name_from(JsonReader& reader, const char* key) {
+  std::string name = reader.text(key, 100);
+  if (name.empty()) reader.refuse(Reason::bad_value, key, "is empty");
+  return name;
+}
+
+void take_name(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
+  if (!names.insert(name).second)
+    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
+}
+
+Eigen::Vector3d place_from(JsonReader& reader, const char* key) {
+  return Eigen::Vector3d(reader.numbers(key, 3, place_range).data());
+}
+
+std::optional<RigidTransform> pose_from(JsonReader& reader, const char* key) {
+  const Json& rows = reader.raw(key);
+  if (rows.is_null()) return std::nullopt;
+  const std::size_t count = rows.is_array() && rows.size() == 3 ? 3 : 4;
+  const auto numbers = reader.matrix(key, count, 4, pose_range);
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    matrix(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
+  return value_or_throw(rigid_transform_from(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
+}
+
+Poses poses_from(JsonReader reader, bool now) {
+  Poses poses;
+  if (!now) poses.tracker_from_calibrator = pose_from(reader, "tracker_from_calibrator");
+  poses.tracker_from_femur = pose_from(reader, "tracker_from_femur");
+  poses.tracker_from_tibia = pose_from(reader, "tracker_from_tibia");
+  if (now) poses.tracker_from_tool = pose_from(reader, "tracker_from_tool");
+  reader.finish();
+  return poses;
+}
+
+std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs::path& folder) {
+  const auto name = reader.optional_text(key, 1000);
+  if (!name) return std::nullopt;
+  return value_or_throw(path_inside(folder, *name));
+}
+
+CaseView view_from(JsonReader reader, const fs::path& folder) {
+  CaseView view;
+  view.name = name_from(reader, "name");
+  view.image = value_or_throw(path_inside(folder, reader.text("image", 1000)));
+  if (!reader.raw("frame").is_null()) view.frame = reader.integer("frame", 1, 100000);
+  view.plate_image = file_from(reader, "plate_image", folder);
+  view.map = file_from(reader, "map", folder);
+  if (view.plate_image && view.map)
+    reader.refuse(Reason::bad_value, "map", "is given beside \"plate_image\"");
+  if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
+  reader.finish();
+  return view;
+}
+
+Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
+  Pick pick;
+  pick.name = name_from(reader, "name");
+  pick.view = name_from(reader, "view");
+  if (!find_named(views, pick.view, &CaseView::name))
+    reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is no view of the case", pick.view));
+  pick.uv_raw = Eigen::Vector2d(reader.numbers("uv", 2, pixel_range).data());
+  if (!reader.raw("snap").is_null()) pick.snap = static_cast<Snap>(reader.choice("snap", {"none", "ball"}));
+  pick.diameter_mm = reader.optional_number("diameter_mm", {0.5, 30}).value_or(pick.diameter_mm);
+  pick.sigma_px = reader.optional_number("sigma_px", {0, 100});
+  if (!reader.raw("moves_with").is_null())
+    pick.moves_with = static_cast<Bone>(reader.choice("moves_with", {"femur", "tibia"}));
+  reader.finish();
+  return pick;
+}
+
+std::vector<Pick> picks_from(JsonReader& reader, const Case& known) {
+  std::vector<Pick> picks;
+  std::set<std::pair<std::string, std::string>> clicks;
+  for (JsonReader& entry : reader.objects("picks", false, most_picks)) {
+    Pick pick = pick_from(entry, known.views);
+    if (!clicks.emplace(pick.name, pick.view).second)
+      entry.refuse(Reason::name_clash, "name",
+                   fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
+    if (find_named(known.calibrator.targets, pick.name, &CalibratorTarget::name))
+      entry.refuse(Reason::name_clash, "name",
+                   fmt::format("\"{}\" is a target of the calibrator", pick.name));
+    const Pick* other = find_named(picks, pick.name, &Pick::name);
+    if (other && other->moves_with != pick.moves_with)
+      entry.refuse(Reason::bad_value, "moves_with",
+                   fmt::format("of \"{}\" differs between views", pick.name));
+    picks.push_back(std::move(pick));
+  }
+  return picks;
+}
+
+std::vector<TunnelPlan> tunnels_from(JsonReader& reader, const std::vector<Pick>& picks) {
+  std::vector<TunnelPlan> tunnels;
+  std::set<std::string> names;
+  for (JsonReader& entry : reader.objects("tunnels", false, most_picks)) {
+    TunnelPlan tunnel{name_from(entry, "name"), name_from(entry, "start"), name_from(entry, "end")};
+    take_name(entry, names, tunnel.name);
+    for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
+      if (!find_named(picks, *pick, &Pick::name))
+        entry.refuse(Reason::bad_value, key, fmt::format("\"{}\" is no pick of the case", *pick));
+    entry.finish();
+    tunnels.push_back(std::move(tunnel));
+  }
+  return tunnels;
+}
+
+std::vector<ToolLine> tool_lines_from(JsonReader& reader, const std::vector<TunnelPlan>& tunnels) {
+  std::vector<ToolLine> lines;
+  std::set<std::string> names;
+  for (JsonReader& entry : reader.objects("tool_lines", false, most_picks)) {
+    ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"), place_from(entry, "p1_in_calibrator"),
+                  place_from(entry, "p2_in_calibrator")};
+    take_name(entry, names, line.name);
+    if (!find_named(tunnels, line.tunnel, &TunnelPlan::name))
+      entry.refuse(Reason::bad_value, "tunnel", fmt::format("\"{}\" is no tunnel of the case", line.tunnel));
+    if ((line.p2_in_calibrator - line.p1_in_calibrator).norm() < 1)
+      entry.refuse(Reason::bad_value, "p2_in_calibrator", "is less than 1 mm from \"p1_in_calibrator\"");
+    entry.finish();
+    lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
+TrackerNoise tracker_from(JsonReader reader) {
+  TrackerNoise noise;
+  noise.sigma_mm = reader.number("sigma_mm", {0, 100});
+  noise.sigma_deg = reader.number("sigma_deg", {0, 90});
+  if (!reader.raw("samples").is_null())
+    noise.samples = static_cast<Samples>(reader.choice("samples", {"shared", "independent"}));
+  reader.finish();
+  return noise;
+}
+
+std::vector<CaseView> views_from(JsonReader& reader, const Case& known) {
+  std::vector<CaseView> views;
+  std::set<std::string> names;
+  for (JsonReader& entry : reader.objects("views", true, most_views)) {
+    views.push_back(view_from(entry, known.folder));
+    take_name(entry, names, views.back().name);
+    if (views.back().plate_image && !known.plate)
+      entry.refuse(Reason::bad_value, "plate_image", "is given, but the case has no plate");
+  }
+  if (views.size() < least_views)
+    reader.refuse(Reason::bad_value, "views",
+                  fmt::format("{} views, at least {}", views.size(), least_views));
+  return views;
+}
+
+void warn_of_borrowed_name(Case& read) {
+  if (read.calibrator.name == udcsc().name && !same_places(read.calibrator, udcsc()))
+    read.warnings.push_back(
+        {Reason::name_differs,
+         fmt::format("the calibrator calls itself \"{}\" but its balls are elsewhere; the file's "
+                     "places are used",
+                     read.calibrator.name),
+         {},
+         {}});
+}
+
+Case case_from(const fs::path& folder) {
+  const Json json = value_or_throw(read_json(folder / "case.json"));
+  JsonReader reader(json, "case.json");
+  reader.choice("format", {"helicarm-case/1"});
+  Case read;
+  read.folder = folder;
+  read.calibrator = value_or_throw(calibrator_named(reader.text("calibrator", 1000), folder));
+  if (const auto plate = reader.optional_text("plate", 1000))
+    read.plate = value_or_throw(plate_named(*plate, folder));
+  read.views = views_from(reader, read);
+  if (!reader.raw("poses_now").is_null()) read.poses_now = poses_from(reader.object("poses_now"), true);
+  if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
+  read.picks = picks_from(reader, read);
+  read.tunnels = tunnels_from(reader, read.picks);
+  read.tool_lines = tool_lines_from(reader, read.tunnels);
+  reader.finish();
+  warn_of_borrowed_name(read);
+  return read;
+}
+
+}  // namespace
+
+Expected<Case> read_case(const fs::path& folder) {
+  return guarded([&] { return case_from(folder); });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/case.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+
+namespace helicarm {
+namespace {
+
+using testing::HasSubstr;
+
+class CaseFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::temp_directory_path() /
+              ("helicarm_case_" + std::to_string(::getpid()) + "_" +
+               testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+    json_ = *parse_json(R"({
+      "format": "helicarm-case/1", "calibrator": "udcsc", "plate": "plate48",
+      "views": [{"name": "AP", "image": "AP.dcm"}, {"name": "LAT", "image": "LAT.dcm", "frame": 2}],
+      "picks": [{"name": "FS", "view": "AP", "uv": [500.5, 401], "snap": "ball", "moves_with": "femur"},
+                {"name": "FS", "view": "LAT", "uv": [512, 400], "moves_with": "femur", "sigma_px": 0},
+                {"name": "FE", "view": "AP", "uv": [300, 401]}],
+      "tunnels": [{"name": "femur", "start": "FS", "end": "FE"}],
+      "tool_lines": [{"name": "drill", "tunnel": "femur", "p1_in_calibrator": [0, 0, 0],
+                      "p2_in_calibrator": [0, 0, 30]}]})",
+                        "test");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  Expected<Case> read() {
+    EXPECT_TRUE(write_file(folder_ / "case.json", json_.dump()).has_value());
+    return read_case(folder_);
+  }
+
+  Failure failure() {
+    auto result = read();
+    EXPECT_FALSE(result.has_value());
+    return result ? Failure{Reason::usage, "was read"} : result.error();
+  }
+
+  std::filesystem::path folder_;
+  Json json_;
+};
+
+const char* const identity = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
+
+TEST_F(CaseFile, GivesWhatItHolds) {
+  json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse("[[0,-1,0,5],[1,0,0,6],[0,0,1,7]]");
+  json_["tracker"] = Json::parse(R"({"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"})");
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_EQ(read_back->calibrator.balls.size(), 12u);
+  EXPECT_TRUE(read_back->plate);
+  EXPECT_EQ(read_back->views[1].frame, 2);
+  EXPECT_EQ(read_back->views[0].poses.tracker_from_calibrator->translation, Eigen::Vector3d(5, 6, 7));
+  EXPECT_FALSE(read_back->views[1].poses.tracker_from_calibrator);
+  EXPECT_EQ(read_back->picks[0].snap, Snap::ball);
+  EXPECT_EQ(read_back->picks[0].moves_with, Bone::femur);
+  EXPECT_EQ(read_back->picks[1].sigma_px, 0.0);
+  EXPECT_FALSE(read_back->picks[2].moves_with);
+  EXPECT_EQ(read_back->tracker.samples, Samples::shared);
+  EXPECT_EQ(read_back->tool_lines[0].tunnel, "femur");
+}
+
+TEST_F(CaseFile, NeedsOnlyFormatCalibratorAndViews) {
+  for (const char* key : {"plate", "picks", "tunnels", "tool_lines"}) json_.erase(key);
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value());
+  EXPECT_FALSE(read_back->plate);
+}
+
+TEST_F(CaseFile, MissingFolderIsMissingFile) {
+  EXPECT_EQ(read_case(folder_ / "nowhere").error().reason, Reason::missing_file);
+}
+
+TEST_F(CaseFile, UnknownKeysAreRefusedAtEveryLevel) {
+  const Json good = json_;
+  const auto refused = [&] { return failure().reason == Reason::unknown_key; };
+  json_["pick"] = 1;
+  EXPECT_TRUE(refused());
+  json_ = good;
+  json_["views"][0]["pose"] = 1;
+  EXPECT_TRUE(refused());
+  json_ = good;
+  json_["picks"][0]["colour"] = 1;
+  EXPECT_TRUE(refused());
+  json_ = good;
+  json_["views"][0]["poses"] = Json::parse(R"({"tracker_from_tool": null})");
+  EXPECT_TRUE(refused());
+}
+
+TEST_F(CaseFile, AnotherFormatIsRefused) {
+  json_["format"] = "helicarm-case/2";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, OneViewIsTooFew) {
+  json_["views"].erase(1);
+  json_["picks"].erase(1);
+  EXPECT_THAT(failure().message, HasSubstr("1 views, at least 2"));
+}
+
+TEST_F(CaseFile, TwoViewsOfOneNameClash) {
+  json_["views"][1]["name"] = "AP";
+  EXPECT_EQ(failure().reason, Reason::name_clash);
+}
+
+TEST_F(CaseFile, PathsMayNotLeaveTheFolder) {
+  for (const char* path : {"../AP.dcm", "/etc/passwd"}) {
+    json_["views"][0]["image"] = path;
+    EXPECT_EQ(failure().reason, Reason::path_outside);
+  }
+}
+
+TEST_F(CaseFile, PlateImageAndMapExcludeEachOther) {
+  json_["views"][0]["plate_image"] = "PLATE.dcm";
+  json_["views"][0]["map"] = "map.json";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, PlateImageNeedsAPlate) {
+  json_["plate"] = nullptr;
+  json_["views"][0]["plate_image"] = "PLATE.dcm";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, PickGivenTwiceInOneViewClashes) {
+  json_["picks"].push_back(json_["picks"][0]);
+  EXPECT_EQ(failure().reason, Reason::name_clash);
+}
+
+TEST_F(CaseFile, PickInAnUnknownViewIsRefused) {
+  json_["picks"][0]["view"] = "OBLIQUE";
+  EXPECT_THAT(failure().message, HasSubstr("OBLIQUE"));
+}
+
+TEST_F(CaseFile, PickMovesWithOneBone) {
+  json_["picks"][1]["moves_with"] = "tibia";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, PickAndTargetMayNotShareAName) {
+  Json calibrator = to_json(udcsc());
+  calibrator["name"] = "own";
+  calibrator["targets"] =
+      Json::parse(R"([{"name": "FS", "xyz_mm": [0, 0, 30], "kind": "ball", "diameter_mm": 3}])");
+  ASSERT_TRUE(write_file(folder_ / "calibrator.json", calibrator.dump()).has_value());
+  json_["calibrator"] = "calibrator.json";
+  EXPECT_EQ(failure().reason, Reason::name_clash);
+}
+
+TEST_F(CaseFile, BuiltInNameWithOtherPlacesIsAWarning) {
+  Json calibrator = to_json(udcsc());
+  calibrator["balls"][3]["xyz_mm"][2] = 20.0;
+  ASSERT_TRUE(write_file(folder_ / "calibrator.json", calibrator.dump()).has_value());
+  json_["calibrator"] = "calibrator.json";
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  ASSERT_EQ(read_back->warnings.size(), 1u);
+  EXPECT_EQ(read_back->warnings[0].reason, Reason::name_differs);
+}
+
+TEST_F(CaseFile, TunnelOfAnUnknownPickIsRefused) {
+  json_["tunnels"][0]["end"] = "XX";
+  EXPECT_THAT(failure().message, HasSubstr("XX"));
+}
+
+TEST_F(CaseFile, ToolLineOfAnUnknownTunnelIsRefused) {
+  json_["tool_lines"][0]["tunnel"] = "XX";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, ToolLineNeedsTwoPlaces) {
+  json_["tool_lines"][0]["p2_in_calibrator"] = Json::array({0, 0, 0});
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+TEST_F(CaseFile, PosesMustBeRigid) {
+  const auto reason_of_pose = [&](const char* text) {
+    json_["poses_now"]["tracker_from_tool"] = Json::parse(text);
+    return failure().reason;
+  };
+  EXPECT_EQ(reason_of_pose("[[1.01,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), Reason::bad_value);
+  EXPECT_EQ(reason_of_pose("[[-1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), Reason::bad_value);
+  EXPECT_EQ(reason_of_pose("[[0,0,0,0],[0,0,0,0],[0,0,0,0],[0,0,0,0]]"), Reason::bad_value);
+  EXPECT_EQ(reason_of_pose("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,1,1]]"), Reason::bad_value);
+  EXPECT_EQ(reason_of_pose("[[1,0],[0,1]]"), Reason::bad_value);
+  json_["poses_now"]["tracker_from_tool"] = Json::parse(identity);
+  EXPECT_TRUE(read().has_value());
+}
+
+TEST_F(CaseFile, NumbersMustBeFiniteAndInRange) {
+  json_["tracker"] = Json::parse(R"({"sigma_mm": -0.1, "sigma_deg": 0})");
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+  ASSERT_TRUE(write_file(folder_ / "case.json", R"({"format": "helicarm-case/1", "x": NaN})").has_value());
+  EXPECT_EQ(read_case(folder_).error().reason, Reason::not_finite);
+}
+
+TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
+  json_["picks"][0]["sigma_px"] = -1;
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
+
+}  // namespace
+}  // namespace helicarm

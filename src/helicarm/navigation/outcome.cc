@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/outcome.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+namespace {
+
+std::size_t index_of(const std::vector<PointResult>& points, const std::string& name) {
+  return static_cast<std::size_t>(std::ranges::find(points, name, &PointResult::name) - points.begin());
+}
+
+std::optional<LineError> error_at(const PointResult& point, const std::vector<View>& views,
+                                  const ToolLine& line) {
+  if (!point.place) return std::nullopt;
+  PlannedPoint planned{point.place->in_calibrator, {}};
+  for (const auto& seen : point.seen)
+    planned.uv.push_back(seen ? std::optional<Eigen::Vector2d>(seen->uv) : std::nullopt);
+  return value_or_throw(distance_to_line(views, planned, line));
+}
+
+}  // namespace
+
+Accuracy measure_accuracy(const Calibrator& calibrator, const CalibrationResult& calibration,
+                          const std::vector<PointResult>& points) {
+  Accuracy accuracy{
+      fiducial_localization_error(calibration), fiducial_registration_error(calibration), {}, {}};
+  std::vector<double> errors;
+  for (const CalibratorTarget& target : calibrator.targets) {
+    const PointResult& point = points[index_of(points, target.name)];
+    if (!point.place) continue;
+    const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
+    errors.push_back((point.place->in_calibrator - target.point_in_calibrator).norm());  // Eq. 12
+    accuracy.targets.push_back(
+        {target.name, errors.back(), std::sqrt(covariance.trace()), length_at_95(covariance)});
+  }
+  accuracy.tre_mm = statistics_of(errors);
+  return accuracy;
+}
+
+std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
+                                    const std::vector<PointResult>& points) {
+  std::vector<TunnelEnds> ends;
+  for (const TunnelPlan& plan : plans)
+    ends.push_back({index_of(points, plan.start), index_of(points, plan.end)});
+  return ends;
+}
+
+Expected<std::vector<Tunnel>> plan_tunnels(const std::vector<TunnelPlan>& plans, const Result& result) {
+  return guarded([&] {
+    std::vector<Tunnel> tunnels;
+    for (std::size_t i = 0; i < plans.size(); ++i) {
+      const auto& start = result.points[result.tunnel_ends[i].start].place;
+      const auto& end = result.points[result.tunnel_ends[i].end].place;
+      tunnels.push_back(start && end ? value_or_throw(plan_tunnel(plans[i].name, *start, *end))
+                                     : Tunnel{plans[i].name, {}, {}, {}, {}});
+    }
+    return tunnels;
+  });
+}
+
+Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
+                                                      const std::vector<CalibratedView>& calibrated,
+                                                      const Result& result) {
+  std::vector<View> views;
+  for (const CalibratedView& view : calibrated) views.push_back(view.view);
+  return guarded([&] {
+    std::vector<Verification> verifications;
+    for (const ToolLine& line : given.tool_lines) {
+      const auto plan =
+          std::ranges::find(given.tunnels, line.tunnel, &TunnelPlan::name) - given.tunnels.begin();
+      const TunnelEnds& ends = result.tunnel_ends[static_cast<std::size_t>(plan)];
+      verifications.push_back({line.name, error_at(result.points[ends.start], views, line),
+                               error_at(result.points[ends.end], views, line)});
+    }
+    return verifications;
+  });
+}
+
+Expected<void> check_certain(const std::vector<PointResult>& points, std::optional<double> max_error_mm) {
+  if (!max_error_mm) return {};
+  for (const PointResult& point : points) {
+    if (!point.place) continue;
+    const double error = length_at_95(point.place->covariance_in_calibrator);
+    if (!(error <= *max_error_mm))
+      return fail(Reason::uncertain,
+                  fmt::format("\"{}\" may be off by {:.3g} mm (95 %), over the limit of {:g} mm", point.name,
+                              error, *max_error_mm),
+                  {{"error_95_mm", error}, {"limit_mm", *max_error_mm}});
+  }
+  return {};
+}
+
+}  // namespace helicarm

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/parallel.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double click_sigma_px = 0.5;
+constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
+
+Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eigen::Vector3d& centre) {
+  const DistortionMap& map = view.rectification->map;
+  if (pick.snap == Snap::ball) {
+    const View& camera = view.calibrated->view;
+    const double px_per_mm =
+        std::sqrt(std::abs(camera.intrinsics.fx * camera.intrinsics.fy)) / camera.depth(centre);
+    auto seen = snap_to_ball(*view.exposure, map, pick.uv_raw, pick.diameter_mm * px_per_mm);
+    if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
+    return seen;
+  }
+  const auto uv = map.rectified_from_raw(pick.uv_raw);
+  if (!uv)
+    return fail(Reason::not_seen, fmt::format("\"{}\" lies where the map cannot be inverted", pick.name));
+  return SeenPoint{pick.uv_raw, *uv, std::hypot(pick.sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
+}
+
+void check_inside(const Pick& pick, const Exposure& exposure) {
+  const double width = exposure.pixels.width();
+  const double height = exposure.pixels.height();
+  if (pick.uv_raw.x() > width - 0.5 || pick.uv_raw.y() > height - 0.5)
+    throw BadInput(
+        {Reason::bad_value,
+         fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the picture of {:g} x {:g} pixels",
+                     pick.name, pick.uv_raw.x(), pick.uv_raw.y(), width, height),
+         pick.view,
+         {}});
+}
+
+/// One thing to be seen in one view.
+struct Task {
+  std::size_t point;
+  std::size_t view;
+  const Pick* pick;                ///< either this
+  const CalibratorTarget* target;  ///< or this
+};
+
+Eigen::Vector3d mean_place(const Calibrator& calibrator) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
+  return sum / double(calibrator.balls.size());
+}
+
+std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) {
+  const std::size_t views = given.views.size();
+  const auto add = [&](const std::string& name, PointSource source, std::optional<Bone> moves_with) {
+    points.push_back({name, source, moves_with, std::vector<std::optional<SeenPoint>>(views), {}, 0, {}});
+    return points.size() - 1;
+  };
+  std::vector<Task> tasks;
+  std::map<std::string, std::size_t> index;
+  for (const Pick& pick : given.picks) {
+    if (!index.contains(pick.name)) index[pick.name] = add(pick.name, PointSource::pick, pick.moves_with);
+    const auto view = std::ranges::find(given.views, pick.view, &CaseView::name) - given.views.begin();
+    tasks.push_back({index[pick.name], static_cast<std::size_t>(view), &pick, nullptr});
+  }
+  for (const CalibratorTarget& target : given.calibrator.targets) {
+    const std::size_t point = add(target.name, PointSource::target, {});
+    for (std::size_t view = 0; view < views; ++view) tasks.push_back({point, view, nullptr, &target});
+  }
+  return tasks;
+}
+
+struct Located {
+  LocatedPoint point;
+  std::optional<Bone> anchor;
+  std::vector<DatedView> views;
+};
+
+/// The bone in whose frame the rays are to meet; nothing where it moves with none or a pose is missing.
+std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
+  if (!point.moves_with) return std::nullopt;
+  for (std::size_t i = 0; i < point.seen.size(); ++i)
+    if (point.seen[i] && !calibrator_from(*point.moves_with, given.views[i].poses)) return std::nullopt;
+  return point.moves_with;
+}
+
+Expected<Located> intersect_rays(const PointResult& point, const Case& given,
+                                 const Calibration& calibration) {
+  const auto anchor = anchor_of(point, given);
+  std::vector<PointPicture> pictures;
+  std::vector<DatedView> views;
+  for (std::size_t i = 0; i < point.seen.size(); ++i) {
+    if (!point.seen[i]) continue;
+    const Poses& poses = given.views[i].poses;
+    const double sigma = point.seen[i]->sigma_px;
+    pictures.push_back({i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
+                        anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
+    views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
+  }
+  return locate(point.name, point.source, pictures, calibration).map([&](const LocatedPoint& located) {
+    return Located{located, anchor, views};
+  });
+}
+
+}  // namespace
+
+Expected<std::vector<PointResult>> see_points(const Case& given, const Result& result) {
+  std::vector<PointResult> points;
+  const std::vector<Task> tasks = tasks_of(given, points);
+  const Eigen::Vector3d centre = mean_place(given.calibrator);
+  std::vector<std::optional<Failure>> failures(tasks.size());
+  const auto done = guarded([&] {
+    for (const Task& task : tasks)
+      if (task.pick) check_inside(*task.pick, *result.views[task.view].exposure);
+  });
+  if (!done) return tl::unexpected<Failure>(done.error());
+  parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
+    const Task& task = tasks[i];
+    const ViewResult& view = result.views[task.view];
+    const auto seen =
+        task.pick ? see_pick(*task.pick, view, centre)
+                  : find_target(*view.exposure, view.rectification->map, view.calibrated->view, *task.target);
+    if (seen)
+      points[task.point].seen[task.view] = *seen;
+    else
+      failures[i] = seen.error();
+  });
+  for (std::size_t i = 0; i < tasks.size(); ++i)
+    if (failures[i] && !points[tasks[i].point].reason) {
+      points[tasks[i].point].reason = failures[i];
+      points[tasks[i].point].reason->view = given.views[tasks[i].view].name;
+    }
+  return points;
+}
+
+std::vector<Warning> locate_points(const Case& given, const Calibration& calibration,
+                                   std::vector<PointResult>& points) {
+  std::vector<Warning> warnings;
+  for (PointResult& point : points) {
+    const auto located = intersect_rays(point, given, calibration);
+    if (!located) {
+      if (!point.reason) point.reason = located.error();
+      continue;
+    }
+    point.reason.reset();
+    point.ray_gap_mm = located->point.ray_gap_mm;
+    point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
+                         located->views},
+                        given.poses_now, given.tracker);
+    if (point.moves_with && !located->anchor)
+      warnings.push_back(
+          {Reason::bone_taken_as_fixed,
+           fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
+                       "is taken as fixed to the calibrator",
+                       point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
+           {},
+           {}});
+  }
+  return warnings;
+}
+
+}  // namespace helicarm

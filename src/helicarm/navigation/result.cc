@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/result.h"
+
+#include <array>
+#include <cmath>
+
+namespace helicarm {
+namespace {
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+template <class T>
+Json optional_number(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+template <class Derived>
+Json vector(const Eigen::MatrixBase<Derived>& values) {
+  Json list = Json::array();
+  for (Eigen::Index i = 0; i < values.size(); ++i) list.push_back(number(values[i]));
+  return list;
+}
+
+template <class Derived>
+Json matrix(const Eigen::MatrixBase<Derived>& values) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < values.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < values.cols(); ++j) row.push_back(number(values(i, j)));
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json optional_vector(const auto& values) { return values ? vector(*values) : Json(nullptr); }
+Json optional_matrix(const auto& values) { return values ? matrix(*values) : Json(nullptr); }
+
+std::string_view name_of(FiducialStatus status) {
+  constexpr std::array names = {"used", "occluded", "outside", "rejected", "not_found"};
+  return names[static_cast<std::size_t>(status)];
+}
+
+Json json_of(const Rectification& rectification) {
+  const DistortionMap& map = rectification.map;
+  const bool fitted = !map.is_identity();
+  const auto if_fitted = [&](double value) { return fitted ? number(value) : Json(nullptr); };
+  return {{"model", map.model},
+          {"dots_found", rectification.dots_found},
+          {"dots_expected", optional_number(rectification.dots_expected)},
+          {"residual_rms_px", if_fitted(map.residual_rms_px)},
+          {"residual_max_px", if_fitted(map.residual_max_px)},
+          {"held_out_rms_px", if_fitted(map.held_out_rms_px)},
+          {"raw_mean_px", if_fitted(rectification.raw_mean_px)},
+          {"raw_max_px", if_fitted(rectification.raw_max_px)},
+          {"rectified_pixel_mm", optional_number(map.rectified_pixel_mm)},
+          {"rectified_plane", !map.rectified_plane                            ? Json(nullptr)
+                              : *map.rectified_plane == RectifiedPlane::plate ? Json("plate")
+                                                                              : Json("detector")},
+          {"map", to_json(map)}};
+}
+
+Json json_of(const Fiducial& fiducial) {
+  const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+  const auto if_seen = [&](Json value) { return seen ? std::move(value) : Json(nullptr); };
+  return {{"label", fiducial.label},
+          {"status", name_of(fiducial.status)},
+          {"uv_raw", if_seen(vector(fiducial.uv_raw))},
+          {"uv", if_seen(vector(fiducial.uv))},
+          {"sigma_px", if_seen(number(fiducial.sigma_px))},
+          {"residual_px", if_seen(number(fiducial.residual_px))}};
+}
+
+/// The focal length in mm needs the pixel of the receiver: the rectified one where the plate's height and the
+/// source distance tell it, else the one of the file.
+Json intrinsics_of(const ViewResult& view) {
+  const Intrinsics& k = view.calibrated->view.intrinsics;
+  const DistortionMap& map = view.rectification->map;
+  std::optional<double> pixel_mm;
+  if (map.rectified_plane == RectifiedPlane::detector) pixel_mm = map.rectified_pixel_mm;
+  if (!pixel_mm && view.exposure && view.exposure->acquisition.pixel_mm)
+    pixel_mm = view.exposure->acquisition.pixel_mm->y();
+  return {{"fx_px", k.fx},
+          {"fy_px", k.fy},
+          {"u0", k.u0},
+          {"v0", k.v0},
+          {"f_mm", pixel_mm ? Json(k.fy * *pixel_mm) : Json(nullptr)},
+          {"pixel_mm", optional_number(pixel_mm)}};
+}
+
+Json json_of(const ViewResult& view) {
+  Json json = {{"name", view.name}};
+  json["image_size"] =
+      view.exposure ? Json({view.exposure->pixels.width(), view.exposure->pixels.height()}) : Json(nullptr);
+  json["rectification"] = view.rectification ? json_of(*view.rectification) : Json(nullptr);
+  json["fiducials"] = Json::array();
+  if (view.found)
+    for (const Fiducial& fiducial : view.found->fiducials) json["fiducials"].push_back(json_of(fiducial));
+  json["false_blobs"] = view.found ? Json(view.found->false_blobs.size()) : Json(nullptr);
+  json["mirrored"] = view.found ? Json(view.found->mirrored) : Json(nullptr);
+  for (const char* key : {"projection", "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px",
+                          "chi2", "dof", "condition"})
+    json[key] = nullptr;
+  if (const auto& calibrated = view.calibrated) {
+    json["projection"] = matrix(calibrated->view.projection());
+    json["dlt"] = optional_vector(calibrated->dlt);
+    json["intrinsics"] = intrinsics_of(view);
+    json["camera_from_calibrator"] = matrix(calibrated->view.camera_from_world.matrix());
+    json["reprojection_rms_px"] = number(calibrated->reprojection_rms_px);
+    json["chi2"] = number(calibrated->chi2);
+    json["dof"] = calibrated->dof;
+    json["condition"] = number(calibrated->condition);
+  }
+  return json;
+}
+
+Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
+  Json json = {{"name", point.name}, {"source", point.source == PointSource::pick ? "pick" : "target"}};
+  const auto& place = point.place;
+  json["xyz_mm"] = place ? vector(place->in_calibrator) : Json(nullptr);
+  json["frame"] = "calibrator";
+  json["covariance_mm2"] = place ? matrix(place->covariance_in_calibrator) : Json(nullptr);
+  json["sigma_mm"] =
+      place ? vector(place->covariance_in_calibrator.diagonal().cwiseMax(0).cwiseSqrt()) : Json(nullptr);
+  json["error_95_mm"] = place ? number(length_at_95(place->covariance_in_calibrator)) : Json(nullptr);
+  json["ray_gap_mm"] = place ? number(point.ray_gap_mm) : Json(nullptr);
+  json["views"] = Json::array();
+  json["seen"] = Json::object();
+  for (std::size_t i = 0; i < point.seen.size(); ++i)
+    if (const auto& seen = point.seen[i]) {
+      json["views"].push_back(views[i].name);
+      json["seen"][views[i].name] = {
+          {"uv_raw", vector(seen->uv_raw)}, {"uv", vector(seen->uv)}, {"sigma_px", seen->sigma_px}};
+    }
+  json["reason"] = point.reason ? Json(code(point.reason->reason)) : Json(nullptr);
+  json["message"] = point.reason ? Json(point.reason->message) : Json(nullptr);
+  json["in_femur"] = place ? optional_vector(place->in_femur) : Json(nullptr);
+  json["in_tibia"] = place ? optional_vector(place->in_tibia) : Json(nullptr);
+  json["in_tool"] = place ? optional_vector(place->in_tool) : Json(nullptr);
+  json["covariance_in_femur_mm2"] = place ? optional_matrix(place->covariance_in_femur) : Json(nullptr);
+  json["covariance_in_tibia_mm2"] = place ? optional_matrix(place->covariance_in_tibia) : Json(nullptr);
+  json["covariance_in_tool_mm2"] = place ? optional_matrix(place->covariance_in_tool) : Json(nullptr);
+  return json;
+}
+
+Json json_of(const Statistics& s) {
+  if (s.n == 0) return nullptr;
+  return {{"mean", s.mean}, {"rms", s.rms}, {"max", s.max}, {"min", s.min}, {"n", s.n}};
+}
+
+Json json_of(const Accuracy& accuracy) {
+  Json json;
+  json["fle_px"] = json_of(accuracy.fle_px);
+  json["fre_mm"] = json_of(accuracy.fre_mm);
+  json["tre_mm"] = json_of(accuracy.tre_mm);
+  json["targets"] = Json::array();
+  for (const TargetError& target : accuracy.targets)
+    json["targets"].push_back({{"name", target.name},
+                               {"error_mm", target.error_mm},
+                               {"predicted_mm", target.predicted_mm},
+                               {"predicted_95_mm", target.predicted_95_mm}});
+  return json;
+}
+
+Json json_of(const Tunnel& tunnel) {
+  return {{"name", tunnel.name},
+          {"start_in_tool", optional_vector(tunnel.start_in_tool)},
+          {"end_in_tool", optional_vector(tunnel.end_in_tool)},
+          {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
+          {"length_mm", optional_number(tunnel.length_mm)}};
+}
+
+Json json_of(const Verification& verification, const std::vector<ViewResult>& views) {
+  const auto per_view = [&](const std::optional<LineError>& error) {
+    Json json = Json::object();
+    for (std::size_t i = 0; i < views.size(); ++i)
+      json[views[i].name] = error ? optional_number(error->per_view_px[i]) : Json(nullptr);
+    return json;
+  };
+  const auto& [name, start, end] = verification;
+  const auto figure = [](const std::optional<LineError>& error, double LineError::*which) {
+    return error ? number((*error).*which) : Json(nullptr);
+  };
+  return {{"name", name},
+          {"start_px", per_view(start)},
+          {"end_px", per_view(end)},
+          {"err_start_px", figure(start, &LineError::combined_px)},
+          {"err_end_px", figure(end, &LineError::combined_px)},
+          {"err_start_mm", figure(start, &LineError::combined_mm)},
+          {"err_end_mm", figure(end, &LineError::combined_mm)},
+          {"distance_start_mm", figure(start, &LineError::distance_mm)},
+          {"distance_end_mm", figure(end, &LineError::distance_mm)}};
+}
+
+Json json_of(const Timing& timing) {
+  return {{"read", optional_number(timing.read)},           {"rectify", optional_number(timing.rectify)},
+          {"detect", optional_number(timing.detect)},       {"label", optional_number(timing.label)},
+          {"calibrate", optional_number(timing.calibrate)}, {"locate", optional_number(timing.locate)},
+          {"total", optional_number(timing.total)}};
+}
+
+template <class T, class... More>
+Json list_of(const std::vector<T>& items, const More&... more) {
+  Json list = Json::array();
+  for (const T& item : items) list.push_back(json_of(item, more...));
+  return list;
+}
+
+}  // namespace
+
+Json to_json(const Failure& failure) {
+  Json figures = Json::object();
+  for (const auto& [name, value] : failure.figures) figures[name] = number(value);
+  return {{"code", code(failure.reason)},
+          {"message", failure.message},
+          {"view", failure.view.empty() ? Json(nullptr) : Json(failure.view)},
+          {"figures", std::move(figures)}};
+}
+
+Json to_json(const Result& result) {
+  Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
+  json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
+  json["warnings"] = Json::array();
+  for (const Warning& warning : result.warnings) json["warnings"].push_back(to_json(warning));
+  json["views"] = list_of(result.views);
+  json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
+                                                  ? matrix(result.joint_covariance)
+                                                  : Json(nullptr)}};
+  json["points"] = list_of(result.points, result.views);
+  json["accuracy"] = json_of(result.accuracy);
+  json["tunnels"] = list_of(result.tunnels);
+  json["verification"] = list_of(result.verifications, result.views);
+  json["timing_ms"] = json_of(result.timing_ms);
+  json["version"] = HELICARM_VERSION;
+  json["options"] = {{"method", result.options.method == Method::paper ? "paper" : "best"},
+                     {"max_error_mm", optional_number(result.options.max_error_mm)},
+                     {"threads", result.options.threads}};
+  return json;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/calibration/calibrated_view.h"
+#include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
+#include "helicarm/fiducials/find_fiducials.h"
+#include "helicarm/fiducials/find_target.h"
+#include "helicarm/guidance/guide.h"
+#include "helicarm/guidance/tunnel.h"
+#include "helicarm/navigation/accuracy.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/verification/verify.h"
+#include "helicarm/xray/exposure.h"
+
+namespace helicarm {
+
+struct RunOptions {
+  Method method = Method::best;
+  std::optional<double>
+      max_error_mm;      ///< refuse (uncertain) a point whose error exceeds this in more than 5 % of cases
+  unsigned threads = 0;  ///< 0: all cores
+};
+
+/// All that the stages made of one exposure; what was not reached is absent.
+struct ViewResult {
+  std::string name;
+  std::optional<Exposure> exposure;
+  std::optional<Rectification> rectification;
+  std::optional<FoundFiducials> found;  ///< after calibration with its residuals and rejections
+  std::optional<CalibratedView> calibrated;
+};
+
+/// One pick or check target: where it was seen and where it is, or why it could not be located.
+struct PointResult {
+  std::string name;
+  PointSource source;
+  std::optional<Bone> moves_with;
+  std::vector<std::optional<SeenPoint>> seen;  ///< one per view
+  std::optional<GuidedPoint> place;
+  double ray_gap_mm = 0;
+  std::optional<Failure> reason;  ///< of an absent place
+};
+
+/// A planned tunnel's start and end, as indices among the points.
+struct TunnelEnds {
+  std::size_t start;
+  std::size_t end;
+};
+
+/// Wall clock of each stage, ms; nothing where it was not reached.
+struct Timing {
+  std::optional<double> read, rectify, detect, label, calibrate, locate, total;
+};
+
+/// The answer of `helicarm run`. A refused case holds all that was known before the refusal.
+struct Result {
+  RunOptions options;
+  std::optional<Failure> failure;
+  std::vector<Warning> warnings;
+  std::vector<ViewResult> views;
+  Eigen::MatrixXd joint_covariance;  ///< of all views' parameters, 10 each; as CalibratedView::covariance
+  std::vector<PointResult> points;
+  Accuracy accuracy;
+  std::vector<TunnelEnds> tunnel_ends;
+  std::vector<Tunnel> tunnels;
+  std::vector<ToolLine> tool_lines;
+  std::vector<Verification> verifications;
+  Timing timing_ms;
+};
+
+/// result.json (docs/formats.md): every key is there, null where not computed.
+Json to_json(const Result& result);
+
+/// As the key of result.json: code, message, view and figures.
+Json to_json(const Failure& failure);
+
+}  // namespace helicarm

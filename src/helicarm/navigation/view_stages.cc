@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/view_stages.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/navigation/prior.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm {
+namespace {
+
+Expected<DistortionMap> map_from(const CaseView& from, const std::optional<Plate>& plate, Method method) {
+  return guarded([&] {
+    if (from.map)
+      return value_or_throw(
+          distortion_map_from_json(value_or_throw(read_json(*from.map)), from.map->filename().string()));
+    const Exposure apart = value_or_throw(read_exposure(*from.plate_image, from.name, std::nullopt));
+    return value_or_throw(rectify(apart, *plate, {method, {}})).map;
+  });
+}
+
+/// Mean place of the balls that serve in any view.
+Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const auto& of_view : calibration.fiducials)
+    for (const Fiducial& ball : of_view)
+      if (ball.status == FiducialStatus::used) {
+        sum += ball.centre_in_calibrator;
+        ++count;
+      }
+  return sum / count;
+}
+
+}  // namespace
+
+Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& views) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Acquisition& a = views[j].exposure->acquisition;
+      const Acquisition& b = views[i].exposure->acquisition;
+      if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
+        return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
+                                                          views[j].name, views[i].name));
+      if (!a.instance_key.empty() && a.instance_key == b.instance_key)
+        return fail(Reason::views_too_close,
+                    fmt::format("{} and {} are the same picture", views[j].name, views[i].name));
+    }
+  return {};
+}
+
+Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
+                                     const std::optional<Plate>& plate, Method method) {
+  if (from.map || from.plate_image)
+    return map_from(from, plate, method).and_then([&](const DistortionMap& map) {
+      return with_map(exposure, map, plate);
+    });
+  if (plate) return rectify(exposure, *plate, {method, {}});
+  return without_plate(exposure);
+}
+
+Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views, Method method) {
+  std::vector<ViewFiducials> fiducials;
+  CalibrationOptions options;
+  options.spread = spread_prior(*views.front().exposure, views.front().rectification->map);
+  for (const ViewResult& view : views)
+    fiducials.push_back({view.name, view.found->fiducials,
+                         intrinsics_prior(*view.exposure, view.rectification->map), view.found->view});
+  return (method == Method::paper ? calibrate_paper(fiducials, options) : calibrate(fiducials, options))
+      .and_then([](CalibrationResult calibration) -> Expected<CalibrationResult> {
+        if (auto apart = check_views_apart(calibration.views, centre_of(calibration)); !apart)
+          return tl::unexpected<Failure>(apart.error());
+        return calibration;
+      });
+}
+
+void keep_calibration(const CalibrationResult& calibration, Result& result) {
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    result.views[i].calibrated = calibration.views[i];
+    result.views[i].found->fiducials = calibration.fiducials[i];
+  }
+  result.joint_covariance = calibration.joint_covariance;
+  result.warnings.insert(result.warnings.end(), calibration.warnings.begin(), calibration.warnings.end());
+}
+
+void gather_warnings(Result& result) {
+  for (const ViewResult& view : result.views) {
+    const auto gather = [&](const std::vector<Warning>& warnings) {
+      for (Warning warning : warnings) {
+        if (warning.view.empty()) warning.view = view.name;
+        result.warnings.push_back(std::move(warning));
+      }
+    };
+    if (view.exposure) gather(view.exposure->warnings);
+    if (view.rectification) gather(view.rectification->warnings);
+    if (view.found) gather(view.found->warnings);
+  }
+}
+
+}  // namespace helicarm

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "helicarm/calibration/calibrate.h"
+#include "helicarm/navigation/case.h"
+#include "helicarm/navigation/result.h"
+
+namespace helicarm {
+
+/// Refuses `patient_mismatch` where two pictures name different patients or studies, `views_too_close` where
+/// two are one and the same picture.
+Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& views);
+
+/// By the plate in the picture, by a plate shot apart, by a known map, or not at all (flat panel).
+Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
+                                     const std::optional<Plate>& plate, Method method);
+
+/// All views together, or each alone by the published recipe. Refuses also views less than 30 degrees apart.
+Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views, Method method);
+
+/// Hands each view its calibration, and its fiducials with their residuals.
+void keep_calibration(const CalibrationResult& calibration, Result& result);
+
+/// Adds each view's warnings to the result's own, with its name.
+void gather_warnings(Result& result);
+
+}  // namespace helicarm

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/markup.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+
+std::string escaped(std::string_view text) {
+  std::string safe;
+  safe.reserve(text.size());
+  for (char c : text) {
+    switch (c) {
+      case '&':
+        safe += "&amp;";
+        break;
+      case '<':
+        safe += "&lt;";
+        break;
+      case '>':
+        safe += "&gt;";
+        break;
+      case '"':
+        safe += "&quot;";
+        break;
+      case '\'':
+        safe += "&#39;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+          safe += "\xef\xbf\xbd";  // U+FFFD
+        else
+          safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](std::size_t k) {
+      return i + k < bytes.size() ? std::uint32_t{static_cast<unsigned char>(bytes[i + k])} : 0u;
+    };
+    const std::uint32_t word = byte(0) << 16 | byte(1) << 8 | byte(2);
+    for (unsigned k = 0; k < 4; ++k) text += i + k <= bytes.size() ? digits[word >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+std::string fixed(std::optional<double> value, int digits) {
+  if (!value || !std::isfinite(*value)) return "–";
+  return fmt::format("{:.{}f}", *value, digits);
+}
+
+std::string HtmlTable::html() const {
+  const auto is_number = [&](std::size_t column) { return headings_[column].starts_with('#'); };
+  std::string html = "<div class=\"scroll\"><table><thead><tr>";
+  for (std::size_t i = 0; i < headings_.size(); ++i)
+    html += is_number(i) ? "<th class=\"n\">" + headings_[i].substr(1) + "</th>"
+                         : "<th>" + headings_[i] + "</th>";
+  html += "</tr></thead>\n<tbody>\n";
+  for (const auto& row : rows_) {
+    html += "<tr>";
+    for (std::size_t i = 0; i < row.size(); ++i)
+      html += (is_number(i) ? "<td class=\"n\">" : "<td>") + row[i] + "</td>";
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table></div>\n";
+}
+
+}  // namespace helicarm

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/overlay.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "helicarm/image/opencv.h"
+#include "helicarm/image/png.h"
+#include "helicarm/report/picture.h"
+
+namespace helicarm {
+namespace {
+
+const cv::Scalar green(74, 222, 128), red(248, 113, 113), blue(147, 197, 253), violet(240, 171, 252),
+    yellow(250, 204, 21), crimson(239, 68, 68);
+
+/// OpenCV draws at fixed-point places: here sixteenths of a pixel.
+constexpr int shift = 4;
+cv::Point fixed_point(const Eigen::Vector2d& at) {
+  const Eigen::Vector2d safe = at.cwiseMax(-1e5).cwiseMin(1e5) * (1 << shift);
+  return {static_cast<int>(std::lround(safe.x())), static_cast<int>(std::lround(safe.y()))};
+}
+
+class Canvas {
+ public:
+  explicit Canvas(const Image<std::uint8_t>& grey) : scale_(grey.width() / 1024.0) {
+    cv::cvtColor(as_mat(grey), picture_, cv::COLOR_GRAY2RGB);
+  }
+  void circle(const Eigen::Vector2d& at, double radius, const cv::Scalar& colour) {
+    cv::circle(picture_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1,
+               cv::LINE_AA, shift);
+  }
+  void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const cv::Scalar& colour) {
+    cv::line(picture_, fixed_point(a), fixed_point(b), colour, 1, cv::LINE_AA, shift);
+  }
+  void cross(const Eigen::Vector2d& at, double arm, const cv::Scalar& colour) {
+    const double reach = arm * scale_;
+    line(at - Eigen::Vector2d(reach, reach), at + Eigen::Vector2d(reach, reach), colour);
+    line(at - Eigen::Vector2d(reach, -reach), at + Eigen::Vector2d(reach, -reach), colour);
+  }
+  void text(const Eigen::Vector2d& at, const std::string& words, const cv::Scalar& colour) {
+    const Eigen::Vector2d corner = at + scale_ * Eigen::Vector2d(17, -9);
+    cv::putText(picture_, words, {static_cast<int>(corner.x()), static_cast<int>(corner.y())},
+                cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, colour, 1, cv::LINE_AA);
+  }
+  std::string png() const { return encode_png(picture_); }
+
+ private:
+  cv::Mat picture_;
+  double scale_;
+};
+
+void draw_lines(Canvas& canvas, const Result& result, std::size_t index) {
+  for (const auto& [start, end] : result.tunnel_ends)
+    if (result.points[start].seen[index] && result.points[end].seen[index])
+      canvas.line(result.points[start].seen[index]->uv, result.points[end].seen[index]->uv, yellow);
+  const View& view = result.views[index].calibrated->view;
+  for (const ToolLine& tool : result.tool_lines) {
+    if (view.depth(tool.p1_in_calibrator) < 1 || view.depth(tool.p2_in_calibrator) < 1) continue;
+    const Eigen::Vector2d a = view.project(tool.p1_in_calibrator);
+    const Eigen::Vector2d b = view.project(tool.p2_in_calibrator);
+    canvas.line(a - (b - a), b + (b - a), crimson);
+  }
+}
+
+}  // namespace
+
+std::string overlay_png(const Result& result, std::size_t index) {
+  const ViewResult& view = result.views[index];
+  Canvas canvas(rectified_picture(view));
+  if (view.rectification) {
+    const DistortionMap& map = view.rectification->map;
+    for (const Dot& dot : view.rectification->plate_dots)
+      if (const auto at = map.rectified_from_raw(dot.centre_px)) canvas.circle(*at, 9, blue);
+    if (view.found)
+      for (const Dot& blob : view.found->false_blobs)
+        if (const auto at = map.rectified_from_raw(blob.centre_px)) canvas.cross(*at, 8, red);
+  }
+  if (view.found)
+    for (const Fiducial& fiducial : view.found->fiducials) {
+      const bool used = fiducial.status == FiducialStatus::used;
+      if (!used && fiducial.status != FiducialStatus::rejected) continue;
+      canvas.circle(fiducial.uv, 15, used ? green : red);
+      canvas.text(fiducial.uv, fiducial.label, used ? green : red);
+    }
+  for (const PointResult& point : result.points)
+    if (const auto& seen = point.seen[index]) {
+      canvas.cross(seen->uv, 7, violet);
+      canvas.text(seen->uv, point.name, violet);
+    }
+  if (view.calibrated) draw_lines(canvas, result, index);
+  return canvas.png();
+}
+
+std::string overlay_name(const std::string& view_name, std::size_t index) {
+  const auto suits = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  const bool plain = !view_name.empty() && view_name.size() <= 64 && std::ranges::all_of(view_name, suits);
+  return plain ? view_name + "_overlay.png" : fmt::format("view{}_overlay.png", index + 1);
+}
+
+}  // namespace helicarm

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "helicarm/navigation/result.h"
+
+namespace helicarm {
+
+/// The whole report as one HTML page: pictures inside, nothing loaded from elsewhere, no identity of the
+/// patient.
+std::string report_html(const Result& result);
+
+/// Writes report.html and NAME_overlay.png for every view into `folder`.
+Expected<void> write_report(const Result& result, const std::filesystem::path& folder);
+
+}  // namespace helicarm

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/sections.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "helicarm/report/figures.h"
+#include "helicarm/report/markup.h"
+
+namespace helicarm {
+namespace {
+
+std::string headed(std::string_view heading, const std::string& content) {
+  return content.empty() ? std::string{}
+                         : fmt::format("<section><h2>{}</h2>\n{}</section>\n", heading, content);
+}
+
+std::string card(const std::string& value, std::string_view unit, std::string_view what) {
+  return fmt::format("<div class=\"card\"><b>{} <small>{}</small></b><span>{}</span></div>\n", value, unit,
+                     what);
+}
+
+std::string coordinates(const std::optional<Eigen::Vector3d>& point) {
+  return point ? fmt::format("{:.2f}, {:.2f}, {:.2f}", point->x(), point->y(), point->z()) : std::string("–");
+}
+
+std::string message_of(const Failure& failure) {
+  const std::string view = failure.view.empty() ? std::string{} : escaped(failure.view) + ": ";
+  return fmt::format("{}{} <span class=\"soft\">({})</span>", view, escaped(failure.message),
+                     code(failure.reason));
+}
+
+double largest_error_95(const Result& result) {
+  double largest = 0;
+  for (const PointResult& point : result.points)
+    if (point.place) largest = std::max(largest, length_at_95(point.place->covariance_in_calibrator));
+  return largest;
+}
+
+/// A bar as long as the error, on the scale of the largest.
+std::string error_bar(double error, double largest) {
+  return fmt::format("<span class=\"error\" style=\"width:{:.2f}rem\"></span>",
+                     largest > 0 ? 8 * error / largest : 0);
+}
+
+std::string status_cell(const Fiducial& fiducial) {
+  constexpr std::array words = {"used", "occluded", "outside", "rejected", "not found"};
+  const char* word = words[static_cast<std::size_t>(fiducial.status)];
+  return fiducial.status == FiducialStatus::used ? word : fmt::format("<span class=\"bad\">{}</span>", word);
+}
+
+void statistics_row(HtmlTable& table, std::string_view what, const Statistics& s) {
+  if (s.n > 0)
+    table.row({std::string(what), fixed(s.mean, 3), fixed(s.rms, 3), fixed(s.max, 3), fixed(s.min, 3),
+               std::to_string(s.n)});
+}
+
+}  // namespace
+
+std::string summary_section(const Result& result) {
+  std::string html;
+  if (result.failure)
+    html +=
+        fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure));
+  else
+    html += "<p><span class=\"state ok\">measured</span></p>\n";
+  const Accuracy& accuracy = result.accuracy;
+  std::string cards;
+  if (accuracy.fre_mm.n)
+    cards += card(fixed(accuracy.fre_mm.mean, 3), "mm", "fiducial registration error, mean");
+  if (accuracy.tre_mm.n) {
+    cards += card(fixed(accuracy.tre_mm.mean, 3), "mm", "target registration error, mean");
+    cards += card(fixed(accuracy.tre_mm.max, 3), "mm", "target registration error, largest");
+  }
+  if (accuracy.fle_px.n)
+    cards += card(fixed(accuracy.fle_px.rms, 3), "px", "fiducial localization error, rms");
+  if (const double largest = largest_error_95(result); largest > 0)
+    cards += card(fixed(largest, 3), "mm", "least certain point, predicted at 95 %");
+  if (!cards.empty()) html += "<div class=\"cards\">\n" + cards + "</div>\n";
+  return html;
+}
+
+std::string views_section(const Result& result) {
+  std::string html;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    const ViewResult& view = result.views[i];
+    const std::string figure = view_figure(result, i);
+    if (figure.empty()) continue;
+    std::string caption = "<b>" + escaped(view.name) + "</b>";
+    if (view.calibrated)
+      caption += fmt::format(", balls reproject within {:.3f} px rms", view.calibrated->reprojection_rms_px);
+    if (view.found && view.found->mirrored) caption += ", stored mirrored";
+    html += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", figure, caption);
+  }
+  if (html.empty()) return {};
+  return headed(
+      "The X-rays, rectified",
+      "<div class=\"views\">\n" + html +
+          "</div>\n<p class=\"soft\">Green: balls used, with their residuals as orange arrows. Red crosses: "
+          "false blobs. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: tool.</p>\n");
+}
+
+std::string points_section(const Result& result) {
+  HtmlTable table({"Point", "Kind", "In calibrator, mm", "#&#963; x", "#&#963; y", "#&#963; z",
+                   "#Error at 95 %, mm", "", "#Ray gap, mm"});
+  const double largest = largest_error_95(result);
+  for (const PointResult& point : result.points) {
+    const std::string kind = point.source == PointSource::pick ? "pick" : "target";
+    if (!point.place) {
+      const std::string why = point.reason ? message_of(*point.reason) : std::string("–");
+      table.row(
+          {escaped(point.name), kind, "<span class=\"bad\">" + why + "</span>", "–", "–", "–", "–", "", "–"});
+      continue;
+    }
+    const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
+    const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+    const double error = length_at_95(covariance);
+    table.row({escaped(point.name), kind, coordinates(point.place->in_calibrator), fixed(sigma.x(), 3),
+               fixed(sigma.y(), 3), fixed(sigma.z(), 3), fixed(error, 3), error_bar(error, largest),
+               fixed(point.ray_gap_mm, 3)});
+  }
+  return table.empty() ? std::string{} : headed("Points", table.html());
+}
+
+std::string accuracy_section(const Result& result) {
+  const Accuracy& accuracy = result.accuracy;
+  HtmlTable table({"Error, mm", "#Mean", "#RMS", "#Max", "#Min", "#n"});
+  statistics_row(table, "FRE, the balls themselves (Eq. 11)", accuracy.fre_mm);
+  statistics_row(table, "TRE, the check targets (Eq. 12)", accuracy.tre_mm);
+  if (table.empty()) return {};
+  std::string html = table.html();
+  HtmlTable targets({"Target", "#Error, mm", "#Predicted rms, mm", "#Predicted at 95 %, mm"});
+  for (const TargetError& target : accuracy.targets)
+    targets.row({escaped(target.name), fixed(target.error_mm, 3), fixed(target.predicted_mm, 3),
+                 fixed(target.predicted_95_mm, 3)});
+  if (!targets.empty()) html += targets.html();
+  return headed("Accuracy", html);
+}
+
+std::string guidance_section(const Result& result) {
+  std::string html;
+  HtmlTable tunnels({"Tunnel", "Start in tool, mm", "End in tool, mm", "Axis in tool", "#Length, mm"});
+  for (const Tunnel& tunnel : result.tunnels)
+    tunnels.row({escaped(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
+                 tunnel.axis_in_tool ? fmt::format("{:.4f}, {:.4f}, {:.4f}", tunnel.axis_in_tool->x(),
+                                                   tunnel.axis_in_tool->y(), tunnel.axis_in_tool->z())
+                                     : std::string("–"),
+                 fixed(tunnel.length_mm, 2)});
+  if (!tunnels.empty()) html += headed("Tunnels", tunnels.html());
+  HtmlTable lines({"Tool line", "End", "#Eq. 17, px", "#Eq. 17, mm", "#In space, mm"});
+  for (const Verification& verification : result.verifications)
+    for (const auto& [end, error] : {std::pair{"start", &verification.start}, {"end", &verification.end}})
+      if (*error)
+        lines.row({escaped(verification.name), end, fixed((*error)->combined_px, 2),
+                   fixed((*error)->combined_mm, 2), fixed((*error)->distance_mm, 2)});
+  if (!lines.empty()) html += headed("Verification", lines.html());
+  return html;
+}
+
+std::string fiducials_section(const Result& result) {
+  std::string html;
+  for (const ViewResult& view : result.views) {
+    if (!view.found) continue;
+    HtmlTable table({"Ball", "Status", "#u raw", "#v raw", "#u", "#v", "#&#963;, px", "#Residual, px"});
+    for (const Fiducial& fiducial : view.found->fiducials) {
+      const bool seen =
+          fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+      const auto if_seen = [&](double value, int digits) {
+        return seen ? fixed(value, digits) : std::string("–");
+      };
+      table.row({escaped(fiducial.label), status_cell(fiducial), if_seen(fiducial.uv_raw.x(), 2),
+                 if_seen(fiducial.uv_raw.y(), 2), if_seen(fiducial.uv.x(), 2), if_seen(fiducial.uv.y(), 2),
+                 if_seen(fiducial.sigma_px, 3), if_seen(fiducial.residual_px, 3)});
+    }
+    html += fmt::format("<div><h3>{}</h3>{}<p class=\"soft\">{} false blobs</p></div>\n", escaped(view.name),
+                        table.html(), view.found->false_blobs.size());
+  }
+  return html.empty() ? html : headed("Fiducials", "<div class=\"views\">" + html + "</div>");
+}
+
+std::string rectification_section(const Result& result) {
+  HtmlTable table({"View", "Model", "#Dots", "#Residual rms, px", "#Largest, px", "#Held out rms, px",
+                   "#Distortion mean, px", "#Largest, px"});
+  std::string figures;
+  for (const ViewResult& view : result.views) {
+    if (!view.rectification || view.rectification->map.is_identity()) continue;
+    const Rectification& r = *view.rectification;
+    table.row({escaped(view.name), escaped(r.map.model),
+               r.dots_expected ? fmt::format("{} of {}", r.dots_found, *r.dots_expected)
+                               : std::to_string(r.dots_found),
+               fixed(r.map.residual_rms_px, 3), fixed(r.map.residual_max_px, 3),
+               fixed(r.map.held_out_rms_px, 3), fixed(r.raw_mean_px, 2), fixed(r.raw_max_px, 2)});
+    if (const std::string figure = distortion_figure(view); !figure.empty())
+      figures += fmt::format(
+          "<figure class=\"plain\">{}<figcaption>Distortion in {}: from the rectified to the raw "
+          "place.</figcaption></figure>\n",
+          figure, escaped(view.name));
+  }
+  if (table.empty()) return {};
+  return headed("Rectification", table.html() + "<div class=\"views\">\n" + figures + "</div>\n");
+}
+
+std::string timing_section(const Result& result) {
+  HtmlTable table({"Stage", "#Time, ms"});
+  const Timing& t = result.timing_ms;
+  for (const auto& [stage, time] : {std::pair{"read", t.read},
+                                    {"rectify", t.rectify},
+                                    {"detect", t.detect},
+                                    {"label", t.label},
+                                    {"calibrate", t.calibrate},
+                                    {"locate", t.locate},
+                                    {"total", t.total}})
+    if (time) table.row({stage, fixed(time, 1)});
+  return table.empty() ? std::string{} : headed("Time", table.html());
+}
+
+std::string warnings_section(const Result& result) {
+  std::string html;
+  for (const Warning& warning : result.warnings) html += "<li>" + message_of(warning) + "</li>\n";
+  return html.empty() ? html : headed("Warnings", "<ul>\n" + html + "</ul>\n");
+}
+
+}  // namespace helicarm

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "helicarm/navigation/result.h"
+
+namespace helicarm {
+
+// Each gives one part of the report as HTML, empty where the result has nothing to show.
+std::string summary_section(const Result& result);
+std::string views_section(const Result& result);
+std::string points_section(const Result& result);
+std::string accuracy_section(const Result& result);
+std::string guidance_section(const Result& result);
+std::string fiducials_section(const Result& result);
+std::string rectification_section(const Result& result);
+std::string timing_section(const Result& result);
+std::string warnings_section(const Result& result);
+
+}  // namespace helicarm
