@@ -19,9 +19,7 @@ Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eig
   const DistortionMap& map = view.rectification->map;
   if (pick.snap == Snap::ball) {
     const View& camera = view.calibrated->view;
-    const double px_per_mm =
-        std::sqrt(std::abs(camera.intrinsics.fx * camera.intrinsics.fy)) / camera.depth(centre);
-    auto seen = snap_to_ball(*view.exposure, map, pick.uv_raw, pick.diameter_mm * px_per_mm);
+    auto seen = snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
@@ -41,6 +39,17 @@ void check_inside(const Pick& pick, const Exposure& exposure) {
                      pick.name, pick.uv_raw.x(), pick.uv_raw.y(), width, height),
          pick.view,
          {}});
+}
+
+/// The dots of plate and calibrator, for a target's fit to leave out.
+std::vector<Disc> discs_of(const ViewResult& view) {
+  std::vector<Disc> discs;
+  for (const Dot& dot : view.rectification->plate_dots) discs.push_back({dot.centre_px, dot.radius_px + 1.5});
+  const View& camera = view.calibrated->view;
+  for (const Fiducial& ball : view.found->fiducials)
+    if (ball.status == FiducialStatus::used)
+      discs.push_back({ball.uv_raw, 2.2 * std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator)});
+  return discs;
 }
 
 /// One thing to be seen in one view.
@@ -126,7 +135,8 @@ Expected<std::vector<PointResult>> see_points(const Case& given, const Result& r
     const ViewResult& view = result.views[task.view];
     const auto seen =
         task.pick ? see_pick(*task.pick, view, centre)
-                  : find_target(*view.exposure, view.rectification->map, view.calibrated->view, *task.target);
+                  : find_target(*view.exposure, view.rectification->map, view.calibrated->view, *task.target,
+                                discs_of(view));
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else
