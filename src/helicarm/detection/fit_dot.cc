@@ -32,31 +32,40 @@ struct Patch {
   float scale;  ///< grey values are divided by it
 };
 
-/// Value and derivatives at one pixel.
-inline float model(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel,
-                   float* jacobian) {
+constexpr int block = 64;
+
+/// A block of pixels: residuals, and derivatives as columns. Written so that the compiler can use wide registers.
+struct Block {
+  alignas(32) float residual[block];
+  alignas(32) float row[n_parameters][block];
+};
+
+inline float background_at(const Parameters& p, float x, float y) {
+  return p[0] + p[1] * x + p[2] * y + p[3] * x * x + p[4] * x * y + p[5] * y * y;
+}
+
+/// Model less its background at one pixel: -(A + hidden G) profile.
+template <class Take>
+inline void shade_at(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel, Take&& take) {
   const float x = pixel.x * patch.inverse_window;
   const float y = pixel.y * patch.inverse_window;
-  const std::array<float, n_background> basis{1, x, y, x * x, x * y, y * y};
-  float background = 0;
-  for (int k = 0; k < n_background; ++k) background += p[k] * basis[static_cast<std::size_t>(k)];
   const float dx = pixel.x - p[7];
   const float dy = pixel.y - p[8];
   const float distance = std::sqrt(dx * dx + dy * dy);
-  const auto [value, slope] = profile.at(distance / p[10]);
+  const auto sample = profile.at(distance / p[10]);
   const float slant = p[1] * x + p[2] * y;
   const float height = p[6] + p[9] * slant;
-  for (int k = 0; k < n_background; ++k) jacobian[k] = basis[static_cast<std::size_t>(k)];
-  jacobian[1] -= p[9] * x * value;
-  jacobian[2] -= p[9] * y * value;
-  jacobian[6] = -value;
-  const float steep = -height * slope / p[10];
-  const float along = distance > 1e-4f ? steep / distance : 0;
-  jacobian[7] = -along * dx;
-  jacobian[8] = -along * dy;
-  jacobian[9] = -slant * value;
-  jacobian[10] = -steep * distance / p[10];
-  return background - height * value;
+  float residual = pixel.grey - (background_at(p, x, y) - height * sample.value);
+  if (pixel.clipped && residual < 0) residual = 0;
+  take(x, y, dx, dy, distance, sample, slant, height, residual);
+}
+
+void find_residuals(const Patch& patch, const BallProfile& profile, const Parameters& p, std::vector<float>& residuals) {
+  for (std::size_t i = 0; i < patch.pixels.size(); ++i)
+    shade_at(patch, profile, p, patch.pixels[i],
+             [&](float, float, float, float, float, BallProfile::Sample, float, float, float residual) {
+               residuals[i] = residual;
+             });
 }
 
 struct Sums {
@@ -66,31 +75,59 @@ struct Sums {
   double weight = 0;
 };
 
-Sums accumulate(const Patch& patch, const BallProfile& profile, const Parameters& p, std::vector<float>& residuals) {
-  Sums sums;
-  Eigen::Matrix<float, n_parameters, n_parameters> block = Eigen::Matrix<float, n_parameters, n_parameters>::Zero();
-  alignas(32) float row[n_parameters];
-  for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
-    const Pixel& pixel = patch.pixels[i];
-    const float residual = pixel.grey - model(patch, profile, p, pixel, row);
-    if (pixel.clipped && residual < 0) {
-      residuals[i] = 0;
-      continue;
-    }
-    residuals[i] = residual;
-    const float w = pixel.weight;
-    if (w == 0) continue;
-    for (int a = 0; a < n_parameters; ++a) {
-      const float wa = w * row[a];
-      for (int b = a; b < n_parameters; ++b) block(b, a) += wa * row[b];
-      sums.right[a] += double(wa * residual);
-    }
-    sums.squares += double(w * residual * residual);
-    sums.weight += double(w);
+void add_block(const Block& rows, int count, const float* weights, Eigen::Matrix<float, n_parameters, n_parameters>& normal,
+               Eigen::Matrix<float, n_parameters, 1>& right) {
+  alignas(32) float weighted[block];
+  for (int a = 0; a < n_parameters; ++a) {
+    for (int k = 0; k < count; ++k) weighted[k] = weights[k] * rows.row[a][k];
+    for (int k = count; k < block; ++k) weighted[k] = 0;
+    using Column = Eigen::Map<const Eigen::Matrix<float, block, 1>, Eigen::Aligned32>;
+    const Column left(weighted);
+    for (int b = a; b < n_parameters; ++b) normal(b, a) += left.dot(Column(rows.row[b]));
+    right[a] += left.dot(Column(rows.residual));
   }
-  sums.normal = block.cast<double>();
-  for (int a = 0; a < n_parameters; ++a)
-    for (int b = 0; b < a; ++b) sums.normal(b, a) = sums.normal(a, b);
+}
+
+Sums accumulate(const Patch& patch, const BallProfile& profile, const Parameters& p) {
+  Sums sums;
+  Eigen::Matrix<float, n_parameters, n_parameters> normal = Eigen::Matrix<float, n_parameters, n_parameters>::Zero();
+  Eigen::Matrix<float, n_parameters, 1> right = Eigen::Matrix<float, n_parameters, 1>::Zero();
+  Block rows{};
+  alignas(32) float weights[block];
+  int count = 0;
+  for (const Pixel& pixel : patch.pixels) {
+    if (pixel.weight == 0) continue;
+    shade_at(patch, profile, p, pixel,
+             [&](float x, float y, float dx, float dy, float distance, BallProfile::Sample sample, float slant,
+                 float height, float residual) {
+               if (pixel.clipped && residual == 0) return;
+               const int k = count++;
+               rows.residual[k] = residual;
+               rows.row[0][k] = 1;
+               rows.row[1][k] = x - p[9] * x * sample.value;
+               rows.row[2][k] = y - p[9] * y * sample.value;
+               rows.row[3][k] = x * x;
+               rows.row[4][k] = x * y;
+               rows.row[5][k] = y * y;
+               rows.row[6][k] = -sample.value;
+               const float steep = -height * sample.slope / p[10];
+               const float along = distance > 1e-4f ? steep / distance : 0;
+               rows.row[7][k] = -along * dx;
+               rows.row[8][k] = -along * dy;
+               rows.row[9][k] = -slant * sample.value;
+               rows.row[10][k] = -steep * distance / p[10];
+               weights[k] = pixel.weight;
+               sums.squares += double(pixel.weight * residual * residual);
+               sums.weight += double(pixel.weight);
+             });
+    if (count == block) {
+      add_block(rows, count, weights, normal, right);
+      count = 0;
+    }
+  }
+  if (count > 0) add_block(rows, count, weights, normal, right);
+  sums.normal = normal.cast<double>().selfadjointView<Eigen::Lower>();
+  sums.right = right.cast<double>();
   return sums;
 }
 
@@ -187,7 +224,7 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
   std::vector<float> scratch;
   const auto noise = [&](const Sums& s) { return s.squares / std::max(1.0, s.weight - n_parameters); };
   const int free = options.free_radius ? n_parameters : n_parameters - 1;
-  Sums sums = accumulate(*patch, profile, p, residuals);
+  Sums sums = accumulate(*patch, profile, p);
   double move = 0;
   for (int i = 0; i < options.iterations; ++i) {
     const Vector step = [&] {
@@ -206,11 +243,11 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
     const float share = float(std::min(1.0, limit / std::max({move, std::abs(step[10]), 1e-12})));
     p += share * step.cast<float>();
     if (!(p[10] > 0.5f * radius && p[10] < 1.8f * radius) || std::hypot(p[7], p[8]) > window) return std::nullopt;
-    accumulate(*patch, profile, p, residuals);
+    find_residuals(*patch, profile, p, residuals);
     // Outliers are told from a rough start only by and by.
     const double tolerance = std::max(options.tolerance, 0.3 * std::pow(0.5, i));
     reweight(*patch, residuals, float(tolerance) * std::abs(p[6]), scratch);
-    sums = accumulate(*patch, profile, p, residuals);
+    sums = accumulate(*patch, profile, p);
     if (i >= 4 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
@@ -229,6 +266,7 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
   dot.radius_px = double(p[10]);
   dot.sigma_px = std::sqrt(std::max(0.0, variance * 0.5 * (inverse(7, 7) + inverse(8, 8))));
   dot.contrast = contrast * double(patch->scale);
+  find_residuals(*patch, profile, p, residuals);
   double raw_squares = 0;
   for (float r : residuals) raw_squares += double(r * r);
   dot.misfit = std::sqrt(raw_squares / double(residuals.size())) / std::max(1e-9, std::abs(contrast));
