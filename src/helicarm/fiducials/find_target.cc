@@ -213,7 +213,10 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
   };
   consider(0.25, 1.0);
   const double attenuation = consider(0.7, 1.0) ? 0.7 : 0.25;
-  if (!consider(attenuation, 0.7)) consider(attenuation, 1.4);
+  if (consider(attenuation, 0.7))
+    consider(attenuation, 0.5);
+  else
+    consider(attenuation, 1.4);
   if (!best || std::abs(best->contrast) < 4 * best->noise || best->misfit > 0.4 || best->sigma_px > 1)
     return fail(Reason::target_not_found, fmt::format("{}: is not to be seen where the view puts it", target.name));
   const Vector2d uv = centre + best->shift;
