@@ -18,6 +18,7 @@ using Eigen::Vector2d;
 
 constexpr std::size_t max_candidates = 30;
 constexpr double paper_systematic = 2e-3;  // of the field radius: what a quadratic leaves of the distortion
+constexpr double shared_bias_sigma = 0.008;
 constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
 
@@ -159,7 +160,7 @@ std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) 
 }  // namespace
 
 Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
-                                        const Calibrator& calibrator, Method method) {
+                                        const Calibrator& calibrator, Method method, std::optional<double> radius_bias) {
   const DistortionMap& map = rectification.map;
   const std::vector<Dot> balls = plausible_balls(rectification, calibrator);
   std::vector<BallCandidate> candidates;
@@ -169,13 +170,19 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
   }
   LabellingOptions labelling_options;
   if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
-  const auto labelling = label_balls(calibrator, candidates, prior_of(exposure, map), labelling_options);
+  LabellingPrior prior = prior_of(exposure, map);
+  if (radius_bias) {
+    prior.radius_bias = *radius_bias;
+    prior.radius_bias_sigma = shared_bias_sigma;
+  }
+  const auto labelling = label_balls(calibrator, candidates, prior, labelling_options);
   if (!labelling) return tl::unexpected<Failure>(labelling.error());
 
   FoundFiducials found;
   found.view = labelling->view;
   found.mirrored = labelling->mirrored;
-  found.ambiguity = labelling->margin;
+  found.margin = labelling->margin;
+  found.radius_bias = labelling->radius_bias;
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);

@@ -127,14 +127,19 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   if (!start.allFinite()) return std::nullopt;
   p.head<linear>() = start;
   double move = 0;
-  for (int i = 0; i < 15; ++i) {
+  double damping = 1;
+  Vector2d before = Vector2d::Zero();
+  for (int i = 0; i < 20; ++i) {
     accumulate(patch, shade, p, residuals);
     reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
     sums = accumulate(patch, shade, p, residuals);
     Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
+    // The drawn template has kinks: a step that turns back overshot.
+    if (step.tail<2>().dot(before) < 0) damping *= 0.5;
+    before = step.tail<2>();
+    step.tail<2>() *= damping * std::min(1.0, 2 / std::max(1e-9, before.norm()));
     move = step.tail<2>().norm();
-    if (move > 2) step.tail<2>() *= 2 / move;
     p += step;
     if (p.tail<2>().norm() > max_shift_px) return std::nullopt;
     if (i >= 5 && move < 2e-3) break;
