@@ -60,8 +60,8 @@ Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& f
   return without_plate(exposure);
 }
 
-Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view, const Calibrator& calibrator,
-                                                              Method method) {
+Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
+                                                              const Calibrator& calibrator, Method method) {
   auto found = find_fiducials(*view.exposure, *view.rectification, calibrator, method);
   if (found) return std::optional(std::move(*found));
   if (found.error().reason == Reason::ambiguous_labels) return std::optional<FoundFiducials>();

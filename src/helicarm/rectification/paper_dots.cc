@@ -26,7 +26,8 @@ std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float 
   const double canny_threshold = 50;
   const double votes = std::max(6.0, 1.2 * zoom * min_radius_px);
   cv::HoughCircles(grey, circles, cv::HOUGH_GRADIENT, 1, 2 * zoom * min_radius_px, canny_threshold, votes,
-                   static_cast<int>(std::floor(zoom * min_radius_px)), static_cast<int>(std::ceil(zoom * max_radius_px)));
+                   static_cast<int>(std::floor(zoom * min_radius_px)),
+                   static_cast<int>(std::ceil(zoom * max_radius_px)));
   std::vector<Dot> dots;
   for (const cv::Vec3f& circle : circles) {
     Dot dot;

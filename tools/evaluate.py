@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Runs `helicarm run` on every case of a folder that has a truth.json, and compares: labels, ball centres, FRE, TRE.
+
+  tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm] [--markdown]
+
+Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
+points (T1, T2, ...) from their true places; where a case has tunnel balls FS, FE, TS, TE and its name begins with n,
+of those."""
+import argparse
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+
+def distance(a, b):
+    return math.sqrt(sum((x - y) ** 2 for x, y in zip(a, b)))
+
+
+def places_of(truth):
+    """Name -> true place in the calibrator's frame, from either layout of truth.json."""
+    pair = truth.get("pair", truth)
+    places = {}
+    for key in ("targets_world", "click_points_world", "targets_in_calibrator", "points_in_calibrator"):
+        value = pair.get(key) or {}
+        if isinstance(value, dict):
+            places.update({k: v for k, v in value.items() if isinstance(v, list)})
+    return places
+
+
+def balls_of(truth, view):
+    of_view = truth.get(view) or next((v for v in truth.get("views", []) if v.get("name") == view), None)
+    balls = (of_view or {}).get("calibrator") or (of_view or {}).get("balls") or []
+    return {b.get("name", b.get("label")): b["raw"] for b in balls if b.get("raw")}
+
+
+def judge(folder, result, truth):
+    squares, wrong = [], 0
+    for view in result["views"]:
+        true_balls = balls_of(truth, view["name"])
+        for ball in view["fiducials"]:
+            if ball["status"] == "used" and ball["label"] in true_balls:
+                error = distance(ball["uv_raw"], true_balls[ball["label"]])
+                squares.append(error * error)
+                wrong += error > 5
+    places = places_of(truth)
+    tunnels = folder.name.startswith("n")
+    errors = []
+    for point in result["points"]:
+        name = point["name"]
+        counts = name in ("FS", "FE", "TS", "TE") if tunnels else name[0] == "T" and name[1:].isdigit()
+        if counts and point["xyz_mm"] and name in places:
+            errors.append(distance(point["xyz_mm"], places[name]))
+    return {
+        "wrong": wrong,
+        "balls": len(squares),
+        "ball_px": math.sqrt(sum(squares) / len(squares)) if squares else math.nan,
+        "fre": result["accuracy"]["fre_mm"]["mean"],
+        "tre": sum(errors) / len(errors) if errors else math.nan,
+        "tre_max": max(errors, default=math.nan),
+        "n": len(errors),
+        "ms": result["timing_ms"]["total"],
+    }
+
+
+def run(helicarm, folder, method):
+    with tempfile.TemporaryDirectory() as out:
+        done = subprocess.run([helicarm, "run", str(folder), "--out", out, "--method", method, "--no-report", "--quiet"],
+                              capture_output=True, text=True)
+        path = Path(out) / "result.json"
+        if not path.exists():
+            return None, done.stderr.strip()
+        return json.loads(path.read_text()), done.stderr.strip()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--method", action="append", choices=["best", "paper"])
+    parser.add_argument("--helicarm", default=str(Path(__file__).resolve().parent.parent / "build/bin/helicarm"))
+    options = parser.parse_args()
+    cases = sorted(p.parent for p in options.folder.glob("*/case.json") if (p.parent / "truth.json").exists())
+    if not cases:
+        sys.exit(f"{options.folder}: no sub-folder with case.json and truth.json")
+    for method in options.method or ["best", "paper"]:
+        print(f"\n### --method {method}\n")
+        print("| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | ms |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+        groups = defaultdict(list)
+        for case in cases:
+            result, message = run(options.helicarm, case, method)
+            if result is None or result["status"] != "ok":
+                code = result["failure"]["code"] if result else message
+                print(f"| {case.name} | refused: {code} | | | | | | | |")
+                continue
+            row = judge(case, result, json.loads((case / "truth.json").read_text()))
+            groups[case.name[0]].append(row)
+            print(f"| {case.name} | {row['wrong']} | {row['balls']} | {row['ball_px']:.3f} | {row['fre']:.4f} | "
+                  f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['ms']:.0f} |")
+        print("\n| group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max |")
+        print("| --- | --- | --- | --- | --- | --- | --- |")
+        for name, rows in sorted(groups.items()):
+            mean = lambda key: sum(r[key] for r in rows) / len(rows)  # noqa: E731
+            print(f"| {name} | {len(rows)} | {sum(r['wrong'] for r in rows)} | {mean('ball_px'):.3f} | {mean('fre'):.4f} | "
+                  f"{mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} |")
+
+
+if __name__ == "__main__":
+    main()
