@@ -1,125 +1,116 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs helicarm over a folder of cases with known truth and writes how well it did as a Markdown table.
+"""Runs `helicarm run` on every case of a folder that has a truth.json, and compares: labels, ball centres, FRE, TRE.
 
-    tools/evaluate.py CASES [--method best|paper] [--out table.md] [--helicarm build/bin/helicarm]
+  tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm] [--markdown]
 
-A case is a folder with case.json and truth.json, as `helicarm simulate` writes them or as rendered by another program
-(`pair.targets_world` and per view `calibrator`). Cases are grouped by the letters at the start of their names.
-"""
-
+Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
+points (T1, T2, ...) from their true places; where a case has tunnel balls FS, FE, TS, TE and its name begins with n,
+of those."""
 import argparse
 import json
 import math
-import pathlib
-import re
 import subprocess
 import sys
 import tempfile
+from collections import defaultdict
+from pathlib import Path
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-
-def balls_of(truth, view):
-    """Label -> raw pixel of the image of the ball's centre."""
-    if "views" in truth:
-        found = next(v for v in truth["views"] if v["name"] == view)
-        return {b["name"]: b["raw"] for b in found["balls"]}
-    return {b["name"]: b["raw"] for b in truth[view]["calibrator"] if b.get("present", True)}
+def distance(a, b):
+    return math.sqrt(sum((x - y) ** 2 for x, y in zip(a, b)))
 
 
 def places_of(truth):
-    """Name -> true place in the calibrator of everything that may be located, the check points of the case first."""
-    if "pair" in truth:
-        return truth["pair"].get("targets_world") or truth["pair"].get("click_points_world") or {}
+    """Name -> true place in the calibrator's frame, from either layout of truth.json."""
+    pair = truth.get("pair", truth)
     places = {}
-    for view in truth["views"]:
-        for kind in ("targets", "tunnel_points"):
-            places.update({p["name"]: p["xyz_mm"] for p in view[kind]})
+    for key in ("targets_world", "click_points_world", "targets_in_calibrator", "points_in_calibrator"):
+        value = pair.get(key) or {}
+        if isinstance(value, dict):
+            places.update({k: v for k, v in value.items() if isinstance(v, list)})
+    for view in truth.get("views", []):  # our own simulation's
+        for point in view["targets"] + view["tunnel_points"]:
+            places[point["name"]] = point["xyz_mm"]
     return places
 
 
-def run(helicarm, case, method):
-    with tempfile.TemporaryDirectory() as out:
-        done = subprocess.run([helicarm, "run", case, "--out", out, "--method", method, "--no-report", "--quiet"],
-                              capture_output=True, text=True)
-        result = pathlib.Path(out) / "result.json"
-        return done, json.loads(result.read_text()) if result.exists() else None
+def balls_of(truth, view):
+    of_view = truth.get(view) or next((v for v in truth.get("views", []) if v.get("name") == view), None)
+    balls = (of_view or {}).get("calibrator") or (of_view or {}).get("balls") or []
+    return {b.get("name", b.get("label")): b["raw"] for b in balls if b.get("raw")}
 
 
-def measure(result, truth):
-    row = {"balls": 0, "right": 0, "squares": [], "tre": [], "predicted": []}
+def judge(folder, result, truth):
+    squares, wrong = [], 0
     for view in result["views"]:
-        real = balls_of(truth, view["name"])
+        true_balls = balls_of(truth, view["name"])
         for ball in view["fiducials"]:
-            if ball["status"] != "used":
-                continue
-            row["balls"] += 1
-            error = math.dist(ball["uv_raw"], real[ball["label"]]) if ball["label"] in real else math.inf
-            if error < 3:
-                row["right"] += 1
-                row["squares"].append(error**2)
+            if ball["status"] == "used" and ball["label"] in true_balls:
+                error = distance(ball["uv_raw"], true_balls[ball["label"]])
+                squares.append(error * error)
+                wrong += error > 5
+    places = places_of(truth)
+    tunnels = folder.name.startswith("n")
+    errors = []
     for point in result["points"]:
-        place = places_of(truth).get(point["name"])
-        if place and point["xyz_mm"]:
-            row["tre"].append(math.dist(point["xyz_mm"], place))
-            row["predicted"].append(math.sqrt(sum(point["covariance_mm2"][i][i] for i in range(3))))
-    row["fre"] = (result["accuracy"]["fre_mm"] or {}).get("mean")
-    row["ms"] = result["timing_ms"]["total"]
-    return row
+        name = point["name"]
+        counts = name in ("FS", "FE", "TS", "TE") if tunnels else name[0] == "T" and name[1:].isdigit()
+        if counts and point["xyz_mm"] and name in places:
+            errors.append(distance(point["xyz_mm"], places[name]))
+    return {
+        "wrong": wrong,
+        "balls": len(squares),
+        "ball_px": math.sqrt(sum(squares) / len(squares)) if squares else math.nan,
+        "fre": result["accuracy"]["fre_mm"]["mean"],
+        "tre": sum(errors) / len(errors) if errors else math.nan,
+        "tre_max": max(errors, default=math.nan),
+        "n": len(errors),
+        "ms": result["timing_ms"]["total"],
+    }
 
 
-def mean(values):
-    values = [v for v in values if v is not None]
-    return sum(values) / len(values) if values else None
-
-
-def text(value, digits=3):
-    return "–" if value is None else f"{value:.{digits}f}"
-
-
-def figures(row):
-    """The table's columns of one case."""
-    rms = math.sqrt(mean(row["squares"])) if row["squares"] else None
-    predicted = math.sqrt(mean([p**2 for p in row["predicted"]])) if row["predicted"] else None
-    return [rms, row["fre"], mean(row["tre"]), max(row["tre"], default=None), predicted, row["ms"]]
+def run(helicarm, folder, method):
+    with tempfile.TemporaryDirectory() as out:
+        done = subprocess.run([helicarm, "run", str(folder), "--out", out, "--method", method, "--no-report", "--quiet"],
+                              capture_output=True, text=True)
+        path = Path(out) / "result.json"
+        if not path.exists():
+            return None, done.stderr.strip()
+        return json.loads(path.read_text()), done.stderr.strip()
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("cases", type=pathlib.Path)
-    parser.add_argument("--method", choices=["best", "paper"], default="best")
-    parser.add_argument("--out", type=pathlib.Path)
-    parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
-    arguments = parser.parse_args()
-
-    lines = ["| case | labels right | ball centre px rms | FRE mm | TRE mm mean | TRE mm max | predicted mm rms | ms |",
-             "| --- | --- | --- | --- | --- | --- | --- | --- |"]
-    groups = {}
-    for case in sorted(p.parent for p in arguments.cases.glob("*/truth.json") if (p.parent / "case.json").exists()):
-        done, result = run(arguments.helicarm, str(case), arguments.method)
-        if result is None or result["status"] != "ok":
-            reason = result["failure"]["code"] if result else f"exit {done.returncode}: {done.stderr.strip()}"
-            lines.append(f"| {case.name} | {reason} | – | – | – | – | – | – |")
-            continue
-        row = measure(result, json.loads((case / "truth.json").read_text()))
-        numbers = figures(row)
-        group = re.match(r"[A-Za-z]*", case.name).group() or case.name
-        groups.setdefault(group, []).append((row, numbers))
-        lines.append(f"| {case.name} | {row['right']} of {row['balls']} | " +
-                     " | ".join(text(n) for n in numbers[:5]) + f" | {text(numbers[5], 0)} |")
-    for group, rows in groups.items():
-        right, balls = (sum(row[key] for row, _ in rows) for key in ("right", "balls"))
-        columns = [mean([numbers[i] for _, numbers in rows]) for i in range(6)]
-        columns[3] = max((n[3] for _, n in rows if n[3] is not None), default=None)
-        lines.append(f"| **{group}** ({len(rows)}) | {right} of {balls} | " +
-                     " | ".join(text(n) for n in columns[:5]) + f" | {text(columns[5], 0)} |")
-    table = "\n".join(lines) + "\n"
-    if arguments.out:
-        arguments.out.write_text(table)
-    print(table, end="")
-    return 0 if groups else 1
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--method", action="append", choices=["best", "paper"])
+    parser.add_argument("--helicarm", default=str(Path(__file__).resolve().parent.parent / "build/bin/helicarm"))
+    options = parser.parse_args()
+    cases = sorted(p.parent for p in options.folder.glob("*/case.json") if (p.parent / "truth.json").exists())
+    if not cases:
+        sys.exit(f"{options.folder}: no sub-folder with case.json and truth.json")
+    for method in options.method or ["best", "paper"]:
+        print(f"\n### --method {method}\n")
+        print("| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | ms |")
+        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+        groups = defaultdict(list)
+        for case in cases:
+            result, message = run(options.helicarm, case, method)
+            if result is None or result["status"] != "ok":
+                code = result["failure"]["code"] if result else message
+                print(f"| {case.name} | refused: {code} | | | | | | | |")
+                continue
+            row = judge(case, result, json.loads((case / "truth.json").read_text()))
+            groups[case.name[0]].append(row)
+            print(f"| {case.name} | {row['wrong']} | {row['balls']} | {row['ball_px']:.3f} | {row['fre']:.4f} | "
+                  f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['ms']:.0f} |")
+        print("\n| group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max |")
+        print("| --- | --- | --- | --- | --- | --- | --- |")
+        for name, rows in sorted(groups.items()):
+            mean = lambda key: sum(r[key] for r in rows) / len(rows)  # noqa: E731
+            print(f"| {name} | {len(rows)} | {sum(r['wrong'] for r in rows)} | {mean('ball_px'):.3f} | {mean('fre'):.4f} | "
+                  f"{mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} |")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

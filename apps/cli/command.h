@@ -8,7 +8,8 @@
 
 namespace helicarm::cli {
 
-/// What every command is given beside its own arguments. Answers go to `out`, progress and messages to `progress`.
+/// What every command is given beside its own arguments. Answers go to `out`, progress and messages to
+/// `progress`.
 struct Console {
   std::ostream& out;
   std::ostream& progress;
@@ -18,8 +19,8 @@ struct Console {
   std::uint64_t seed = 1;
 };
 
-/// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc turns
-/// its failure into a message and an exit code.
+/// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc
+/// turns its failure into a message and an exit code.
 using CommandResult = Expected<void>;
 
 }  // namespace helicarm::cli

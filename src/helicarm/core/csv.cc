@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/csv.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <sstream>
+
+#include <fmt/format.h>
 
 #include "helicarm/core/files.h"
 
@@ -87,11 +87,13 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
       return fail(Reason::bad_value, fmt::format("{}: the column \"{}\" is missing", table.origin_, column));
   const auto known = [&](const std::string& column) {
     const auto same = [&](const char* name) { return column == name; };
-    return std::any_of(required.begin(), required.end(), same) || std::any_of(optional.begin(), optional.end(), same);
+    return std::any_of(required.begin(), required.end(), same) ||
+           std::any_of(optional.begin(), optional.end(), same);
   };
   for (const std::string& column : table.columns_)
     if (!known(column))
-      return fail(Reason::unknown_key, fmt::format("{}: the column \"{}\" is not known", table.origin_, column));
+      return fail(Reason::unknown_key,
+                  fmt::format("{}: the column \"{}\" is not known", table.origin_, column));
   return table;
 }
 

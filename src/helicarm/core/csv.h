@@ -30,7 +30,8 @@ class CsvTable {
   std::vector<std::vector<std::string>> cells_;
 };
 
-/// Reads a comma-separated file. Every `required` column must be there; a column in neither list is unknown_key.
+/// Reads a comma-separated file. Every `required` column must be there; a column in neither list is
+/// unknown_key.
 Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_list<const char*> required,
                             std::initializer_list<const char*> optional);
 

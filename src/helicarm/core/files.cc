@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/files.h"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -51,8 +51,7 @@ Expected<void> write_file(const fs::path& path, std::string_view bytes) {
     std::ofstream out(aside, std::ios::binary | std::ios::trunc);
     out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     out.close();
-    if (!out)
-      return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)));
+    if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)));
     return {};
   });
 }
@@ -79,7 +78,8 @@ Expected<void> write_file_with(const fs::path& path,
 
 Expected<fs::path> path_inside(const fs::path& folder, const std::string& relative) {
   const auto outside = [&] {
-    return fail(Reason::path_outside, fmt::format("\"{}\": leads out of the folder {}", relative, folder.string()));
+    return fail(Reason::path_outside,
+                fmt::format("\"{}\": leads out of the folder {}", relative, folder.string()));
   };
   if (relative.empty() || relative.find('\0') != std::string::npos)
     return fail(Reason::bad_value, "a file name is empty or holds a NUL");

@@ -16,9 +16,11 @@ Expected<std::string> read_file(const std::filesystem::path& path, std::uintmax_
 /// Replaces `path` as a whole or not at all: written aside, fsynced, renamed, folder fsynced.
 Expected<void> write_file(const std::filesystem::path& path, std::string_view bytes);
 
-/// As `write_file`, for a library that insists on writing the file itself: `write` fills the name it is given.
-Expected<void> write_file_with(const std::filesystem::path& path,
-                               const std::function<Expected<void>(const std::filesystem::path& aside)>& write);
+/// As `write_file`, for a library that insists on writing the file itself: `write` fills the name it is
+/// given.
+Expected<void> write_file_with(
+    const std::filesystem::path& path,
+    const std::function<Expected<void>(const std::filesystem::path& aside)>& write);
 
 /// `relative` below `folder`; a name that is absolute, or that leaves the folder by ".." or by a link, is
 /// refused (path_outside).

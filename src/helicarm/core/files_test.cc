@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/files.h"
 
+#include <fstream>
+
 #include <gtest/gtest.h>
 #include <unistd.h>
-
-#include <fstream>
 
 namespace helicarm {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/json.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <set>
+
+#include <fmt/format.h>
 
 #include "helicarm/core/files.h"
 
@@ -46,7 +46,8 @@ Expected<Json> parse_json(std::string_view text, const std::string& origin) {
   };
   try {
     Json value = Json::parse(text.begin(), text.end(), watch);
-    if (!twice.empty()) return fail(Reason::bad_json, fmt::format("{}: key \"{}\" is given twice", origin, twice));
+    if (!twice.empty())
+      return fail(Reason::bad_json, fmt::format("{}: key \"{}\" is given twice", origin, twice));
     return value;
   } catch (const BadInput& bad) {
     return tl::unexpected<Failure>(bad.failure());
@@ -54,7 +55,8 @@ Expected<Json> parse_json(std::string_view text, const std::string& origin) {
     std::size_t at = std::min<std::size_t>(error.byte, text.size());
     for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
       if (names_non_finite(text.substr(start)))
-        return fail(Reason::not_finite, fmt::format("{}: a number is not finite (byte {})", origin, start + 1));
+        return fail(Reason::not_finite,
+                    fmt::format("{}: a number is not finite (byte {})", origin, start + 1));
     return fail(Reason::bad_json, fmt::format("{}: not valid JSON at byte {}", origin, error.byte));
   } catch (const Json::out_of_range& error) {
     return fail(Reason::not_finite, fmt::format("{}: a number is beyond the range of a double", origin));
@@ -113,7 +115,8 @@ std::optional<double> JsonReader::optional_number(const char* key, Range range) 
 
 int JsonReader::integer(const char* key, int low, int high) {
   const double value = checked(required(key), key, {double(low), double(high)});
-  if (value != std::floor(value)) refuse(Reason::bad_value, key, fmt::format("{} is not a whole number", value));
+  if (value != std::floor(value))
+    refuse(Reason::bad_value, key, fmt::format("{} is not a whole number", value));
   return static_cast<int>(value);
 }
 
@@ -137,7 +140,8 @@ std::optional<std::string> JsonReader::optional_text(const char* key, std::size_
 bool JsonReader::boolean(const char* key, bool fallback) {
   const Json& value = raw(key);
   if (value.is_null()) return fallback;
-  if (!value.is_boolean()) refuse(Reason::bad_value, key, fmt::format("{} is not true or false", shorten(value)));
+  if (!value.is_boolean())
+    refuse(Reason::bad_value, key, fmt::format("{} is not true or false", shorten(value)));
   return value.get<bool>();
 }
 
@@ -187,8 +191,8 @@ std::size_t JsonReader::choice(const char* key, std::initializer_list<std::strin
 void JsonReader::finish() const {
   for (const auto& [key, value] : value_->items())
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end())
-      throw BadInput(Reason::unknown_key, fmt::format("{}: \"{}\" is not a known key (known: {})", where_, key,
-                                                      fmt::join(asked_, ", ")));
+      throw BadInput(Reason::unknown_key, fmt::format("{}: \"{}\" is not a known key (known: {})", where_,
+                                                      key, fmt::join(asked_, ", ")));
 }
 
 }  // namespace helicarm

@@ -27,8 +27,8 @@ struct Range {
   double high;
 };
 
-/// Reads one JSON object strictly: every field is checked for type and range, and a key nobody asked for is an
-/// error. All members throw BadInput, with a message that names file, field, value and limit.
+/// Reads one JSON object strictly: every field is checked for type and range, and a key nobody asked for is
+/// an error. All members throw BadInput, with a message that names file, field, value and limit.
 class JsonReader {
  public:
   JsonReader(const Json& value, std::string where);

@@ -26,7 +26,9 @@ TEST(ParseJson, BrokenTextIsBadJson) {
 
 TEST(ParseJson, KeyGivenTwiceIsBadJson) { EXPECT_EQ(reason_of(R"({"a": 1, "a": 2})"), Reason::bad_json); }
 
-TEST(ParseJson, SameKeyInTwoObjectsIsFine) { EXPECT_TRUE(parse_json(R"([{"a": 1}, {"a": 2}])", "x").has_value()); }
+TEST(ParseJson, SameKeyInTwoObjectsIsFine) {
+  EXPECT_TRUE(parse_json(R"([{"a": 1}, {"a": 2}])", "x").has_value());
+}
 
 TEST(ParseJson, DeepNestingIsRefused) { EXPECT_EQ(reason_of(std::string(100000, '[')), Reason::bad_json); }
 
@@ -50,7 +52,9 @@ TEST(JsonReader, ValueOutsideItsRangeNamesFieldValueAndLimit) {
 }
 
 TEST(JsonReader, KeyNobodyAskedForIsUnknown) {
-  const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) { r.number("size", {0, 9}); });
+  const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) {
+    r.number("size", {0, 9});
+  });
   EXPECT_EQ(failure.reason, Reason::unknown_key);
 }
 
@@ -59,7 +63,11 @@ TEST(JsonReader, MissingFieldIsBadValue) {
 }
 
 TEST(JsonReader, MatrixOfWrongShapeIsBadValue) {
-  EXPECT_EQ(failure_of(R"({"m": [[1, 2], [3]]})", [](JsonReader& r) { r.matrix("m", 2, 2, {-9, 9}); }).reason,
+  EXPECT_EQ(failure_of(R"({"m": [[1, 2], [3]]})",
+                       [](JsonReader& r) {
+                         r.matrix("m", 2, 2, {-9, 9});
+                       })
+                .reason,
             Reason::bad_value);
 }
 

@@ -11,8 +11,8 @@
 
 namespace helicarm {
 
-/// Calls `work(i)` for i in 0 .. count - 1 on up to `threads` threads (0: all cores). The order is free, so `work`
-/// must write only to its own index. The first exception is rethrown.
+/// Calls `work(i)` for i in 0 .. count - 1 on up to `threads` threads (0: all cores). The order is free, so
+/// `work` must write only to its own index. The first exception is rethrown.
 template <class Work>
 void parallel_for(std::size_t count, unsigned threads, Work&& work) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());

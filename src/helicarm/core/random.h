@@ -9,8 +9,8 @@
 
 namespace helicarm {
 
-/// Counter-based random numbers (Philox 4x32-10, Salmon et al. 2011), keyed by (seed, stream, trial): any trial can
-/// be replayed alone and nothing depends on threads or order.
+/// Counter-based random numbers (Philox 4x32-10, Salmon et al. 2011), keyed by (seed, stream, trial): any
+/// trial can be replayed alone and nothing depends on threads or order.
 class RandomStream {
  public:
   RandomStream(std::uint64_t seed, std::uint32_t stream, std::uint64_t trial = 0)
@@ -47,7 +47,9 @@ class RandomStream {
   }
 
   /// Whole number in 0 .. count - 1.
-  std::uint32_t index(std::uint32_t count) { return static_cast<std::uint32_t>((std::uint64_t{bits()} * count) >> 32); }
+  std::uint32_t index(std::uint32_t count) {
+    return static_cast<std::uint32_t>((std::uint64_t{bits()} * count) >> 32);
+  }
 
  private:
   r123::Philox4x32::key_type key_;

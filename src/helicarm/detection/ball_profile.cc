@@ -12,14 +12,16 @@ double scaled_bessel_i0(double x) {
   if (x < 3.75) {
     const double t = (x / 3.75) * (x / 3.75);
     return std::exp(-x) *
-           (1 + t * (3.5156229 + t * (3.0899424 + t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))));
+           (1 + t * (3.5156229 +
+                     t * (3.0899424 + t * (1.2067492 + t * (0.2659732 + t * (0.0360768 + t * 0.0045813))))));
   }
   const double t = 3.75 / x;
   return (0.39894228 +
           t * (0.01328592 +
                t * (0.00225319 +
                     t * (-0.00157565 +
-                         t * (0.00916281 + t * (-0.02057706 + t * (0.02635537 + t * (-0.01647633 + t * 0.00392377)))))))) /
+                         t * (0.00916281 +
+                              t * (-0.02057706 + t * (0.02635537 + t * (-0.01647633 + t * 0.00392377)))))))) /
          std::sqrt(x);
 }
 
@@ -54,7 +56,8 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
     for (int k = 0; k < rings; ++k) {
       const double gap = radius[k] - d;
       const double exponent = gap * gap / (2 * blur * blur);
-      if (exponent < 30) sum += weight[k] * std::exp(-exponent) * scaled_bessel_i0(radius[k] * d / (blur * blur));
+      if (exponent < 30)
+        sum += weight[k] * std::exp(-exponent) * scaled_bessel_i0(radius[k] * d / (blur * blur));
     }
     values_[static_cast<std::size_t>(i)] = static_cast<float>(sum / (blur * blur));
   }
@@ -62,7 +65,8 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   for (int i = 0; i < count; ++i) {
     const auto before = static_cast<std::size_t>(std::max(0, i - 1));
     const auto after = static_cast<std::size_t>(std::min(count - 1, i + 1));
-    slopes_[static_cast<std::size_t>(i)] = (values_[after] - values_[before]) * per_unit_ / float(after - before);
+    slopes_[static_cast<std::size_t>(i)] =
+        (values_[after] - values_[before]) * per_unit_ / float(after - before);
   }
   slopes_.front() = 0;
 }

@@ -5,12 +5,13 @@
 
 namespace helicarm {
 
-/// The radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian and
-/// scaled to 1 at the centre of the sharp picture. Tabulated over s = distance / radius.
+/// The radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian
+/// and scaled to 1 at the centre of the sharp picture. Tabulated over s = distance / radius.
 class BallProfile {
  public:
-  /// `blur`: standard deviation of the Gaussian over the ball's radius. `absorbance`: attenuation times diameter;
-  /// small for a faint ball (profile like the chord length), large for an opaque one or a hole (flat disc).
+  /// `blur`: standard deviation of the Gaussian over the ball's radius. `absorbance`: attenuation times
+  /// diameter; small for a faint ball (profile like the chord length), large for an opaque one or a hole
+  /// (flat disc).
   BallProfile(double blur, double absorbance);
 
   struct Sample {

@@ -15,8 +15,8 @@ namespace {
 constexpr int levels_per_octave = 3;
 constexpr double ratio = 1.2599210498948732;  // 2^(1/3)
 
-/// Least answer worth a look: so many times the robust spread of the answers over a coarse grid (nought left out: black
-/// surround), but never more than a quarter of the strongest, for plates that are full of holes.
+/// Least answer worth a look: so many times the robust spread of the answers over a coarse grid (nought left
+/// out: black surround), but never more than a quarter of the strongest, for plates that are full of holes.
 float threshold(const cv::Mat& picture, double sigmas) {
   std::vector<float> values;
   for (int v = 3; v < picture.rows; v += 5)
@@ -36,7 +36,8 @@ bool is_peak(const std::vector<cv::Mat>& answers, std::size_t level, int u, int 
     for (int y = v - 1; y <= v + 1; ++y) {
       const float* row = answers[k].ptr<float>(y);
       for (int x = u - 1; x <= u + 1; ++x)
-        if (row[x] > value || (row[x] == value && (k < level || (k == level && (y < v || (y == v && x < u))))))
+        if (row[x] > value ||
+            (row[x] == value && (k < level || (k == level && (y < v || (y == v && x < u))))))
           return false;
     }
   return true;
@@ -49,7 +50,8 @@ bool is_round(const cv::Mat& answer, int u, int v, double max_elongation) {
   const double xy = 0.25 * (at(u + 1, v + 1) - at(u - 1, v + 1) - at(u + 1, v - 1) + at(u - 1, v - 1));
   const double determinant = xx * yy - xy * xy;
   const double trace = xx + yy;
-  return determinant > 0 && trace * trace * max_elongation < (1 + max_elongation) * (1 + max_elongation) * determinant;
+  return determinant > 0 &&
+         trace * trace * max_elongation < (1 + max_elongation) * (1 + max_elongation) * determinant;
 }
 
 double offset_of_peak(float before, float here, float after) {
@@ -60,14 +62,16 @@ double offset_of_peak(float before, float here, float after) {
 void search_octave(const cv::Mat& base, double step, const BlobOptions& options, std::vector<Dot>& blobs) {
   const double first_sigma = 1.1;
   std::vector<cv::Mat> blurred(levels_per_octave + 3);
-  cv::GaussianBlur(base, blurred[0], {}, step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
+  cv::GaussianBlur(base, blurred[0], {},
+                   step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
   for (std::size_t k = 1; k < blurred.size(); ++k) {
     const double sigma = first_sigma * std::pow(ratio, double(k - 1));
     cv::GaussianBlur(blurred[k - 1], blurred[k], {}, sigma * std::sqrt(ratio * ratio - 1));
   }
   std::vector<cv::Mat> answers(blurred.size() - 1);
   for (std::size_t k = 0; k < answers.size(); ++k)
-    answers[k] = options.polarity == Polarity::dark ? blurred[k + 1] - blurred[k] : blurred[k] - blurred[k + 1];
+    answers[k] =
+        options.polarity == Polarity::dark ? blurred[k + 1] - blurred[k] : blurred[k] - blurred[k + 1];
   for (std::size_t k = 1; k + 1 < answers.size(); ++k) {
     const float limit = threshold(answers[k], options.threshold_sigma);
     const double sigma = first_sigma * std::pow(ratio, double(k) + 0.5);
@@ -78,10 +82,13 @@ void search_octave(const cv::Mat& base, double step, const BlobOptions& options,
       for (int u = 1; u + 1 < base.cols; ++u) {
         const float value = row[u];
         if (value <= limit || value < row[u - 1] || value < row[u + 1]) continue;
-        if (!is_peak(answers, k, u, v, value) || !is_round(answers[k], u, v, options.max_elongation)) continue;
+        if (!is_peak(answers, k, u, v, value) || !is_round(answers[k], u, v, options.max_elongation))
+          continue;
         const double du = offset_of_peak(row[u - 1], value, row[u + 1]);
-        const double dv = offset_of_peak(answers[k].at<float>(v - 1, u), value, answers[k].at<float>(v + 1, u));
-        const double dk = offset_of_peak(answers[k - 1].at<float>(v, u), value, answers[k + 1].at<float>(v, u));
+        const double dv =
+            offset_of_peak(answers[k].at<float>(v - 1, u), value, answers[k].at<float>(v + 1, u));
+        const double dk =
+            offset_of_peak(answers[k - 1].at<float>(v, u), value, answers[k + 1].at<float>(v, u));
         Dot blob;
         blob.centre_px = {(u + du + 0.5) * step - 0.5, (v + dv + 0.5) * step - 0.5};
         blob.radius_px = radius * std::pow(ratio, dk);
@@ -105,7 +112,8 @@ std::vector<Dot> find_blobs(const Image<float>& image, const BlobOptions& option
     cv::resize(base, half, {base.cols / 2, base.rows / 2}, 0, 0, cv::INTER_AREA);
     base = half;
   }
-  std::stable_sort(blobs.begin(), blobs.end(), [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; });
+  std::stable_sort(blobs.begin(), blobs.end(),
+                   [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; });
   if (blobs.size() > options.max_count) blobs.resize(options.max_count);
   return blobs;
 }

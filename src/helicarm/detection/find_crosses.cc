@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/detection/find_crosses.h"
 
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
+
+#include <Eigen/Dense>
 
 #include "helicarm/detection/find_dots.h"
 
@@ -34,9 +34,9 @@ float bilinear(const Image<float>& image, double u, double v) {
 }
 
 struct Arms {
-  double first;   ///< angles of the wires, rad
+  double first;  ///< angles of the wires, rad
   double second;
-  double depth;   ///< of the fainter
+  double depth;  ///< of the fainter
 };
 
 /// Directions in which the picture is dark on both sides of a place, at two distances.
@@ -83,7 +83,8 @@ struct Wire {
   double depth, angle, offset;
 };
 
-/// Value of one wire's profile (a Gaussian across) at a pixel, and its derivatives by angle, offset and width.
+/// Value of one wire's profile (a Gaussian across) at a pixel, and its derivatives by angle, offset and
+/// width.
 struct Across {
   double value, by_angle, by_offset, by_width;
 };
@@ -120,8 +121,8 @@ void reweight(std::vector<Pixel>& pixels, const std::vector<double>& residuals, 
   }
 }
 
-std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width, const Arms& arms,
-                             std::span<const Disc> discs) {
+std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width,
+                             const Arms& arms, std::span<const Disc> discs) {
   const int u0 = static_cast<int>(std::lround(start.x()));
   const int v0 = static_cast<int>(std::lround(start.y()));
   const double window = 4 * half_width + 4;
@@ -144,7 +145,9 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
   Vector p = Vector::Zero();
   p[0] = mean;
   const Vector2d shift = start - Vector2d(u0, v0);
-  const auto offset = [&](double angle) { return -std::sin(angle) * shift.x() + std::cos(angle) * shift.y(); };
+  const auto offset = [&](double angle) {
+    return -std::sin(angle) * shift.x() + std::cos(angle) * shift.y();
+  };
   p.segment<3>(6) << arms.depth, arms.first, offset(arms.first);
   p.segment<3>(9) << arms.depth, arms.second, offset(arms.second);
   p[12] = 0.7 * half_width;
@@ -173,8 +176,8 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
         row << 1, x, y, x * x, x * y, y * y, -wa.value, -a.depth * wa.by_angle, -a.depth * wa.by_offset,
             -wb.value * left_b, -b.depth * wb.by_angle * left_b, -b.depth * wb.by_offset * left_b,
             -a.depth * wa.by_width - b.depth * wb.by_width * left_b;
-        residuals[k] =
-            pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) - a.depth * wa.value - b.depth * wb.value * left_b);
+        residuals[k] = pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) -
+                                     a.depth * wa.value - b.depth * wb.value * left_b);
         normal.selfadjointView<Eigen::Lower>().rankUpdate(row, pixel.weight);
         right += pixel.weight * residuals[k] * row;
         squares += pixel.weight * residuals[k] * residuals[k];
@@ -202,7 +205,8 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
   }
   if (move > 0.05 || p[6] * arms.depth <= 0 || p[9] * arms.depth <= 0) return std::nullopt;
   const double fainter = std::min(std::abs(p[6]), std::abs(p[9]));
-  if (fainter < 0.3 * std::max(std::abs(p[6]), std::abs(p[9])) || fainter < 3 * std::sqrt(variance)) return std::nullopt;
+  if (fainter < 0.3 * std::max(std::abs(p[6]), std::abs(p[9])) || fainter < 3 * std::sqrt(variance))
+    return std::nullopt;
   const Normal inverse = normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
   Dot cross;
   cross.centre_px = Vector2d(u0, v0) + *before;
@@ -216,9 +220,10 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
 
 }  // namespace
 
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle,
-                             std::span<const Disc> discs) {
-  return fit_wires(exposure.pixels, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast}, discs);
+std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle,
+                             double second_angle, std::span<const Disc> discs) {
+  return fit_wires(exposure.pixels, start.centre_px, start.radius_px,
+                   {first_angle, second_angle, start.contrast}, discs);
 }
 
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options) {
@@ -230,7 +235,8 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
   const double sign = options.polarity == Polarity::dark ? 1 : -1;
   std::vector<Dot> crosses;
   for (const Dot& blob : find_blobs(exposure.pixels, blob_options)) {
-    const double half_width = std::clamp(0.75 * blob.radius_px, 0.5 * options.min_width_px, 0.5 * options.max_width_px);
+    const double half_width =
+        std::clamp(0.75 * blob.radius_px, 0.5 * options.min_width_px, 0.5 * options.max_width_px);
     const auto arms = arms_at(exposure.pixels, blob.centre_px, 3 * half_width + 3, sign, options);
     if (!arms) continue;
     Arms signed_arms = *arms;
@@ -238,7 +244,8 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
     const auto cross = fit_wires(exposure.pixels, blob.centre_px, half_width, signed_arms, {});
     if (!cross || cross->sigma_px > options.max_sigma_px) continue;
     const auto twin = std::find_if(crosses.begin(), crosses.end(), [&](const Dot& other) {
-      return (other.centre_px - cross->centre_px).norm() < 2 * std::max(other.radius_px, cross->radius_px) + 1;
+      return (other.centre_px - cross->centre_px).norm() <
+             2 * std::max(other.radius_px, cross->radius_px) + 1;
     });
     if (twin == crosses.end())
       crosses.push_back(*cross);

@@ -14,19 +14,19 @@ namespace helicarm {
 
 struct CrossOptions {
   Polarity polarity = Polarity::dark;
-  double min_width_px = 2.5;    ///< of the wires
+  double min_width_px = 2.5;  ///< of the wires
   double max_width_px = 12;
   double least_angle_deg = 40;  ///< between the wires
   double max_sigma_px = 0.5;
 };
 
-/// Crossings of two wires, each with the sub-pixel place where the wires' axes meet. `radius_px` is half the wires'
-/// width. Round dots, single wires and wire ends are no crossings.
+/// Crossings of two wires, each with the sub-pixel place where the wires' axes meet. `radius_px` is half the
+/// wires' width. Round dots, single wires and wire ends are no crossings.
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options);
 
 /// The crossing near `start` (place, half width, contrast) of two wires that run about along the given angles
 /// (radians), or nothing where the pixels do not show one. The discs are left out.
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle, double second_angle,
-                             std::span<const Disc> discs);
+std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle,
+                             double second_angle, std::span<const Disc> discs);
 
 }  // namespace helicarm

@@ -50,7 +50,8 @@ DotFitOptions fit_options_for(const Exposure& exposure) {
 
 DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
-  std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
+  std::stable_sort(dots.begin(), dots.end(),
+                   [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
   const DotFitOptions options = fit_options_for(exposure);
@@ -104,13 +105,16 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   fit.margin_px = 3.5;
   const double least_contrast = options.min_contrast_share * double(exposure.highest - exposure.lowest);
   std::vector<BallProfile> profiles;  // by the radius' octave: the blur is about a pixel whatever the size
-  for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5) profiles.emplace_back(1 / radius, 2.0);
+  for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5)
+    profiles.emplace_back(1 / radius, 2.0);
   std::vector<Dot> dots;
   for (const Dot& blob : blobs) {
-    const auto octave = static_cast<std::size_t>(std::max(0.0, std::round(std::log(blob.radius_px / 1.5) / std::log(1.5))));
+    const auto octave =
+        static_cast<std::size_t>(std::max(0.0, std::round(std::log(blob.radius_px / 1.5) / std::log(1.5))));
     const auto dot = fit_dot(exposure.pixels, blob, profiles[std::min(octave, profiles.size() - 1)], {}, fit);
     if (!dot || dot->sigma_px > options.max_sigma_px || dot->misfit > options.max_misfit) continue;
-    if (dot->radius_px < 0.8 * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px) continue;
+    if (dot->radius_px < 0.8 * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px)
+      continue;
     const double contrast = options.polarity == Polarity::dark ? dot->contrast : -dot->contrast;
     if (contrast < least_contrast) continue;
     if ((dot->centre_px - blob.centre_px).norm() > 0.8 * blob.radius_px + 1) continue;
@@ -123,7 +127,8 @@ std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& do
                             const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
-    if (const auto better = fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options))
+    if (const auto better =
+            fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options))
       refitted.push_back(*better);
   return refitted;
 }

@@ -15,7 +15,7 @@ struct DotOptions {
   double min_radius_px = 2;
   double max_radius_px = 32;
   double max_sigma_px = 0.6;
-  double max_misfit = 0.35;     ///< rms residual over contrast
+  double max_misfit = 0.35;           ///< rms residual over contrast
   double min_contrast_share = 0.012;  ///< contrast over the picture's range of grey values
 };
 
@@ -31,10 +31,12 @@ struct DotLook {
 /// The look that fits the given dots of one size best: blur and absorbance of least total sigma.
 DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots);
 
-/// All round dots of one polarity, each with the fitted sub-pixel centre, its standard deviation and its radius.
+/// All round dots of one polarity, each with the fitted sub-pixel centre, its standard deviation and its
+/// radius.
 std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options);
 
-/// Fits every dot again with the look of its kind and with its neighbours masked; those that fail are left out.
+/// Fits every dot again with the look of its kind and with its neighbours masked; those that fail are left
+/// out.
 std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const DotLook& look,
                             const std::vector<Dot>& neighbours);
 

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/detection/fit_dot.h"
 
-#include <Eigen/Cholesky>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 namespace helicarm {
 namespace {
 
-/// Parameters: background b0 bx by bxx bxy byy (patch coordinates in units of the window), contrast, centre, hidden share,
-/// radius.
+/// Parameters: background b0 bx by bxx bxy byy (patch coordinates in units of the window), contrast, centre,
+/// hidden share, radius.
 constexpr int n_parameters = 11;
 constexpr int n_background = 6;
 using Parameters = Eigen::Matrix<float, n_parameters, 1>;
@@ -34,7 +34,8 @@ struct Patch {
 
 constexpr int block = 64;
 
-/// A block of pixels: residuals, and derivatives as columns. Written so that the compiler can use wide registers.
+/// A block of pixels: residuals, and derivatives as columns. Written so that the compiler can use wide
+/// registers.
 struct Block {
   alignas(32) float residual[block];
   alignas(32) float row[n_parameters][block];
@@ -46,7 +47,8 @@ inline float background_at(const Parameters& p, float x, float y) {
 
 /// Model less its background at one pixel: -(A + hidden G) profile.
 template <class Take>
-inline void shade_at(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel, Take&& take) {
+inline void shade_at(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel,
+                     Take&& take) {
   const float x = pixel.x * patch.inverse_window;
   const float y = pixel.y * patch.inverse_window;
   const float dx = pixel.x - p[7];
@@ -60,7 +62,8 @@ inline void shade_at(const Patch& patch, const BallProfile& profile, const Param
   take(x, y, dx, dy, distance, sample, slant, height, residual);
 }
 
-void find_residuals(const Patch& patch, const BallProfile& profile, const Parameters& p, std::vector<float>& residuals) {
+void find_residuals(const Patch& patch, const BallProfile& profile, const Parameters& p,
+                    std::vector<float>& residuals) {
   for (std::size_t i = 0; i < patch.pixels.size(); ++i)
     shade_at(patch, profile, p, patch.pixels[i],
              [&](float, float, float, float, float, BallProfile::Sample, float, float, float residual) {
@@ -75,7 +78,8 @@ struct Sums {
   double weight = 0;
 };
 
-void add_block(const Block& rows, int count, const float* weights, Eigen::Matrix<float, n_parameters, n_parameters>& normal,
+void add_block(const Block& rows, int count, const float* weights,
+               Eigen::Matrix<float, n_parameters, n_parameters>& normal,
                Eigen::Matrix<float, n_parameters, 1>& right) {
   alignas(32) float weighted[block];
   for (int a = 0; a < n_parameters; ++a) {
@@ -90,7 +94,8 @@ void add_block(const Block& rows, int count, const float* weights, Eigen::Matrix
 
 Sums accumulate(const Patch& patch, const BallProfile& profile, const Parameters& p) {
   Sums sums;
-  Eigen::Matrix<float, n_parameters, n_parameters> normal = Eigen::Matrix<float, n_parameters, n_parameters>::Zero();
+  Eigen::Matrix<float, n_parameters, n_parameters> normal =
+      Eigen::Matrix<float, n_parameters, n_parameters>::Zero();
   Eigen::Matrix<float, n_parameters, 1> right = Eigen::Matrix<float, n_parameters, 1>::Zero();
   Block rows{};
   alignas(32) float weights[block];
@@ -98,8 +103,8 @@ Sums accumulate(const Patch& patch, const BallProfile& profile, const Parameters
   for (const Pixel& pixel : patch.pixels) {
     if (pixel.weight == 0) continue;
     shade_at(patch, profile, p, pixel,
-             [&](float x, float y, float dx, float dy, float distance, BallProfile::Sample sample, float slant,
-                 float height, float residual) {
+             [&](float x, float y, float dx, float dy, float distance, BallProfile::Sample sample,
+                 float slant, float height, float residual) {
                if (pixel.clipped && residual == 0) return;
                const int k = count++;
                rows.residual[k] = residual;
@@ -145,14 +150,15 @@ void reweight(Patch& patch, const std::vector<float>& residuals, float least, st
   }
 }
 
-std::optional<Patch> gather(const Image<float>& image, int u, int v, float window, std::span<const Disc> others,
-                            const DotFitOptions& options) {
+std::optional<Patch> gather(const Image<float>& image, int u, int v, float window,
+                            std::span<const Disc> others, const DotFitOptions& options) {
   Patch patch;
   patch.inverse_window = 1 / window;
   const int half = static_cast<int>(std::ceil(window));
   std::vector<Disc> near;
   for (const Disc& disc : others)
-    if (std::hypot(disc.centre.x() - u, disc.centre.y() - v) < double(window) + disc.radius) near.push_back(disc);
+    if (std::hypot(disc.centre.x() - u, disc.centre.y() - v) < double(window) + disc.radius)
+      near.push_back(disc);
   patch.pixels.reserve(static_cast<std::size_t>((2 * half + 1) * (2 * half + 1)));
   int inside = 0;
   int open = 0;
@@ -242,7 +248,8 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
     const double limit = 0.35 * double(radius);
     const float share = float(std::min(1.0, limit / std::max({move, std::abs(step[10]), 1e-12})));
     p += share * step.cast<float>();
-    if (!(p[10] > 0.5f * radius && p[10] < 1.8f * radius) || std::hypot(p[7], p[8]) > window) return std::nullopt;
+    if (!(p[10] > 0.5f * radius && p[10] < 1.8f * radius) || std::hypot(p[7], p[8]) > window)
+      return std::nullopt;
     find_residuals(*patch, profile, p, residuals);
     // Outliers are told from a rough start only by and by.
     const double tolerance = std::max(options.tolerance, 0.3 * std::pow(0.5, i));

@@ -19,21 +19,22 @@ struct Disc {
 };
 
 struct DotFitOptions {
-  double hidden_share = 0.4;    ///< of the background's slope that the dot hides: expected value
-  double hidden_sigma = 0.2;    ///< and its standard deviation
-  bool free_radius = true;      ///< off: the radius of the start is kept
-  double margin_px = 2.5;       ///< ring of background around the dot
-  double margin_share = 0.1;    ///< and as a share of the radius
-  double tolerance = 0.03;      ///< misfit, as a share of the contrast, that the profile itself may cause
+  double hidden_share = 0.4;  ///< of the background's slope that the dot hides: expected value
+  double hidden_sigma = 0.2;  ///< and its standard deviation
+  bool free_radius = true;    ///< off: the radius of the start is kept
+  double margin_px = 2.5;     ///< ring of background around the dot
+  double margin_share = 0.1;  ///< and as a share of the radius
+  double tolerance = 0.03;    ///< misfit, as a share of the contrast, that the profile itself may cause
   int iterations = 12;
-  float floor = -1e30f;         ///< pixels at or below are outside the field: left out
-  float ceiling = 1e30f;        ///< pixels at or above are saturated: the model may exceed them freely
+  float floor = -1e30f;   ///< pixels at or below are outside the field: left out
+  float ceiling = 1e30f;  ///< pixels at or above are saturated: the model may exceed them freely
 };
 
-/// Fits the image of a ball, on a quadratic background, to the pixels around `start` by robust least squares over
-/// centre, radius, contrast and background: grey = B - (A + hidden G) profile, with B quadratic
-/// and G its linear part. The hidden share (a ball hides neither scatter nor glare) has a prior and is fitted along. Nothing where the patch is not usable (outside the image, clipped,
-/// no contrast) or the fit does not settle.
+/// Fits the image of a ball, on a quadratic background, to the pixels around `start` by robust least squares
+/// over centre, radius, contrast and background: grey = B - (A + hidden G) profile, with B quadratic and G
+/// its linear part. The hidden share (a ball hides neither scatter nor glare) has a prior and is fitted
+/// along. Nothing where the patch is not usable (outside the image, clipped, no contrast) or the fit does not
+/// settle.
 std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
                            std::span<const Disc> others, const DotFitOptions& options);
 

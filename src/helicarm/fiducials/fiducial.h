@@ -10,16 +10,16 @@ namespace helicarm {
 
 enum class FiducialStatus { used, occluded, outside, rejected, not_found };
 
-/// One ball of the calibrator in one view. The pixels are those of the image of the ball's centre and are meaningful
-/// only when it is `used` or `rejected`.
+/// One ball of the calibrator in one view. The pixels are those of the image of the ball's centre and are
+/// meaningful only when it is `used` or `rejected`.
 struct Fiducial {
   std::string label;
-  Eigen::Vector3d centre_in_calibrator;                 ///< mm
+  Eigen::Vector3d centre_in_calibrator;  ///< mm
   FiducialStatus status = FiducialStatus::not_found;
   Eigen::Vector2d uv_raw = Eigen::Vector2d::Zero();
-  Eigen::Vector2d uv = Eigen::Vector2d::Zero();         ///< rectified
-  double sigma_px = 0;                                  ///< per axis, rectified
-  double residual_px = 0;                               ///< distance to the calibrated view's projection
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< rectified
+  double sigma_px = 0;                           ///< per axis, rectified
+  double residual_px = 0;                        ///< distance to the calibrated view's projection
 };
 
 }  // namespace helicarm

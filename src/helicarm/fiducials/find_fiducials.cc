@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/fiducials/find_fiducials.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
@@ -18,6 +18,7 @@ using Eigen::Vector2d;
 
 constexpr std::size_t max_candidates = 30;
 constexpr double paper_systematic = 2e-3;  // of the field radius: what a quadratic leaves of the distortion
+constexpr double shared_bias_sigma = 0.008;
 constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
 
@@ -27,7 +28,8 @@ struct RadiusRange {
   bool holds(double radius) const { return low <= radius && radius <= high; }
 };
 
-/// Radii that a ball of the calibrator can have: it stands somewhere between the receiver and half way to the source.
+/// Radii that a ball of the calibrator can have: it stands somewhere between the receiver and half way to the
+/// source.
 RadiusRange radii_of(const Calibrator& calibrator, const DistortionMap& map) {
   double least = 1e9;
   double most = 0;
@@ -44,10 +46,12 @@ std::vector<Dot> plausible_balls(const Rectification& rectification, const Calib
   const RadiusRange radii = radii_of(calibrator, rectification.map);
   std::vector<Dot> balls;
   for (const Dot& dot : rectification.other_dots)
-    if (radii.holds(dot.radius_px) && dot.sigma_px < 0.5 && rectification.map.rectified_from_raw(dot.centre_px))
+    if (radii.holds(dot.radius_px) && dot.sigma_px < 0.5 &&
+        rectification.map.rectified_from_raw(dot.centre_px))
       balls.push_back(dot);
   const auto clarity = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
-  std::stable_sort(balls.begin(), balls.end(), [&](const Dot& a, const Dot& b) { return clarity(a) > clarity(b); });
+  std::stable_sort(balls.begin(), balls.end(),
+                   [&](const Dot& a, const Dot& b) { return clarity(a) > clarity(b); });
   if (balls.size() > max_candidates) balls.resize(max_candidates);
   return balls;
 }
@@ -71,9 +75,7 @@ double predicted_radius(const View& view, const CalibratorBall& ball) {
 class BallFitter {
  public:
   BallFitter(const Exposure& exposure, const Rectification& rectification, const std::vector<Dot>& named)
-      : exposure_(exposure),
-        look_(estimate_look(exposure, named)),
-        neighbours_(rectification.other_dots) {
+      : exposure_(exposure), look_(estimate_look(exposure, named)), neighbours_(rectification.other_dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
     for (const Dot& dot : named) contrasts.push_back(dot.contrast);
@@ -126,9 +128,11 @@ FiducialStatus absence(const Exposure& exposure, const BallFitter& fitter, const
   return behind ? FiducialStatus::occluded : FiducialStatus::not_found;
 }
 
-void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, const View& view, double diameter_mm) {
+void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, const View& view,
+                double diameter_mm) {
   const Eigen::Vector3d& centre = fiducial.centre_in_calibrator;
-  const Vector2d raw = dot.centre_px - blob_offset(map, view, view.project(centre), view.depth(centre), diameter_mm);
+  const Vector2d raw =
+      dot.centre_px - blob_offset(map, view, view.project(centre), view.depth(centre), diameter_mm);
   const auto uv = map.rectified_from_raw(raw);
   if (!uv) return;
   fiducial.status = FiducialStatus::used;
@@ -159,7 +163,8 @@ std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) 
 }  // namespace
 
 Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
-                                        const Calibrator& calibrator, Method method) {
+                                        const Calibrator& calibrator, Method method,
+                                        std::optional<double> radius_bias) {
   const DistortionMap& map = rectification.map;
   const std::vector<Dot> balls = plausible_balls(rectification, calibrator);
   std::vector<BallCandidate> candidates;
@@ -169,18 +174,25 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
   }
   LabellingOptions labelling_options;
   if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
-  const auto labelling = label_balls(calibrator, candidates, prior_of(exposure, map), labelling_options);
+  LabellingPrior prior = prior_of(exposure, map);
+  if (radius_bias) {
+    prior.radius_bias = *radius_bias;
+    prior.radius_bias_sigma = shared_bias_sigma;
+  }
+  const auto labelling = label_balls(calibrator, candidates, prior, labelling_options);
   if (!labelling) return tl::unexpected<Failure>(labelling.error());
 
   FoundFiducials found;
   found.view = labelling->view;
   found.mirrored = labelling->mirrored;
-  found.ambiguity = labelling->margin;
+  found.margin = labelling->margin;
+  found.radius_bias = labelling->radius_bias;
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
   const BallFitter fitter(exposure, rectification, named);
-  const std::vector<Dot> circles = method == Method::paper ? hough_circles(exposure, named) : std::vector<Dot>{};
+  const std::vector<Dot> circles =
+      method == Method::paper ? hough_circles(exposure, named) : std::vector<Dot>{};
 
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const CalibratorBall& ball = calibrator.balls[k];
@@ -196,14 +208,15 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
     else if (inside(exposure, raw, 2))
       dot = fitter.rescue(raw, radius);
     if (dot && method == Method::paper) dot = circle_near(circles, *dot);
-    if (dot)
-      set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
-    if (fiducial.status != FiducialStatus::used) fiducial.status = absence(exposure, fitter, raw, radius, named);
+    if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
+    if (fiducial.status != FiducialStatus::used)
+      fiducial.status = absence(exposure, fitter, raw, radius, named);
     found.fiducials.push_back(fiducial);
   }
   for (std::size_t i = 0; i < balls.size(); ++i) {
     const auto& taken = labelling->candidate_of_ball;
-    if (std::find(taken.begin(), taken.end(), static_cast<int>(i)) == taken.end()) found.false_blobs.push_back(balls[i]);
+    if (std::find(taken.begin(), taken.end(), static_cast<int>(i)) == taken.end())
+      found.false_blobs.push_back(balls[i]);
   }
   return found;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "helicarm/detection/dot.h"
@@ -13,17 +14,21 @@ namespace helicarm {
 
 /// What stage 2 says of one picture.
 struct FoundFiducials {
-  std::vector<Fiducial> fiducials;    ///< one per ball of the calibrator, in its order
-  std::vector<Dot> false_blobs;       ///< of a ball's size, but no ball of the calibrator
-  View view;                          ///< pose estimate from the labelling: a start for the calibration
+  std::vector<Fiducial> fiducials;  ///< one per ball of the calibrator, in its order
+  std::vector<Dot> false_blobs;     ///< of a ball's size, but no ball of the calibrator
+  View view;                        ///< pose estimate from the labelling: a start for the calibration
   bool mirrored = false;
-  double ambiguity = 0;               ///< runner-up's rms over the winner's
+  double margin = 0;       ///< log odds of the labelling against the best other one
+  double radius_bias = 0;  ///< of the balls' radii in the picture, relative
   std::vector<Warning> warnings;
 };
 
-/// Finds and names the calibrator's balls among the dots that are not the plate's, rescues those that the search
-/// missed at their predicted places, and says of each of the others why it is not used.
+/// Finds and names the calibrator's balls among the dots that are not the plate's, rescues those that the
+/// search missed at their predicted places, and says of each of the others why it is not used. Along the
+/// cone's axis the labels hang on the balls' sizes: `radius_bias`, as another view of the same calibrator
+/// found it, tells them apart.
 Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
-                                        const Calibrator& calibrator, Method method);
+                                        const Calibrator& calibrator, Method method,
+                                        std::optional<double> radius_bias = {});
 
 }  // namespace helicarm

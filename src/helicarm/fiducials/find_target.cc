@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/fiducials/find_target.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
 #include <vector>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
 
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
@@ -86,7 +85,8 @@ struct Sums {
   double weight = 0;
 };
 
-Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p, std::vector<double>& residuals) {
+Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
+                std::vector<double>& residuals) {
   Sums sums;
   for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
     const Pixel& pixel = patch.pixels[i];
@@ -123,18 +123,24 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   Sums sums = accumulate(patch, shade, p, residuals);
   constexpr int linear = n_background + 1;
   const Eigen::Matrix<double, linear, 1> start =
-      sums.normal.topLeftCorner<linear, linear>().selfadjointView<Eigen::Lower>().ldlt().solve(sums.right.head<linear>());
+      sums.normal.topLeftCorner<linear, linear>().selfadjointView<Eigen::Lower>().ldlt().solve(
+          sums.right.head<linear>());
   if (!start.allFinite()) return std::nullopt;
   p.head<linear>() = start;
   double move = 0;
-  for (int i = 0; i < 15; ++i) {
+  double damping = 1;
+  Vector2d before = Vector2d::Zero();
+  for (int i = 0; i < 20; ++i) {
     accumulate(patch, shade, p, residuals);
     reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
     sums = accumulate(patch, shade, p, residuals);
     Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
+    // The drawn template has kinks: a step that turns back overshot.
+    if (step.tail<2>().dot(before) < 0) damping *= 0.5;
+    before = step.tail<2>();
+    step.tail<2>() *= damping * std::min(1.0, 2 / std::max(1e-9, before.norm()));
     move = step.tail<2>().norm();
-    if (move > 2) step.tail<2>() *= 2 / move;
     p += step;
     if (p.tail<2>().norm() > max_shift_px) return std::nullopt;
     if (i >= 5 && move < 2e-3) break;
@@ -147,15 +153,17 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   Fit fit;
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background];
-  fit.sigma_px = std::sqrt(std::max(0.0, 0.5 * variance * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
+  fit.sigma_px =
+      std::sqrt(std::max(0.0, 0.5 * variance * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;
 }
 
 /// The pixels within a few pixels of the metal: further off the background is another one.
-Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre, double half_width,
-                       const PathPicture& picture, std::span<const Disc> others, const std::string& name) {
+Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre,
+                       double half_width, const PathPicture& picture, std::span<const Disc> others,
+                       const std::string& name) {
   const SolidTemplate neighbourhood(picture, 1, 2.5);
   const auto not_seen = [&] {
     return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
@@ -184,7 +192,8 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
       });
       if (!hidden) patch.pixels.push_back({offset, double(grey), 1});
     }
-  if (2 * patch.pixels.size() < static_cast<std::size_t>(inside) || patch.pixels.size() < 40) return not_seen();
+  if (2 * patch.pixels.size() < static_cast<std::size_t>(inside) || patch.pixels.size() < 40)
+    return not_seen();
   return patch;
 }
 
@@ -193,13 +202,16 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
                                 const CalibratorTarget& target, std::span<const Disc> others) {
   const double depth = view.depth(target.point_in_calibrator);
-  if (!(depth > 0)) return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
+  if (!(depth > 0))
+    return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
   const double px_per_mm = std::abs(view.intrinsics.fy) / depth;
   const Vector2d centre = view.project(target.point_in_calibrator);
-  // Enough of a wire to tell its direction, but short of its far end (a wire of unknown length has 10 mm at least).
+  // Enough of a wire to tell its direction, but short of its far end (a wire of unknown length has 10 mm at
+  // least).
   const double reach_mm = target.kind == TargetKind::ball ? 0.55 * target.diameter_mm
-                          : target.kind == TargetKind::cross ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
-                                                             : 2.5 * target.diameter_mm;
+                          : target.kind == TargetKind::cross
+                              ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
+                              : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
   const PathPicture picture = picture_of_target(target, view, half_width + max_shift_px);
   const auto patch = gather(exposure, map, centre, half_width, picture, others, target.name);
@@ -213,17 +225,22 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
   };
   consider(0.25, 1.0);
   const double attenuation = consider(0.7, 1.0) ? 0.7 : 0.25;
-  if (!consider(attenuation, 0.7)) consider(attenuation, 1.4);
+  if (consider(attenuation, 0.7))
+    consider(attenuation, 0.5);
+  else
+    consider(attenuation, 1.4);
   if (!best || std::abs(best->contrast) < 4 * best->noise || best->misfit > 0.4 || best->sigma_px > 1)
-    return fail(Reason::target_not_found, fmt::format("{}: is not to be seen where the view puts it", target.name));
+    return fail(Reason::target_not_found,
+                fmt::format("{}: is not to be seen where the view puts it", target.name));
   const Vector2d uv = centre + best->shift;
   const double map_sigma = map.sigma_px(uv);
-  return SeenPoint{map.raw_from_rectified(uv), uv,
-                   std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+  return SeenPoint{
+      map.raw_from_rectified(uv), uv,
+      std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
-Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view, double depth_mm,
-                                 const Vector2d& click_raw, double diameter_mm) {
+Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
+                                 double depth_mm, const Vector2d& click_raw, double diameter_mm) {
   Dot start;
   start.radius_px = 0.5 * diameter_mm * std::abs(view.intrinsics.fy) / depth_mm;
   const double reach = std::max(5.0, start.radius_px);
@@ -236,7 +253,8 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
   std::optional<Dot> best;
   for (const double r : {0.0, 0.5})
     for (int k = 0; k < (r > 0 ? 6 : 1); ++k) {
-      start.centre_px = click_raw + r * start.radius_px * Vector2d(std::cos(1.0472 * k), std::sin(1.0472 * k));
+      start.centre_px =
+          click_raw + r * start.radius_px * Vector2d(std::cos(1.0472 * k), std::sin(1.0472 * k));
       const auto rough = fit_dot(exposure.pixels, start, profile, {}, wide);
       if (!rough || (rough->centre_px - click_raw).norm() > reach) continue;
       if (std::abs(rough->radius_px / start.radius_px - 1) > 0.3 || rough->misfit > 0.35) continue;
@@ -245,16 +263,16 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
       if (!best || dot.misfit < best->misfit) best = dot;
     }
   if (!best)
-    return fail(Reason::target_not_found,
-                fmt::format("no ball of {} mm within {:.0f} px of ({:.1f}, {:.1f})", diameter_mm, reach, click_raw.x(),
-                            click_raw.y()));
+    return fail(Reason::target_not_found, fmt::format("no ball of {} mm within {:.0f} px of ({:.1f}, {:.1f})",
+                                                      diameter_mm, reach, click_raw.x(), click_raw.y()));
   const auto rough_uv = map.rectified_from_raw(best->centre_px);
   if (!rough_uv) return fail(Reason::not_seen, "the click lies outside the rectified field");
   const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
   const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
   const double map_sigma = map.sigma_px(uv);
-  return SeenPoint{raw, uv,
-                   std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+  return SeenPoint{
+      raw, uv,
+      std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
 }  // namespace helicarm

@@ -15,19 +15,20 @@ namespace helicarm {
 /// Where a point was seen in one picture.
 struct SeenPoint {
   Eigen::Vector2d uv_raw;
-  Eigen::Vector2d uv;      ///< rectified
-  double sigma_px;         ///< per axis, rectified
+  Eigen::Vector2d uv;  ///< rectified
+  double sigma_px;     ///< per axis, rectified
 };
 
-/// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts it: the
-/// absorption of the solid itself, drawn for this view, is shifted until it fits the pixels. `others` are discs to leave
-/// out. target_not_found; not_seen when it falls outside the picture.
+/// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts
+/// it: the absorption of the solid itself, drawn for this view, is shifted until it fits the pixels. `others`
+/// are discs to leave out. target_not_found; not_seen when it falls outside the picture.
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
                                 const CalibratorTarget& target, std::span<const Disc> others);
 
-/// The image of the centre of the ball nearest to a click (picks with "snap": "ball"). The ball is taken to be at
-/// `depth_mm` from the source. target_not_found where no such ball is within its own radius of the click.
-Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view, double depth_mm,
-                                 const Eigen::Vector2d& click_raw, double diameter_mm);
+/// The image of the centre of the ball nearest to a click (picks with "snap": "ball"). The ball is taken to
+/// be at `depth_mm` from the source. target_not_found where no such ball is within its own radius of the
+/// click.
+Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
+                                 double depth_mm, const Eigen::Vector2d& click_raw, double diameter_mm);
 
 }  // namespace helicarm

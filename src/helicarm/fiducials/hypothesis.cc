@@ -13,17 +13,11 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double radius_sigmas = 4;
 constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or metal is no better known
 constexpr double radius_range = 0.2;         // of ln radius: how evenly false blobs are thought to spread
-constexpr double match_sigmas = 3.5;         // loses one ball in 460
 constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the nearest distance thinkable
 
-std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
-  std::vector<Sighting> sightings;
-  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
-    if (candidate_of_ball[k] < 0) continue;
-    const auto& seen = scene.candidates[candidate_of_ball[k]];
-    sightings.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
-  }
-  return sightings;
+/// Cauchy's weights: one false match among the true ones must not bend the fit to itself.
+void doubt_the_far(std::vector<Sighting>& sightings, const View& view) {
+  for (auto& s : sightings) s.sigma_px = std::hypot(s.sigma_px, (view.project(s.point) - s.uv).norm());
 }
 
 struct RadiusVerdict {
@@ -76,6 +70,16 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
 }
 
 }  // namespace
+
+std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
+  std::vector<Sighting> sightings;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    if (candidate_of_ball[k] < 0) continue;
+    const auto& seen = scene.candidates[candidate_of_ball[k]];
+    sightings.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
+  }
+  return sightings;
+}
 
 Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
                       double sigmas) {
@@ -134,7 +138,8 @@ Hypothesis settle(const Scene& scene, const View& rough) {
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < 4) return h;
-    h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? 10 : 5);
+    if (!narrow) doubt_the_far(sightings, h.fit.view);
+    h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);

@@ -61,6 +61,12 @@ struct Hypothesis {
 /// other and at a distance from the source that fits the candidate's radius.
 std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas);
 
+constexpr double match_sigmas = 3.5;  ///< between a ball and its candidate; loses one ball in 460
+constexpr int fit_steps = 10;         ///< at most
+
+/// The matched balls, as a fit wants them.
+std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball);
+
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 

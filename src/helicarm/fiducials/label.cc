@@ -17,7 +17,6 @@ constexpr int least_balls = 6;
 constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
 constexpr double most_deviation = 3.3;     // of chi2, in sigmas: one honest view in 2000
 constexpr std::size_t loose_triples = 30;
-constexpr int challenges = 8;  // triples of the best hypothesis on which rivals are sought
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -59,14 +58,21 @@ bool surely(const Hypothesis& h, const LabellingOptions& options) {
   return h.matched >= least_balls && h.log_odds >= options.least_log_odds;
 }
 
-/// A ball whose disc another, unnamed ball covers, or one with two candidates in reach, is better left
-/// unnamed.
+/// A ball is better left unnamed when the disc of another, unnamed ball covers it, when two candidates are in
+/// its reach, or when it bent the fit to suit itself: the geometric mean of its distances with and without a
+/// say is the studentised residual.
 void drop_doubtful(const Scene& scene, Hypothesis& h) {
   const std::vector<int> named = h.candidate_of_ball;
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k] < 0) continue;
     const auto& own = scene.candidates[named[k]];
-    bool doubtful = false;
+    const auto distance = [&](const View& view) {
+      return (view.project(scene.balls[k].centre) - own.uv).norm();
+    };
+    auto others = named;
+    others[k] = -1;
+    const View without = fit_pose(h.fit.view, sightings_of(scene, others), scene.camera, fit_steps).view;
+    bool doubtful = std::sqrt(distance(h.fit.view) * distance(without)) > 3 * own.sigma_px;
     for (std::size_t other = 0; other < named.size(); ++other) {
       if (named[other] >= 0) continue;
       const Eigen::Vector2d uv = h.fit.view.project(scene.balls[other].centre);
@@ -194,6 +200,7 @@ Expected<Hypothesis> undisputed(const Scene& scene, const Ranking& ranking, cons
                    {"margin_needed", asked}});
     }
   }
+  best.fit = fit_pose(best.fit.view, sightings_of(scene, best.candidate_of_ball), scene.camera, fit_steps);
   return best;
 }
 
@@ -206,7 +213,7 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   explore(search, most_triples, [&](const Hypothesis& h) { return surely(h, options); });
-  if (!search.ranking().empty()) challenge(search, challenges);
+  if (!search.ranking().empty()) challenge(search);
   auto failure = objection(scene, search.ranking(), prior, options);
   if (failure) return tl::unexpected(*std::move(failure));
   const auto best = undisputed(scene, search.ranking(), options);

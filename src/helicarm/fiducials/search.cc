@@ -191,12 +191,13 @@ void explore(LabelSearch& search, std::size_t triples,
   }
 }
 
-void challenge(LabelSearch& search, int triples) {
+void challenge(LabelSearch& search) {
   std::vector<int> best;
   do {
     best = search.ranking().front().candidate_of_ball;
     std::vector<int> seen;
     std::copy_if(best.begin(), best.end(), std::back_inserter(seen), [](int i) { return i >= 0; });
+    const int triples = seen.size() < 8 ? 24 : 8;  // of six candidates few are left when one is not shared
     TripleDealer dealer(seen);
     for (int done = 0, dealt = 0; done < triples && dealt < 5 * triples; ++dealt) {
       done += search.try_triple(dealer.deal()) ? 1 : 0;

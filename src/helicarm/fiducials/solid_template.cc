@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/fiducials/solid_template.h"
 
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Dense>
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/image/opencv.h"
@@ -35,8 +34,8 @@ Span in_sphere(const Vector3d& start, const Vector3d& along, double radius) {
 }
 
 /// Cylinder about `axis` through the origin, between two places on the axis.
-Span in_cylinder(const Vector3d& start, const Vector3d& along, const Vector3d& axis, double radius, double low,
-                 double high) {
+Span in_cylinder(const Vector3d& start, const Vector3d& along, const Vector3d& axis, double radius,
+                 double low, double high) {
   const Vector3d p = start - start.dot(axis) * axis;
   const Vector3d d = along - along.dot(axis) * axis;
   const double a = d.squaredNorm();
@@ -62,11 +61,14 @@ double path_in_target(const CalibratorTarget& target, const Vector3d& point, con
   const double endless = 1e6;
   const double length = target.length_mm > 0 ? target.length_mm : endless;
   switch (target.kind) {
-    case TargetKind::ball: return in_sphere(start, along, radius).length();
-    case TargetKind::line_end: return in_cylinder(start, along, target.directions[0], radius, 0, length).length();
+    case TargetKind::ball:
+      return in_sphere(start, along, radius).length();
+    case TargetKind::line_end:
+      return in_cylinder(start, along, target.directions[0], radius, 0, length).length();
     case TargetKind::cross: {
       const Span first = in_cylinder(start, along, target.directions[0], radius, -0.5 * length, 0.5 * length);
-      const Span second = in_cylinder(start, along, target.directions[1], radius, -0.5 * length, 0.5 * length);
+      const Span second =
+          in_cylinder(start, along, target.directions[1], radius, -0.5 * length, 0.5 * length);
       const double shared = std::min(first.to, second.to) - std::max(first.from, second.from);
       const bool both = first.length() > 0 && second.length() > 0;
       return first.length() + second.length() - (both ? std::max(0.0, shared) : 0);
@@ -112,8 +114,9 @@ SolidTemplate::Sample SolidTemplate::at(const Vector2d& offset) const {
   const double b = double(shade_(i + 1, j));
   const double c = double(shade_(i, j + 1));
   const double d = double(shade_(i + 1, j + 1));
-  return {(1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d),
-          PathPicture::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
+  return {
+      (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d),
+      PathPicture::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
 }
 
 }  // namespace helicarm

@@ -9,15 +9,16 @@
 
 namespace helicarm {
 
-/// Length of a straight line inside a target's metal, mm. `along` is a unit vector. Wires are as long as the file says,
-/// or without end; a line's end is flat.
-double path_in_target(const CalibratorTarget& target, const Eigen::Vector3d& point, const Eigen::Vector3d& along);
+/// Length of a straight line inside a target's metal, mm. `along` is a unit vector. Wires are as long as the
+/// file says, or without end; a line's end is flat.
+double path_in_target(const CalibratorTarget& target, const Eigen::Vector3d& point,
+                      const Eigen::Vector3d& along);
 
 /// Paths through a target's metal (mm) on a grid of rectified pixels about the image of its point.
 struct PathPicture {
   static constexpr int per_pixel = 2;  ///< grid steps in a pixel
   Image<float> path_mm;
-  int middle;                          ///< grid index of the point's image
+  int middle;  ///< grid index of the point's image
 };
 
 PathPicture picture_of_target(const CalibratorTarget& target, const View& view, double half_width_px);

@@ -8,14 +8,16 @@
 
 namespace helicarm {
 
-/// A matrix of pixels, row major, without padding. Pixel (0, 0) is the centre of the top-left pixel; u (column) runs
-/// right, v (row) down. A value: it copies deeply and moves cheaply.
+/// A matrix of pixels, row major, without padding. Pixel (0, 0) is the centre of the top-left pixel; u
+/// (column) runs right, v (row) down. A value: it copies deeply and moves cheaply.
 template <class T>
 class Image {
  public:
   Image() = default;
   Image(int width, int height, T fill = T{})
-      : width_(width), height_(height), pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
+      : width_(width),
+        height_(height),
+        pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
 
   int width() const { return width_; }
   int height() const { return height_; }

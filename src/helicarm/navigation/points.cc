@@ -19,7 +19,8 @@ Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eig
   const DistortionMap& map = view.rectification->map;
   if (pick.snap == Snap::ball) {
     const View& camera = view.calibrated->view;
-    auto seen = snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm);
+    auto seen =
+        snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
@@ -48,7 +49,8 @@ std::vector<Disc> discs_of(const ViewResult& view) {
   const View& camera = view.calibrated->view;
   for (const Fiducial& ball : view.found->fiducials)
     if (ball.status == FiducialStatus::used)
-      discs.push_back({ball.uv_raw, 2.2 * std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator)});
+      discs.push_back(
+          {ball.uv_raw, 2.2 * std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator)});
   return discs;
 }
 
@@ -133,10 +135,9 @@ Expected<std::vector<PointResult>> see_points(const Case& given, const Result& r
   parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
     const Task& task = tasks[i];
     const ViewResult& view = result.views[task.view];
-    const auto seen =
-        task.pick ? see_pick(*task.pick, view, centre)
-                  : find_target(*view.exposure, view.rectification->map, view.calibrated->view, *task.target,
-                                discs_of(view));
+    const auto seen = task.pick ? see_pick(*task.pick, view, centre)
+                                : find_target(*view.exposure, view.rectification->map, view.calibrated->view,
+                                              *task.target, discs_of(view));
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

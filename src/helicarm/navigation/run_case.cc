@@ -30,8 +30,14 @@ void run_stages(const Case& given, Result& result) {
   });
 
   each_view(time.detect, [&](const CaseView&, ViewResult& view) {  // 2.1, 2.3.4
-    view.found =
-        value_or_throw(find_fiducials(*view.exposure, *view.rectification, given.calibrator, options.method));
+    view.found = value_or_throw(find_unless_ambiguous(view, given.calibrator, options.method));
+  });
+  // A view along the cone's axis is named with the help of another.
+  const auto radius_bias = common_radius_bias(result.views);
+  each_view(time.label, [&](const CaseView&, ViewResult& view) {
+    if (!view.found)
+      view.found = value_or_throw(
+          find_fiducials(*view.exposure, *view.rectification, given.calibrator, options.method, radius_bias));
   });
 
   const CalibrationResult calibration = timed(time.calibrate, [&] {  // 2.2, Eq. 4-7

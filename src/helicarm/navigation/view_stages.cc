@@ -60,6 +60,21 @@ Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& f
   return without_plate(exposure);
 }
 
+Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
+                                                              const Calibrator& calibrator, Method method) {
+  auto found = find_fiducials(*view.exposure, *view.rectification, calibrator, method);
+  if (found) return std::optional(std::move(*found));
+  if (found.error().reason == Reason::ambiguous_labels) return std::optional<FoundFiducials>();
+  return tl::unexpected<Failure>(found.error());
+}
+
+std::optional<double> common_radius_bias(const std::vector<ViewResult>& views) {
+  const FoundFiducials* surest = nullptr;
+  for (const ViewResult& view : views)
+    if (view.found && (!surest || view.found->margin > surest->margin)) surest = &*view.found;
+  return surest ? std::optional(surest->radius_bias) : std::nullopt;
+}
+
 Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views, Method method) {
   std::vector<ViewFiducials> fiducials;
   CalibrationOptions options;

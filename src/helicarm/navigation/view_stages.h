@@ -18,6 +18,14 @@ Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& vie
 Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
                                      const std::optional<Plate>& plate, Method method);
 
+/// The balls of one view, or nothing where their labels stay ambiguous by this view alone.
+Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
+                                                              const Calibrator& calibrator, Method method);
+
+/// The relative bias of the balls' radii, as found in the view whose labels are surest; nothing where none is
+/// named.
+std::optional<double> common_radius_bias(const std::vector<ViewResult>& views);
+
 /// All views together, or each alone by the published recipe. Refuses also views less than 30 degrees apart.
 Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views, Method method);
 

@@ -39,7 +39,8 @@ inline double kernel(double squared_distance, double length) {
 }
 
 /// Monomials followed by the kernels at the knots.
-inline Eigen::VectorXd basis_row(const Eigen::Vector2d& t, int order, const Eigen::MatrixX2d& knots, double length) {
+inline Eigen::VectorXd basis_row(const Eigen::Vector2d& t, int order, const Eigen::MatrixX2d& knots,
+                                 double length) {
   const Eigen::Index terms = term_count(order);
   Eigen::VectorXd row(terms + knots.rows());
   row.head(terms) = monomials(t, order);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/distortion_map.h"
 
-#include <Eigen/Dense>
-
 #include <cmath>
+
+#include <Eigen/Dense>
 
 #include "helicarm/rectification/basis.h"
 
@@ -28,7 +28,8 @@ Json rows_of(const Eigen::MatrixXd& matrix) {
 Eigen::MatrixXd matrix_of(JsonReader& reader, const char* key, Eigen::Index columns, std::size_t max_rows) {
   const Json& value = reader.raw(key);
   const std::size_t rows = value.is_array() ? value.size() : 0;
-  if (!value.is_array() || rows > max_rows) reader.refuse(Reason::bad_value, key, "is not a list of allowed length");
+  if (!value.is_array() || rows > max_rows)
+    reader.refuse(Reason::bad_value, key, "is not a list of allowed length");
   const auto numbers = reader.matrix(key, rows, static_cast<std::size_t>(columns), {-1e12, 1e12});
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
       numbers.data(), static_cast<Eigen::Index>(rows), columns);
@@ -56,8 +57,8 @@ Matrix2d DistortionMap::jacobian(const Vector2d& rectified) const {
   Matrix2d slope = coefficients.transpose() * monomial_slopes(t, order);
   for (Eigen::Index k = 0; k < knots.rows(); ++k) {
     const Vector2d d = t - knots.row(k).transpose();
-    slope -= kernel(d.squaredNorm(), kernel_length) / (kernel_length * kernel_length) * weights.row(k).transpose() *
-             d.transpose();
+    slope -= kernel(d.squaredNorm(), kernel_length) / (kernel_length * kernel_length) *
+             weights.row(k).transpose() * d.transpose();
   }
   return slope / scale;
 }
@@ -112,7 +113,8 @@ Json to_json(const DistortionMap& map) {
   json["held_out_rms_px"] = map.held_out_rms_px;
   json["rectified_pixel_mm"] = map.rectified_pixel_mm ? Json(*map.rectified_pixel_mm) : Json();
   json["rectified_plane"] =
-      map.rectified_plane ? Json(*map.rectified_plane == RectifiedPlane::detector ? "detector" : "plate") : Json();
+      map.rectified_plane ? Json(*map.rectified_plane == RectifiedPlane::detector ? "detector" : "plate")
+                          : Json();
   return json;
 }
 
@@ -135,7 +137,8 @@ Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::st
     const auto terms = map.coefficients.rows() + map.knots.rows();
     if (reader.has("covariance") && !json["covariance"].empty()) {
       map.coefficient_covariance = matrix_of(reader, "covariance", terms, 2200);
-      if (map.coefficient_covariance.rows() != terms) reader.refuse(Reason::bad_value, "covariance", "is not square");
+      if (map.coefficient_covariance.rows() != terms)
+        reader.refuse(Reason::bad_value, "covariance", "is not square");
     } else {
       reader.raw("covariance");
     }
@@ -147,14 +150,16 @@ Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::st
     map.held_out_rms_px = reader.number("held_out_rms_px", {0, 1e6});
     map.rectified_pixel_mm = reader.optional_number("rectified_pixel_mm", {1e-4, 100});
     if (reader.has("rectified_plane"))
-      map.rectified_plane = reader.choice("rectified_plane", {"detector", "plate"}) == 0 ? RectifiedPlane::detector
-                                                                                       : RectifiedPlane::plate;
+      map.rectified_plane = reader.choice("rectified_plane", {"detector", "plate"}) == 0
+                                ? RectifiedPlane::detector
+                                : RectifiedPlane::plate;
     else
       reader.raw("rectified_plane");
     reader.finish();
     if (map.order > 0 && map.coefficients.rows() != term_count(map.order))
       reader.refuse(Reason::bad_value, "coefficients", "do not match the order");
-    if (map.weights.rows() != map.knots.rows()) reader.refuse(Reason::bad_value, "weights", "do not match the knots");
+    if (map.weights.rows() != map.knots.rows())
+      reader.refuse(Reason::bad_value, "weights", "do not match the knots");
     if (map.knots.rows() > 0 && !(map.kernel_length > 0))
       reader.refuse(Reason::bad_value, "kernel_length", "must be positive where there are knots");
     return map;

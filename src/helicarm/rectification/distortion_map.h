@@ -15,27 +15,28 @@ namespace helicarm {
 
 enum class RectifiedPlane { detector, plate };
 
-/// The intensifier's distortion: rectified (x, y) -> raw (u, v) as in Eq. 1, by a polynomial of any order and, where
-/// the data carry it, a smooth remainder (Gaussian kernels at knots). Points go the other way by numerical inversion,
-/// so both directions agree. Rectified pixels have the raw scale and no rotation at the image centre.
+/// The intensifier's distortion: rectified (x, y) -> raw (u, v) as in Eq. 1, by a polynomial of any order
+/// and, where the data carry it, a smooth remainder (Gaussian kernels at knots). Points go the other way by
+/// numerical inversion, so both directions agree. Rectified pixels have the raw scale and no rotation at the
+/// image centre.
 struct DistortionMap {
   std::string model = "identity";
-  int order = 0;                                 ///< of the polynomial; 0: the identity (flat panel)
+  int order = 0;                                     ///< of the polynomial; 0: the identity (flat panel)
   Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< normalisation: t = (p - centre) / scale
   double scale = 1;
-  Eigen::MatrixX2d coefficients;                 ///< terms x 2, in the order of monomials of docs/method.md
-  Eigen::MatrixX2d knots;                        ///< m x 2, normalised
-  double kernel_length = 0;                      ///< normalised
-  Eigen::MatrixX2d weights;                      ///< m x 2
-  double residual_rms_px = 0;                    ///< per point, over the dots used
+  Eigen::MatrixX2d coefficients;  ///< terms x 2, in the order of monomials of docs/method.md
+  Eigen::MatrixX2d knots;         ///< m x 2, normalised
+  double kernel_length = 0;       ///< normalised
+  Eigen::MatrixX2d weights;       ///< m x 2
+  double residual_rms_px = 0;     ///< per point, over the dots used
   double residual_max_px = 0;
   double held_out_rms_px = 0;
-  Eigen::MatrixXd coefficient_covariance;        ///< of terms and weights, per axis, px^2; empty: taken as exact
-  Eigen::Vector2d hull_low = Eigen::Vector2d::Zero();   ///< rectified box that the dots cover
+  Eigen::MatrixXd coefficient_covariance;  ///< of terms and weights, per axis, px^2; empty: taken as exact
+  Eigen::Vector2d hull_low = Eigen::Vector2d::Zero();  ///< rectified box that the dots cover
   Eigen::Vector2d hull_high = Eigen::Vector2d::Zero();
   std::optional<double> rectified_pixel_mm;
   std::optional<RectifiedPlane> rectified_plane;
-  int width = 0;                                 ///< of the picture it belongs to
+  int width = 0;  ///< of the picture it belongs to
   int height = 0;
 
   bool is_identity() const { return order == 0; }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/fit_map.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
 
 #include "helicarm/rectification/basis.h"
 
@@ -64,10 +63,10 @@ struct Solution {
 };
 
 struct Design {
-  MatrixXd rows;      ///< unweighted
-  MatrixXd normal;    ///< weighted
+  MatrixXd rows;    ///< unweighted
+  MatrixXd normal;  ///< weighted
   MatrixX2d right;
-  MatrixXd penalty;   ///< of unit strength; zero for the polynomial
+  MatrixXd penalty;  ///< of unit strength; zero for the polynomial
 };
 
 Design make_design(MatrixXd rows, const MatrixX2d& raw, const VectorXd& weights, const MatrixXd& gram) {
@@ -120,7 +119,7 @@ struct Model {
 struct Data {
   std::vector<Vector2d> points;  ///< normalised
   MatrixX2d raw;
-  VectorXd weights;              ///< relative, mean one
+  VectorXd weights;  ///< relative, mean one
 };
 
 MatrixXd rows_for(const Data& data, int order, const MatrixX2d& knots, double length) {
@@ -132,7 +131,8 @@ MatrixXd rows_for(const Data& data, int order, const MatrixX2d& knots, double le
 
 Model polynomial(const Data& data, int order) {
   Model model{order, 0, 0, {}};
-  const Design design = make_design(rows_for(data, order, MatrixX2d(0, 2), 1), data.raw, data.weights, MatrixXd());
+  const Design design =
+      make_design(rows_for(data, order, MatrixX2d(0, 2), 1), data.raw, data.weights, MatrixXd());
   model.solution = solve(design, data.raw, data.weights, 0);
   return model;
 }
@@ -158,7 +158,8 @@ Model best_model(const Data& data, const MatrixX2d& knots, const MapOptions& opt
       const Index m = knots.rows();
       MatrixXd gram(m, m);
       for (Index i = 0; i < m; ++i)
-        for (Index j = 0; j < m; ++j) gram(i, j) = kernel((knots.row(i) - knots.row(j)).squaredNorm(), length);
+        for (Index j = 0; j < m; ++j)
+          gram(i, j) = kernel((knots.row(i) - knots.row(j)).squaredNorm(), length);
       gram.diagonal().array() += 1e-8;
       const Design design = make_design(rows_for(data, order, knots, length), data.raw, data.weights, gram);
       for (const double strength : {0.01, 0.03, 0.1, 0.3, 1.0}) {
@@ -188,15 +189,16 @@ Data gather(const std::vector<Correspondence>& dots, const std::vector<Vector2d>
     const Correspondence& dot = dots[rows[k]];
     data.points.push_back(frame.normalised(places[rows[k]]));
     data.raw.row(static_cast<Index>(k)) = dot.raw_px.transpose();
-    data.weights[static_cast<Index>(k)] = 1 / (dot.sigma_px * dot.sigma_px + centre_floor_px * centre_floor_px);
+    data.weights[static_cast<Index>(k)] =
+        1 / (dot.sigma_px * dot.sigma_px + centre_floor_px * centre_floor_px);
   }
   data.weights /= data.weights.mean();
   return data;
 }
 
 /// Drops dots that the others contradict, the gravest first (of many dots, several at a time).
-void reject_outliers(const std::vector<Correspondence>& dots, const std::vector<Vector2d>& places, const Frame& frame,
-                     std::vector<bool>& used) {
+void reject_outliers(const std::vector<Correspondence>& dots, const std::vector<Vector2d>& places,
+                     const Frame& frame, std::vector<bool>& used) {
   for (std::size_t round = 0; round < 10; ++round) {
     const Data data = gather(dots, places, frame, used);
     int order = 1;
@@ -243,7 +245,8 @@ std::vector<Vector2d> places_of(const std::vector<Correspondence>& dots) {
 
 }  // namespace
 
-Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height, const MapOptions& options) {
+Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
+                         const MapOptions& options) {
   MapFit fit;
   fit.used.assign(dots.size(), true);
   const auto too_few = [&] {
@@ -303,7 +306,8 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
     fit.map.hull_high = fit.map.hull_high.cwiseMax(places[i]);
   }
   fit.map.residual_rms_px = std::sqrt(sum / count);
-  fit.map.held_out_rms_px = std::sqrt(model.solution.held_out.squaredNorm() / double(model.solution.held_out.size()));
+  fit.map.held_out_rms_px =
+      std::sqrt(model.solution.held_out.squaredNorm() / double(model.solution.held_out.size()));
   return fit;
 }
 

@@ -18,23 +18,24 @@ struct Correspondence {
 };
 
 struct MapOptions {
-  std::optional<int> order;     ///< fixed order, 1..7; otherwise chosen by held-out error
+  std::optional<int> order;  ///< fixed order, 1..7; otherwise chosen by held-out error
   int max_order = 7;
-  bool remainder = true;        ///< allow the smooth remainder on top of the polynomial
+  bool remainder = true;  ///< allow the smooth remainder on top of the polynomial
   bool reject_outliers = true;
 };
 
 struct MapFit {
   DistortionMap map;
-  std::vector<bool> used;             ///< per correspondence
-  std::vector<double> residual_px;    ///< per correspondence, distance in raw pixels
-  double px_per_mm = 0;               ///< rectified pixels per plate millimetre
+  std::vector<bool> used;           ///< per correspondence
+  std::vector<double> residual_px;  ///< per correspondence, distance in raw pixels
+  double px_per_mm = 0;             ///< rectified pixels per plate millimetre
   Eigen::Affine2d rectified_from_plate = Eigen::Affine2d::Identity();  ///< a similarity
 };
 
-/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder are those of least held-out error, each dot
-/// being predicted by the others (closed form of leave-one-out). plate_not_found below 6 correspondences or when they
-/// do not carry an affine map.
-Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height, const MapOptions& options);
+/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder are those of least held-out error,
+/// each dot being predicted by the others (closed form of leave-one-out). plate_not_found below 6
+/// correspondences or when they do not carry an affine map.
+Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
+                         const MapOptions& options);
 
 }  // namespace helicarm

@@ -84,7 +84,8 @@ struct Seed {
 };
 
 /// Dots whose neighbours stand where the lattice says, best first.
-std::vector<Seed> seeds(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, double pitch, double tolerance) {
+std::vector<Seed> seeds(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, double pitch,
+                        double tolerance) {
   const double turn = kind == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   std::vector<Seed> found;
   for (std::size_t i = 0; i < dots.size(); ++i) {
@@ -111,7 +112,8 @@ std::vector<Seed> seeds(const std::vector<Dot>& dots, const Cells& cells, Lattic
       if (there >= 3) found.push_back({i, a, b, misfit});
     });
   }
-  std::stable_sort(found.begin(), found.end(), [](const Seed& x, const Seed& y) { return x.misfit < y.misfit; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Seed& x, const Seed& y) { return x.misfit < y.misfit; });
   return found;
 }
 

@@ -14,7 +14,7 @@ namespace helicarm {
 
 /// A dot with its place on the lattice: position = index.x() a + index.y() b.
 struct IndexedDot {
-  std::size_t dot;          ///< place in the list that was searched
+  std::size_t dot;  ///< place in the list that was searched
   Eigen::Vector2i index;
 };
 
@@ -27,12 +27,13 @@ struct LatticeOptions {
 
 struct IndexedLattice {
   std::vector<IndexedDot> dots;
-  double pitch_px = 0;             ///< mean near the middle
+  double pitch_px = 0;  ///< mean near the middle
 };
 
-/// Places dots on a distorted lattice, with dots missing or extra, from the pictures's geometry alone: a regular
-/// neighbourhood is taken as the seed and grown with the local spacing. The lattice axes are the ones nearest to +u
-/// and (square) +v, or (hexagonal) 60 degrees on from it. Fewer than 5 dots in place: an empty lattice.
+/// Places dots on a distorted lattice, with dots missing or extra, from the pictures's geometry alone: a
+/// regular neighbourhood is taken as the seed and grown with the local spacing. The lattice axes are the ones
+/// nearest to +u and (square) +v, or (hexagonal) 60 degrees on from it. Fewer than 5 dots in place: an empty
+/// lattice.
 IndexedLattice index_lattice(const std::vector<Dot>& dots, Lattice kind, const LatticeOptions& options);
 
 /// Lattice coordinates of an index in pitches: square (i, j); hexagonal (i + j/2, j sqrt(3)/2).

@@ -14,20 +14,26 @@ std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float 
                                  double max_radius_px) {
   cv::Mat filtered;
   cv::medianBlur(as_mat(image), filtered, 5);
+  // To eight bits as a display would show it: a root lifts what is dark.
+  cv::Mat lifted = cv::max(filtered - double(lowest), 0.0) / std::max(1e-6, double(highest - lowest));
+  cv::sqrt(lifted, lifted);
   cv::Mat grey;
-  const double gain = 255.0 / std::max(1e-6, double(highest - lowest));
-  filtered.convertTo(grey, CV_8U, gain, -gain * double(lowest));
+  lifted.convertTo(grey, CV_8U, 255);
+  // The transform needs a few pixels of radius to vote with.
+  const double zoom = min_radius_px < 4 ? 2 : 1;
+  if (zoom > 1) cv::resize(grey, grey, {}, zoom, zoom, cv::INTER_LINEAR);
   std::vector<cv::Vec3f> circles;
-  const double canny_threshold = 60;
-  const double votes = std::max(6.0, 1.2 * min_radius_px);
-  cv::HoughCircles(grey, circles, cv::HOUGH_GRADIENT, 1, 2 * min_radius_px, canny_threshold, votes,
-                   static_cast<int>(std::floor(min_radius_px)), static_cast<int>(std::ceil(max_radius_px)));
+  const double canny_threshold = 50;
+  const double votes = std::max(6.0, 1.2 * zoom * min_radius_px);
+  cv::HoughCircles(grey, circles, cv::HOUGH_GRADIENT, 1, 2 * zoom * min_radius_px, canny_threshold, votes,
+                   static_cast<int>(std::floor(zoom * min_radius_px)),
+                   static_cast<int>(std::ceil(zoom * max_radius_px)));
   std::vector<Dot> dots;
   for (const cv::Vec3f& circle : circles) {
     Dot dot;
-    dot.centre_px = {double(circle[0]), double(circle[1])};
+    dot.centre_px = {(double(circle[0]) + 0.5) / zoom - 0.5, (double(circle[1]) + 0.5) / zoom - 0.5};
     dot.sigma_px = 0.45;
-    dot.radius_px = double(circle[2]);
+    dot.radius_px = double(circle[2]) / zoom;
     dots.push_back(dot);
   }
   return dots;

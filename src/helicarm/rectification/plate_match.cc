@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/plate_match.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/Dense>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <set>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
 
 namespace helicarm {
 namespace {
@@ -47,7 +46,8 @@ PlateLattice lattice_of(const Plate& plate) {
   const double sector = plate.lattice == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   const double angle = std::atan2(axis.y(), axis.x());
   const double turn = angle - sector * std::round(angle / sector);
-  const Matrix2d to_index = (Eigen::Rotation2Dd(turn).toRotationMatrix() * basis(plate.lattice) * pitch).inverse();
+  const Matrix2d to_index =
+      (Eigen::Rotation2Dd(turn).toRotationMatrix() * basis(plate.lattice) * pitch).inverse();
   PlateLattice lattice{{}, pitch};
   for (const Vector2d& p : plate.dots_mm) lattice.indices.push_back(rounded(to_index * (p - origin)));
   return lattice;
@@ -85,7 +85,8 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   Vector2d own_middle = Vector2d::Zero();
   for (const Vector2i& i : own.indices) own_middle += i.cast<double>() / double(own.indices.size());
   Vector2d seen_middle = Vector2d::Zero();
-  for (const IndexedDot& d : lattice.dots) seen_middle += d.index.cast<double>() / double(lattice.dots.size());
+  for (const IndexedDot& d : lattice.dots)
+    seen_middle += d.index.cast<double>() / double(lattice.dots.size());
   // Where the middle of the plate falls in the picture: an affine map from index to pixel.
   Eigen::Matrix<double, Eigen::Dynamic, 3> design(lattice.dots.size(), 3);
   Eigen::MatrixX2d pixels(lattice.dots.size(), 2);
@@ -109,7 +110,8 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
       // Three anchors, for one of them may be a stray.
       const Vector2i anchor = way * lattice.dots[(1 + k % 3) * lattice.dots.size() / 4].index;
       const Vector2i shift = own.indices[k / 3] - anchor;
-      if (own.indices.size() < 200 || (shift.cast<double>() - about).norm() < 4) shifts.insert({shift.x(), shift.y()});
+      if (own.indices.size() < 200 || (shift.cast<double>() - about).norm() < 4)
+        shifts.insert({shift.x(), shift.y()});
     }
     for (const Cell& cell : shifts) {
       const Vector2i shift(cell.first, cell.second);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/rectify.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "helicarm/detection/find_dots.h"
@@ -20,9 +19,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double pitch_tolerance = 0.04;    // measured against expected
+constexpr double pitch_tolerance = 0.04;  // measured against expected
 constexpr std::size_t least_dots = 10;
-constexpr double max_ball_radius = 0.04;    // of the picture's width: nothing larger is a ball
+constexpr double max_ball_radius = 0.04;  // of the picture's width: nothing larger is a ball
 
 /// Pixels per plate millimetre in the middle of the picture, where the file and the plate tell.
 std::optional<double> expected_scale(const Exposure& exposure, const Plate& plate) {
@@ -33,7 +32,9 @@ std::optional<double> expected_scale(const Exposure& exposure, const Plate& plat
   return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
 }
 
-Polarity opposite(Polarity polarity) { return polarity == Polarity::dark ? Polarity::bright : Polarity::dark; }
+Polarity opposite(Polarity polarity) {
+  return polarity == Polarity::dark ? Polarity::bright : Polarity::dark;
+}
 
 DotOptions dot_options(const Exposure& exposure, Polarity polarity) {
   DotOptions options;
@@ -49,7 +50,8 @@ std::vector<Dot> with_radius_near(const std::vector<Dot>& dots, double radius) {
   return near;
 }
 
-/// The dots as a lattice: of the expected size where that is known, else of the size that gives the largest lattice.
+/// The dots as a lattice: of the expected size where that is known, else of the size that gives the largest
+/// lattice.
 struct SeenLattice {
   std::vector<Dot> dots;
   IndexedLattice lattice;
@@ -72,7 +74,8 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
   std::sort(radii.begin(), radii.end());
   for (const double q : {0.2, 0.5, 0.8})
     if (!radii.empty())
-      consider(with_radius_near(dots, radii[static_cast<std::size_t>(q * double(radii.size() - 1))]), std::nullopt);
+      consider(with_radius_near(dots, radii[static_cast<std::size_t>(q * double(radii.size() - 1))]),
+               std::nullopt);
   return best;
 }
 
@@ -83,7 +86,8 @@ void sharpen(const Exposure& exposure, const std::vector<Dot>& all, SeenLattice&
   const DotLook look = estimate_look(exposure, members);
   for (const IndexedDot& d : seen.lattice.dots) {
     const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
-    if (!refitted.empty() && (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
+    if (!refitted.empty() &&
+        (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
   }
 }
@@ -93,10 +97,11 @@ Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, st
   if (!scale || !plate.pitch_mm) return {};
   const double ratio = fit.px_per_mm / *scale;
   if (std::abs(ratio - 1) <= pitch_tolerance) return {};
-  return fail(Reason::plate_mismatch,
-              fmt::format("the plate in the picture has a pitch of {:.2f} mm, \"{}\" says {} mm (tolerance {:.0f} %)",
-                          *plate.pitch_mm * ratio, plate.name, *plate.pitch_mm, 100 * pitch_tolerance),
-              {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
+  return fail(
+      Reason::plate_mismatch,
+      fmt::format("the plate in the picture has a pitch of {:.2f} mm, \"{}\" says {} mm (tolerance {:.0f} %)",
+                  *plate.pitch_mm * ratio, plate.name, *plate.pitch_mm, 100 * pitch_tolerance),
+      {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
 }
 
 void set_metric(DistortionMap& map, const Exposure& exposure, const Plate& plate, double px_per_mm) {
@@ -116,7 +121,8 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
   double radius = 0;
   for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
   for (const Vector2d& place : plate.dots_mm) {
-    const bool known = std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
+    const bool known =
+        std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
     if (known) continue;
     Dot start;
     start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
@@ -125,7 +131,8 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
     if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
-    if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15) continue;
+    if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15)
+      continue;
     seen.push_back({place, dot[0].centre_px, dot[0].sigma_px});
     plate_dots.push_back(dot[0]);
   }
@@ -157,7 +164,8 @@ std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity p
 
 }  // namespace
 
-Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, const RectificationOptions& options) {
+Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
+                                const RectificationOptions& options) {
   if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
   const auto scale = expected_scale(exposure, plate);
   const Polarity expected = plate.kind == DotKind::balls ? Polarity::dark : Polarity::bright;
@@ -215,7 +223,8 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, co
     if (!fit->used[i]) continue;
     result.plate_dots.push_back(dots[i]);
     result.residual_px.push_back(fit->residual_px[i]);
-    const double shift = (seen[i].raw_px - fit->map.rectified_from_raw(seen[i].raw_px).value_or(seen[i].raw_px)).norm();
+    const double shift =
+        (seen[i].raw_px - fit->map.rectified_from_raw(seen[i].raw_px).value_or(seen[i].raw_px)).norm();
     result.raw_mean_px += shift;
     result.raw_max_px = std::max(result.raw_max_px, shift);
   }
@@ -240,10 +249,12 @@ Expected<Rectification> without_plate(const Exposure& exposure) {
   return result;
 }
 
-Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map, const std::optional<Plate>& plate) {
+Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
+                                 const std::optional<Plate>& plate) {
   if (map.width != exposure.pixels.width() || map.height != exposure.pixels.height())
-    return fail(Reason::plate_mismatch, fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width,
-                                                    map.height, exposure.pixels.width(), exposure.pixels.height()));
+    return fail(Reason::plate_mismatch,
+                fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
+                            exposure.pixels.width(), exposure.pixels.height()));
   auto result = without_plate(exposure);
   if (!result) return result;
   result->map = map;
@@ -265,11 +276,13 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
   const auto fit = fit_map(dots, map.width, map.height, straight);
   const double limit = std::max(0.5, 3 * map.held_out_rms_px);
   if (fit && fit->map.residual_rms_px > limit)
-    return fail(Reason::plate_mismatch,
-                fmt::format("the map does not fit the plate in the picture: its rectified dots are {:.2f} px rms off a "
-                            "lattice, limit {:.2f}",
-                            fit->map.residual_rms_px, limit),
-                {{"residual_rms_px", fit->map.residual_rms_px}});
+    return fail(
+        Reason::plate_mismatch,
+        fmt::format(
+            "the map does not fit the plate in the picture: its rectified dots are {:.2f} px rms off a "
+            "lattice, limit {:.2f}",
+            fit->map.residual_rms_px, limit),
+        {{"residual_rms_px", fit->map.residual_rms_px}});
   result->other_dots = without(result->other_dots, members);
   return result;
 }
@@ -288,10 +301,12 @@ Image<float> resample(const Exposure& exposure, const DistortionMap& map) {
     }
   const cv::Matx23f enlarge(1.f / step, 0, 0, 0, 1.f / step, 0);
   cv::Mat places;
-  cv::warpAffine(coarse, places, enlarge, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  cv::warpAffine(coarse, places, enlarge, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_REPLICATE);
   Image<float> rectified(width, height);
   cv::Mat target = as_mat(rectified);
-  cv::remap(as_mat(exposure.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, double(exposure.lowest));
+  cv::remap(as_mat(exposure.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+            double(exposure.lowest));
   return rectified;
 }
 

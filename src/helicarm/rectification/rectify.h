@@ -18,31 +18,33 @@ enum class Method { best, paper };
 /// What stage 1 learns from one picture of the plate.
 struct Rectification {
   DistortionMap map;
-  std::vector<Dot> plate_dots;       ///< used for the map
-  std::vector<double> residual_px;   ///< of each
+  std::vector<Dot> plate_dots;      ///< used for the map
+  std::vector<double> residual_px;  ///< of each
   int dots_found = 0;
   std::optional<int> dots_expected;  ///< nothing for an unbounded lattice
-  double raw_mean_px = 0;            ///< distance from raw to rectified over the dots used: the distortion itself
+  double raw_mean_px = 0;  ///< distance from raw to rectified over the dots used: the distortion itself
   double raw_max_px = 0;
-  Polarity metal = Polarity::dark;   ///< how metal shows in this picture
-  std::vector<Dot> other_dots;       ///< metal dots that are not the plate's: ball candidates
+  Polarity metal = Polarity::dark;  ///< how metal shows in this picture
+  std::vector<Dot> other_dots;      ///< metal dots that are not the plate's: ball candidates
   std::vector<Warning> warnings;
 };
 
 struct RectificationOptions {
   Method method = Method::best;
-  std::optional<int> order;          ///< fixed polynomial order; otherwise chosen by held-out error
+  std::optional<int> order;  ///< fixed polynomial order; otherwise chosen by held-out error
 };
 
-/// Finds the plate in the picture and fits the map (2.1). Refuses a blank or saturated picture, a missing plate and a
-/// plate whose pitch is not the file's.
-Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate, const RectificationOptions& options);
+/// Finds the plate in the picture and fits the map (2.1). Refuses a blank or saturated picture, a missing
+/// plate and a plate whose pitch is not the file's.
+Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
+                                const RectificationOptions& options);
 
 /// For a flat panel: no distortion; all dots are candidates.
 Expected<Rectification> without_plate(const Exposure& exposure);
 
 /// For a map known already (from a plate shot apart or a file): only the dots are found.
-Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map, const std::optional<Plate>& plate);
+Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
+                                 const std::optional<Plate>& plate);
 
 /// The picture resampled to rectified pixels (Eq. 3), same size; outside the raw picture it is `lowest`.
 Image<float> resample(const Exposure& exposure, const DistortionMap& map);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/test_grid.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <map>
 #include <numbers>
 #include <optional>
+
+#include <fmt/format.h>
 
 #include "helicarm/detection/find_crosses.h"
 #include "helicarm/detection/find_dots.h"
@@ -22,7 +22,8 @@ using Eigen::Vector2i;
 using Complex = std::complex<double>;
 using Points = std::vector<Complex>;
 
-/// In the plane a similarity is w = scale z + shift with complex numbers, and its least-squares fit is one division.
+/// In the plane a similarity is w = scale z + shift with complex numbers, and its least-squares fit is one
+/// division.
 GridError error_of(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
   Complex ideal_middle;
   Complex seen_middle;
@@ -121,7 +122,8 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
       };
       const auto cross =
           fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
-      if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px && cross->sigma_px < 0.5)
+      if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
+          cross->sigma_px < 0.5)
         complete.push_back(*cross);
     }
   return complete;
@@ -154,9 +156,10 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
     }
   }
   if (central.empty())
-    return fail(Reason::too_few_fiducials,
-                fmt::format("{} crossings on a grid were found, but no nine that form its middle", grid.crosses),
-                {{"crosses", double(grid.crosses)}});
+    return fail(
+        Reason::too_few_fiducials,
+        fmt::format("{} crossings on a grid were found, but no nine that form its middle", grid.crosses),
+        {{"crosses", double(grid.crosses)}});
   Points ideal;
   Points raw;
   Points rectified;

@@ -17,21 +17,23 @@ struct GridError {
   double max_px = 0;
 };
 
-/// The test of 3.1: crossings of a square grid of wires against the grid that its nine central crossings define.
+/// The test of 3.1: crossings of a square grid of wires against the grid that its nine central crossings
+/// define.
 struct TestGrid {
   GridError raw;
   GridError rectified;
   int crosses = 0;
-  std::vector<Eigen::Vector2d> raw_px;        ///< the crossings on the grid
+  std::vector<Eigen::Vector2d> raw_px;  ///< the crossings on the grid
   std::vector<Eigen::Vector2d> rectified_px;
 };
 
-/// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their neighbours put
-/// them.
+/// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their
+/// neighbours put them.
 std::vector<Dot> find_grid(const Exposure& exposure);
 
-/// Similarity of the nine central crossings by least squares (Eq. 14, Umeyama 1991), then the distance of every
-/// crossing from its ideal place (Eq. 15), before and after rectification. too_few_fiducials unless the nine are there.
+/// Similarity of the nine central crossings by least squares (Eq. 14, Umeyama 1991), then the distance of
+/// every crossing from its ideal place (Eq. 15), before and after rectification. too_few_fiducials unless the
+/// nine are there.
 Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map);
 
 }  // namespace helicarm

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/rectification/usable.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <vector>
+
+#include <fmt/format.h>
 
 namespace helicarm {
 namespace {
 
-constexpr double least_range = 0.01;       // of block means, as a share of the grey scale
-constexpr double most_saturated = 0.9;     // of the field
+constexpr double least_range = 0.01;    // of block means, as a share of the grey scale
+constexpr double most_saturated = 0.9;  // of the field
 
 /// Means of blocks of 16 x 16 pixels: noise averages out, structure stays.
 std::vector<float> block_means(const Image<float>& image) {
@@ -42,17 +42,21 @@ double saturated_share(const Exposure& exposure) {
 Expected<void> check_usable(const Exposure& exposure) {
   std::vector<float> means = block_means(exposure.pixels);
   if (means.size() < 9)
-    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few to hold a calibrator", exposure.pixels.width(),
-                                              exposure.pixels.height()));
+    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few to hold a calibrator",
+                                              exposure.pixels.width(), exposure.pixels.height()));
   std::sort(means.begin(), means.end());
   const double share = saturated_share(exposure);
   if (share > most_saturated && means.back() > exposure.lowest)
-    return fail(Reason::saturated, fmt::format("{:.0f} % of the field is clipped at the highest grey value", 100 * share),
+    return fail(Reason::saturated,
+                fmt::format("{:.0f} % of the field is clipped at the highest grey value", 100 * share),
                 {{"saturated_share", share}});
-  const auto at = [&](double q) { return double(means[static_cast<std::size_t>(q * double(means.size() - 1))]); };
+  const auto at = [&](double q) {
+    return double(means[static_cast<std::size_t>(q * double(means.size() - 1))]);
+  };
   const double range = (at(0.99) - at(0.01)) / double(exposure.highest - exposure.lowest);
   if (range < least_range)
-    return fail(Reason::blank_image, fmt::format("the picture is blank: its grey values span {:.2f} % of the scale", 100 * range),
+    return fail(Reason::blank_image,
+                fmt::format("the picture is blank: its grey values span {:.2f} % of the scale", 100 * range),
                 {{"grey_range", range}});
   return {};
 }

@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Configures and builds the release into build/: with AVX2 and FMA where the processor has them, else portable.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+preset=portable
+if grep -qw avx2 /proc/cpuinfo && grep -qw fma /proc/cpuinfo; then preset=release; fi
+echo "Building ($preset) ..." >&2
+cmake --preset "$preset" >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
+mv build-configure.log build/configure.log
+cmake --build build --target "${@:-all}" >&2
