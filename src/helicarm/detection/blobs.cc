@@ -13,6 +13,7 @@ namespace helicarm {
 namespace {
 
 constexpr int levels_per_octave = 3;
+constexpr double first_sigma = 1.1;
 constexpr double ratio = 1.2599210498948732;  // 2^(1/3)
 
 /// Least answer worth a look: so many times the robust spread of the answers over a coarse grid (nought left
@@ -60,7 +61,6 @@ double offset_of_peak(float before, float here, float after) {
 }
 
 void search_octave(const cv::Mat& base, double step, const BlobOptions& options, std::vector<Dot>& blobs) {
-  const double first_sigma = 1.1;
   std::vector<cv::Mat> blurred(levels_per_octave + 3);
   cv::GaussianBlur(base, blurred[0], {},
                    step > 1 ? std::sqrt(first_sigma * first_sigma - 0.25) : first_sigma);
@@ -105,9 +105,11 @@ std::vector<Dot> find_blobs(const Image<float>& image, const BlobOptions& option
   std::vector<Dot> blobs;
   cv::Mat base = as_mat(image);
   for (double step = 1; base.cols >= 16 && base.rows >= 16; step *= 2) {
-    const double smallest = std::numbers::sqrt2 * 1.1 * step;
-    if (smallest > options.max_radius_px) break;
-    if (2 * smallest * 1.15 > options.min_radius_px) search_octave(base, step, options, blobs);
+    const auto radius_at = [&](double level) {
+      return std::numbers::sqrt2 * first_sigma * step * std::pow(ratio, level + 0.5);
+    };
+    if (radius_at(1) > 1.15 * options.max_radius_px) break;
+    if (1.15 * radius_at(levels_per_octave) > options.min_radius_px) search_octave(base, step, options, blobs);
     cv::Mat half;
     cv::resize(base, half, {base.cols / 2, base.rows / 2}, 0, 0, cv::INTER_AREA);
     base = half;

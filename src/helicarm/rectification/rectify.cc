@@ -157,8 +157,12 @@ struct Attempt {
 
 std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity polarity, Method method,
                         std::optional<double> scale) {
-  if (method == Method::best) return find_dots(exposure, dot_options(exposure, polarity));
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * exposure.pixels.width();
+  if (method == Method::best) {
+    DotOptions options = dot_options(exposure, polarity);
+    if (scale) options.min_radius_px = std::max(options.min_radius_px, 0.75 * radius);
+    return find_dots(exposure, options);
+  }
   return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.7 * radius, 1.35 * radius);
 }
 
