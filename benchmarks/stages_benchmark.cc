@@ -50,7 +50,8 @@ void search_blobs(benchmark::State& state) {
 BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
 void fit_one_ball(benchmark::State& state) {
-  const auto found = value_or_throw(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+  const auto found =
+      value_or_throw(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
   Dot start;
   for (const Fiducial& ball : found.fiducials)
     if (ball.status == FiducialStatus::used) start.centre_px = ball.uv_raw;
@@ -68,7 +69,8 @@ BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
 void find_balls(benchmark::State& state) {
   for (auto _ : state)
-    benchmark::DoNotOptimize(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+    benchmark::DoNotOptimize(
+        find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
 }
 BENCHMARK(find_balls)->Unit(benchmark::kMillisecond);
 

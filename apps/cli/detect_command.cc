@@ -21,7 +21,7 @@ std::vector<Dot> found_in(const Exposure& exposure, bool crosses, Polarity polar
   }
   DotOptions options;
   options.polarity = polarity;
-  return find_dots(exposure, options);
+  return find_clear_dots(exposure, options);
 }
 
 /// Metal is dark in most pictures and bright in the others: the polarity that shows more of it is right.

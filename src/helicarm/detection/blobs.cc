@@ -109,7 +109,8 @@ std::vector<Dot> find_blobs(const Image<float>& image, const BlobOptions& option
       return std::numbers::sqrt2 * first_sigma * step * std::pow(ratio, level + 0.5);
     };
     if (radius_at(1) > 1.15 * options.max_radius_px) break;
-    if (1.15 * radius_at(levels_per_octave) > options.min_radius_px) search_octave(base, step, options, blobs);
+    if (1.15 * radius_at(levels_per_octave) > options.min_radius_px)
+      search_octave(base, step, options, blobs);
     cv::Mat half;
     cv::resize(base, half, {base.cols / 2, base.rows / 2}, 0, 0, cv::INTER_AREA);
     base = half;

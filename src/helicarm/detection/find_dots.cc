@@ -123,6 +123,23 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   return without_doubles(std::move(dots));
 }
 
+std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& options, double clear_sigma_px) {
+  constexpr double same_size = 1.15;
+  std::vector<Dot> found = find_dots(exposure, options);
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Dot& a, const Dot& b) { return a.radius_px < b.radius_px; });
+  std::vector<Dot> clear;
+  for (auto first = found.begin(); first != found.end();) {
+    const auto last = std::find_if(
+        first, found.end(), [&](const Dot& dot) { return dot.radius_px > same_size * first->radius_px; });
+    const std::vector<Dot> size(first, last);
+    for (const Dot& dot : refit_dots(exposure, size, estimate_look(exposure, size), found))
+      if (dot.sigma_px < clear_sigma_px && dot.misfit < options.max_misfit) clear.push_back(dot);
+    first = last;
+  }
+  return clear;
+}
+
 std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const DotLook& look,
                             const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
