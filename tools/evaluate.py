@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs `helicarm run` on every case of a folder that has a truth.json, and compares: labels, ball centres, FRE, TRE.
 
-  tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm] [--markdown]
+  tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm]
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
 points (T1, T2, ...) from their true places; where a case has tunnel balls FS, FE, TS, TE and its name begins with n,

@@ -183,7 +183,9 @@ int run(int argc, char** argv) {
   app.add_flag("--json", console.json, "Print the answer as JSON");
   app.add_flag("--quiet", console.quiet, "Print nothing but failures");
   app.add_option("--threads", console.threads, "Threads to use; 0: all cores")->check(CLI::Range(0, 1024));
-  app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")->capture_default_str();
+  app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   for (const auto add : {add_demo, add_run, add_solve, add_locate, add_rectify, add_detect, add_import,
                          add_simulate, add_phantom})
     add(app, action);

@@ -88,6 +88,21 @@ std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) 
   return tasks;
 }
 
+/// Rays that miss each other by more than their errors allow show that one of them is not of this point: the
+/// point's covariance is then enlarged until they do.
+std::optional<Warning> doubt(LocatedPoint& located) {
+  constexpr double largest_excess = 9;  // three standard deviations
+  const double excess = located.chi2 / double(2 * located.views.size() - 3);
+  if (!(excess > largest_excess)) return std::nullopt;
+  located.covariance_in_anchor *= excess;
+  return Warning{
+      Reason::residual_too_large,
+      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain",
+                  located.name, located.ray_gap_mm, std::sqrt(excess)),
+      {},
+      {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
+}
+
 struct Located {
   LocatedPoint point;
   std::optional<Bone> anchor;
@@ -155,12 +170,14 @@ std::vector<Warning> locate_points(const Case& given, const Calibration& calibra
                                    std::vector<PointResult>& points) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
-    const auto located = intersect_rays(point, given, calibration);
+    auto located = intersect_rays(point, given, calibration);
     if (!located) {
       if (!point.reason) point.reason = located.error();
       continue;
     }
     point.reason.reset();
+    const bool errors_known = calibration.joint_covariance.size() > 0;
+    if (auto warning = errors_known ? doubt(located->point) : std::nullopt) warnings.push_back(*warning);
     point.ray_gap_mm = located->point.ray_gap_mm;
     point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
                          located->views},

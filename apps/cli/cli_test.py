@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The program from outside: exit codes, streams and files. Usage: cli_test.py PROGRAM"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM = sys.argv.pop(1)
+
+
+def run(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+
+
+class CommandLine(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.folder.name)
+        done = run("simulate", cls.root / "case", "--size", 512, "--seed", 5, "--quiet")
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def test_run_writes_result_report_and_overlays(self):
+        done = run("run", self.root / "case", "--out", self.root / "out", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        printed = json.loads(done.stdout)
+        written = json.loads((self.root / "out/result.json").read_text())
+        self.assertEqual(printed, written)
+        self.assertEqual(written["status"], "ok")
+        self.assertLess(written["accuracy"]["tre_mm"]["mean"], 0.2)
+        for name in ("report.html", "AP_overlay.png", "LAT_overlay.png"):
+            self.assertTrue((self.root / "out" / name).stat().st_size > 1000, name)
+
+    def test_published_recipe_gives_the_same_fields(self):
+        outs = []
+        for method in ("best", "paper"):
+            done = run("run", self.root / "case", "--out", self.root / method, "--method", method, "--json", "--no-report")
+            self.assertIn(done.returncode, (0, 3), done.stderr)
+            outs.append(json.loads((self.root / method / "result.json").read_text()))
+        self.assertEqual(list(outs[0]), list(outs[1]))
+
+    def test_refusal_is_exit_3_with_a_result(self):
+        done = run("run", self.root / "case", "--out", self.root / "strict", "--max-error", 0.0001, "--json")
+        self.assertEqual(done.returncode, 3)
+        self.assertTrue(done.stderr.startswith("helicarm: "), done.stderr)
+        self.assertIn("uncertain", done.stderr)
+        self.assertEqual(json.loads(done.stdout)["failure"]["code"], "uncertain")
+        self.assertEqual(json.loads((self.root / "strict/result.json").read_text())["status"], "refused")
+
+    def test_unusable_input_is_exit_2_and_leaves_no_old_result(self):
+        out = self.root / "stale"
+        out.mkdir()
+        (out / "result.json").write_text("{}")
+        done = run("run", self.root / "nowhere", "--out", out)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("missing_file", done.stderr)
+        self.assertEqual(done.stdout, "")
+        self.assertFalse((out / "result.json").exists())
+
+    def test_wrong_usage_is_exit_2(self):
+        for words in ([], ["run"], ["fly"], ["run", "x", "--colour"], ["demo", "--seed", "-1"], ["rectify"],
+                      ["run", "x", "--method", "worst"], ["detect", "x", "--kind", "cats"]):
+            done = run(*words, "--json")
+            self.assertEqual(done.returncode, 2, words)
+            self.assertIn("helicarm: usage: ", done.stderr)
+            self.assertEqual(json.loads(done.stdout)["failure"]["code"], "usage")
+
+    def test_help_teaches_with_an_example(self):
+        for command in ("demo", "run", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):
+            done = run(command, "--help")
+            self.assertEqual(done.returncode, 0)
+            self.assertIn(f"Example:\n  helicarm {command}", done.stdout)
+
+    def test_rectify_writes_a_map_that_maps_both_ways(self):
+        out = self.root / "rectified"
+        done = run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((out / "rectified.dcm").exists())
+        self.assertTrue((out / "residuals.csv").exists())
+        points = self.root / "points.csv"
+        points.write_text("u_px,v_px\n200.5,300.25\n256,256\n")
+        there = run("rectify", "--map", out / "map.json", "--points", points)
+        points.write_text(there.stdout)
+        back = json.loads(run("rectify", "--map", out / "map.json", "--points", points, "--inverse", "--json").stdout)
+        for (u, v), point in zip([(200.5, 300.25), (256, 256)], back["points"]):
+            self.assertAlmostEqual(point["u"], u, 6)
+            self.assertAlmostEqual(point["v"], v, 6)
+
+    def test_detect_finds_the_metal(self):
+        done = run("detect", self.root / "case/AP.dcm", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreater(len(json.loads(done.stdout)["dots"]), 40)
+
+    def test_locate_reads_a_result(self):
+        run("run", self.root / "case", "--out", self.root / "calibrated", "--no-report", "--quiet")
+        result = json.loads((self.root / "calibrated/result.json").read_text())
+        target = next(p for p in result["points"] if p["name"] == "T1")
+        picks = self.root / "picks.csv"
+        picks.write_text("name,view,u_px,v_px\n" + "".join(
+            f"T1,{view},{seen['uv'][0]},{seen['uv'][1]}\n" for view, seen in target["seen"].items()))
+        done = run("locate", "--calibration", self.root / "calibrated/result.json", "--picks", picks, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for a, b in zip(json.loads(done.stdout)["points"][0]["xyz_mm"], target["xyz_mm"]):
+            self.assertAlmostEqual(a, b, 2)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/navigation/points.h"
+
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+namespace helicarm {
+namespace {
+
+RigidTransform motion(double x, double y, double z, double degrees, const Eigen::Vector3d& axis) {
+  return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix(),
+          {x, y, z}};
+}
+
+/// A frontal and a lateral view, and a femur that bends between them.
+class TwoExposures : public testing::Test {
+ protected:
+  TwoExposures() {
+    CalibratedView frontal;
+    frontal.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 0, {0, 0, 1})};
+    CalibratedView lateral;
+    lateral.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})};
+    calibration.views = {frontal, lateral};
+    calibration.joint_covariance = 1e-12 * Eigen::MatrixXd::Identity(20, 20);
+    const RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
+    const RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
+    given.views.resize(2);
+    given.views[0].poses = {tracker_from_calibrator, tracker_from_femur, {}, {}};
+    given.views[1].poses = {
+        tracker_from_calibrator, tracker_from_femur * motion(2, 3, -1, 8, {1, 0, 0}), {}, {}};
+  }
+
+  Eigen::Vector3d in_calibrator(std::size_t view) const {
+    return *calibrator_from(Bone::femur, given.views[view].poses) * point_in_femur;
+  }
+
+  PointResult seen_point(std::optional<Bone> moves_with) const {
+    PointResult point{"FS", PointSource::pick, moves_with, {}, {}, 0, {}};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Vector2d uv = calibration.views[i].view.project(in_calibrator(i));
+      point.seen.emplace_back(SeenPoint{uv, uv, 0.1});
+    }
+    return point;
+  }
+
+  Calibration calibration;
+  Case given;
+  Eigen::Vector3d point_in_femur{12, -7, 30};
+};
+
+TEST_F(TwoExposures, RaysMeetInTheFrameOfTheBoneThatMoved) {
+  std::vector<PointResult> points = {seen_point(Bone::femur)};
+  EXPECT_TRUE(locate_points(given, calibration, points).empty());
+  ASSERT_TRUE(points[0].place);
+  EXPECT_LT((*points[0].place->in_femur - point_in_femur).norm(), 1e-6);
+  EXPECT_LT((points[0].place->in_calibrator - in_calibrator(0)).norm(), 1e-6);
+  EXPECT_LT(points[0].ray_gap_mm, 1e-6);
+}
+
+TEST_F(TwoExposures, RaysThatMissAreDoubted) {
+  std::vector<PointResult> points = {seen_point(std::nullopt)};
+  const auto warnings = locate_points(given, calibration, points);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::residual_too_large);
+  EXPECT_GT(points[0].place->covariance_in_calibrator.trace(), 0.1);
+}
+
+TEST_F(TwoExposures, BoneWithoutPosesIsTakenAsFixed) {
+  given.views[1].poses = given.views[0].poses;
+  std::vector<PointResult> points = {seen_point(Bone::femur)};
+  given.views[1].poses = {};
+  const auto warnings = locate_points(given, calibration, points);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::bone_taken_as_fixed);
+  EXPECT_TRUE(points[0].place);
+}
+
+TEST_F(TwoExposures, PointSeenOnceIsNotLocated) {
+  std::vector<PointResult> points = {seen_point(Bone::femur)};
+  points[0].seen[1].reset();
+  locate_points(given, calibration, points);
+  EXPECT_FALSE(points[0].place);
+  ASSERT_TRUE(points[0].reason);
+  EXPECT_EQ(points[0].reason->reason, Reason::not_seen);
+}
+
+}  // namespace
+}  // namespace helicarm
