@@ -29,6 +29,9 @@ def places_of(truth):
         value = pair.get(key) or {}
         if isinstance(value, dict):
             places.update({k: v for k, v in value.items() if isinstance(v, list)})
+    for view in truth.get("views", []):  # our own simulation's
+        for point in view["targets"] + view["tunnel_points"]:
+            places[point["name"]] = point["xyz_mm"]
     return places
 
 

@@ -1,2 +1,215 @@
 // SPDX-License-Identifier: Apache-2.0
-int main() { return 0; }
+#include <algorithm>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <string_view>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "command.h"
+#include "demo_command.h"
+#include "detect_command.h"
+#include "helicarm/core/json.h"
+#include "helicarm/navigation/result.h"
+#include "import_command.h"
+#include "locate_command.h"
+#include "phantom_command.h"
+#include "rectify_command.h"
+#include "run_command.h"
+#include "simulate_command.h"
+#include "solve_command.h"
+
+namespace helicarm::cli {
+namespace {
+
+constexpr int internal_error = 1;
+
+/// The chosen command with its arguments; set while the command line is parsed.
+using Action = std::function<CommandResult(Console&)>;
+
+CLI::App* add_command(CLI::App& app, const char* name, const char* what, const char* example) {
+  CLI::App* command = app.add_subcommand(name, what);
+  command->footer(std::string("Example:\n  ") + example);
+  return command;
+}
+
+/// A command whose arguments live as long as its callback.
+template <class Arguments>
+Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(const Arguments&, Console&)) {
+  auto arguments = std::make_shared<Arguments>();
+  command->callback([arguments, run, &action] {
+    action = [arguments, run](Console& console) { return run(*arguments, console); };
+  });
+  return *arguments;
+}
+
+void add_run(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "run", "Measure a case: two or more X-rays to points, tunnels and error bars",
+                  "helicarm run my-case --out my-result");
+  auto& a = arguments_of(command, action, run_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
+      ->capture_default_str();
+  command->add_option("--method", a.method, "best, or paper: the published recipe")->capture_default_str();
+  command->add_option("--max-error", a.max_error_mm, "Refuse when a point may be off by more, mm (95 %)")
+      ->check(CLI::Range(1e-6, 1000.0));
+  command->add_flag("--no-report", a.no_report, "Write result.json only");
+}
+
+void add_demo(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "demo", "Simulate a pair of X-rays, measure it and compare with the truth",
+                              "helicarm demo --out helicarm-demo");
+  auto& a = arguments_of(command, action, demo_command);
+  command->add_option("--out", a.out, "Folder for the case and its result")->capture_default_str();
+}
+
+void add_solve(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "solve", "Calibrate one view from points of known place and their pixels (Eq. 4-7)",
+                  "helicarm solve --points points.csv --method ml --json");
+  auto& a = arguments_of(command, action, solve_command);
+  command->add_option("--points", a.points, "CSV: label,x_mm,y_mm,z_mm,u_px,v_px[,sigma_px]")->required();
+  command->add_option("--method", a.method, "dlt, homogeneous or ml")->capture_default_str();
+}
+
+void add_locate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "locate", "Intersect rays of picked pixels in views calibrated before (Eq. 8)",
+                  "helicarm locate --calibration my-result/result.json --picks picks.csv --json");
+  auto& a = arguments_of(command, action, locate_command);
+  command->add_option("--calibration", a.calibration, "result.json of a run")->required();
+  command->add_option("--picks", a.picks, "CSV: name,view,u_px,v_px[,sigma_px], rectified pixels")
+      ->required();
+  command->add_flag("--raw", a.raw, "The picks are raw pixels");
+}
+
+void add_rectify(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "rectify", "Undo an intensifier's distortion by its plate, or apply a known map (2.1)",
+                  "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
+                  "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
+                  "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
+  auto& a = arguments_of(command, action, rectify_command);
+  command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF");
+  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(CLI::PositiveNumber);
+  command->add_option("--plate", a.plate, "plate.json, or plate48");
+  command->add_option("--map", a.map, "map.json of an earlier rectification");
+  command->add_option("--points", a.points, "CSV: u_px,v_px, raw pixels");
+  command->add_flag("--inverse", a.inverse, "The points are rectified pixels; give raw ones");
+  command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--out", a.out, "Folder for rectified.dcm, map.json and residuals.csv")
+      ->capture_default_str();
+  command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
+      ->capture_default_str();
+}
+
+void add_detect(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "detect", "Find balls, holes or wire crossings to a fraction of a pixel",
+                              "helicarm detect AP.dcm --kind balls --json");
+  auto& a = arguments_of(command, action, detect_command);
+  command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF")->required();
+  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(CLI::PositiveNumber);
+  command->add_option("--kind", a.kind, "balls, holes or crosses")->capture_default_str();
+}
+
+void add_import(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "import", "Read a projection that another program made: MayaCam 2, NRRD, a matrix",
+                  "helicarm import camera.txt --unit cm --json");
+  auto& a = arguments_of(command, action, import_command);
+  command->add_option("FILE", a.file, "MayaCam 2, NRRD header, or a 3x4 matrix as text or JSON")->required();
+  command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")->capture_default_str();
+}
+
+void add_simulate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "simulate", "Draw a case with known truth: X-rays of a knee with the calibrator",
+                  "helicarm simulate my-case --kind tunnels --seed 7");
+  auto& a = arguments_of(command, action, simulate_command);
+  command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
+  command->add_option("--kind", a.kind, "accuracy, tunnels or flat")->capture_default_str();
+  command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
+  command->add_option("--bits", a.bits, "Stored bits: 8, 12 or 16")->capture_default_str();
+  command->add_flag("!--no-knee", a.knee, "Leave the knee out");
+  command->add_option(
+      "--fault", a.faults,
+      "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable");
+}
+
+void add_phantom(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "phantom", "Show, check or export the calibrator and the plate",
+                              "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
+                              "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg");
+  auto& a = arguments_of(command, action, phantom_command);
+  command->add_option("ACTION", a.action, "show, check or export")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
+                                               {"check", PhantomAction::check},
+                                               {"export", PhantomAction::export_files}}))
+      ->required();
+  command->add_option("NAME_OR_FILE", a.name_or_file,
+                      "A built-in's name or a file; udcsc or plate48 without it");
+  command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
+  command->add_option("--stl", a.stl, "export: the printable body");
+  command->add_option("--svg", a.svg, "export: the drawing");
+  command->add_option("--file", a.file, "export: calibrator.json or plate.json");
+}
+
+int report(const Failure& failure, const Console& console) {
+  const int exit = exit_code(failure.reason);
+  const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
+  console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view, failure.message);
+  if (console.json)
+    console.out << Json{{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}}.dump(2)
+                << '\n';
+  return exit;
+}
+
+int run(int argc, char** argv) {
+  Console console{std::cout, std::cerr};
+  Action action;
+  CLI::App app(
+      "helicarm: two X-rays of a knee with a plastic cone on it become points in space, with error bars.\n"
+      "Research instrument, not a medical device.",
+      "helicarm");
+  app.footer("Begin with:\n  helicarm demo\nEach command explains itself: helicarm COMMAND --help");
+  app.set_version_flag("--version", "helicarm " HELICARM_VERSION);
+  app.fallthrough();
+  app.require_subcommand(1);
+  app.add_flag("--json", console.json, "Print the answer as JSON");
+  app.add_flag("--quiet", console.quiet, "Print nothing but failures");
+  app.add_option("--threads", console.threads, "Threads to use; 0: all cores")->check(CLI::Range(0, 1024));
+  app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")->capture_default_str();
+  for (const auto add : {add_demo, add_run, add_solve, add_locate, add_rectify, add_detect, add_import,
+                         add_simulate, add_phantom})
+    add(app, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& wish) {
+    return app.exit(wish, console.out, console.progress);
+  } catch (const CLI::ParseError& error) {
+    console.json =
+        std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
+    return report({Reason::usage, error.what(), {}, {}}, console);
+  }
+  const auto done = action(console);
+  return done ? 0 : report(done.error(), console);
+}
+
+}  // namespace
+}  // namespace helicarm::cli
+
+int main(int argc, char** argv) {
+  try {
+    return helicarm::cli::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "helicarm: internal: " << error.what() << '\n';
+  } catch (...) {
+    std::cerr << "helicarm: internal: unknown error\n";
+  }
+  return helicarm::cli::internal_error;
+}

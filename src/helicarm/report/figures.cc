@@ -125,7 +125,7 @@ void draw_lines(Drawing& drawing, const Result& result, std::size_t view) {
     if (projection.depth(tool.p1_in_calibrator) < 1 || projection.depth(tool.p2_in_calibrator) < 1) continue;
     const Pixel a = projection.project(tool.p1_in_calibrator);
     const Pixel b = projection.project(tool.p2_in_calibrator);
-    drawing.line("tool", a - (b - a), b + (b - a));
+    drawing.line("tool", a - 3 * (b - a), b + 3 * (b - a));
   }
 }
 

@@ -34,7 +34,7 @@ class Canvas {
                cv::LINE_AA, shift);
   }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const cv::Scalar& colour) {
-    cv::line(picture_, fixed_point(a), fixed_point(b), colour, 1, cv::LINE_AA, shift);
+    cv::line(picture_, fixed_point(a), fixed_point(b), colour, 2, cv::LINE_AA, shift);
   }
   void cross(const Eigen::Vector2d& at, double arm, const cv::Scalar& colour) {
     const double reach = arm * scale_;
@@ -43,8 +43,10 @@ class Canvas {
   }
   void text(const Eigen::Vector2d& at, const std::string& words, const cv::Scalar& colour) {
     const Eigen::Vector2d corner = at + scale_ * Eigen::Vector2d(17, -9);
-    cv::putText(picture_, words, {static_cast<int>(corner.x()), static_cast<int>(corner.y())},
-                cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, colour, 1, cv::LINE_AA);
+    const cv::Point place(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
+    for (const auto& [ink, thickness] : {std::pair{cv::Scalar(0, 0, 0), 3}, {colour, 1}})
+      cv::putText(picture_, words, place, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness,
+                  cv::LINE_AA);
   }
   std::string png() const { return encode_png(picture_); }
 
@@ -62,7 +64,7 @@ void draw_lines(Canvas& canvas, const Result& result, std::size_t index) {
     if (view.depth(tool.p1_in_calibrator) < 1 || view.depth(tool.p2_in_calibrator) < 1) continue;
     const Eigen::Vector2d a = view.project(tool.p1_in_calibrator);
     const Eigen::Vector2d b = view.project(tool.p2_in_calibrator);
-    canvas.line(a - (b - a), b + (b - a), crimson);
+    canvas.line(a - 3 * (b - a), b + 3 * (b - a), crimson);
   }
 }
 

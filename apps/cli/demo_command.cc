@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "demo_command.h"
+
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "helicarm/simulation/write_case.h"
+#include "run_command.h"
+
+namespace helicarm::cli {
+namespace {
+
+using simulation::SimulatedCase;
+
+/// How the measurement compares with what is true of the simulated pair.
+struct Comparison {
+  int balls = 0;           ///< measured in all views
+  double ball_rms_px = 0;  ///< raw image of the centre against truth, distance
+  std::map<std::string, double> point_error_mm;
+};
+
+Comparison compare(const Result& result, const SimulatedCase& truth) {
+  Comparison comparison;
+  double squares = 0;
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    for (const Fiducial& ball : result.views[i].found->fiducials)
+      for (const simulation::TruePoint& real : truth.views[i].balls)
+        if (ball.status == FiducialStatus::used && ball.label == real.name) {
+          squares += (ball.uv_raw - real.raw).squaredNorm();
+          ++comparison.balls;
+        }
+  comparison.ball_rms_px = std::sqrt(squares / std::max(comparison.balls, 1));
+  for (const PointResult& point : result.points)
+    for (const auto* known : {&truth.views[0].targets, &truth.views[0].tunnel_points})
+      for (const simulation::TruePoint& real : *known)
+        if (point.place && point.name == real.name)
+          comparison.point_error_mm[point.name] = (point.place->in_calibrator - real.in_calibrator).norm();
+  return comparison;
+}
+
+void print(const Comparison& comparison, const std::filesystem::path& report, Console& console) {
+  if (console.json) {
+    Json json = {{"balls", comparison.balls},
+                 {"ball_rms_px", comparison.ball_rms_px},
+                 {"point_error_mm", comparison.point_error_mm},
+                 {"report", report.string()}};
+    console.out << json.dump(2) << '\n';
+    return;
+  }
+  console.out << fmt::format("\n  Against the truth: {} images of balls, {:.3f} px rms off\n",
+                             comparison.balls, comparison.ball_rms_px);
+  for (const auto& [name, error] : comparison.point_error_mm)
+    console.out << fmt::format("    {:<6} {:.3f} mm off\n", name, error);
+  console.out << fmt::format("\n  Report: {}\n", report.string());
+}
+
+}  // namespace
+
+CommandResult demo_command(const DemoArguments& arguments, Console& console) {
+  return guarded([&] {
+    simulation::SimulationOptions options;
+    options.seed = console.seed;
+    options.threads = console.threads;
+    if (!console.quiet)
+      console.progress << "helicarm: simulating two X-rays of a knee with the calibrator on it\n";
+    const SimulatedCase truth = value_or_throw(simulation::simulate_case(options));
+    RunArguments run{arguments.out / "case", arguments.out / "result", "best", {}, false};
+    value_or_throw(simulation::check_case_folder(run.folder));
+    value_or_throw(simulation::write_case(run.folder, truth));
+    if (!console.quiet) console.progress << "helicarm: measuring\n\n";
+    const Result result = value_or_throw(run_and_write(run, console));
+    if (result.failure) throw BadInput(*result.failure);
+    if (!console.json) console.out << summary_of(result);
+    print(compare(result, truth), std::filesystem::absolute(run.out / "report.html"), console);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "detect_command.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/detection/find_crosses.h"
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm::cli {
+namespace {
+
+std::vector<Dot> found_in(const Exposure& exposure, bool crosses, Polarity polarity) {
+  if (crosses) {
+    CrossOptions options;
+    options.polarity = polarity;
+    return find_crosses(exposure, options);
+  }
+  DotOptions options;
+  options.polarity = polarity;
+  return find_dots(exposure, options);
+}
+
+/// Metal is dark in most pictures and bright in the others: the polarity that shows more of it is right.
+std::vector<Dot> metal_in(const Exposure& exposure, bool crosses) {
+  auto dark = found_in(exposure, crosses, Polarity::dark);
+  auto bright = found_in(exposure, crosses, Polarity::bright);
+  return dark.size() >= bright.size() ? dark : bright;
+}
+
+}  // namespace
+
+CommandResult detect_command(const DetectArguments& arguments, Console& console) {
+  return guarded([&] {
+    const bool crosses = arguments.kind == "crosses";
+    if (!crosses && arguments.kind != "balls" && arguments.kind != "holes")
+      throw BadInput(Reason::usage,
+                     fmt::format("--kind: \"{}\" is none of: balls, holes, crosses", arguments.kind));
+    const Exposure exposure =
+        value_or_throw(read_exposure(arguments.image, arguments.image.filename().string(), arguments.frame));
+    const std::vector<Dot> dots =
+        arguments.kind == "holes" ? found_in(exposure, false, Polarity::bright) : metal_in(exposure, crosses);
+    if (console.json) {
+      Json list = Json::array();
+      for (const Dot& dot : dots)
+        list.push_back({{"u", dot.centre_px.x()},
+                        {"v", dot.centre_px.y()},
+                        {"sigma_px", dot.sigma_px},
+                        {"radius_px", dot.radius_px}});
+      console.out << Json{{"dots", std::move(list)}}.dump(2) << '\n';
+      return;
+    }
+    console.out << fmt::format("{:>10} {:>10} {:>9} {:>9}\n", "u px", "v px", "sigma px", "radius px");
+    for (const Dot& dot : dots)
+      console.out << fmt::format("{:>10.3f} {:>10.3f} {:>9.3f} {:>9.2f}\n", dot.centre_px.x(),
+                                 dot.centre_px.y(), dot.sigma_px, dot.radius_px);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rectify_command.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/rectification/test_grid.h"
+#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/write_dicom.h"
+#include "run_command.h"
+
+namespace helicarm::cli {
+namespace {
+
+Exposure picture_of(const RectifyArguments& arguments) {
+  return value_or_throw(
+      read_exposure(*arguments.image, arguments.image->filename().string(), arguments.frame));
+}
+
+DistortionMap map_of(const RectifyArguments& arguments) {
+  return value_or_throw(distortion_map_from_json(value_or_throw(read_json(*arguments.map)),
+                                                 arguments.map->filename().string()));
+}
+
+Plate plate_of(const std::string& name) {
+  return name == plate48().name ? plate48() : value_or_throw(read_plate(name));
+}
+
+DerivedImage rectified_image(const Exposure& exposure, const DistortionMap& map) {
+  const Image<float> picture = resample(exposure, map);
+  DerivedImage image;
+  const auto range =
+      std::clamp(static_cast<long>(std::lround(exposure.highest - exposure.lowest)), 1l, 65535l);
+  image.bits_stored = std::max(8, static_cast<int>(std::bit_width(static_cast<unsigned>(range))));
+  image.pixels = Image<std::uint16_t>(picture.width(), picture.height());
+  std::ranges::transform(picture.pixels(), image.pixels.pixels().begin(), [&](float value) {
+    return static_cast<std::uint16_t>(std::clamp(std::lround(value - exposure.lowest), 0l, range));
+  });
+  image.acquisition = exposure.acquisition;
+  if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
+    image.acquisition.pixel_mm = Eigen::Vector2d::Constant(*map.rectified_pixel_mm);
+  image.series_description = "rectified";
+  return image;
+}
+
+Json figures_of(const Rectification& r) {
+  return {{"model", r.map.model},
+          {"dots_found", r.dots_found},
+          {"dots_expected", r.dots_expected ? Json(*r.dots_expected) : Json(nullptr)},
+          {"residual_rms_px", r.map.residual_rms_px},
+          {"residual_max_px", r.map.residual_max_px},
+          {"held_out_rms_px", r.map.held_out_rms_px},
+          {"raw_mean_px", r.raw_mean_px},
+          {"raw_max_px", r.raw_max_px}};
+}
+
+void rectify_picture(const RectifyArguments& arguments, Console& console) {
+  const Exposure exposure = picture_of(arguments);
+  const Rectification r = value_or_throw(
+      rectify(exposure, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
+  std::string residuals = "u_px,v_px,residual_px\n";
+  for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
+    residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
+                             r.residual_px[i]);
+  value_or_throw(write_dicom(arguments.out / "rectified.dcm", rectified_image(exposure, r.map)));
+  value_or_throw(write_file(arguments.out / "map.json", to_json(r.map).dump(2) + "\n"));
+  value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
+  if (console.json)
+    console.out << figures_of(r).dump(2) << '\n';
+  else if (!console.quiet)
+    console.out << fmt::format(
+        "{}: {} dots, residual {:.3f} px rms, {:.3f} max, held out {:.3f}; written to {}\n", r.map.model,
+        r.dots_found, r.map.residual_rms_px, r.map.residual_max_px, r.map.held_out_rms_px,
+        arguments.out.string());
+}
+
+void map_points(const RectifyArguments& arguments, Console& console) {
+  const DistortionMap map = map_of(arguments);
+  const CsvTable table = value_or_throw(read_csv(*arguments.points, {"u_px", "v_px"}, {}));
+  Json points = Json::array();
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const Eigen::Vector2d given{table.number(row, "u_px"), table.number(row, "v_px")};
+    const auto mapped =
+        arguments.inverse ? std::optional(map.raw_from_rectified(given)) : map.rectified_from_raw(given);
+    points.push_back(mapped ? Json{{"u", mapped->x()}, {"v", mapped->y()}}
+                            : Json{{"u", nullptr}, {"v", nullptr}});
+  }
+  if (console.json) {
+    console.out << Json{{"points", std::move(points)}}.dump(2) << '\n';
+    return;
+  }
+  console.out << "u_px,v_px\n";
+  for (const Json& point : points) console.out << point["u"].dump() << ',' << point["v"].dump() << '\n';
+}
+
+void measure_grid(const RectifyArguments& arguments, Console& console) {
+  const DistortionMap map = map_of(arguments);
+  const TestGrid grid = value_or_throw(measure_test_grid(find_grid(picture_of(arguments)), map));
+  const auto json_of = [](const GridError& error) {
+    return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
+  };
+  if (console.json)
+    console.out
+        << Json{{"raw", json_of(grid.raw)}, {"rectified", json_of(grid.rectified)}, {"n", grid.crosses}}.dump(
+               2)
+        << '\n';
+  else
+    console.out << fmt::format(
+        "{} crosses; raw {:.3f} px mean, {:.3f} max; rectified {:.3f} mean, {:.3f} max\n", grid.crosses,
+        grid.raw.mean_px, grid.raw.max_px, grid.rectified.mean_px, grid.rectified.max_px);
+}
+
+}  // namespace
+
+CommandResult rectify_command(const RectifyArguments& arguments, Console& console) {
+  return guarded([&] {
+    if (arguments.points && arguments.map && !arguments.image) return map_points(arguments, console);
+    if (arguments.image && arguments.test_grid_mm && arguments.map) return measure_grid(arguments, console);
+    if (arguments.image && arguments.plate && !arguments.map && !arguments.points)
+      return rectify_picture(arguments, console);
+    throw BadInput(Reason::usage,
+                   "rectify: give IMAGE --plate, or --map --points, or IMAGE --map --test-grid (see --help)");
+  });
+}
+
+}  // namespace helicarm::cli

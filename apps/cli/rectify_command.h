@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "command.h"
+
+namespace helicarm::cli {
+
+/// One of: an image with a plate; points with a map; an image of the test grid with a map.
+struct RectifyArguments {
+  std::optional<std::filesystem::path> image;
+  std::optional<int> frame;
+  std::optional<std::string> plate;  ///< plate.json or plate48
+  std::optional<std::filesystem::path> map;
+  std::optional<std::filesystem::path> points;  ///< CSV: u_px,v_px
+  std::optional<double> test_grid_mm;           ///< pitch of the grid of 3.1
+  std::filesystem::path out = "helicarm-rectified";
+  std::string method = "best";
+  bool inverse = false;  ///< points: rectified -> raw
+};
+
+/// Fits the distortion of a picture and writes rectified.dcm, map.json and residuals.csv; or applies a map to
+/// points; or measures what a map leaves on the test grid (Eq. 14-15).
+CommandResult rectify_command(const RectifyArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

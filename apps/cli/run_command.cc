@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/navigation/case.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/report/report.h"
+
+namespace helicarm::cli {
+namespace {
+
+std::string coordinates(const Eigen::Vector3d& p) {
+  return fmt::format("{:9.3f} {:9.3f} {:9.3f}", p.x(), p.y(), p.z());
+}
+
+std::string statistics_line(std::string_view what, const Statistics& s) {
+  if (s.n == 0) return {};
+  return fmt::format("  {:<8} mean {:7.3f}   rms {:7.3f}   max {:7.3f}   n {}\n", what, s.mean, s.rms, s.max,
+                     s.n);
+}
+
+/// A result of an earlier run must never pass for the answer of one that failed.
+void forget_earlier(const std::filesystem::path& out) {
+  std::error_code ignored;
+  std::filesystem::remove(out / "result.json", ignored);
+}
+
+}  // namespace
+
+Expected<Method> method_named(const std::string& name) {
+  if (name == "best") return Method::best;
+  if (name == "paper") return Method::paper;
+  return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
+}
+
+std::string summary_of(const Result& result) {
+  std::string text = statistics_line("FLE px", result.accuracy.fle_px) +
+                     statistics_line("FRE mm", result.accuracy.fre_mm) +
+                     statistics_line("TRE mm", result.accuracy.tre_mm);
+  if (!result.points.empty())
+    text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm in the calibrator\n", "point", "x", "y", "z");
+  for (const PointResult& point : result.points)
+    text += point.place
+                ? fmt::format("  {:<12} {}   within {:.3f} (95 %)\n", point.name,
+                              coordinates(point.place->in_calibrator),
+                              length_at_95(point.place->covariance_in_calibrator))
+                : fmt::format("  {:<12} {}\n", point.name, point.reason ? code(point.reason->reason) : "");
+  for (const Tunnel& tunnel : result.tunnels)
+    if (tunnel.start_in_tool && tunnel.end_in_tool)
+      text += fmt::format(
+          "\n  tunnel {:<8} in the tool's frame, {:.2f} mm long\n    start {}\n    end   {}\n", tunnel.name,
+          tunnel.length_mm.value_or(0), coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
+  for (const Verification& v : result.verifications)
+    for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
+      if (*error)
+        text += fmt::format(
+            "\n  tool line {:<8} misses the {} by {:.2f} px, {:.2f} mm (Eq. 17), {:.2f} mm in space", v.name,
+            end, (*error)->combined_px, (*error)->combined_mm, (*error)->distance_mm);
+  return text + (result.verifications.empty() ? "" : "\n");
+}
+
+Expected<Result> run_and_write(const RunArguments& arguments, Console& console) {
+  return guarded([&] {
+    const RunOptions options{value_or_throw(method_named(arguments.method)), arguments.max_error_mm,
+                             console.threads};
+    forget_earlier(arguments.out);
+    const Case given = value_or_throw(read_case(arguments.folder));
+    Result result = value_or_throw(run_case(given, options));
+    value_or_throw(write_file(arguments.out / "result.json", to_json(result).dump(2) + "\n"));
+    if (!arguments.no_report) value_or_throw(write_report(result, arguments.out));
+    if (!console.quiet)
+      for (const Warning& warning : result.warnings)
+        console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
+                                        warning.view.empty() ? "" : ": ", warning.message);
+    return result;
+  });
+}
+
+CommandResult run_command(const RunArguments& arguments, Console& console) {
+  const auto result = run_and_write(arguments, console);
+  if (!result) return tl::unexpected<Failure>(result.error());
+  if (result->failure) return tl::unexpected<Failure>(*result->failure);
+  if (console.json)
+    console.out << to_json(*result).dump(2) << '\n';
+  else if (!console.quiet)
+    console.out << summary_of(*result) << fmt::format("\n  written to {}\n", arguments.out.string());
+  return {};
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "command.h"
+#include "helicarm/navigation/result.h"
+
+namespace helicarm::cli {
+
+struct RunArguments {
+  std::filesystem::path folder;  ///< holds case.json
+  std::filesystem::path out = "helicarm-result";
+  std::string method = "best";         ///< best or paper
+  std::optional<double> max_error_mm;  ///< refuse when a point's predicted error (95 %) is larger
+  bool no_report = false;              ///< only result.json
+};
+
+/// Runs a case and writes result.json, report.html and NAME_overlay.png. A refusal writes them too and then
+/// fails with its reason; input that cannot be used leaves no result.json behind.
+CommandResult run_command(const RunArguments& arguments, Console& console);
+
+/// The same, and the result for the caller to look at; prints nothing to `console.out`.
+Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
+
+/// "best" or "paper"; usage otherwise.
+Expected<Method> method_named(const std::string& name);
+
+/// Accuracy, points, tunnels and verification as a table for a terminal.
+std::string summary_of(const Result& result);
+
+}  // namespace helicarm::cli

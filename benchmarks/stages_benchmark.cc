@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Times every stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 exposures.
+#include <filesystem>
+
+#include <benchmark/benchmark.h>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/detection/find_dots.h"
+#include "helicarm/fiducials/find_fiducials.h"
+#include "helicarm/navigation/case.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/simulation/simulate_case.h"
+#include "helicarm/simulation/write_case.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm {
+namespace {
+
+/// One simulated case on disk, made once.
+const Case& simulated_case() {
+  static const Case given = [] {
+    const auto folder = std::filesystem::temp_directory_path() / "helicarm_benchmark_case";
+    simulation::SimulationOptions options;
+    const auto simulated = value_or_throw(simulation::simulate_case(options));
+    value_or_throw(simulation::write_case(folder, simulated));
+    return value_or_throw(read_case(folder));
+  }();
+  return given;
+}
+
+const Exposure& exposure() {
+  static const Exposure read = value_or_throw(read_exposure(simulated_case().views[0].image, "AP", {}));
+  return read;
+}
+
+const Rectification& rectification() {
+  static const Rectification rectified = value_or_throw(rectify(exposure(), *simulated_case().plate, {}));
+  return rectified;
+}
+
+void read_file(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(read_exposure(simulated_case().views[0].image, "AP", {}));
+}
+BENCHMARK(read_file)->Unit(benchmark::kMillisecond);
+
+void search_blobs(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(find_blobs(exposure().pixels, {}));
+}
+BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
+
+void fit_one_ball(benchmark::State& state) {
+  const auto found = value_or_throw(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+  Dot start;
+  for (const Fiducial& ball : found.fiducials)
+    if (ball.status == FiducialStatus::used) start.centre_px = ball.uv_raw;
+  start.radius_px = 13;
+  const BallProfile profile(0.9 / start.radius_px, 3);
+  const DotFitOptions options = fit_options_for(exposure());
+  for (auto _ : state) benchmark::DoNotOptimize(fit_dot(exposure().pixels, start, profile, {}, options));
+}
+BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
+
+void rectify_view(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(rectify(exposure(), *simulated_case().plate, {}));
+}
+BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
+
+void find_balls(benchmark::State& state) {
+  for (auto _ : state)
+    benchmark::DoNotOptimize(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+}
+BENCHMARK(find_balls)->Unit(benchmark::kMillisecond);
+
+void resample_picture(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(resample(exposure(), rectification().map));
+}
+BENCHMARK(resample_picture)->Unit(benchmark::kMillisecond);
+
+void run_whole_case(benchmark::State& state) {
+  RunOptions options;
+  options.threads = static_cast<unsigned>(state.range(0));
+  for (auto _ : state) benchmark::DoNotOptimize(run_case(simulated_case(), options));
+}
+BENCHMARK(run_whole_case)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace helicarm
