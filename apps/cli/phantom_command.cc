@@ -80,14 +80,15 @@ void check(const Calibrator& calibrator, Console& console) {
                                {"unit", f.unit},
                                {"passed", f.passed()}});
     console.out << json.dump(2) << "\n";
-    return;
   }
-  for (const auto& f : findings)
+  for (const auto& f : console.json ? std::vector<RuleFinding>{} : findings)
     console.out << fmt::format("{:<7}{:>9.3f} {} {:>6.2f} {:<6} {}\n", f.passed() ? "kept" : "BROKEN",
                                f.figure, f.bound == Bound::at_most ? "<=" : ">=", f.limit, f.unit,
                                f.sentence);
-  console.out << fmt::format("\n{}: {}; uniformity (Eq. 13) {:.3f}\n", calibrator.name,
-                             passed ? "keeps all rules" : "breaks a rule", spread);
+  if (!console.json)
+    console.out << fmt::format("\n{}: {}; uniformity (Eq. 13) {:.3f}\n", calibrator.name,
+                               passed ? "keeps all rules" : "breaks a rule", spread);
+  if (!passed) throw BadInput(Reason::rules_broken, fmt::format("{} breaks a design rule", calibrator.name));
 }
 
 Files exported(const Calibrator& calibrator, const PhantomArguments& arguments) {

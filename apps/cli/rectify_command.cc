@@ -9,6 +9,7 @@
 
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
+#include "helicarm/rectification/inpaint.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/test_grid.h"
 #include "helicarm/xray/read_exposure.h"
@@ -32,7 +33,7 @@ Plate plate_of(const std::string& name) {
   return name == plate48().name ? plate48() : value_or_throw(read_plate(name));
 }
 
-DerivedImage rectified_image(const Exposure& exposure, const DistortionMap& map) {
+DerivedImage rectified_image(const Exposure& exposure, const DistortionMap& map, std::string description) {
   const Image<float> picture = resample(exposure, map);
   DerivedImage image;
   const auto range =
@@ -45,7 +46,7 @@ DerivedImage rectified_image(const Exposure& exposure, const DistortionMap& map)
   image.acquisition = exposure.acquisition;
   if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
     image.acquisition.pixel_mm = Eigen::Vector2d::Constant(*map.rectified_pixel_mm);
-  image.series_description = "rectified";
+  image.series_description = std::move(description);
   return image;
 }
 
@@ -68,7 +69,11 @@ void rectify_picture(const RectifyArguments& arguments, Console& console) {
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
-  value_or_throw(write_dicom(arguments.out / "rectified.dcm", rectified_image(exposure, r.map)));
+  value_or_throw(write_dicom(arguments.out / "rectified.dcm", rectified_image(exposure, r.map, "rectified")));
+  Exposure without_dots = exposure;
+  without_dots.pixels = inpainted(exposure.pixels, r.plate_dots);
+  value_or_throw(write_dicom(arguments.out / "inpainted.dcm",
+                             rectified_image(without_dots, r.map, "rectified, plate hidden")));
   value_or_throw(write_file(arguments.out / "map.json", to_json(r.map).dump(2) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)

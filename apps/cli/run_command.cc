@@ -27,6 +27,17 @@ void forget_earlier(const std::filesystem::path& out) {
   std::filesystem::remove(out / "result.json", ignored);
 }
 
+/// A case whose description already allows no answer (a flat calibrator, say) is refused like any other.
+Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions& options) {
+  const auto given = read_case(folder);
+  if (given) return run_case(*given, options);
+  if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
+  Result refused;
+  refused.options = options;
+  refused.failure = given.error();
+  return refused;
+}
+
 }  // namespace
 
 Expected<Method> method_named(const std::string& name) {
@@ -66,8 +77,7 @@ Expected<Result> run_and_write(const RunArguments& arguments, Console& console) 
     const RunOptions options{value_or_throw(method_named(arguments.method)), arguments.max_error_mm,
                              console.threads};
     forget_earlier(arguments.out);
-    const Case given = value_or_throw(read_case(arguments.folder));
-    Result result = value_or_throw(run_case(given, options));
+    const Result result = value_or_throw(result_of(arguments.folder, options));
     value_or_throw(write_file(arguments.out / "result.json", to_json(result).dump(2) + "\n"));
     if (!arguments.no_report) value_or_throw(write_report(result, arguments.out));
     if (!console.quiet)

@@ -20,7 +20,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double max_shift_px = 8;
-constexpr double sigma_floor_px = 0.03;
+constexpr double sigma_floor_px = 0.06;  // what a drawn solid on a smooth background does not know of
 
 /// A cubic background, contrast, shift.
 constexpr int n_background = 10;
@@ -117,6 +117,22 @@ void reweight(Patch& patch, const std::vector<double>& residuals, double least) 
   }
 }
 
+/// By how much neighbours that err together (blurred noise, background, wire) enlarge a variance that takes
+/// them for independent: ((1 + r) / (1 - r))^2 for a correlation r from pixel to pixel both ways.
+double correlation_factor(const Patch& patch, const std::vector<double>& residuals) {
+  double together = 0;
+  double alone = 0;
+  for (std::size_t i = 0; i + 1 < residuals.size(); ++i) {
+    const double weight = patch.pixels[i].weight * patch.pixels[i + 1].weight;
+    const bool neighbours = (patch.pixels[i + 1].offset - patch.pixels[i].offset).norm() < 1.2;
+    if (!neighbours || weight == 0) continue;
+    together += weight * residuals[i] * residuals[i + 1];
+    alone += 0.5 * weight * (residuals[i] * residuals[i] + residuals[i + 1] * residuals[i + 1]);
+  }
+  const double r = alone > 0 ? std::clamp(together / alone, 0.0, 0.6) : 0;
+  return std::pow((1 + r) / (1 - r), 2);
+}
+
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   std::vector<double> residuals(patch.pixels.size());
   Vector p = Vector::Zero();
@@ -146,7 +162,8 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
     if (i >= 5 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
-  const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
+  const double variance =
+      sums.squares / std::max(1.0, sums.weight - n_parameters) * correlation_factor(patch, residuals);
   const Normal inverse = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
   double squares = 0;
   for (const double r : residuals) squares += r * r;
