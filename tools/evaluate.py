@@ -3,6 +3,7 @@
 """Runs `helicarm run` on every case of a folder that has a truth.json, and compares: labels, ball centres, FRE, TRE.
 
   tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm]
+  tools/evaluate.py --simulate 4 --readme README.md     simulates cases first, and renews the README's tables
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
 points (T1, T2, ...) from their true places; where a case has tunnel balls FS, FE, TS, TE and its name begins with n,
@@ -80,36 +81,80 @@ def run(helicarm, folder, method):
         return json.loads(path.read_text()), done.stderr.strip()
 
 
+def simulate(helicarm, folder, count):
+    """Cases of every kind, `count` seeds each: a(ccuracy), t(unnels), f(lat panel), h(ard: with faults)."""
+    kinds = {"a": ["--kind", "accuracy"], "t": ["--kind", "tunnels"], "f": ["--kind", "flat"],
+             "h": ["--kind", "tunnels", "--fault", "wires", "--fault", "decoys", "--fault", "mirrored"]}
+    for letter, options in kinds.items():
+        for seed in range(1, count + 1):
+            subprocess.run([helicarm, "simulate", str(folder / f"{letter}{seed:02}"), "--seed", str(seed), "--quiet",
+                            *options], check=True)
+
+
+def evaluate(helicarm, cases, method):
+    """Rows of the cases, and a table of the groups."""
+    lines = ["| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | ms |",
+             "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    groups = defaultdict(list)
+    for case in cases:
+        result, message = run(helicarm, case, method)
+        if result is None or result["status"] != "ok":
+            code = result["failure"]["code"] if result else message
+            lines.append(f"| {case.name} | refused: {code} | | | | | | | |")
+            continue
+        row = judge(case, result, json.loads((case / "truth.json").read_text()))
+        groups[case.name[0]].append(row)
+        lines.append(f"| {case.name} | {row['wrong']} | {row['balls']} | {row['ball_px']:.3f} | {row['fre']:.4f} | "
+                     f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['ms']:.0f} |")
+    return lines, groups
+
+
+GROUP_HEAD = ["| method | group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max |",
+              "| --- | --- | --- | --- | --- | --- | --- | --- |"]
+
+
+def group_lines(method, groups):
+    for name, rows in sorted(groups.items()):
+        mean = lambda key: sum(r[key] for r in rows) / len(rows)  # noqa: E731
+        yield (f"| {method} | {name} | {len(rows)} | {sum(r['wrong'] for r in rows)} | {mean('ball_px'):.3f} | "
+               f"{mean('fre'):.4f} | {mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} |")
+
+
+def renew(readme, marker, lines):
+    text = readme.read_text()
+    begin, end = f"<!-- {marker} -->", f"<!-- /{marker} -->"
+    head, rest = text.split(begin)
+    readme.write_text(head + begin + "\n" + "\n".join(lines) + "\n" + end + rest.split(end)[1])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?")
+    parser.add_argument("--simulate", type=int, metavar="N", help="simulate N cases of each kind instead of a folder")
+    parser.add_argument("--readme", type=Path, help="file whose tables between the accuracy and speed marks are renewed")
     parser.add_argument("--method", action="append", choices=["best", "paper"])
     parser.add_argument("--helicarm", default=str(Path(__file__).resolve().parent.parent / "build/bin/helicarm"))
     options = parser.parse_args()
-    cases = sorted(p.parent for p in options.folder.glob("*/case.json") if (p.parent / "truth.json").exists())
-    if not cases:
-        sys.exit(f"{options.folder}: no sub-folder with case.json and truth.json")
-    for method in options.method or ["best", "paper"]:
-        print(f"\n### --method {method}\n")
-        print("| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | ms |")
-        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-        groups = defaultdict(list)
-        for case in cases:
-            result, message = run(options.helicarm, case, method)
-            if result is None or result["status"] != "ok":
-                code = result["failure"]["code"] if result else message
-                print(f"| {case.name} | refused: {code} | | | | | | | |")
-                continue
-            row = judge(case, result, json.loads((case / "truth.json").read_text()))
-            groups[case.name[0]].append(row)
-            print(f"| {case.name} | {row['wrong']} | {row['balls']} | {row['ball_px']:.3f} | {row['fre']:.4f} | "
-                  f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['ms']:.0f} |")
-        print("\n| group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max |")
-        print("| --- | --- | --- | --- | --- | --- | --- |")
-        for name, rows in sorted(groups.items()):
-            mean = lambda key: sum(r[key] for r in rows) / len(rows)  # noqa: E731
-            print(f"| {name} | {len(rows)} | {sum(r['wrong'] for r in rows)} | {mean('ball_px'):.3f} | {mean('fre'):.4f} | "
-                  f"{mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} |")
+    if (options.folder is None) == (options.simulate is None):
+        parser.error("give a folder, or --simulate N")
+    with tempfile.TemporaryDirectory() as made:
+        folder = options.folder or Path(made)
+        if options.simulate:
+            simulate(options.helicarm, folder, options.simulate)
+        cases = sorted(p.parent for p in folder.glob("*/case.json") if (p.parent / "truth.json").exists())
+        if not cases:
+            sys.exit(f"{folder}: no sub-folder with case.json and truth.json")
+        summary, speed = list(GROUP_HEAD), ["| method | cases | median ms | slowest ms |", "| --- | --- | --- | --- |"]
+        for method in options.method or ["best", "paper"]:
+            lines, groups = evaluate(options.helicarm, cases, method)
+            print(f"\n### --method {method}\n", *lines, sep="\n")
+            summary += group_lines(method, groups)
+            times = sorted(row["ms"] for rows in groups.values() for row in rows)
+            speed.append(f"| {method} | {len(times)} | {times[len(times) // 2]:.0f} | {times[-1]:.0f} |")
+    print("", *summary, "", *speed, sep="\n")
+    if options.readme:
+        renew(options.readme, "accuracy", summary)
+        renew(options.readme, "speed", speed)
 
 
 if __name__ == "__main__":
