@@ -6,8 +6,8 @@
   tools/evaluate.py --simulate 4 --readme README.md     simulates cases first, and renews the README's tables
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
-points (T1, T2, ...) from their true places; where a case has tunnel balls FS, FE, TS, TE and its name begins with n,
-of those."""
+points (T1, T2, ...) from their true places; of the tunnels' balls FS, FE, TS, TE where there are no such points or the
+case's name begins with n."""
 import argparse
 import json
 import math
@@ -52,13 +52,11 @@ def judge(folder, result, truth):
                 squares.append(error * error)
                 wrong += error > 5
     places = places_of(truth)
-    tunnels = folder.name.startswith("n")
-    errors = []
-    for point in result["points"]:
-        name = point["name"]
-        counts = name in ("FS", "FE", "TS", "TE") if tunnels else name[0] == "T" and name[1:].isdigit()
-        if counts and point["xyz_mm"] and name in places:
-            errors.append(distance(point["xyz_mm"], places[name]))
+    checks = [p["name"] for p in result["points"] if p["name"][0] == "T" and p["name"][1:].isdigit()]
+    if folder.name.startswith("n") or not checks:
+        checks = ["FS", "FE", "TS", "TE"]
+    errors = [distance(p["xyz_mm"], places[p["name"]]) for p in result["points"]
+              if p["name"] in checks and p["name"] in places and p["xyz_mm"]]
     return {
         "wrong": wrong,
         "balls": len(squares),

@@ -162,8 +162,8 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
     if (i >= 5 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
-  const double variance =
-      sums.squares / std::max(1.0, sums.weight - n_parameters) * correlation_factor(patch, residuals);
+  const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
+  const double enlarged = variance * correlation_factor(patch, residuals);
   const Normal inverse = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
   double squares = 0;
   for (const double r : residuals) squares += r * r;
@@ -171,7 +171,7 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background];
   fit.sigma_px =
-      std::sqrt(std::max(0.0, 0.5 * variance * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
+      std::sqrt(std::max(0.0, 0.5 * enlarged * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;

@@ -31,7 +31,7 @@ figcaption { padding-top: 0.4rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums lining-nums; font-size: 0.96rem; }
 th { text-align: left; font-weight: 600; color: var(--soft); border-bottom: 1px solid var(--ink); }
-th, td { padding: 0.28rem 1.1rem 0.28rem 0; white-space: nowrap; vertical-align: baseline; }
+th, td { padding: 0.28rem 0.7rem 0.28rem 0; white-space: nowrap; vertical-align: baseline; }
 td { border-bottom: 1px solid var(--rule); }
 .n { text-align: right; }
 .bad { color: var(--bad); }
