@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace helicarm {
 namespace {
@@ -40,13 +41,13 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   last_ = count - 1;
   values_.resize(static_cast<std::size_t>(count));
   slopes_.resize(static_cast<std::size_t>(count));
-  // The rings stand closer towards the rim, where the chord length falls like a square root.
+  // The rings stand closer towards the rim, where the chord length falls like a square root, and towards the centre.
   double radius[rings];
   double weight[rings];
   for (int k = 0; k < rings; ++k) {
     const double a = double(k) / rings;
     const double b = double(k + 1) / rings;
-    const auto place = [](double x) { return 1 - (1 - x) * (1 - x); };
+    const auto place = [](double x) { return 0.5 * (1 - std::cos(std::numbers::pi * x)); };
     radius[k] = place(0.5 * (a + b));
     weight[k] = (place(b) - place(a)) * sharp(radius[k], absorbance) * radius[k];
   }

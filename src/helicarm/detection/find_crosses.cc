@@ -231,7 +231,7 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = 0.5 * options.min_width_px;
   blob_options.max_radius_px = 0.9 * options.max_width_px;
-  blob_options.max_elongation = 6;
+  blob_options.max_elongation = 12;  // wires that cross at a slant
   const double sign = options.polarity == Polarity::dark ? 1 : -1;
   std::vector<Dot> crosses;
   for (const Dot& blob : find_blobs(exposure.pixels, blob_options)) {

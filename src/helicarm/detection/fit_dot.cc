@@ -15,6 +15,7 @@ namespace {
 /// hidden share, radius.
 constexpr int n_parameters = 11;
 constexpr int n_background = 6;
+constexpr double least_contrast = 1e-4;  ///< as a share of the patch's mean: below, rounding errors speak
 using Parameters = Eigen::Matrix<float, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
@@ -268,6 +269,7 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
     return full;
   }();
   const double contrast = double(p[6]);
+  if (!(std::abs(contrast) > least_contrast)) return std::nullopt;
   Dot dot;
   dot.centre_px = {u + double(p[7]), v + double(p[8])};
   dot.radius_px = double(p[10]);

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/detection/fit_dot.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/detection/drawn_picture.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+using Background = std::function<double(double, double)>;
+
+constexpr double blur_px = 0.9;
+constexpr double absorbance = 3;
+constexpr int side = 64;
+const Vector2d middle(32, 32);
+
+double even(double, double) { return 2000; }
+double sloping(double u, double v) { return 2000 + 10 * (u - 32) - 6 * (v - 32); }
+double bent(double u, double v) {
+  return sloping(u, v) + 0.4 * (u - 32) * (u - 32) - 0.3 * (u - 32) * (v - 32) + 0.2 * (v - 32) * (v - 32);
+}
+
+drawn::Shade ball(const Vector2d& centre, double radius) {
+  drawn::Shade shade(side, side);
+  drawn::add_ball(shade, centre, radius, blur_px, absorbance);
+  return shade;
+}
+
+/// The ball takes a share of the background...
+Image<float> multiplied(const drawn::Shade& shade, const Background& background, double share) {
+  Image<float> picture(side, side);
+  for (int v = 0; v < side; ++v)
+    for (int u = 0; u < side; ++u)
+      picture(u, v) = float(background(u, v) * (1 - share * double(shade(u, v))));
+  return picture;
+}
+
+/// ... or, in a logarithmic picture, the same everywhere.
+Image<float> subtracted(const drawn::Shade& shade, const Background& background, double contrast) {
+  Image<float> picture(side, side);
+  for (int v = 0; v < side; ++v)
+    for (int u = 0; u < side; ++u) picture(u, v) = float(background(u, v) - contrast * double(shade(u, v)));
+  return picture;
+}
+
+BallProfile profile_for(double radius) {
+  return BallProfile(std::sqrt(blur_px * blur_px + 1.0 / 12) / radius, absorbance);
+}
+
+/// From a rough start, as the search gives it.
+std::optional<Dot> fit(const Image<float>& picture, const Vector2d& centre, double radius,
+                       std::vector<Disc> others = {}, DotFitOptions options = {}) {
+  Dot start;
+  start.centre_px = centre + Vector2d(0.3, -0.25);
+  start.radius_px = 1.06 * radius;
+  return fit_dot(picture, start, profile_for(radius), others, options);
+}
+
+double error(const std::optional<Dot>& dot, const Vector2d& centre) {
+  return dot ? (dot->centre_px - centre).norm() : 1e9;
+}
+
+/// Greatest error over sub-pixel places.
+double worst(double radius, double noise, const std::function<Image<float>(const drawn::Shade&)>& picture_of) {
+  RandomStream random(5, 1);
+  double most = 0;
+  for (const double x : {0.0, 0.25, 0.5, 0.8})
+    for (const double y : {0.0, 0.35, 0.6}) {
+      const Vector2d centre = middle + Vector2d(x, y);
+      Image<float> picture = picture_of(ball(centre, radius));
+      drawn::add_noise(picture, noise, random);
+      most = std::max(most, error(fit(picture, centre, radius), centre));
+    }
+  return most;
+}
+
+class FitDotOfRadius : public testing::TestWithParam<double> {};
+
+TEST_P(FitDotOfRadius, EveryPhaseOnAnEvenBackground) {
+  EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, even, 0.4); }), 0.02);
+}
+
+TEST_P(FitDotOfRadius, SlopeUnderATransparentBall) {
+  EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, sloping, 0.4); }), 0.02);
+}
+
+TEST_P(FitDotOfRadius, SlopeUnderABallThatTakesTheSameEverywhere) {
+  EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return subtracted(shade, sloping, 800); }), 0.02);
+}
+
+TEST_P(FitDotOfRadius, BentBackground) {
+  EXPECT_LT(worst(GetParam(), 2, [](const auto& shade) { return subtracted(shade, bent, 800); }), 0.02);
+  EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, bent, 0.4); }), 0.02);
+}
+
+TEST_P(FitDotOfRadius, BrightDot) {
+  EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return subtracted(shade, even, -800); }), 0.02);
+}
+
+TEST_P(FitDotOfRadius, MaskedNeighbourDoesNotPull) {
+  const double radius = GetParam();
+  const Vector2d centre = middle + Vector2d(0.2, 0.4);
+  const Vector2d other = centre + 2.1 * radius * Vector2d(0.8, 0.6);
+  drawn::Shade shade = ball(centre, radius);
+  drawn::add_ball(shade, other, radius, blur_px, absorbance);
+  const Image<float> picture = subtracted(shade, even, 800);
+  EXPECT_LT(error(fit(picture, centre, radius, {{other, radius + 2}}), centre), 0.02);
+}
+
+TEST_P(FitDotOfRadius, SaturatedOnOneSide) {
+  const double radius = GetParam();
+  const Vector2d centre = middle + Vector2d(0.2, 0.4);
+  Image<float> picture = subtracted(ball(centre, radius), sloping, 800);
+  DotFitOptions options;
+  options.ceiling = 2030;
+  for (float& grey : picture.pixels()) grey = std::min(grey, options.ceiling);
+  EXPECT_LT(error(fit(picture, centre, radius, {}, options), centre), 0.05);
+}
+
+TEST_P(FitDotOfRadius, RadiusAndContrastAreTheDrawnOnes) {
+  const auto dot = fit(subtracted(ball(middle, GetParam()), even, 800), middle, GetParam());
+  ASSERT_TRUE(dot);
+  EXPECT_NEAR(dot->radius_px / GetParam(), 1, 0.01);
+  EXPECT_NEAR(dot->contrast / 800, 1, 0.02);
+  EXPECT_LT(dot->misfit, 0.01);
+}
+
+TEST_P(FitDotOfRadius, SigmaIsHonest) {
+  const double radius = GetParam();
+  RandomStream random(11, 2);
+  double squares = 0;
+  int trials = 0;
+  for (int phase = 0; phase < 10; ++phase) {
+    const Vector2d centre = middle + Vector2d(random.uniform(), random.uniform());
+    const Image<float> clean = subtracted(ball(centre, radius), sloping, 800);
+    for (int k = 0; k < 20; ++k) {
+      Image<float> picture = clean;
+      drawn::add_noise(picture, 40, random);
+      const auto dot = fit(picture, centre, radius);
+      ASSERT_TRUE(dot);
+      squares += (dot->centre_px - centre).squaredNorm() / (dot->sigma_px * dot->sigma_px);
+      trials += 2;
+    }
+  }
+  const double rms = std::sqrt(squares / trials);
+  EXPECT_GT(rms, 0.6);
+  EXPECT_LT(rms, 1.6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Radii, FitDotOfRadius, testing::Values(2.7, 5.5, 13.0));
+
+TEST(FitDot, KeepsTheRadiusWhereTold) {
+  DotFitOptions options;
+  options.free_radius = false;
+  const auto dot = fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options);
+  ASSERT_TRUE(dot);
+  EXPECT_FLOAT_EQ(float(dot->radius_px), float(1.06 * 5.5));
+  EXPECT_LT(error(dot, middle), 0.02);
+}
+
+TEST(FitDot, RefusesAPlaceOutsideThePicture) {
+  const Image<float> picture = subtracted(ball(middle, 5.5), even, 800);
+  EXPECT_FALSE(fit(picture, {-3, 20}, 5.5));
+  EXPECT_FALSE(fit(picture, {20, 200}, 5.5));
+}
+
+TEST(FitDot, RefusesABlankPatch) {
+  EXPECT_FALSE(fit(subtracted(drawn::Shade(side, side), even, 0), middle, 5.5));
+  EXPECT_FALSE(fit(Image<float>(side, side, 0), middle, 5.5));
+}
+
+TEST(FitDot, RefusesAPatchOutsideTheField) {
+  DotFitOptions options;
+  options.floor = 2500;
+  EXPECT_FALSE(fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options));
+}
+
+TEST(FitDot, RefusesAPatchThatIsWhollyClipped) {
+  DotFitOptions options;
+  options.ceiling = 1000;
+  EXPECT_FALSE(fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options));
+}
+
+TEST(FitDot, RefusesAStartWithoutRadius) {
+  Dot start;
+  start.centre_px = middle;
+  EXPECT_FALSE(fit_dot(subtracted(ball(middle, 5.5), even, 800), start, profile_for(5.5), {}, {}));
+}
+
+}  // namespace
+}  // namespace helicarm

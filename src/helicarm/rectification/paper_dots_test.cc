@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/paper_dots.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/detection/drawn_picture.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+TEST(FindDotsPaper, CirclesOfTheRightSizeWithinAPixelAndAHalf) {
+  drawn::Shade shade(256, 256);
+  std::vector<Vector2d> places;
+  for (int k = 0; k < 9; ++k) places.emplace_back(50.3 + 75.4 * (k % 3), 50.6 + 75.2 * (k / 3));
+  for (const Vector2d& place : places) drawn::add_ball(shade, place, 8, 0.9, 3);
+  Image<float> picture = drawn::grey(shade, 1500);
+  RandomStream random(1, 1);
+  drawn::add_noise(picture, 20, random);
+  const auto dots = find_dots_paper(picture, 0, 4095, 6, 10);
+  EXPECT_EQ(dots.size(), places.size());
+  for (const Vector2d& place : places)
+    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {
+      return (dot.centre_px - place).norm() < 1.5 && dot.sigma_px == 0.45;
+    })) << place.transpose();
+}
+
+TEST(FindDotsPaper, EmptyFieldHasNone) {
+  EXPECT_TRUE(find_dots_paper(Image<float>(128, 128, 2000), 0, 4095, 6, 10).empty());
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/rectify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/detection/drawn_picture.h"
+#include "helicarm/rectification/simulated_exposure.h"
+
+namespace helicarm {
+namespace {
+
+using namespace std::complex_literals;
+using Eigen::Vector2d;
+using simulation::SimulatedCase;
+using simulation::SimulatedView;
+
+const SimulatedCase& room() {
+  static const SimulatedCase simulated = small_case(5, simulation::CaseKind::accuracy);
+  return simulated;
+}
+
+const Rectification& rectified_ap() {
+  static const Rectification result = rectify(exposure_of(room().views[0]), plate48(), {}).value();
+  return result;
+}
+
+/// Rectified pixels differ from ideal ones by a similarity; distances from the best one at places inside the plate.
+struct Misfit {
+  double rms, max;
+};
+Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
+  const auto& distortion = view.shot.detector.distortion;
+  std::vector<std::complex<double>> ideal;
+  std::vector<std::complex<double>> rectified;
+  for (int v = 0; v < 512; v += 16)
+    for (int u = 0; u < 512; u += 16) {
+      if ((Vector2d(u, v) - distortion.centre_px).norm() > 170) continue;
+      const Vector2d a = distortion.ideal_from_raw({u, v});
+      const Vector2d b = map.rectified_from_raw({u, v}).value();
+      ideal.emplace_back(a.x(), a.y());
+      rectified.emplace_back(b.x(), b.y());
+    }
+  // With complex numbers a similarity is a straight line.
+  const auto middle = [](const auto& z) { return std::accumulate(z.begin(), z.end(), 0i) / double(z.size()); };
+  const std::complex<double> from = middle(ideal);
+  const std::complex<double> to = middle(rectified);
+  std::complex<double> mixed;
+  double squares = 0;
+  for (std::size_t k = 0; k < ideal.size(); ++k) {
+    mixed += std::conj(ideal[k] - from) * (rectified[k] - to);
+    squares += std::norm(ideal[k] - from);
+  }
+  Misfit misfit{0, 0};
+  for (std::size_t k = 0; k < ideal.size(); ++k) {
+    const double miss = std::abs(rectified[k] - to - mixed / squares * (ideal[k] - from));
+    misfit.rms += miss * miss / double(ideal.size());
+    misfit.max = std::max(misfit.max, miss);
+  }
+  misfit.rms = std::sqrt(misfit.rms);
+  return misfit;
+}
+
+TEST(Rectify, FindsEveryClearDotOfThePlate) {
+  const auto& dots = room().views[0].plate_dots;
+  const auto clear = std::count_if(dots.begin(), dots.end(),
+                                   [](const auto& dot) { return dot.visibility == simulation::Visibility::clear; });
+  EXPECT_GE(rectified_ap().dots_found, clear - 2);
+  EXPECT_EQ(rectified_ap().dots_expected, 48);
+  EXPECT_EQ(rectified_ap().metal, Polarity::dark);
+}
+
+TEST(Rectify, DotsLieWithinATenthOfAPixelOfTheTruth) {
+  int near = 0;
+  for (const Dot& dot : rectified_ap().plate_dots)
+    for (const auto& truth : room().views[0].plate_dots)
+      if (truth.visibility == simulation::Visibility::clear && (truth.raw - dot.centre_px).norm() < 0.1) ++near;
+  EXPECT_GE(near, 0.9 * rectified_ap().dots_found);
+}
+
+TEST(Rectify, ResidualsAreSmallAndAddUp) {
+  const Rectification& result = rectified_ap();
+  ASSERT_EQ(result.residual_px.size(), result.plate_dots.size());
+  double squares = 0;
+  for (const double r : result.residual_px) squares += r * r;
+  EXPECT_NEAR(result.map.residual_rms_px, std::sqrt(squares / double(result.residual_px.size())), 1e-9);
+  EXPECT_LT(result.map.residual_rms_px, 0.15);
+  EXPECT_GT(result.map.held_out_rms_px, result.map.residual_rms_px);
+  EXPECT_GT(result.raw_mean_px, 1);
+  EXPECT_GT(result.raw_max_px, result.raw_mean_px);
+}
+
+TEST(Rectify, RectifiedPictureIsTheIdealOneUpToASimilarity) {
+  const Misfit best = misfit_of(rectified_ap().map, room().views[0]);
+  EXPECT_LT(best.rms, 0.2);
+  EXPECT_LT(best.max, 0.6);
+}
+
+TEST(Rectify, PixelSizeIsTheDetectors) {
+  ASSERT_TRUE(rectified_ap().map.rectified_pixel_mm);
+  EXPECT_EQ(rectified_ap().map.rectified_plane, RectifiedPlane::detector);
+  EXPECT_NEAR(*rectified_ap().map.rectified_pixel_mm / room().views[0].shot.pixel_mm(), 1, 0.01);
+}
+
+TEST(Rectify, WithoutDistancePixelSizeIsThePlates) {
+  Exposure exposure = exposure_of(room().views[0]);
+  exposure.acquisition.source_detector_mm.reset();
+  const auto result = rectify(exposure, plate48(), {});
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->map.rectified_plane, RectifiedPlane::plate);
+  EXPECT_NEAR(*result->map.rectified_pixel_mm * 997 / (997 - 15) / *rectified_ap().map.rectified_pixel_mm, 1, 1e-3);
+}
+
+TEST(Rectify, InvertedPictureGivesTheSameMap) {
+  Exposure inverted = exposure_of(room().views[0]);
+  for (float& grey : inverted.pixels.pixels()) grey = inverted.highest - grey;
+  const auto result = rectify(inverted, plate48(), {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->metal, Polarity::bright);
+  double most = 0;
+  for (const auto& dot : room().views[0].plate_dots)
+    if (const auto seen = rectified_ap().map.rectified_from_raw(dot.raw); seen && (dot.raw - Vector2d(256, 256)).norm() < 200)
+      most = std::max(most, (result->map.raw_from_rectified(*seen) - dot.raw).norm());
+  EXPECT_LT(most, 0.02);
+}
+
+TEST(Rectify, PaperMethodIsAQuadraticAndWorse) {
+  RectificationOptions options;
+  options.method = Method::paper;
+  const auto result = rectify(exposure_of(room().views[0]), plate48(), options);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->map.order, 2);
+  EXPECT_EQ(result->map.knots.rows(), 0);
+  EXPECT_GE(result->dots_found, 25);
+  EXPECT_GT(misfit_of(result->map, room().views[0]).rms, 2 * misfit_of(rectified_ap().map, room().views[0]).rms);
+}
+
+TEST(Rectify, OrderIsTheOneAskedFor) {
+  RectificationOptions options;
+  options.order = 4;
+  const auto result = rectify(exposure_of(room().views[0]), plate48(), options);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->map.order, 4);
+  EXPECT_EQ(result->map.knots.rows(), 0);
+}
+
+TEST(Rectify, PlateOfAnotherPitchIsAMismatch) {
+  Plate other = plate48();
+  other.pitch_mm = 20;
+  for (Vector2d& place : other.dots_mm) place *= 0.8;
+  const auto result = rectify(exposure_of(room().views[0]), other, {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+  EXPECT_NEAR(result.error().figures.at("pitch_mm"), 25, 0.5);
+}
+
+TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
+  for (const auto& ball : room().views[0].balls) {
+    if (ball.visibility != simulation::Visibility::clear) continue;
+    const auto& dots = rectified_ap().other_dots;
+    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 1; }))
+        << ball.name;
+  }
+}
+
+/// Some dots here and there, on no lattice.
+Exposure strewn(const drawn::Shade& shade) {
+  Image<float> picture = drawn::grey(shade, 1200);
+  RandomStream random(1, 1);
+  for (int v = 0; v < picture.height(); ++v)
+    for (int u = 0; u < picture.width(); ++u) picture(u, v) -= 2 * float(u);
+  drawn::add_noise(picture, 10, random);
+  return drawn::exposure(std::move(picture));
+}
+
+TEST(Rectify, PictureWithoutPlateIsRefused) {
+  drawn::Shade shade(256, 256);
+  for (const Vector2d& place : {Vector2d(60, 70), Vector2d(190, 40), Vector2d(140, 199), Vector2d(77, 150)})
+    drawn::add_ball(shade, place, 5, 0.9, 3);
+  const auto result = rectify(strewn(shade), plate48(), {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_not_found);
+}
+
+TEST(Rectify, BlankAndSaturatedPicturesAreRefused) {
+  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 1800)), plate48(), {}).error().reason, Reason::blank_image);
+  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 4095)), plate48(), {}).error().reason, Reason::saturated);
+  EXPECT_EQ(without_plate(drawn::exposure(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
+}
+
+TEST(Rectify, PlateOfHoles) {
+  Plate plate = plate48();
+  plate.kind = DotKind::holes;
+  plate.diameter_mm = 5;
+  drawn::Shade shade(384, 384);
+  for (const Vector2d& place : plate.dots_mm) drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
+  Image<float> picture = drawn::grey(shade, -1200);
+  RandomStream random(1, 1);
+  drawn::add_noise(picture, 10, random);
+  const auto result = rectify(drawn::exposure(std::move(picture)), plate, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->dots_found, 48);
+  EXPECT_EQ(result->metal, Polarity::dark);
+  EXPECT_LT(result->map.residual_rms_px, 0.03);
+  EXPECT_LT(result->raw_max_px, 0.1);
+}
+
+TEST(WithMap, ItsOwnMapIsAcceptedAndTheBallsFound) {
+  const auto result = with_map(exposure_of(room().views[0]), rectified_ap().map, plate48());
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(to_json(result->map), to_json(rectified_ap().map));
+  EXPECT_GE(result->other_dots.size(), 10u);
+}
+
+TEST(WithMap, MapOfAnotherAngleIsAMismatch) {
+  // Three pixels more of S distortion at the edge, as the earth's field gives it when the arm turns.
+  DistortionMap turned = rectified_ap().map;
+  ASSERT_GE(turned.order, 3);
+  Eigen::Matrix<double, 4, 2> twist;
+  twist << 0, 3, -3, 0, 0, 3, -3, 0;
+  turned.coefficients.middleRows(6, 4) += twist;
+  const auto result = with_map(exposure_of(room().views[0]), turned, plate48());
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+}
+
+TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
+  const auto result = with_map(exposure_of(room().views[0]), identity_map(1024, 1024, {}), {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+}
+
+TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
+  const auto result = without_plate(exposure_of(room().views[0]));
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->map.is_identity());
+  EXPECT_NEAR(*result->map.rectified_pixel_mm, room().views[0].shot.pixel_mm(), 1e-12);
+  EXPECT_FALSE(result->dots_expected);
+}
+
+TEST(Resample, TakesEachPixelFromWhereTheMapSays) {
+  Exposure ramp = exposure_of(room().views[0]);
+  for (int v = 0; v < 512; ++v)
+    for (int u = 0; u < 512; ++u) ramp.pixels(u, v) = 1000 + 3 * float(u) - 2 * float(v);
+  const DistortionMap& map = rectified_ap().map;
+  const Image<float> picture = resample(ramp, map);
+  for (int v = 60; v < 450; v += 13)
+    for (int u = 60; u < 450; u += 13) {
+      const Vector2d raw = map.raw_from_rectified({u, v});
+      EXPECT_NEAR(picture(u, v), 1000 + 3 * raw.x() - 2 * raw.y(), 0.15);  // remap steps by 1/32 px
+    }
+}
+
+TEST(Resample, OutsideTheRawPictureIsBlack) {
+  Exposure white = exposure_of(room().views[0]);
+  white.lowest = 7;
+  std::fill(white.pixels.pixels().begin(), white.pixels.pixels().end(), 3000.f);
+  DistortionMap shifted = identity_map(512, 512, {});
+  shifted.order = 1;
+  shifted.coefficients.resize(3, 2);
+  shifted.coefficients << 100, 0, 1, 0, 0, 1;
+  const Image<float> picture = resample(white, shifted);
+  EXPECT_EQ(picture(500, 100), 7);
+  EXPECT_EQ(picture(300, 100), 3000);
+}
+
+TEST(Resample, IdentityLeavesThePixels) {
+  const Exposure exposure = exposure_of(room().views[0]);
+  const Image<float> picture = resample(exposure, identity_map(512, 512, {}));
+  EXPECT_TRUE(std::equal(picture.pixels().begin(), picture.pixels().end(), exposure.pixels.pixels().begin()));
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/test_grid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "helicarm/detection/drawn_picture.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr int side = 192;
+const Vector2d middle(95.5, 95.5);
+
+/// 7 x 7 crossings, 30 px apart, a little turned.
+std::vector<Dot> grid() {
+  std::vector<Dot> crosses;
+  for (int j = -3; j <= 3; ++j)
+    for (int i = -3; i <= 3; ++i) {
+      Dot cross;
+      cross.centre_px = middle + Vector2d(0.4, -0.3) + 30 * (Eigen::Rotation2Dd(0.05) * Vector2d(i, j));
+      crosses.push_back(cross);
+    }
+  return crosses;
+}
+
+Vector2d pincushion(const Vector2d& p) {
+  const Vector2d t = (p - middle) / 128;
+  return p + 5 * t.squaredNorm() * t;
+}
+
+DistortionMap pincushion_map() {
+  DistortionMap map = identity_map(side, side, {});
+  map.order = 3;
+  map.centre = middle;
+  map.scale = 128;
+  map.coefficients = Eigen::MatrixX2d::Zero(10, 2);
+  map.coefficients.topRows(3) << middle.transpose(), 128, 0, 0, 128;
+  map.coefficients.bottomRows(4) << 5, 0, 0, 5, 5, 0, 0, 5;
+  return map;
+}
+
+TEST(MeasureTestGrid, PerfectGridHasNoError) {
+  const auto measured = measure_test_grid(grid(), identity_map(side, side, {}));
+  ASSERT_TRUE(measured);
+  EXPECT_EQ(measured->crosses, 49);
+  EXPECT_LT(measured->raw.max_px, 1e-9);
+  EXPECT_LT(measured->rectified.max_px, 1e-9);
+}
+
+TEST(MeasureTestGrid, OneMovedCornerIsTheGreatestErrorAndItsShareTheMean) {
+  auto crosses = grid();
+  crosses.front().centre_px += Vector2d(-1.2, 1.6);
+  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  ASSERT_TRUE(measured);
+  EXPECT_NEAR(measured->raw.max_px, 2, 1e-9);
+  EXPECT_NEAR(measured->raw.mean_px, 2.0 / 49, 1e-9);
+}
+
+TEST(MeasureTestGrid, TheRightMapTakesTheDistortionAway) {
+  auto crosses = grid();
+  for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
+  const auto measured = measure_test_grid(crosses, pincushion_map());
+  ASSERT_TRUE(measured);
+  EXPECT_GT(measured->raw.max_px, 4);
+  EXPECT_LT(measured->rectified.max_px, 1e-8);
+}
+
+TEST(MeasureTestGrid, WithoutItsMiddleIsRefused) {
+  auto crosses = grid();
+  std::erase_if(crosses, [](const Dot& cross) {  // two rows are left
+    return cross.centre_px.y() - middle.y() < -40 || cross.centre_px.y() - middle.y() > 12;
+  });
+  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  ASSERT_FALSE(measured);
+  EXPECT_EQ(measured.error().reason, Reason::too_few_fiducials);
+  EXPECT_EQ(measure_test_grid({}, identity_map(side, side, {})).error().reason, Reason::too_few_fiducials);
+}
+
+/// Five wires each way.
+drawn::Shade wires() {
+  std::vector<drawn::Wire> wires;
+  for (int k = -2; k <= 2; ++k) {
+    const Vector2d offset = 30.3 * Vector2d(k, k);
+    wires.push_back({{-5, middle.y() + offset.y()}, {197, middle.y() + offset.y() + 4}});
+    wires.push_back({{middle.x() + offset.x() + 2, -5}, {middle.x() + offset.x() - 2, 197}});
+  }
+  drawn::Shade shade(side, side);
+  drawn::add_wires(shade, wires, 2.2, 0.9);
+  return shade;
+}
+
+Exposure noisy(const drawn::Shade& shade) {
+  RandomStream random(4, 2);
+  Image<float> picture = drawn::grey(shade, 1200);
+  drawn::add_noise(picture, 12, random);
+  return drawn::exposure(std::move(picture));
+}
+
+TEST(FindGrid, EveryCrossingOfAGridOfWires) {
+  const auto crosses = find_grid(noisy(wires()));
+  EXPECT_EQ(crosses.size(), 25u);
+  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  ASSERT_TRUE(measured);
+  EXPECT_LT(measured->raw.max_px, 0.5);  // the wires themselves are not quite square
+}
+
+TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
+  const Vector2d crossing = middle + Vector2d(30.3, 30.3);
+  drawn::Shade shade = wires();
+  drawn::add_ball(shade, crossing + Vector2d(9, 10), 5, 0.9, 3);
+  const auto crosses = find_grid(noisy(shade));
+  EXPECT_GE(crosses.size(), 24u);
+  const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
+  ASSERT_TRUE(measured);
+  EXPECT_LT(measured->raw.max_px, 0.5);
+}
+
+TEST(FindGrid, EmptyFieldHasNoCrossings) { EXPECT_TRUE(find_grid(noisy(drawn::Shade(side, side))).empty()); }
+
+}  // namespace
+}  // namespace helicarm
