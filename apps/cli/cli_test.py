@@ -58,20 +58,36 @@ class CommandLine(unittest.TestCase):
     def test_unusable_input_is_exit_2_and_leaves_no_old_result(self):
         out = self.root / "stale"
         out.mkdir()
-        (out / "result.json").write_text("{}")
+        for name in ("result.json", "report.html"):
+            (out / name).write_text("{}")
         done = run("run", self.root / "nowhere", "--out", out)
         self.assertEqual(done.returncode, 2)
         self.assertIn("missing_file", done.stderr)
         self.assertEqual(done.stdout, "")
-        self.assertFalse((out / "result.json").exists())
+        self.assertEqual(list(out.iterdir()), [])
 
     def test_wrong_usage_is_exit_2(self):
-        for words in ([], ["run"], ["fly"], ["run", "x", "--colour"], ["demo", "--seed", "-1"], ["rectify"],
+        for words in ([], ["run"], ["fly"], ["run", "x", "--colour"], ["demo", "--seed", "-1"], ["demo", "--seed", "1e30"],
+                      ["run", "x", "--max-error", "nan"], ["detect", "x", "--frame", "0"], ["rectify"],
                       ["run", "x", "--method", "worst"], ["detect", "x", "--kind", "cats"]):
             done = run(*words, "--json")
             self.assertEqual(done.returncode, 2, words)
             self.assertIn("helicarm: usage: ", done.stderr)
             self.assertEqual(json.loads(done.stdout)["failure"]["code"], "usage")
+
+    def test_quiet_prints_only_failures(self):
+        points = self.root / "solve.csv"
+        points.write_text("label,x_mm,y_mm,z_mm,u_px,v_px\n" + "".join(
+            f"P{i},{x},{y},{z},{5 * x * 1000 / (1000 + z)},{5 * y * 1000 / (1000 + z)}\n"
+            for i, (x, y, z) in enumerate([(0, 0, 0), (50, 0, 0), (0, 50, 0), (0, 0, 50), (50, 50, 0), (50, 0, 50), (0, 50, 50)])))
+        done = run("solve", "--points", points, "--quiet")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", ""))
+        self.assertIn("intrinsics", json.loads(run("solve", "--points", points, "--quiet", "--json").stdout))
+
+    def test_export_names_its_files_as_json(self):
+        drawing = self.root / "calibrator.svg"
+        done = run("phantom", "export", "--svg", drawing, "--json")
+        self.assertEqual(json.loads(done.stdout), {"written": [str(drawing)]})
 
     def test_help_teaches_with_an_example(self):
         for command in ("demo", "run", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):

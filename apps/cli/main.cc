@@ -35,6 +35,17 @@ CLI::App* add_command(CLI::App& app, const char* name, const char* what, const c
   return command;
 }
 
+/// A number within bounds that the message names. CLI11's own checks let NaN pass.
+CLI::Validator within(double low, double high) {
+  const std::string bounds = fmt::format("{:g} to {:g}", low, high);
+  const auto check = [=](const std::string& word) -> std::string {
+    double value = 0;
+    const bool good = CLI::detail::lexical_cast(word, value) && value >= low && value <= high;
+    return good ? std::string{} : fmt::format("{} is not a number of {}", word, bounds);
+  };
+  return {check, bounds};
+}
+
 /// A command whose arguments live as long as its callback.
 template <class Arguments>
 Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(const Arguments&, Console&)) {
@@ -55,7 +66,7 @@ void add_run(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--method", a.method, "best, or paper: the published recipe")->capture_default_str();
   command->add_option("--max-error", a.max_error_mm, "Refuse when a point may be off by more, mm (95 %)")
-      ->check(CLI::Range(1e-6, 1000.0));
+      ->check(within(1e-6, 1000));
   command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
 
@@ -94,13 +105,13 @@ void add_rectify(CLI::App& app, Action& action) {
                   "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
   auto& a = arguments_of(command, action, rectify_command);
   command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF");
-  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(CLI::PositiveNumber);
+  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(within(1, 100000));
   command->add_option("--plate", a.plate, "plate.json, or plate48");
   command->add_option("--map", a.map, "map.json of an earlier rectification");
   command->add_option("--points", a.points, "CSV: u_px,v_px, raw pixels");
   command->add_flag("--inverse", a.inverse, "The points are rectified pixels; give raw ones");
   command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
-      ->check(CLI::PositiveNumber);
+      ->check(within(0.1, 1000));
   command->add_option("--out", a.out, "Folder for rectified.dcm, map.json and residuals.csv")
       ->capture_default_str();
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
@@ -112,7 +123,7 @@ void add_detect(CLI::App& app, Action& action) {
                               "helicarm detect AP.dcm --kind balls --json");
   auto& a = arguments_of(command, action, detect_command);
   command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF")->required();
-  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(CLI::PositiveNumber);
+  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(within(1, 100000));
   command->add_option("--kind", a.kind, "balls, holes or crosses")->capture_default_str();
 }
 
@@ -181,10 +192,10 @@ int run(int argc, char** argv) {
   app.fallthrough();
   app.require_subcommand(1);
   app.add_flag("--json", console.json, "Print the answer as JSON");
-  app.add_flag("--quiet", console.quiet, "Print nothing but failures");
-  app.add_option("--threads", console.threads, "Threads to use; 0: all cores")->check(CLI::Range(0, 1024));
+  app.add_flag("--quiet", console.quiet, "Print nothing but failures, and what --json asks for");
+  app.add_option("--threads", console.threads, "Threads to use; 0: all cores")->check(within(0, 1024));
   app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")
-      ->check(CLI::NonNegativeNumber)
+      ->check(within(0, 1e19))
       ->capture_default_str();
   for (const auto add : {add_demo, add_run, add_solve, add_locate, add_rectify, add_detect, add_import,
                          add_simulate, add_phantom})
@@ -198,7 +209,14 @@ int run(int argc, char** argv) {
         std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
     return report({Reason::usage, error.what(), {}, {}}, console);
   }
-  const auto done = action(console);
+  std::ostream nowhere(nullptr);
+  Console heard{console.quiet && !console.json ? nowhere : console.out,
+                console.progress,
+                console.json,
+                console.quiet,
+                console.threads,
+                console.seed};
+  const auto done = action(heard);
   return done ? 0 : report(done.error(), console);
 }
 

@@ -113,6 +113,10 @@ void write(const Files& files, Console& console) {
     value_or_throw(write_file(path, bytes));
     if (!console.quiet) console.progress << fmt::format("wrote {} ({} bytes)\n", path.string(), bytes.size());
   }
+  if (!console.json) return;
+  Json written = Json::array();
+  for (const auto& file : files) written.push_back(file.first.string());
+  console.out << Json{{"written", written}}.dump(2) << "\n";
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ std::string statistics_line(std::string_view what, const Statistics& s) {
 /// A result of an earlier run must never pass for the answer of one that failed.
 void forget_earlier(const std::filesystem::path& out) {
   std::error_code ignored;
-  std::filesystem::remove(out / "result.json", ignored);
+  for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
 }
 
 /// A case whose description already allows no answer (a flat calibrator, say) is refused like any other.

@@ -85,7 +85,7 @@ bool JsonReader::has(const char* key) const {
 
 const Json& JsonReader::raw(const char* key) {
   static const Json null;
-  asked_.emplace_back(key);
+  if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.emplace_back(key);
   const auto found = value_->find(key);
   return found == value_->end() ? null : *found;
 }
@@ -126,6 +126,8 @@ std::string JsonReader::text(const char* key, std::size_t max_length) {
   auto text = value.get<std::string>();
   if (text.size() > max_length)
     refuse(Reason::bad_value, key, fmt::format("{} characters, limit {}", text.size(), max_length));
+  if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }))
+    refuse(Reason::bad_value, key, fmt::format("{} holds a control character", shorten(value)));
   return text;
 }
 

@@ -37,6 +37,7 @@ class JsonReader {
   double number(const char* key, Range range);
   std::optional<double> optional_number(const char* key, Range range);
   int integer(const char* key, int low, int high);
+  /// Without control characters: it may end up on a terminal or in a file's name.
   std::string text(const char* key, std::size_t max_length = 200);
   std::optional<std::string> optional_text(const char* key, std::size_t max_length = 200);
   bool boolean(const char* key, bool fallback);

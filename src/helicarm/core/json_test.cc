@@ -58,6 +58,18 @@ TEST(JsonReader, KeyNobodyAskedForIsUnknown) {
   EXPECT_EQ(failure.reason, Reason::unknown_key);
 }
 
+TEST(JsonReader, KnownKeysAreListedOnce) {
+  const Failure failure = failure_of(R"({"kind": "b", "sise": 5})", [](JsonReader& r) {
+    if (!r.raw("kind").is_null()) r.choice("kind", {"a", "b"});
+  });
+  EXPECT_EQ(failure.message, "x.json: \"sise\" is not a known key (known: kind)");
+}
+
+TEST(JsonReader, ControlCharacterInATextIsBadValue) {
+  for (const char* text : {R"({"name": "a\u0000b"})", R"({"name": "a\nb"})", R"({"name": "\u001b[31m"})"})
+    EXPECT_EQ(failure_of(text, [](JsonReader& r) { r.text("name"); }).reason, Reason::bad_value) << text;
+}
+
 TEST(JsonReader, MissingFieldIsBadValue) {
   EXPECT_EQ(failure_of("{}", [](JsonReader& r) { r.text("name"); }).reason, Reason::bad_value);
 }

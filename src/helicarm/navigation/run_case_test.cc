@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "helicarm/navigation/view_stages.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm {
@@ -66,6 +67,16 @@ TEST_F(SimulatedNavigation, SamePictureTwiceIsRefused) {
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::views_too_close);
   EXPECT_TRUE(result->views[0].exposure);
+}
+
+TEST_F(SimulatedNavigation, BlankPictureTwiceIsBlankFirst) {
+  ViewResult view{"AP", Exposure{}, {}, {}, {}};
+  view.exposure->pixels = Image<float>(64, 64);
+  view.exposure->highest = 4095;
+  view.exposure->acquisition.instance_key = "one";
+  const auto checked = check_pictures_belong_together({view, view});
+  ASSERT_FALSE(checked.has_value());
+  EXPECT_EQ(checked.error().reason, Reason::blank_image);
 }
 
 TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {

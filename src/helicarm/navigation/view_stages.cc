@@ -5,6 +5,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/navigation/prior.h"
+#include "helicarm/rectification/usable.h"
 #include "helicarm/xray/read_exposure.h"
 
 namespace helicarm {
@@ -43,9 +44,11 @@ Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& vie
       if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
         return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
                                                           views[j].name, views[i].name));
-      if (!a.instance_key.empty() && a.instance_key == b.instance_key)
+      if (a.instance_key.empty() || a.instance_key != b.instance_key) continue;
+      return check_usable(*views[i].exposure).and_then([&]() -> Expected<void> {
         return fail(Reason::views_too_close,
                     fmt::format("{} and {} are the same picture", views[j].name, views[i].name));
+      });
     }
   return {};
 }
