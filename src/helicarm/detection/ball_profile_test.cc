@@ -24,7 +24,8 @@ double mass(const BallProfile& profile) {
 
 TEST(BallProfile, FaintBallsMassIsHalfTheSpheresVolume) {
   // The chord is 2 sqrt(1 - r^2) and the profile half of it: 2 pi / 3.
-  for (const double blur : {0.08, 0.2, 0.45}) EXPECT_NEAR(mass(BallProfile(blur, 1e-3)) / (2 * pi / 3), 1, 2e-3);
+  for (const double blur : {0.08, 0.2, 0.45})
+    EXPECT_NEAR(mass(BallProfile(blur, 1e-3)) / (2 * pi / 3), 1, 2e-3);
 }
 
 TEST(BallProfile, OpaqueBallsMassIsTheDiscsArea) {

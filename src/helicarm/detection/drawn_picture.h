@@ -18,10 +18,11 @@ namespace helicarm::drawn {
 
 using Shade = Image<float>;  ///< share of the rays that is absorbed, 0 .. 1
 
-/// Adds what `absorbed(x, y)` says at the places within `reach` of `middle`: sampled on a fine grid, blurred there and
-/// averaged over each pixel's area.
+/// Adds what `absorbed(x, y)` says at the places within `reach` of `middle`: sampled on a fine grid, blurred
+/// there and averaged over each pixel's area.
 template <class Absorbed>
-void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double blur_px, Absorbed&& absorbed) {
+void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double blur_px,
+               Absorbed&& absorbed) {
   constexpr int fine = 8;
   const double rim = reach + 4 * blur_px + 1;
   const int u0 = static_cast<int>(std::floor(middle.x() - rim));
@@ -41,7 +42,8 @@ void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double
 }
 
 /// A ball whose diameter has the given absorbance, 1 at the centre of the sharp picture.
-inline void add_ball(Shade& shade, const Eigen::Vector2d& centre, double radius, double blur_px, double absorbance) {
+inline void add_ball(Shade& shade, const Eigen::Vector2d& centre, double radius, double blur_px,
+                     double absorbance) {
   add_shade(shade, centre, radius, blur_px, [&](double x, double y) {
     const double square = 1 - (Eigen::Vector2d(x, y) - centre).squaredNorm() / (radius * radius);
     return square > 0 ? std::expm1(-absorbance * std::sqrt(square)) / std::expm1(-absorbance) : 0;

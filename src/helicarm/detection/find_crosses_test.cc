@@ -78,7 +78,9 @@ TEST(FindCrosses, WireEndIsNone) {
   }
 }
 
-TEST(FindCrosses, NoisyEmptyFieldHasNone) { EXPECT_TRUE(find_crosses(noisy(drawn::Shade(128, 128)), {}).empty()); }
+TEST(FindCrosses, NoisyEmptyFieldHasNone) {
+  EXPECT_TRUE(find_crosses(noisy(drawn::Shade(128, 128)), {}).empty());
+}
 
 TEST(FitCross, DiscOverAnArmIsLeftOut) {
   const Vector2d place(64.3, 63.6);

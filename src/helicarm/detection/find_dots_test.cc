@@ -24,8 +24,9 @@ std::vector<Ball> some_balls() {
   RandomStream random(3, 1);
   for (int j = 0; j < 4; ++j)
     for (int i = 0; i < 4; ++i)
-      balls.push_back({Vector2d(36 + 60 * i, 36 + 60 * j) + Vector2d(random.uniform(-4, 4), random.uniform(-4, 4)),
-                       std::array{2.7, 4.0, 7.0, 13.0}[static_cast<std::size_t>((i + j) % 4)]});
+      balls.push_back(
+          {Vector2d(36 + 60 * i, 36 + 60 * j) + Vector2d(random.uniform(-4, 4), random.uniform(-4, 4)),
+           std::array{2.7, 4.0, 7.0, 13.0}[static_cast<std::size_t>((i + j) % 4)]});
   return balls;
 }
 
@@ -139,7 +140,8 @@ TEST(FindBlobs, StrongestFirstAndNoMoreThanAsked) {
   options.max_count = 5;
   const auto blobs = find_blobs(drawn::grey(shade_of(some_balls()), 1200), options);
   ASSERT_EQ(blobs.size(), 5u);
-  EXPECT_TRUE(std::is_sorted(blobs.begin(), blobs.end(), [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; }));
+  EXPECT_TRUE(std::is_sorted(blobs.begin(), blobs.end(),
+                             [](const Dot& a, const Dot& b) { return a.contrast > b.contrast; }));
 }
 
 }  // namespace

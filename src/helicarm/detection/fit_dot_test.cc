@@ -66,7 +66,8 @@ double error(const std::optional<Dot>& dot, const Vector2d& centre) {
 }
 
 /// Greatest error over sub-pixel places.
-double worst(double radius, double noise, const std::function<Image<float>(const drawn::Shade&)>& picture_of) {
+double worst(double radius, double noise,
+             const std::function<Image<float>(const drawn::Shade&)>& picture_of) {
   RandomStream random(5, 1);
   double most = 0;
   for (const double x : {0.0, 0.25, 0.5, 0.8})

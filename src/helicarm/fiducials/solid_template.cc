@@ -39,11 +39,15 @@ Span in_cylinder(const Vector3d& start, const Vector3d& along, const Vector3d& a
   const Vector3d p = start - start.dot(axis) * axis;
   const Vector3d d = along - along.dot(axis) * axis;
   const double a = d.squaredNorm();
-  if (a < 1e-12) return {0, 0};
-  const double b = p.dot(d) / a;
-  const double square = b * b - (p.squaredNorm() - radius * radius) / a;
-  if (square <= 0) return {0, 0};
-  Span span{-b - std::sqrt(square), -b + std::sqrt(square)};
+  Span span;
+  if (a < 1e-12) {  // along the axis
+    if (p.norm() >= radius) return {0, 0};
+  } else {
+    const double b = p.dot(d) / a;
+    const double square = b * b - (p.squaredNorm() - radius * radius) / a;
+    if (square <= 0) return {0, 0};
+    span = {-b - std::sqrt(square), -b + std::sqrt(square)};
+  }
   const double rise = along.dot(axis);
   const double foot = start.dot(axis);
   if (std::abs(rise) < 1e-12) return foot < low || foot > high ? Span{0, 0} : span;

@@ -79,7 +79,8 @@ TEST(DistortionMap, JacobianMatchesNumbers) {
   for (const Vector2d& place : {Vector2d(250, 260), Vector2d(30, 470), Vector2d(411.5, 77.25)})
     for (int axis = 0; axis < 2; ++axis) {
       const Vector2d step = h * Vector2d::Unit(axis);
-      const Vector2d numeric = (map.raw_from_rectified(place + step) - map.raw_from_rectified(place - step)) / (2 * h);
+      const Vector2d numeric =
+          (map.raw_from_rectified(place + step) - map.raw_from_rectified(place - step)) / (2 * h);
       EXPECT_LT((map.jacobian(place).col(axis) - numeric).norm(), 1e-8);
     }
 }

@@ -26,8 +26,8 @@ std::vector<Correspondence> plate(int n, const Bend& bend, double noise = 0, std
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
       const Vector2d place = pitch * Vector2d(i - 0.5 * (n - 1), j - 0.5 * (n - 1));
-      const Vector2d raw = Vector2d(255.5, 255.5) + 2 * (Eigen::Rotation2Dd(0.1) * place) + bend(place / 110) +
-                           noise * Vector2d(random.normal(), random.normal());
+      const Vector2d raw = Vector2d(255.5, 255.5) + 2 * (Eigen::Rotation2Dd(0.1) * place) +
+                           bend(place / 110) + noise * Vector2d(random.normal(), random.normal());
       dots.push_back({place, raw, 0.05});
     }
   return dots;
@@ -53,7 +53,8 @@ TEST(FitMap, ExactOnPolynomialData) {
   const auto fit = fit_map(dots, side, side, fixed(3));
   ASSERT_TRUE(fit);
   for (const Correspondence& dot : dots)
-    EXPECT_LT((fit->map.raw_from_rectified(fit->rectified_from_plate * dot.place_mm) - dot.raw_px).norm(), 1e-9);
+    EXPECT_LT((fit->map.raw_from_rectified(fit->rectified_from_plate * dot.place_mm) - dot.raw_px).norm(),
+              1e-9);
   EXPECT_LT(fit->map.residual_max_px, 1e-9);
   EXPECT_LT(fit->map.held_out_rms_px, 1e-8);
 }
@@ -64,7 +65,8 @@ TEST(FitMap, RectifiedDotsAreThePlateTurnedAndScaled) {
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->px_per_mm, 2, 1e-6);
   for (const Correspondence& dot : dots)
-    EXPECT_LT((*fit->map.rectified_from_raw(dot.raw_px) - fit->rectified_from_plate * dot.place_mm).norm(), 1e-8);
+    EXPECT_LT((*fit->map.rectified_from_raw(dot.raw_px) - fit->rectified_from_plate * dot.place_mm).norm(),
+              1e-8);
 }
 
 TEST(FitMap, RawScaleAndNoTurnAtTheMiddle) {
@@ -134,7 +136,8 @@ TEST(FitMap, RemainderFollowsALocalBump) {
   EXPECT_LT(full->map.held_out_rms_px, 0.9 * polynomial->map.held_out_rms_px);
   double most = 0;
   for (const Correspondence& dot : plate(24, bumpy))
-    most = std::max(most, (full->map.raw_from_rectified(full->rectified_from_plate * dot.place_mm) - dot.raw_px).norm());
+    most = std::max(
+        most, (full->map.raw_from_rectified(full->rectified_from_plate * dot.place_mm) - dot.raw_px).norm());
   EXPECT_LT(most, 0.25);
 }
 
@@ -190,7 +193,8 @@ TEST(FitMap, SigmaCoversTheMapsOwnError) {
     for (std::size_t i = 0; i < exact.size(); i += 7) {
       const Vector2d rectified = fit->rectified_from_plate * exact[i].place_mm;
       const double sigma = fit->map.sigma_px(rectified);
-      squares += (fit->map.raw_from_rectified(rectified) - exact[i].raw_px).squaredNorm() / (2 * sigma * sigma);
+      squares +=
+          (fit->map.raw_from_rectified(rectified) - exact[i].raw_px).squaredNorm() / (2 * sigma * sigma);
       ++count;
     }
   }
@@ -205,7 +209,8 @@ TEST(FitMap, HullHoldsTheUsedDots) {
   EXPECT_LT((fit->map.hull_low - fit->rectified_from_plate * Vector2d(-110, 110)).x(), 1e-9);
   for (const Correspondence& dot : plate(7, straight)) {
     const Vector2d p = fit->rectified_from_plate * dot.place_mm;
-    EXPECT_TRUE((p.array() >= fit->map.hull_low.array() - 1e-9).all() && (p.array() <= fit->map.hull_high.array() + 1e-9).all());
+    EXPECT_TRUE((p.array() >= fit->map.hull_low.array() - 1e-9).all() &&
+                (p.array() <= fit->map.hull_high.array() + 1e-9).all());
   }
 }
 

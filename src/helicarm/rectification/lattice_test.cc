@@ -40,7 +40,8 @@ Scatter scatter(Lattice kind, const Trouble& trouble, std::uint64_t seed) {
       const Vector2d p = turn * (made.pitch * lattice_point({i, j}, kind)) + shift;
       if (p.norm() > 430 || random.uniform() < trouble.missing) continue;
       Dot dot;
-      dot.centre_px = Vector2d(500, 500) + (1 + trouble.pincushion_px / 430 * (p.squaredNorm() / (430 * 430))) * p +
+      dot.centre_px = Vector2d(500, 500) +
+                      (1 + trouble.pincushion_px / 430 * (p.squaredNorm() / (430 * 430))) * p +
                       0.3 * Vector2d(random.normal(), random.normal());
       made.dots.push_back(dot);
       made.index.emplace_back(i, j);
@@ -125,7 +126,9 @@ TEST_P(IndexLatticeOf, NoIndexAndNoDotTwice) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, IndexLatticeOf, testing::Values(Lattice::square, Lattice::hexagonal),
-                         [](const auto& kind) { return kind.param == Lattice::square ? "Square" : "Hexagonal"; });
+                         [](const auto& kind) {
+                           return kind.param == Lattice::square ? "Square" : "Hexagonal";
+                         });
 
 TEST(IndexLattice, AFewDotsAreNoLattice) {
   EXPECT_TRUE(index_lattice({}, Lattice::square, {}).dots.empty());

@@ -29,7 +29,8 @@ const Rectification& rectified_ap() {
   return result;
 }
 
-/// Rectified pixels differ from ideal ones by a similarity; distances from the best one at places inside the plate.
+/// Rectified pixels differ from ideal ones by a similarity; distances from the best one at places inside the
+/// plate.
 struct Misfit {
   double rms, max;
 };
@@ -46,7 +47,9 @@ Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
       rectified.emplace_back(b.x(), b.y());
     }
   // With complex numbers a similarity is a straight line.
-  const auto middle = [](const auto& z) { return std::accumulate(z.begin(), z.end(), 0i) / double(z.size()); };
+  const auto middle = [](const auto& z) {
+    return std::accumulate(z.begin(), z.end(), 0i) / double(z.size());
+  };
   const std::complex<double> from = middle(ideal);
   const std::complex<double> to = middle(rectified);
   std::complex<double> mixed;
@@ -67,8 +70,9 @@ Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
 
 TEST(Rectify, FindsEveryClearDotOfThePlate) {
   const auto& dots = room().views[0].plate_dots;
-  const auto clear = std::count_if(dots.begin(), dots.end(),
-                                   [](const auto& dot) { return dot.visibility == simulation::Visibility::clear; });
+  const auto clear = std::count_if(dots.begin(), dots.end(), [](const auto& dot) {
+    return dot.visibility == simulation::Visibility::clear;
+  });
   EXPECT_GE(rectified_ap().dots_found, clear - 2);
   EXPECT_EQ(rectified_ap().dots_expected, 48);
   EXPECT_EQ(rectified_ap().metal, Polarity::dark);
@@ -78,7 +82,8 @@ TEST(Rectify, DotsLieWithinATenthOfAPixelOfTheTruth) {
   int near = 0;
   for (const Dot& dot : rectified_ap().plate_dots)
     for (const auto& truth : room().views[0].plate_dots)
-      if (truth.visibility == simulation::Visibility::clear && (truth.raw - dot.centre_px).norm() < 0.1) ++near;
+      if (truth.visibility == simulation::Visibility::clear && (truth.raw - dot.centre_px).norm() < 0.1)
+        ++near;
   EXPECT_GE(near, 0.9 * rectified_ap().dots_found);
 }
 
@@ -112,7 +117,8 @@ TEST(Rectify, WithoutDistancePixelSizeIsThePlates) {
   const auto result = rectify(exposure, plate48(), {});
   ASSERT_TRUE(result);
   EXPECT_EQ(result->map.rectified_plane, RectifiedPlane::plate);
-  EXPECT_NEAR(*result->map.rectified_pixel_mm * 997 / (997 - 15) / *rectified_ap().map.rectified_pixel_mm, 1, 1e-3);
+  EXPECT_NEAR(*result->map.rectified_pixel_mm * 997 / (997 - 15) / *rectified_ap().map.rectified_pixel_mm, 1,
+              1e-3);
 }
 
 TEST(Rectify, InvertedPictureGivesTheSameMap) {
@@ -123,7 +129,8 @@ TEST(Rectify, InvertedPictureGivesTheSameMap) {
   EXPECT_EQ(result->metal, Polarity::bright);
   double most = 0;
   for (const auto& dot : room().views[0].plate_dots)
-    if (const auto seen = rectified_ap().map.rectified_from_raw(dot.raw); seen && (dot.raw - Vector2d(256, 256)).norm() < 200)
+    if (const auto seen = rectified_ap().map.rectified_from_raw(dot.raw);
+        seen && (dot.raw - Vector2d(256, 256)).norm() < 200)
       most = std::max(most, (result->map.raw_from_rectified(*seen) - dot.raw).norm());
   EXPECT_LT(most, 0.02);
 }
@@ -136,7 +143,8 @@ TEST(Rectify, PaperMethodIsAQuadraticAndWorse) {
   EXPECT_EQ(result->map.order, 2);
   EXPECT_EQ(result->map.knots.rows(), 0);
   EXPECT_GE(result->dots_found, 25);
-  EXPECT_GT(misfit_of(result->map, room().views[0]).rms, 2 * misfit_of(rectified_ap().map, room().views[0]).rms);
+  EXPECT_GT(misfit_of(result->map, room().views[0]).rms,
+            2 * misfit_of(rectified_ap().map, room().views[0]).rms);
 }
 
 TEST(Rectify, OrderIsTheOneAskedFor) {
@@ -162,8 +170,9 @@ TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
   for (const auto& ball : room().views[0].balls) {
     if (ball.visibility != simulation::Visibility::clear) continue;
     const auto& dots = rectified_ap().other_dots;
-    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 1; }))
-        << ball.name;
+    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {
+      return (dot.centre_px - ball.raw).norm() < 1;
+    })) << ball.name;
   }
 }
 
@@ -187,8 +196,10 @@ TEST(Rectify, PictureWithoutPlateIsRefused) {
 }
 
 TEST(Rectify, BlankAndSaturatedPicturesAreRefused) {
-  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 1800)), plate48(), {}).error().reason, Reason::blank_image);
-  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 4095)), plate48(), {}).error().reason, Reason::saturated);
+  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 1800)), plate48(), {}).error().reason,
+            Reason::blank_image);
+  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 4095)), plate48(), {}).error().reason,
+            Reason::saturated);
   EXPECT_EQ(without_plate(drawn::exposure(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
 }
 
@@ -197,7 +208,8 @@ TEST(Rectify, PlateOfHoles) {
   plate.kind = DotKind::holes;
   plate.diameter_mm = 5;
   drawn::Shade shade(384, 384);
-  for (const Vector2d& place : plate.dots_mm) drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
+  for (const Vector2d& place : plate.dots_mm)
+    drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
   Image<float> picture = drawn::grey(shade, -1200);
   RandomStream random(1, 1);
   drawn::add_noise(picture, 10, random);

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/fiducials/find_fiducials.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/rectification/simulated_exposure.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+using simulation::CaseKind;
+using simulation::Fault;
+using simulation::SimulatedCase;
+using simulation::SimulatedView;
+using simulation::Visibility;
+
+const SimulatedCase& sound_case() {
+  static const SimulatedCase room = small_case(5, CaseKind::accuracy);
+  return room;
+}
+
+/// The lateral view mirrored, two stray balls, two of the calibrator's lost.
+const SimulatedCase& faulty_case() {
+  static const SimulatedCase room =
+      small_case(7, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
+  return room;
+}
+
+FoundFiducials found_in(const SimulatedCase& room, const SimulatedView& view, Method method = Method::best) {
+  const Exposure exposure = exposure_of(view);
+  RectificationOptions options;
+  options.method = method;
+  const Rectification rectification = rectify(exposure, *room.plate, options).value();
+  return find_fiducials(exposure, rectification, room.calibrator, method).value();
+}
+
+/// Every used ball is where it truly is, and every clear one is used.
+void expect_right(const FoundFiducials& found, const SimulatedView& view, double tolerance_px) {
+  ASSERT_EQ(found.fiducials.size(), view.balls.size());
+  for (std::size_t k = 0; k < view.balls.size(); ++k) {
+    const Fiducial& fiducial = found.fiducials[k];
+    EXPECT_EQ(fiducial.label, view.balls[k].name);
+    if (view.balls[k].visibility == Visibility::clear) {
+      EXPECT_EQ(fiducial.status, FiducialStatus::used) << fiducial.label;
+    }
+    if (fiducial.status != FiducialStatus::used) continue;
+    EXPECT_LT((fiducial.uv_raw - view.balls[k].raw).norm(), tolerance_px) << fiducial.label;
+    EXPECT_GT(fiducial.sigma_px, 0);
+  }
+}
+
+TEST(FindFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
+  for (const SimulatedView& view : sound_case().views) {
+    const FoundFiducials found = found_in(sound_case(), view);
+    expect_right(found, view, 0.1);
+    EXPECT_FALSE(found.mirrored);
+    EXPECT_GT(found.view.intrinsics.fx, 0);
+    EXPECT_GT(found.ambiguity, 1);
+  }
+}
+
+TEST(FindFiducials, RectifiedPlaceIsTheRawOnesOwn) {
+  const Exposure exposure = exposure_of(sound_case().views[0]);
+  const Rectification rectification = rectify(exposure, plate48(), {}).value();
+  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  ASSERT_TRUE(found);
+  for (const Fiducial& fiducial : found->fiducials)
+    if (fiducial.status == FiducialStatus::used) {
+      EXPECT_LT((rectification.map.raw_from_rectified(fiducial.uv) - fiducial.uv_raw).norm(), 1e-8);
+    }
+}
+
+TEST(FindFiducials, MirroredLateralViewIsSeenToBeMirrored) {
+  const FoundFiducials found = found_in(faulty_case(), faulty_case().views[1]);
+  EXPECT_TRUE(found.mirrored);
+  EXPECT_LT(found.view.intrinsics.fx, 0);
+  expect_right(found, faulty_case().views[1], 0.1);
+  EXPECT_FALSE(found_in(faulty_case(), faulty_case().views[0]).mirrored);
+}
+
+TEST(FindFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
+  for (const SimulatedView& view : faulty_case().views) {
+    const FoundFiducials found = found_in(faulty_case(), view);
+    for (const Fiducial& fiducial : found.fiducials)
+      if (fiducial.label == "P4" || fiducial.label == "P9") {
+        EXPECT_NE(fiducial.status, FiducialStatus::used) << view.shot.name << " " << fiducial.label;
+      }
+    EXPECT_GE(found.false_blobs.size(), 1u) << view.shot.name;
+    for (const Dot& blob : found.false_blobs)
+      for (const Fiducial& fiducial : found.fiducials)
+        if (fiducial.status == FiducialStatus::used) {
+          EXPECT_GT((blob.centre_px - fiducial.uv_raw).norm(), 2);
+        }
+  }
+}
+
+TEST(FindFiducials, BallOutOfTheFieldIsOutside) {
+  Exposure exposure = exposure_of(sound_case().views[0]);
+  const auto& lost = sound_case().views[0].balls[5];
+  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  for (int v = 0; v < 512; ++v)
+    for (int u = 0; u < 512; ++u)
+      if ((Vector2d(u, v) - lost.raw).norm() < 10) exposure.pixels(u, v) = exposure.lowest;
+  std::erase_if(rectification.other_dots,
+                [&](const Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
+  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  ASSERT_TRUE(found) << found.error().message;
+  for (const Fiducial& fiducial : found->fiducials)
+    EXPECT_EQ(fiducial.status == FiducialStatus::outside, fiducial.label == lost.name) << fiducial.label;
+}
+
+TEST(FindFiducials, BallTheSearchMissedIsRescued) {
+  const Exposure exposure = exposure_of(sound_case().views[0]);
+  const auto& ball = sound_case().views[0].balls[6];
+  ASSERT_EQ(ball.visibility, Visibility::clear);
+  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  std::erase_if(rectification.other_dots,
+                [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
+  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->fiducials[6].status, FiducialStatus::used);
+  EXPECT_LT((found->fiducials[6].uv_raw - ball.raw).norm(), 0.1);
+}
+
+TEST(FindFiducials, WithoutCandidatesIsRefused) {
+  const Exposure exposure = exposure_of(sound_case().views[0]);
+  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  rectification.other_dots.clear();
+  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
+}
+
+TEST(FindFiducials, PaperMethodNamesTheBallsWithinAPixelAndAHalf) {
+  const FoundFiducials found = found_in(sound_case(), sound_case().views[0], Method::paper);
+  int used = 0;
+  for (std::size_t k = 0; k < found.fiducials.size(); ++k) {
+    if (found.fiducials[k].status != FiducialStatus::used) continue;
+    ++used;
+    EXPECT_LT((found.fiducials[k].uv_raw - sound_case().views[0].balls[k].raw).norm(), 1.5);
+  }
+  EXPECT_GE(used, 6);
+}
+
+}  // namespace
+}  // namespace helicarm

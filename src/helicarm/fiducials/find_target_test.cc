@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/fiducials/find_target.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/fiducials/solid_template.h"
+#include "helicarm/rectification/simulated_exposure.h"
+#include "helicarm/simulation/develop.h"
+#include "helicarm/simulation/render_view.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using simulation::SimulatedCase;
+using simulation::SimulatedView;
+using simulation::Visibility;
+
+/// A flat panel, so that rectified, ideal and raw pixels are the same; the lateral view is mirrored.
+const SimulatedCase& room() {
+  static const SimulatedCase simulated =
+      small_case(5, simulation::CaseKind::flat, {simulation::Fault::mirrored});
+  return simulated;
+}
+
+DistortionMap straight() { return identity_map(512, 512, {}); }
+
+/// One target of each kind in soft tissue that grows thicker sideways, in a picture of 256 pixels.
+struct Bench {
+  View view{{3300, 3300, 127, 126}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  std::vector<CalibratorTarget> targets = {
+      {"ball", {-12.3, -10.1, 3}, TargetKind::ball, 3, {}, 0},
+      {"cross", {9.7, -8.2, -4}, TargetKind::cross, 2, {Vector3d(0.8, 0.6, 0), Vector3d(-0.6, 0.8, 0)}, 16},
+      {"end", {-9.2, 11.4, 5}, TargetKind::line_end, 2, {Vector3d(0.96, 0.28, 0)}, 20}};
+  Exposure exposure;
+
+  explicit Bench(bool mirrored) {
+    const simulation::Body tissue{
+        "tissue", {simulation::ellipsoid({25, 10, 0}, {90, 70, 40})}, simulation::material::muscle};
+    const auto wire = [&](std::size_t k, const Vector3d& axis, double from, double to) {
+      const Vector3d& at = targets[k].point_in_calibrator;
+      return simulation::cylinder(at + from * axis, at + to * axis, 1);
+    };
+    const simulation::Scene scene = {
+        tissue, simulation::steel("ball", {simulation::sphere(targets[0].point_in_calibrator, 1.5)}),
+        simulation::steel(
+            "cross", {wire(1, targets[1].directions[0], -8, 8), wire(1, targets[1].directions[1], -8, 8)}),
+        simulation::steel("end", {wire(2, targets[2].directions[0], 0, 20)})};
+    simulation::VirtualDetector detector;
+    detector.width = detector.height = 256;
+    auto pixels = simulation::develop(simulation::render_view(scene, detector, view), {}, 1, 1);
+    if (mirrored) {
+      pixels = simulation::mirrored(pixels);
+      view.intrinsics.fx = -view.intrinsics.fx;
+      view.intrinsics.u0 = 255 - view.intrinsics.u0;
+    }
+    exposure.pixels = Image<float>(256, 256);
+    std::copy(pixels.pixels().begin(), pixels.pixels().end(), exposure.pixels.pixels().begin());
+  }
+};
+
+/// The view as a calibration would have it: a pixel or two off.
+void expect_found(std::size_t k) {
+  for (const bool mirrored : {false, true}) {
+    const Bench bench(mirrored);
+    View off = bench.view;
+    off.intrinsics.u0 += 1.3;
+    off.intrinsics.v0 -= 0.8;
+    const auto found = find_target(bench.exposure, identity_map(256, 256, {}), off, bench.targets[k], {});
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_LT((found->uv - bench.view.project(bench.targets[k].point_in_calibrator)).norm(), 0.1) << mirrored;
+    EXPECT_EQ(found->uv, found->uv_raw);
+    EXPECT_LT(found->sigma_px, 0.1);
+  }
+}
+
+TEST(FindTarget, BallWithinATenthOfAPixel) { expect_found(0); }
+TEST(FindTarget, CrossWithinATenthOfAPixel) { expect_found(1); }
+TEST(FindTarget, LineEndWithinATenthOfAPixel) { expect_found(2); }
+
+TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
+  for (const SimulatedView& view : room().views)
+    for (const std::size_t k : {1u, 2u}) {
+      if (view.targets[k].visibility != Visibility::clear) continue;
+      const auto found = find_target(exposure_of(view), straight(), view.shot.stored_view(),
+                                     room().calibrator.targets[k], {});
+      ASSERT_TRUE(found) << found.error().message;
+      EXPECT_LT((found->uv - view.targets[k].ideal).norm(), 0.1)
+          << view.shot.name << " " << view.targets[k].name;
+    }
+}
+
+TEST(FindTarget, NothingThereIsNotFound) {
+  CalibratorTarget absent = room().calibrator.targets[0];
+  absent.point_in_calibrator += Vector3d(14, 5, -20);
+  const auto found =
+      find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(), absent, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().reason, Reason::target_not_found);
+}
+
+TEST(FindTarget, OutsideThePictureIsNotSeen) {
+  CalibratorTarget outside = room().calibrator.targets[0];
+  outside.point_in_calibrator += Vector3d(0, 400, 0);
+  const auto found =
+      find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(), outside, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().reason, Reason::not_seen);
+}
+
+TEST(FindTarget, BehindTheSourceIsRefused) {
+  const View view = room().views[0].shot.stored_view();
+  CalibratorTarget behind = room().calibrator.targets[0];
+  behind.point_in_calibrator = view.camera_from_world.inverse() * Vector3d(0, 0, -50);
+  const auto found = find_target(exposure_of(room().views[0]), straight(), view, behind, {});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().reason, Reason::behind_source);
+}
+
+TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
+  for (const SimulatedView& view : room().views) {
+    const View stored = view.shot.stored_view();
+    for (const auto& ball : view.balls) {
+      if (ball.visibility != Visibility::clear) continue;
+      const auto found = snap_to_ball(exposure_of(view), straight(), stored, stored.depth(ball.in_calibrator),
+                                      ball.raw + Vector2d(2.1, -1.6), 4);
+      ASSERT_TRUE(found) << view.shot.name << " " << ball.name;
+      EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.shot.name << " " << ball.name;
+    }
+  }
+}
+
+TEST(SnapToBall, NoBallNearTheClickIsNotFound) {
+  const SimulatedView& view = room().views[0];
+  const auto found = snap_to_ball(exposure_of(view), straight(), view.shot.stored_view(), 640, {20, 20}, 4);
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().reason, Reason::target_not_found);
+}
+
+CalibratorTarget target_of(TargetKind kind) {
+  return {"T", {1, 2, 3}, kind, 2, {Vector3d::UnitX(), Vector3d::UnitY()}, 16};
+}
+
+TEST(PathInTarget, BallsDiameterAndChord) {
+  const CalibratorTarget ball = target_of(TargetKind::ball);
+  EXPECT_NEAR(path_in_target(ball, {1, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
+  EXPECT_NEAR(path_in_target(ball, {1.6, 2, -90}, Vector3d::UnitZ()), 1.6, 1e-12);
+  EXPECT_EQ(path_in_target(ball, {2.1, 2, -90}, Vector3d::UnitZ()), 0);
+}
+
+TEST(PathInTarget, CrossCountsTheSharedMetalOnce) {
+  const CalibratorTarget cross = target_of(TargetKind::cross);
+  EXPECT_NEAR(path_in_target(cross, {1, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
+  EXPECT_NEAR(path_in_target(cross, {6, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
+  EXPECT_EQ(path_in_target(cross, {9.1, 2, -90}, Vector3d::UnitZ()), 0);
+  EXPECT_NEAR(path_in_target(cross, {-90, 2, 3}, Vector3d::UnitX()), 16, 1e-12);
+}
+
+TEST(PathInTarget, LineEndsFlatAtItsPoint) {
+  const CalibratorTarget end = target_of(TargetKind::line_end);
+  EXPECT_NEAR(path_in_target(end, {1.01, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
+  EXPECT_EQ(path_in_target(end, {0.99, 2, -90}, Vector3d::UnitZ()), 0);
+  EXPECT_EQ(path_in_target(end, {17.01, 2, -90}, Vector3d::UnitZ()), 0);
+}
+
+TEST(SolidTemplate, SlopeMatchesNumbers) {
+  const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  const SolidTemplate shade(picture_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
+  const double h = 0.01;
+  for (double x = -9.13; x < 9; x += 1.7)
+    for (double y = -9.13; y < 9; y += 1.7)
+      for (int axis = 0; axis < 2; ++axis) {
+        const Vector2d step = h * Vector2d::Unit(axis);
+        const double numeric =
+            (shade.at(Vector2d(x, y) + step).value - shade.at(Vector2d(x, y) - step).value) / (2 * h);
+        EXPECT_NEAR(shade.at({x, y}).slope[axis], numeric, 1e-4);
+      }
+}
+
+TEST(SolidTemplate, IsNoughtOutsideItsPicture) {
+  const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  EXPECT_EQ(
+      SolidTemplate(picture_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1).at({90, 0}).value, 0);
+}
+
+}  // namespace
+}  // namespace helicarm
