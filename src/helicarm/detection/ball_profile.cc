@@ -41,7 +41,8 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   last_ = count - 1;
   values_.resize(static_cast<std::size_t>(count));
   slopes_.resize(static_cast<std::size_t>(count));
-  // The rings stand closer towards the rim, where the chord length falls like a square root, and towards the centre.
+  // The rings stand closer towards the rim, where the chord length falls like a square root, and towards the
+  // centre.
   double radius[rings];
   double weight[rings];
   for (int k = 0; k < rings; ++k) {
