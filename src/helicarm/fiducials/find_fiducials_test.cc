@@ -58,7 +58,7 @@ TEST(FindFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
     expect_right(found, view, 0.1);
     EXPECT_FALSE(found.mirrored);
     EXPECT_GT(found.view.intrinsics.fx, 0);
-    EXPECT_GT(found.ambiguity, 1);
+    EXPECT_GT(found.margin, 1);
   }
 }
 
