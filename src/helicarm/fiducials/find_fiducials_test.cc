@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/rectification/simulated_exposure.h"
+#include "helicarm/rectification/simulated_exposure_test.h"
 
 namespace helicarm {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/fiducials/solid_template.h"
-#include "helicarm/rectification/simulated_exposure.h"
+#include "helicarm/rectification/simulated_exposure_test.h"
 #include "helicarm/simulation/develop.h"
 #include "helicarm/simulation/render_view.h"
 

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture.h"
-#include "helicarm/rectification/simulated_exposure.h"
+#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/rectification/simulated_exposure_test.h"
 
 namespace helicarm {
 namespace {

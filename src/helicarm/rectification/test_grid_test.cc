@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture.h"
+#include "helicarm/detection/drawn_picture_test.h"
 
 namespace helicarm {
 namespace {
