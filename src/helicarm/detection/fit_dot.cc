@@ -46,7 +46,7 @@ inline float background_at(const Parameters& p, float x, float y) {
   return p[0] + p[1] * x + p[2] * y + p[3] * x * x + p[4] * x * y + p[5] * y * y;
 }
 
-/// Model less its background at one pixel: -(A + hidden G) profile.
+/// Hands over what residual and derivatives at one pixel are made of.
 template <class Take>
 inline void shade_at(const Patch& patch, const BallProfile& profile, const Parameters& p, const Pixel& pixel,
                      Take&& take) {
