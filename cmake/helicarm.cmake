@@ -15,6 +15,14 @@ if(HELICARM_SANITIZE)
   target_link_options(helicarm_flags INTERFACE -fsanitize=address,undefined)
 endif()
 
+# Eigen, JSON and fmt are most of what the compiler reads: it reads them once.
+add_library(helicarm_precompiled OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)
+target_link_libraries(helicarm_precompiled PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
+                      tl::expected)
+target_precompile_headers(helicarm_precompiled PRIVATE
+  <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>
+  <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
+
 # helicarm_room(NAME SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
 function(helicarm_room name)
   cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
@@ -23,6 +31,7 @@ function(helicarm_room name)
   if(ARG_SOURCES)
     add_library(helicarm_${name} STATIC ${ARG_SOURCES})
     target_link_libraries(helicarm_${name} PUBLIC helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})
+    target_precompile_headers(helicarm_${name} REUSE_FROM helicarm_precompiled)
   else()
     add_library(helicarm_${name} INTERFACE)
     target_link_libraries(helicarm_${name} INTERFACE helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})
@@ -30,6 +39,7 @@ function(helicarm_room name)
   if(ARG_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
+    target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60)
   endif()
 endfunction()

@@ -9,6 +9,8 @@
 
 #include "helicarm/core/files.h"
 
+template class nlohmann::basic_json<nlohmann::ordered_map>;
+
 namespace helicarm {
 namespace {
 

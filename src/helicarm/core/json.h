@@ -17,6 +17,13 @@ namespace helicarm {
 /// Keys keep the order in which they were written.
 using Json = nlohmann::ordered_json;
 
+}  // namespace helicarm
+
+/// Compiled once, in json.cc.
+extern template class nlohmann::basic_json<nlohmann::ordered_map>;
+
+namespace helicarm {
+
 /// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a key given twice and every
 /// other fault are `bad_json`; nesting is bounded. `origin` (a file name) begins each message.
 Expected<Json> parse_json(std::string_view text, const std::string& origin);

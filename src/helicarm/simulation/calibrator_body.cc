@@ -5,12 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <fmt/format.h>
 
 namespace helicarm::simulation {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double wire_length_mm = 16;
@@ -54,20 +55,24 @@ Body target_body(const CalibratorTarget& target, const std::vector<CalibratorTar
 }  // namespace
 
 ConeWall cone_wall(const Calibrator& calibrator) {
-  Eigen::MatrixX2d design(calibrator.balls.size(), 2);
-  Eigen::VectorXd radius(calibrator.balls.size());
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
-  for (std::size_t i = 0; i < calibrator.balls.size(); ++i) {
-    const Vector3d& centre = calibrator.balls[i].centre_in_calibrator;
-    const auto row = static_cast<Eigen::Index>(i);
-    design.row(row) << 1, centre.z();
-    radius[row] = centre.head<2>().norm();
+  Vector2d mean = Vector2d::Zero();  // of z and radius
+  for (const CalibratorBall& ball : calibrator.balls) {
+    const Vector3d& centre = ball.centre_in_calibrator;
     low = std::min(low, centre.z());
     high = std::max(high, centre.z());
+    mean += Vector2d(centre.z(), centre.head<2>().norm()) / double(calibrator.balls.size());
   }
-  const Eigen::Vector2d line = design.colPivHouseholderQr().solve(radius);
-  return {line[0], line[1], low - 6, high + 8};
+  double squares = 0;
+  double products = 0;
+  for (const CalibratorBall& ball : calibrator.balls) {
+    const double dz = ball.centre_in_calibrator.z() - mean.x();
+    squares += dz * dz;
+    products += dz * (ball.centre_in_calibrator.head<2>().norm() - mean.y());
+  }
+  const double slope = products / squares;
+  return {mean.y() - slope * mean.x(), slope, low - 6, high + 8};
 }
 
 std::vector<CalibratorTarget> check_targets(const Calibrator& calibrator) {
