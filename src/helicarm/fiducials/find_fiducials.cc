@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include <fmt/format.h>
 
@@ -22,31 +23,13 @@ constexpr double shared_bias_sigma = 0.008;
 constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
 
-struct RadiusRange {
-  double low;
-  double high;
-  bool holds(double radius) const { return low <= radius && radius <= high; }
-};
-
-/// Radii that a ball of the calibrator can have: it stands somewhere between the receiver and half way to the
-/// source.
-RadiusRange radii_of(const Calibrator& calibrator, const DistortionMap& map) {
-  double least = 1e9;
-  double most = 0;
-  for (const CalibratorBall& ball : calibrator.balls) {
-    least = std::min(least, 0.5 * ball.diameter_mm);
-    most = std::max(most, 0.5 * ball.diameter_mm);
-  }
-  if (!map.rectified_pixel_mm) return {2, 1e9};
-  return {1.03 * least / *map.rectified_pixel_mm, 2.7 * most / *map.rectified_pixel_mm};
-}
-
 /// Dots that may be balls of the calibrator, the clearest first.
 std::vector<Dot> plausible_balls(const Rectification& rectification, const Calibrator& calibrator) {
-  const RadiusRange radii = radii_of(calibrator, rectification.map);
+  const auto& pixel_mm = rectification.map.rectified_pixel_mm;
+  const Range radii = pixel_mm ? ball_radii_px(calibrator, *pixel_mm) : Range{2, 1e9};
   std::vector<Dot> balls;
   for (const Dot& dot : rectification.other_dots)
-    if (radii.holds(dot.radius_px) && dot.sigma_px < 0.5 &&
+    if (radii.low <= dot.radius_px && dot.radius_px <= radii.high && dot.sigma_px < 0.5 &&
         rectification.map.rectified_from_raw(dot.centre_px))
       balls.push_back(dot);
   const auto clarity = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
@@ -161,6 +144,12 @@ std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) 
 }
 
 }  // namespace
+
+Range ball_radii_px(const Calibrator& calibrator, double pixel_mm) {
+  const auto [least, most] =
+      std::ranges::minmax(calibrator.balls | std::views::transform(&CalibratorBall::diameter_mm));
+  return {1.03 * 0.5 * least / pixel_mm, 2.7 * 0.5 * most / pixel_mm};
+}
 
 Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
                                         const Calibrator& calibrator, Method method,

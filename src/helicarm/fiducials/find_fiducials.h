@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "helicarm/core/json.h"
 #include "helicarm/detection/dot.h"
 #include "helicarm/fiducials/fiducial.h"
 #include "helicarm/geometry/view.h"
@@ -22,6 +23,10 @@ struct FoundFiducials {
   double radius_bias = 0;  ///< of the balls' radii in the picture, relative
   std::vector<Warning> warnings;
 };
+
+/// Radii that a ball's image can have on a receiver of a given pixel: the ball stands somewhere between the
+/// receiver and half way to the source.
+Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
 
 /// Finds and names the calibrator's balls among the dots that are not the plate's, rescues those that the
 /// search missed at their predicted places, and says of each of the others why it is not used. Along the

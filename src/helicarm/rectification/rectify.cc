@@ -243,13 +243,15 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   return result;
 }
 
-Expected<Rectification> without_plate(const Exposure& exposure) {
+Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px) {
   if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
   const auto& pixel = exposure.acquisition.pixel_mm;
   result.map = identity_map(exposure.pixels.width(), exposure.pixels.height(),
                             pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
-  result.other_dots = find_dots(exposure, dot_options(exposure, Polarity::dark));
+  DotOptions dots = dot_options(exposure, Polarity::dark);
+  dots.min_radius_px = std::max(dots.min_radius_px, least_radius_px);
+  result.other_dots = find_dots(exposure, dots);
   return result;
 }
 
@@ -259,7 +261,7 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
                             exposure.pixels.width(), exposure.pixels.height()));
-  auto result = without_plate(exposure);
+  auto result = without_plate(exposure, 0);
   if (!result) return result;
   result->map = map;
   if (!plate || plate->kind == DotKind::holes) return result;

@@ -39,8 +39,8 @@ struct RectificationOptions {
 Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
                                 const RectificationOptions& options);
 
-/// For a flat panel: no distortion; all dots are candidates.
-Expected<Rectification> without_plate(const Exposure& exposure);
+/// For a flat panel: no distortion; all dots from a radius on are candidates.
+Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px);
 
 /// For a map known already (from a plate shot apart or a file): only the dots are found.
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,

@@ -200,7 +200,8 @@ TEST(Rectify, BlankAndSaturatedPicturesAreRefused) {
             Reason::blank_image);
   EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 4095)), plate48(), {}).error().reason,
             Reason::saturated);
-  EXPECT_EQ(without_plate(drawn::exposure(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
+  EXPECT_EQ(without_plate(drawn::exposure(Image<float>(256, 256, 1800)), 0).error().reason,
+            Reason::blank_image);
 }
 
 TEST(Rectify, PlateOfHoles) {
@@ -247,7 +248,7 @@ TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
 }
 
 TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
-  const auto result = without_plate(exposure_of(room().views[0]));
+  const auto result = without_plate(exposure_of(room().views[0]), 0);
   ASSERT_TRUE(result);
   EXPECT_TRUE(result->map.is_identity());
   EXPECT_NEAR(*result->map.rectified_pixel_mm, room().views[0].shot.pixel_mm(), 1e-12);
