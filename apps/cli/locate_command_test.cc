@@ -72,13 +72,13 @@ TEST(LocateCommand, PointsAndReasonsComeInTheOrderOfThePicks) {
 
 TEST(LocateCommand, CovarianceOfTheCalibrationWidensThatOfThePoint) {
   Json calibrated = result_json();
-  calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(20, 20));
+  calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(22, 22));
   const double with =
       locate_in(calibrated, picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
   const double without =
       locate_in(result_json(), picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
   EXPECT_GT(with, 2 * without);
-  calibrated["calibration"]["joint_covariance"] = json_rows(Eigen::MatrixXd::Identity(10, 10));
+  calibrated["calibration"]["joint_covariance"] = json_rows(Eigen::MatrixXd::Identity(11, 11));
   EXPECT_EQ(locate_in(calibrated, picks_of({10, 20, 30})).result.error().reason, Reason::bad_value);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_command.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -25,6 +27,24 @@ std::string statistics_line(std::string_view what, const Statistics& s) {
 void forget_earlier(const std::filesystem::path& out) {
   std::error_code ignored;
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
+}
+
+/// A history that is not there yet is empty.
+Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path) {
+  if (!path) return std::optional<Machine>();
+  if (!std::filesystem::exists(*path)) return std::optional(Machine());
+  return read_json(*path)
+      .and_then([&](const Json& json) { return machine_from_json(json, path->filename().string()); })
+      .map([](Machine machine) { return std::optional(std::move(machine)); });
+}
+
+/// Each picture once.
+Expected<void> remember(const std::filesystem::path& path, Machine machine,
+                        const std::vector<MachineShot>& shots) {
+  for (const MachineShot& shot : shots)
+    if (std::ranges::find(machine.shots, shot.picture, &MachineShot::picture) == machine.shots.end())
+      machine.shots.push_back(shot);
+  return write_file(path, to_json(machine).dump(2) + "\n");
 }
 
 /// A case whose description already allows no answer (a flat calibrator, say) is refused like any other.
@@ -75,10 +95,12 @@ std::string summary_of(const Result& result) {
 Expected<Result> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
     const RunOptions options{value_or_throw(method_named(arguments.method)), arguments.max_error_mm,
-                             console.threads};
+                             console.threads, value_or_throw(machine_at(arguments.machine))};
     forget_earlier(arguments.out);
     const Result result = value_or_throw(result_of(arguments.folder, options));
     value_or_throw(write_file(arguments.out / "result.json", to_json(result).dump(2) + "\n"));
+    if (arguments.machine && !result.failure)
+      value_or_throw(remember(*arguments.machine, *options.machine, result.shots));
     if (!arguments.no_report) value_or_throw(write_report(result, arguments.out));
     if (!console.quiet)
       for (const Warning& warning : result.warnings)

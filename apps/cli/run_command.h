@@ -16,6 +16,7 @@ struct RunArguments {
   std::string method = "best";         ///< best or paper
   std::optional<double> max_error_mm;  ///< refuse when a point's predicted error (95 %) is larger
   bool no_report = false;              ///< only result.json
+  std::optional<std::filesystem::path> machine = {};  ///< the C-arm's history: read, and added to
 };
 
 /// Runs a case and writes result.json, report.html and NAME_overlay.png. A refusal writes them too and then

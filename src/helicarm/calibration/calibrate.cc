@@ -41,18 +41,25 @@ Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<Poin
 Expected<ViewProblem> problem_of(const ViewFiducials& view) {
   std::vector<Observation> observations;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (const Fiducial& f : view.fiducials) {
+  for (std::size_t ball = 0; ball < view.fiducials.size(); ++ball) {
+    const Fiducial& f = view.fiducials[ball];
     if (f.status != FiducialStatus::used) continue;
     if (!(f.sigma_px > 0) || !std::isfinite(f.sigma_px))
       return fail(Reason::bad_value,
                   fmt::format("ball {}: sigma {} px must be positive", f.label, f.sigma_px));
-    observations.push_back({f.centre_in_calibrator, f.uv, f.sigma_px});
+    observations.push_back({ball, f.centre_in_calibrator, f.uv, f.sigma_px});
     centre += f.centre_in_calibrator;
   }
   centre /= std::max(1.0, double(observations.size()));
   const auto start = start_of(view, pairs_of(view.fiducials), centre);
   if (!start) return tl::unexpected<Failure>(start.error());
   return ViewProblem{*start, std::move(observations), view.prior};
+}
+
+/// What of a matrix of all views concerns one.
+auto block_of(Eigen::MatrixXd& joint, std::size_t view) {
+  const Eigen::Index at = view_parameters * Eigen::Index(view);
+  return joint.block<view_parameters, view_parameters>(at, at);
 }
 
 void mark_rejected(std::vector<Fiducial>& fiducials, std::size_t used_index) {
@@ -150,16 +157,15 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     result.fiducials.push_back(view.fiducials);
   }
   const auto clean =
-      refine_without_outliers(problems, options.spread, options.rejection_probability, least_fiducials);
+      refine_without_outliers(problems, options.common, options.rejection_probability, least_fiducials);
   if (!clean) return blame(views, problems, clean.error(), options);
   const Refinement& fit = clean->fit;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
-  const auto n = Eigen::Index(views.size());
-  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(10 * n, 10 * n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    by_step.block<10, 10>(10 * i, 10 * i) = parameters_by_step(fit.views[std::size_t(i)]);
-  result.joint_covariance = by_step * fit.covariance * by_step.transpose();
+  const Eigen::Index numbers = view_parameters * Eigen::Index(views.size());
+  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(numbers, numbers);
+  for (std::size_t i = 0; i < views.size(); ++i) block_of(by_step, i) = parameters_by_step(fit.views[i]);
+  result.joint_covariance = by_step * fit.covariance.topLeftCorner(numbers, numbers) * by_step.transpose();
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 
   Eigen::Index row = 0;
@@ -174,7 +180,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     const Eigen::Index rows = 2 * Eigen::Index(clean->problems[i].observations.size());
     const auto j = fit.jacobian.middleRows(row, rows);
     view->dof = int(std::lround(double(rows) - (j * fit.covariance * j.transpose()).trace()));
-    view->covariance = result.joint_covariance.block<10, 10>(10 * Eigen::Index(i), 10 * Eigen::Index(i));
+    view->covariance = block_of(result.joint_covariance, i);
     result.views.push_back(*std::move(view));
     row += rows;
   }

@@ -23,7 +23,7 @@ struct ViewFiducials {
 };
 
 struct CalibrationOptions {
-  SpreadPrior spread = {};
+  CommonPrior common = {};
   double rejection_probability = 1e-4;  ///< of losing a good ball, 0 to 0.1; 0: every ball is believed
   double largest_rms_px = 5;            ///< beyond it (and 3 sigma) labels or calibrator must be wrong
 };

@@ -12,14 +12,17 @@
 
 namespace helicarm {
 
+/// Numbers of a view: fx, fy, u0, v0, rotation vector in the camera frame (rad), translation (mm), skew.
+inline constexpr int view_parameters = 11;
+using ViewCovariance = Eigen::Matrix<double, view_parameters, view_parameters>;
+
 /// A view that has been calibrated by its fiducials.
 struct CalibratedView {
   std::string name;
   View view;                      ///< world = calibrator, pixels = rectified
   std::optional<DltFactors> dlt;  ///< A1..A11 of Eq. 6; nothing where t_z = 0
-  /// Of (fx, fy, u0, v0, rotation vector in the camera frame (rad), translation (mm)): the true pose is
-  /// (exp(w) R, t + dt). Zero where it was not computed.
-  Eigen::Matrix<double, 10, 10> covariance = Eigen::Matrix<double, 10, 10>::Zero();
+  /// Of the view's numbers: the true pose is (exp(w) R, t + dt). Zero where it was not computed.
+  ViewCovariance covariance = ViewCovariance::Zero();
   double reprojection_rms_px = 0;
   double chi2 = 0;
   int dof = 0;
@@ -29,7 +32,7 @@ struct CalibratedView {
 /// Views calibrated together.
 struct Calibration {
   std::vector<CalibratedView> views;
-  /// Of all views' parameters (CalibratedView::covariance), 10 n x 10 n. Empty: not computed, the views are
+  /// Of all views' parameters (CalibratedView::covariance), 11 n x 11 n. Empty: not computed, the views are
   /// taken as exact.
   Eigen::MatrixXd joint_covariance;
 };

@@ -3,12 +3,14 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/geometry/view.h"
 
 namespace helicarm {
 
-/// A view without skew, written about the centre of its fiducials: with d = R (x - centre),
-///   u = uc + ax (dx - qx dz) / (1 + dz rho),   v = vc + ay (dy - qy dz) / (1 + dz rho).
+/// A view written about the centre of its fiducials: with d = R (x - centre),
+///   gx = (dx - qx dz) / (1 + dz rho),   gy = (dy - qy dz) / (1 + dz rho),
+///   u = uc + ax gx + skew gy,   v = vc + ay gy.
 /// In fx, u0 and t the fiducials hardly tell a far source with a long focus from a near one; here that doubt
 /// is all in rho (one over the depth of the centre), and the fit is nearly linear.
 struct CentredView {
@@ -18,10 +20,11 @@ struct CentredView {
   double uc = 0, vc = 0;                                   ///< picture of the centre, px
   double rho = 0;                                          ///< 1 / mm
   double qx = 0, qy = 0;  ///< tangent of the centre's angle off the central ray
+  double skew = 0;        ///< px / mm
 };
 
-/// Small changes of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy).
-using ViewStep = Eigen::Matrix<double, 10, 1>;
+/// Small changes of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy, skew).
+using ViewStep = Eigen::Vector<double, view_parameters>;
 
 CentredView centred(const View& view, const Eigen::Vector3d& centre);
 View uncentred(const CentredView& view);
@@ -29,15 +32,17 @@ CentredView moved(const CentredView& view, const ViewStep& step);
 
 struct Picture {
   Eigen::Vector2d pixel;
-  Eigen::Matrix<double, 2, 10> by_step;
+  Eigen::Matrix<double, 2, view_parameters> by_step;
+  Eigen::Matrix<double, 2, 3> by_place;
   double relative_depth;  ///< over that of the centre; positive before the source
 };
 Picture picture_of(const CentredView& view, const Eigen::Vector3d& point_in_world);
 
-/// d (fx, fy, u0, v0, rotation vector, translation) / d step: the parameters of `CalibratedView::covariance`.
-Eigen::Matrix<double, 10, 10> parameters_by_step(const CentredView& view);
+/// d (the parameters of `CalibratedView::covariance`) / d step.
+ViewCovariance parameters_by_step(const CentredView& view);
 
-/// d pixel / d (fx, fy, u0, v0, rotation vector, translation) of a plain view.
-Eigen::Matrix<double, 2, 10> pixel_by_parameters(const View& view, const Eigen::Vector3d& point_in_world);
+/// d pixel / d (the parameters of `CalibratedView::covariance`) of a plain view.
+Eigen::Matrix<double, 2, view_parameters> pixel_by_parameters(const View& view,
+                                                              const Eigen::Vector3d& point_in_world);
 
 }  // namespace helicarm

@@ -9,9 +9,9 @@
 namespace helicarm {
 namespace {
 
-using Parameters = Eigen::Matrix<double, 10, 1>;
+using Parameters = Eigen::Vector<double, view_parameters>;
 
-const View example{{-6000, 6200, 500, 530, 0}, {rotation_from_euler(0.3, -0.8, 2), {30, -20, 820}}};
+const View example{{-6000, 6200, 500, 530, 40}, {rotation_from_euler(0.3, -0.8, 2), {30, -20, 820}}};
 const Eigen::Vector3d centre(5, 3, 40);
 
 /// Parameters of a view near `example`, the rotation as a step from it.
@@ -20,17 +20,17 @@ Parameters parameters_of(const View& view) {
   Parameters p;
   p << k.fx, k.fy, k.u0, k.v0,
       vector_from_rotation(view.camera_from_world.rotation * example.camera_from_world.rotation.transpose()),
-      view.camera_from_world.translation;
+      view.camera_from_world.translation, k.skew;
   return p;
 }
 
 View view_of(const Parameters& p) {
-  return {{p(0), p(1), p(2), p(3), 0},
-          {rotation_from_vector(p.segment<3>(4)) * example.camera_from_world.rotation, p.tail<3>()}};
+  return {{p(0), p(1), p(2), p(3), p(10)},
+          {rotation_from_vector(p.segment<3>(4)) * example.camera_from_world.rotation, p.segment<3>(7)}};
 }
 
 const Parameters step_sizes =
-    (Parameters() << 1e-4, 1e-4, 1e-2, 1e-2, 1e-5, 1e-5, 1e-5, 1e-7, 1e-5, 1e-5).finished();
+    (Parameters() << 1e-4, 1e-4, 1e-2, 1e-2, 1e-5, 1e-5, 1e-5, 1e-7, 1e-5, 1e-5, 1e-4).finished();
 
 TEST(CentredView, IsTheSameCamera) {
   const CentredView view = centred(example, centre);
@@ -43,19 +43,25 @@ TEST(CentredView, PictureJacobianAgreesWithDifferences) {
   const CentredView view = centred(example, centre);
   const Eigen::Vector3d point(-20, 40, 70);
   const auto jacobian = picture_of(view, point).by_step;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < view_parameters; ++i) {
     const ViewStep step = step_sizes(i) * ViewStep::Unit(i);
     const Eigen::Vector2d slope =
         (picture_of(moved(view, step), point).pixel - picture_of(moved(view, -step), point).pixel) /
         (2 * step_sizes(i));
     EXPECT_LT((slope - jacobian.col(i)).norm(), 1e-6 * (1 + jacobian.col(i).norm())) << i;
   }
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d step = 1e-4 * Eigen::Vector3d::Unit(axis);
+    const Eigen::Vector2d slope =
+        (picture_of(view, point + step).pixel - picture_of(view, point - step).pixel) / 2e-4;
+    EXPECT_LT((slope - picture_of(view, point).by_place.col(axis)).norm(), 1e-6) << axis;
+  }
 }
 
 TEST(CentredView, ParameterJacobianAgreesWithDifferences) {
   const CentredView view = centred(example, centre);
   const auto jacobian = parameters_by_step(view);
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < view_parameters; ++i) {
     const ViewStep step = step_sizes(i) * ViewStep::Unit(i);
     const Parameters slope =
         (parameters_of(uncentred(moved(view, step))) - parameters_of(uncentred(moved(view, -step)))) /
@@ -67,7 +73,7 @@ TEST(CentredView, ParameterJacobianAgreesWithDifferences) {
 TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
   const Eigen::Vector3d point(-20, 40, 70);
   const auto jacobian = pixel_by_parameters(example, point);
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < view_parameters; ++i) {
     const double size = i < 4 || i > 6 ? 1e-3 : 1e-6;
     const Parameters at = parameters_of(example), step = size * Parameters::Unit(i);
     const Eigen::Vector2d slope =
@@ -80,7 +86,7 @@ TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
 
 TEST(DrawnToPrior, TakesTheKnownIntrinsicsAndKeepsThePictures) {
   const CentredView view = centred(example, centre);
-  const IntrinsicsPrior prior{Belief{6300, 30}, Belief{0.97, 0.01}, PrincipalBelief{{512, 515}, 20}};
+  const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, Belief{0.97, 0.01}};
   const CentredView drawn = drawn_to_prior(view, prior);
   const Intrinsics k = uncentred(drawn).intrinsics;
   EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
@@ -95,20 +101,33 @@ TEST(PriorRows, JacobianAgreesWithDifferences) {
   View other = example;
   other.intrinsics = {6100, 6150, 515, 505, 0};
   const std::vector<CentredView> views{centred(example, centre), centred(other, centre)};
-  const std::vector<IntrinsicsPrior> priors{
-      {Belief{6000, 30}, Belief{1, 0.01}, PrincipalBelief{{512, 512}, 20}}, {}};
-  const SpreadPrior spread{10, 15};
-  const PriorRows rows = prior_rows(views, priors, spread);
-  EXPECT_EQ(rows.independent, 4 + 3);
-  for (int i = 0; i < 20; ++i) {
-    const double size = step_sizes(i % 10);
+  const IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, Belief{1, 0.01}, Belief{0, 0.01}};
+  const std::vector<IntrinsicsPrior> priors{prior, prior};
+  const MachinePrior machine{Departure{10, 2}, Departure{7, 4}};
+  const PriorRows rows = prior_rows(views, priors, machine);
+  EXPECT_EQ(rows.residuals.size(), 2 * (2 + 1 + 2));
+  for (int i = 0; i < 2 * view_parameters; ++i) {
+    const double size = step_sizes(i % view_parameters);
     auto up = views, down = views;
-    up[std::size_t(i / 10)] = moved(views[std::size_t(i / 10)], size * ViewStep::Unit(i % 10));
-    down[std::size_t(i / 10)] = moved(views[std::size_t(i / 10)], -size * ViewStep::Unit(i % 10));
+    up[std::size_t(i / view_parameters)] =
+        moved(views[std::size_t(i / view_parameters)], size * ViewStep::Unit(i % view_parameters));
+    down[std::size_t(i / view_parameters)] =
+        moved(views[std::size_t(i / view_parameters)], -size * ViewStep::Unit(i % view_parameters));
     const Eigen::VectorXd slope =
-        (prior_rows(up, priors, spread).residuals - prior_rows(down, priors, spread).residuals) / (2 * size);
+        (prior_rows(up, priors, machine).residuals - prior_rows(down, priors, machine).residuals) /
+        (2 * size);
     EXPECT_LT((slope - rows.jacobian.col(i)).norm(), 1e-5 * (1 + rows.jacobian.col(i).norm())) << i;
   }
+}
+
+TEST(PriorRows, DeparturesOfTwoViewsGoTogether) {
+  const std::vector<CentredView> views{centred(example, centre), centred(example, centre)};
+  IntrinsicsPrior prior{6200, std::nullopt, 4};
+  prior.skew.reset();
+  const double first = (6100 - 6200) / 4.0;
+  const PriorRows rows = prior_rows(views, std::vector{prior, prior}, {Departure{10, 2}, std::nullopt});
+  // Both views depart alike: a common cause, not two.
+  EXPECT_NEAR(rows.residuals.squaredNorm(), first * first / (100 + 4.0 / 2), 1e-9);
 }
 
 }  // namespace

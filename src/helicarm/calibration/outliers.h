@@ -24,7 +24,7 @@ struct CleanFit {
 /// Generalised extreme studentised deviate test (Rosner 1983): the worst observation is removed again and
 /// again, at most a third of all and never below `least_kept` of a view; then the last removal that mattered
 /// decides how many were false, so that several cannot hide one another.
-Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, const SpreadPrior& spread,
+Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, const CommonPrior& common,
                                            double probability, std::size_t least_kept);
 
 }  // namespace helicarm

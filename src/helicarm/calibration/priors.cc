@@ -4,66 +4,85 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm {
 namespace {
 
-/// Numbers of one view that priors speak of, by its step: focal length, aspect, u0, v0.
-struct Known {
-  Eigen::Vector4d values;
-  Eigen::Matrix<double, 4, 10> by_step;
-};
+constexpr int n = view_parameters;
 
-enum : Eigen::Index { focal, aspect, principal };
+/// Numbers of one view that priors speak of, by its step.
+enum : Eigen::Index { focal, aspect, principal_u, principal_v, skew };
+struct Known {
+  Eigen::Vector<double, 5> values;
+  Eigen::Matrix<double, 5, n> by_step;
+};
 
 Known known_of(const CentredView& view) {
   const Intrinsics k = uncentred(view).intrinsics;
-  const Eigen::Matrix<double, 4, 10> by_step = parameters_by_step(view).topRows<4>();
+  const ViewCovariance by_step = parameters_by_step(view);
   const double sign = k.fx < 0 ? -1 : 1;
-  Known known{{(sign * k.fx + k.fy) / 2, sign * k.fx / k.fy, k.u0, k.v0}, by_step};
+  Known known{{(sign * k.fx + k.fy) / 2, sign * k.fx / k.fy, k.u0, k.v0, k.skew / k.fy}, {}};
   known.by_step.row(focal) = (sign * by_step.row(0) + by_step.row(1)) / 2;
   known.by_step.row(aspect) = sign * (by_step.row(0) - k.fx / k.fy * by_step.row(1)) / k.fy;
+  known.by_step.middleRows<2>(principal_u) = by_step.middleRows<2>(2);
+  known.by_step.row(skew) = (by_step.row(10) - k.skew / k.fy * by_step.row(1)) / k.fy;
   return known;
 }
 
 class Rows {
  public:
-  explicit Rows(std::size_t views) : columns_(10 * Eigen::Index(views)) {}
-
-  Eigen::RowVectorXd& add(double residual) {
-    residuals_.push_back(residual);
-    return rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_));
+  explicit Rows(std::span<const CentredView> views) : columns_(n * Eigen::Index(views.size())) {
+    for (const CentredView& view : views) known_.push_back(known_of(view));
   }
 
-  PriorRows finish(int independent) const {
+  void add_own(std::size_t view, Eigen::Index which, const Belief& belief) {
+    residuals_.push_back((known_[view].values(which) - belief.value) / belief.sigma);
+    rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_)).segment<n>(n * Eigen::Index(view)) =
+        known_[view].by_step.row(which) / belief.sigma;
+  }
+
+  /// A quantity's departures from nominal in some views, which have covariance common^2 + of_view^2 [i = j].
+  struct Nominal {
+    std::size_t view;
+    double value;
+    double unit;
+  };
+  void add_common(const std::vector<Nominal>& nominal, Eigen::Index which, const Departure& departure) {
+    const auto count = Eigen::Index(nominal.size());
+    Eigen::VectorXd residuals(count);
+    Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(count, columns_);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto& [view, value, unit] = nominal[std::size_t(i)];
+      residuals(i) = (known_[view].values(which) - value) / unit;
+      rows.row(i).segment<n>(n * Eigen::Index(view)) = known_[view].by_step.row(which) / unit;
+    }
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, departure.common * departure.common);
+    covariance.diagonal().array() += departure.of_view * departure.of_view;
+    const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+    root.matrixL().solveInPlace(residuals);
+    root.matrixL().solveInPlace(rows);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      residuals_.push_back(residuals(i));
+      rows_.emplace_back(rows.row(i));
+    }
+  }
+
+  PriorRows finish() const {
     PriorRows result{Eigen::Map<const Eigen::VectorXd>(residuals_.data(), Eigen::Index(residuals_.size())),
-                     Eigen::MatrixXd(Eigen::Index(rows_.size()), columns_), independent};
+                     Eigen::MatrixXd(Eigen::Index(rows_.size()), columns_)};
     for (std::size_t i = 0; i < rows_.size(); ++i) result.jacobian.row(Eigen::Index(i)) = rows_[i];
     return result;
   }
 
-  int count() const { return int(rows_.size()); }
-
  private:
   Eigen::Index columns_;
+  std::vector<Known> known_;
   std::vector<double> residuals_;
   std::vector<Eigen::RowVectorXd> rows_;
 };
-
-/// Deviations from the views' mean: as n - 1 independent differences with the common value unknown.
-void add_spread(Rows& rows, const std::vector<Known>& known, Eigen::Index which, double sigma_of_difference) {
-  const double n = double(known.size());
-  const double sigma = sigma_of_difference / std::sqrt(2.0);
-  double mean = 0;
-  for (const Known& k : known) mean += k.values(which) / n;
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    Eigen::RowVectorXd& row = rows.add((known[i].values(which) - mean) / sigma);
-    for (std::size_t j = 0; j < known.size(); ++j)
-      row.segment<10>(10 * Eigen::Index(j)) =
-          ((i == j ? 1 : 0) - 1 / n) / sigma * known[j].by_step.row(which);
-  }
-}
 
 }  // namespace
 
@@ -73,10 +92,11 @@ CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior) {
     view.ay = 2 * magnification / (1 + prior.aspect->value);
     view.ax = std::copysign(prior.aspect->value * view.ay, view.ax);
   }
-  if (prior.focal_px) view.rho = magnification / prior.focal_px->value;
+  if (prior.skew) view.skew = prior.skew->value * view.ay;
+  if (prior.focal_px) view.rho = magnification / *prior.focal_px;
   if (!prior.principal_px) return view;
-  const double qx = (view.uc - prior.principal_px->value.x()) * view.rho / view.ax;
-  const double qy = (view.vc - prior.principal_px->value.y()) * view.rho / view.ay;
+  const double qy = (view.vc - prior.principal_px->y()) * view.rho / view.ay;
+  const double qx = ((view.uc - prior.principal_px->x()) * view.rho - view.skew * qy) / view.ax;
   view.rotation = rotation_from_vector({view.qy - qy, qx - view.qx, 0}) * view.rotation;
   view.qx = qx;
   view.qy = qy;
@@ -84,32 +104,24 @@ CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior) {
 }
 
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
-                     const SpreadPrior& spread) {
-  std::vector<Known> known;
-  for (const CentredView& view : views) known.push_back(known_of(view));
-  Rows rows(views.size());
+                     const MachinePrior& machine) {
+  Rows rows(views);
+  std::vector<Rows::Nominal> focals, principals_u, principals_v;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto add = [&](Eigen::Index which, double value, double sigma) {
-      rows.add((known[i].values(which) - value) / sigma).segment<10>(10 * Eigen::Index(i)) =
-          known[i].by_step.row(which) / sigma;
-    };
-    if (const auto& f = priors[i].focal_px) add(focal, f->value, f->sigma);
-    if (const auto& a = priors[i].aspect) add(aspect, a->value, a->sigma);
-    if (const auto& p = priors[i].principal_px)
-      for (Eigen::Index axis = 0; axis < 2; ++axis) add(principal + axis, p->value(axis), p->sigma);
+    const IntrinsicsPrior& prior = priors[i];
+    if (prior.aspect) rows.add_own(i, aspect, *prior.aspect);
+    if (prior.skew) rows.add_own(i, skew, *prior.skew);
+    if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});
+    if (!prior.principal_px) continue;
+    principals_u.push_back({i, prior.principal_px->x(), prior.unit_px});
+    principals_v.push_back({i, prior.principal_px->y(), prior.unit_px});
   }
-  int independent = rows.count();
-  const int differences = int(views.size()) - 1;
-  if (spread.focal_px && differences > 0) {
-    add_spread(rows, known, focal, *spread.focal_px);
-    independent += differences;
+  if (machine.focal) rows.add_common(focals, focal, *machine.focal);
+  if (machine.principal) {
+    rows.add_common(principals_u, principal_u, *machine.principal);
+    rows.add_common(principals_v, principal_v, *machine.principal);
   }
-  if (spread.principal_px && differences > 0) {
-    for (Eigen::Index axis = 0; axis < 2; ++axis)
-      add_spread(rows, known, principal + axis, *spread.principal_px);
-    independent += 2 * differences;
-  }
-  return rows.finish(independent);
+  return rows.finish();
 }
 
 }  // namespace helicarm

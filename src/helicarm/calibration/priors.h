@@ -16,37 +16,47 @@ struct Belief {
   double sigma = 0;
 };
 
-struct PrincipalBelief {
-  Eigen::Vector2d value = Eigen::Vector2d::Zero();
-  double sigma = 0;  ///< per axis
+/// What is known of one view's intrinsics before a ball is seen (rectified px), each where it is known.
+struct IntrinsicsPrior {
+  std::optional<double> focal_px = {};  ///< nominal mean of |fx| and fy
+  std::optional<Eigen::Vector2d> principal_px = {};
+  double unit_px = 1;  ///< the unit of MachinePrior in this view: px / mm on the receiver, or 1
+  std::optional<Belief> aspect = {};             ///< |fx| / fy: 1 for square pixels
+  std::optional<Belief> skew = Belief{0, 1e-12};  ///< over fy. Nothing: free
 };
 
-/// What is known of a view's intrinsics before a ball is seen (rectified px), each where it is known.
-struct IntrinsicsPrior {
-  std::optional<Belief> focal_px;  ///< mean of |fx| and fy
-  std::optional<Belief> aspect;    ///< |fx| / fy: 1 for square pixels
-  std::optional<PrincipalBelief> principal_px;
+/// How a quantity departs from its nominal value: by an amount common to all views of a machine, and by what
+/// each view adds (sag). Standard deviations.
+struct Departure {
+  double common;
+  double of_view;
+};
+
+/// How far a machine's intrinsics may be from nominal, in each view's unit (mm on the receiver). Nothing: not
+/// known.
+struct MachinePrior {
+  std::optional<Departure> focal;
+  std::optional<Departure> principal;  ///< per axis
+};
+
+/// What all views share.
+struct CommonPrior {
+  MachinePrior machine;
+  double ball_tolerance_mm = 0;  ///< standard deviation, per axis, of a ball's place about the drawing's
 };
 
 /// A start whose intrinsics the balls hardly fix, brought to what is known of them; its pictures change
 /// little.
 CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior);
 
-/// How far the intrinsics of one machine wander from view to view (sag): standard deviation of the difference
-/// of two views, px.
-struct SpreadPrior {
-  std::optional<double> focal_px;
-  std::optional<double> principal_px;  ///< per axis
-};
-
-/// The priors as rows of a least-squares problem: `residuals` over `jacobian` by the steps of all views.
+/// The priors as rows of a least-squares problem: `residuals` over `jacobian` by the steps of all views. Each
+/// row is worth one observation.
 struct PriorRows {
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  int independent = 0;  ///< how many observations they are worth
 };
 
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
-                     const SpreadPrior& spread);
+                     const MachinePrior& machine);
 
 }  // namespace helicarm

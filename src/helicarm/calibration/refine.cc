@@ -15,43 +15,56 @@ constexpr double least_gain = 1e-10;  // of chi2, before one last full step
 constexpr double least_damping = 1e-12;
 constexpr double most_damping = 1e12;
 
-/// Rows at given views; false where a point is not before its source. Without priors rho may pass through
-/// zero on the way: nothing happens there.
-bool evaluate(const std::vector<ViewProblem>& problems, const SpreadPrior& spread, Refinement& at) {
+constexpr int n = view_parameters;
+
+/// Rows at given views and departures; false where a point is not before its source. Without priors rho may
+/// pass through zero on the way: nothing happens there.
+bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
   std::vector<IntrinsicsPrior> beliefs;
   Eigen::Index count = 0;
-  for (std::size_t i = 0; i < problems.size(); ++i) {
-    beliefs.push_back(problems[i].prior);
-    count += 2 * Eigen::Index(problems[i].observations.size());
+  for (const ViewProblem& problem : problems) {
+    beliefs.push_back(problem.prior);
+    count += 2 * Eigen::Index(problem.observations.size());
   }
-  const PriorRows priors = prior_rows(at.views, beliefs, spread);
+  const PriorRows priors = prior_rows(at.views, beliefs, common.machine);
   const bool has_source =
       std::all_of(at.views.begin(), at.views.end(), [](const auto& v) { return v.rho > 0; });
-  if (priors.residuals.size() > 0 && !has_source) return false;
-  const Eigen::Index columns = 10 * Eigen::Index(problems.size());
-  at.residuals.resize(count + priors.residuals.size());
-  at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), columns);
+  const bool needs_source =
+      common.machine.focal || common.machine.principal ||
+      std::any_of(beliefs.begin(), beliefs.end(), [](const auto& belief) { return belief.aspect; });
+  if (needs_source && !has_source) return false;
+  const Eigen::Index steps = n * Eigen::Index(problems.size());
+  const Eigen::Index own = at.departures.size();
+  at.residuals.resize(count + priors.residuals.size() + own);
+  at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < problems.size(); ++i)
     for (const Observation& seen : problems[i].observations) {
-      const Picture picture = picture_of(at.views[i], seen.point_in_world);
+      const Eigen::Index ball = own > 0 ? 3 * Eigen::Index(seen.ball) : 0;
+      Eigen::Vector3d place = seen.point_in_world;
+      if (own > 0) place += common.ball_tolerance_mm * at.departures.segment<3>(ball);
+      const Picture picture = picture_of(at.views[i], place);
       if (!(picture.relative_depth > 0)) return false;
       at.residuals.segment<2>(row) = (picture.pixel - seen.pixel) / seen.sigma_px;
-      at.jacobian.block<2, 10>(row, 10 * Eigen::Index(i)) = picture.by_step / seen.sigma_px;
+      at.jacobian.block<2, n>(row, n * Eigen::Index(i)) = picture.by_step / seen.sigma_px;
+      if (own > 0)
+        at.jacobian.block<2, 3>(row, steps + ball) =
+            common.ball_tolerance_mm / seen.sigma_px * picture.by_place;
       row += 2;
     }
-  at.residuals.tail(priors.residuals.size()) = priors.residuals;
-  at.jacobian.bottomRows(priors.residuals.size()) = priors.jacobian;
+  at.residuals.segment(count, priors.residuals.size()) = priors.residuals;
+  at.jacobian.block(count, 0, priors.residuals.size(), steps) = priors.jacobian;
+  at.residuals.tail(own) = at.departures;
+  at.jacobian.bottomRightCorner(own, own).setIdentity();
   at.chi2 = at.residuals.squaredNorm();
-  at.dof = int(count) + priors.independent - int(columns);
+  at.dof = int(at.jacobian.rows() - at.jacobian.cols());
   return std::isfinite(at.chi2);
 }
 
-std::vector<CentredView> all_moved(const std::vector<CentredView>& views, const Eigen::VectorXd& step) {
-  std::vector<CentredView> next;
-  for (std::size_t i = 0; i < views.size(); ++i)
-    next.push_back(moved(views[i], step.segment<10>(10 * Eigen::Index(i))));
-  return next;
+void move(const Refinement& from, const Eigen::VectorXd& step, Refinement& to) {
+  for (std::size_t i = 0; i < from.views.size(); ++i)
+    to.views.push_back(moved(from.views[i], step.segment<n>(n * Eigen::Index(i))));
+  to.departures = from.departures + step.tail(from.departures.size());
 }
 
 tl::unexpected<Failure> open_views(const Refinement& at) {
@@ -70,10 +83,15 @@ std::optional<Eigen::MatrixXd> covariance_of(const Eigen::MatrixXd& jacobian) {
 
 }  // namespace
 
-Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const SpreadPrior& spread) {
+Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
   Refinement at;
-  for (const ViewProblem& problem : problems) at.views.push_back(problem.start);
-  if (!evaluate(problems, spread, at)) return open_views(at);
+  std::size_t balls = 0;
+  for (const ViewProblem& problem : problems) {
+    at.views.push_back(problem.start);
+    for (const Observation& seen : problem.observations) balls = std::max(balls, seen.ball + 1);
+  }
+  if (common.ball_tolerance_mm > 0) at.departures = Eigen::VectorXd::Zero(3 * Eigen::Index(balls));
+  if (!evaluate(problems, common, at)) return open_views(at);
   double damping = 1e-3;
   bool done = false;
   for (int i = 0; i < most_iterations && !done; ++i) {
@@ -85,8 +103,8 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Spre
       Eigen::MatrixXd damped = normal;
       damped.diagonal() *= 1 + damping;
       Refinement next;
-      next.views = all_moved(at.views, done ? newton : Eigen::VectorXd(-damped.ldlt().solve(slope)));
-      lower = evaluate(problems, spread, next) && next.chi2 < at.chi2;
+      move(at, done ? newton : Eigen::VectorXd(-damped.ldlt().solve(slope)), next);
+      lower = evaluate(problems, common, next) && next.chi2 < at.chi2;
       if (lower) at = std::move(next);
       if (done) break;
       damping = lower ? std::max(least_damping, damping / 8) : damping * 5;

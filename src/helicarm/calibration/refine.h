@@ -12,6 +12,7 @@ namespace helicarm {
 
 /// A ball's place (mm) and picture (px), with the picture's standard deviation per axis.
 struct Observation {
+  std::size_t ball;  ///< the same in all views
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d pixel;
   double sigma_px;
@@ -24,18 +25,20 @@ struct ViewProblem {
 };
 
 /// The fit of all views at once. Rows are the observations' u and v, view by view, then the priors, each over
-/// its standard deviation.
+/// its standard deviation. Columns are the steps of all views, then, if there is a tolerance, the balls'
+/// departures from the drawing, over it.
 struct Refinement {
   std::vector<CentredView> views;
+  Eigen::VectorXd departures;  ///< of the balls; empty without tolerance
   Eigen::VectorXd residuals;
-  Eigen::MatrixXd jacobian;    ///< by the steps of all views
-  Eigen::MatrixXd covariance;  ///< of the steps, the sigmas taken at their word
+  Eigen::MatrixXd jacobian;
+  Eigen::MatrixXd covariance;  ///< of all columns, the sigmas taken at their word
   double chi2 = 0;
   int dof = 0;
 };
 
 /// Maximum likelihood by Levenberg and Marquardt's method. `uncertain` where the observations do not fix the
 /// views.
-Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const SpreadPrior& spread);
+Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common);
 
 }  // namespace helicarm

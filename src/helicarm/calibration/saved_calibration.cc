@@ -50,7 +50,7 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
     }
     if (reader.has("calibration")) {
       JsonReader calibration = reader.object("calibration");
-      const auto n = 10 * saved.views.size();
+      const auto n = view_parameters * saved.views.size();
       if (calibration.has("joint_covariance"))
         saved.joint_covariance =
             Eigen::Map<const Eigen::MatrixXd>(calibration.matrix("joint_covariance", n, n, any_number).data(),

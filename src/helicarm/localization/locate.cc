@@ -18,8 +18,9 @@ Eigen::MatrixXd calibration_noise(const Eigen::Vector3d& point_in_anchor,
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(n, columns);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
     const PointPicture& picture = pictures[std::size_t(i)];
-    jacobian.block<2, 10>(2 * i, 10 * Eigen::Index(picture.view)) = pixel_by_parameters(
-        calibration.views[picture.view].view, picture.calibrator_from_anchor * point_in_anchor);
+    jacobian.block<2, view_parameters>(2 * i, view_parameters * Eigen::Index(picture.view)) =
+        pixel_by_parameters(calibration.views[picture.view].view,
+                            picture.calibrator_from_anchor * point_in_anchor);
   }
   return jacobian * calibration.joint_covariance * jacobian.transpose();
 }

@@ -29,7 +29,7 @@ Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random
   std::vector<ViewFiducials> views;
   for (const View& view : truth) {
     ViewFiducials seen{fmt::format("V{}", views.size()), {}};
-    seen.prior = {std::nullopt, Belief{1, 0.001}, std::nullopt};
+    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, Belief{1, 0.001}};
     for (int k = 0; k < 12; ++k) {
       const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);
       Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
@@ -42,7 +42,7 @@ Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random
   }
   CalibrationOptions options;
   options.rejection_probability = 0;
-  options.spread = {std::nullopt, 1.0};
+  options.common.machine.principal = Departure{1000, 0.7};
   return calibrate(views, options);
 }
 

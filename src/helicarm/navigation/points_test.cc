@@ -22,7 +22,7 @@ class TwoExposures : public testing::Test {
     CalibratedView lateral;
     lateral.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})};
     calibration.views = {frontal, lateral};
-    calibration.joint_covariance = 1e-12 * Eigen::MatrixXd::Identity(20, 20);
+    calibration.joint_covariance = 1e-12 * Eigen::MatrixXd::Identity(22, 22);
     const RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
     const RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
     given.views.resize(2);

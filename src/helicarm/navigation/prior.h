@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// What the file's tags and the making of C-arms say of a view's intrinsics, in rectified pixels: the source
-/// distance within 1 %, square pixels, the central ray within a centimetre or so of the picture's centre.
+/// What the file and the plate say of a view's intrinsics. The file's source distance is nominal, and the
+/// central ray meets the receiver somewhere about its middle; square pixels are as good as the rectification.
 IntrinsicsPrior intrinsics_prior(const Exposure& exposure, const DistortionMap& map);
 
-/// How far one stand sags between two views: a few mm in source distance, about a centimetre across.
-SpreadPrior spread_prior(const Exposure& exposure, const DistortionMap& map);
+/// How far a C-arm that nobody knows may be from its file's word, and its views from each other (sag).
+MachinePrior unknown_machine();
 
 }  // namespace helicarm

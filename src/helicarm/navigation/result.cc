@@ -216,6 +216,21 @@ Json to_json(const Failure& failure) {
           {"figures", std::move(figures)}};
 }
 
+namespace {
+
+Json json_of(const std::optional<MachineKnowledge>& machine) {
+  if (!machine) return nullptr;
+  const auto departure = [](const Departure& d) {
+    return Json{{"common_mm", d.common}, {"of_view_mm", d.of_view}};
+  };
+  return Json{{"focal_mm", machine->mean_mm.x()},
+          {"principal_mm", vector(machine->mean_mm.tail<2>())},
+          {"focal_sigma", departure(*machine->prior.focal)},
+          {"principal_sigma", departure(*machine->prior.principal)}};
+}
+
+}  // namespace
+
 Json to_json(const Result& result) {
   Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
   json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
@@ -225,6 +240,7 @@ Json to_json(const Result& result) {
   json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
                                                   ? matrix(result.joint_covariance)
                                                   : Json(nullptr)}};
+  json["machine"] = json_of(result.machine);
   json["points"] = list_of(result.points, result.views);
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = list_of(result.tunnels);

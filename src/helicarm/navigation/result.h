@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "helicarm/calibration/calibrated_view.h"
+#include "helicarm/calibration/machine.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/fiducials/find_fiducials.h"
@@ -26,6 +27,7 @@ struct RunOptions {
   std::optional<double>
       max_error_mm;      ///< refuse (uncertain) a point whose error exceeds this in more than 5 % of cases
   unsigned threads = 0;  ///< 0: all cores
+  std::optional<Machine> machine = {};  ///< the C-arm's history, which then serves as a prior
 };
 
 /// All that the stages made of one exposure; what was not reached is absent.
@@ -65,7 +67,9 @@ struct Result {
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
   std::vector<ViewResult> views;
-  Eigen::MatrixXd joint_covariance;  ///< of all views' parameters, 10 each; as CalibratedView::covariance
+  Eigen::MatrixXd joint_covariance;         ///< of all views' parameters; as CalibratedView::covariance
+  std::optional<MachineKnowledge> machine;  ///< what its history told, where one was given
+  std::vector<MachineShot> shots;           ///< what this case adds to it
   std::vector<PointResult> points;
   Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;

@@ -26,7 +26,8 @@ void run_stages(const Case& given, Result& result) {
   value_or_throw(check_pictures_belong_together(result.views));
 
   each_view(time.rectify, [&](const CaseView& from, ViewResult& view) {  // 2.1, Eq. 1-3
-    view.rectification = value_or_throw(rectify_view(*view.exposure, from, given.plate, options.method));
+    view.rectification =
+        value_or_throw(rectify_view(*view.exposure, from, given.plate, given.calibrator, options.method));
   });
 
   each_view(time.detect, [&](const CaseView&, ViewResult& view) {  // 2.1, 2.3.4
@@ -40,10 +41,13 @@ void run_stages(const Case& given, Result& result) {
           find_fiducials(*view.exposure, *view.rectification, given.calibrator, options.method, radius_bias));
   });
 
+  if (options.machine) result.machine = value_or_throw(recall_machine(result.views, *options.machine));
   const CalibrationResult calibration = timed(time.calibrate, [&] {  // 2.2, Eq. 4-7
-    return value_or_throw(calibrate_views(result.views, options.method));
+    return value_or_throw(calibrate_views(result.views, given.calibrator, options.method, result.machine));
   });
   keep_calibration(calibration, result);
+  if (options.machine && calibration.variance_scale == 1)
+    result.shots = lessons_of(result.views, given.calibrator);
 
   timed(time.locate, [&] {  // Eq. 8, Eq. 16
     result.points = value_or_throw(see_points(given, result));

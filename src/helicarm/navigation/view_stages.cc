@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/navigation/view_stages.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -34,6 +37,11 @@ Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
   return sum / count;
 }
 
+ViewFiducials fiducials_of(const ViewResult& view) {
+  return {view.name, view.found->fiducials, intrinsics_prior(*view.exposure, view.rectification->map),
+          view.found->view};
+}
+
 }  // namespace
 
 Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& views) {
@@ -54,13 +62,15 @@ Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& vie
 }
 
 Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
-                                     const std::optional<Plate>& plate, Method method) {
+                                     const std::optional<Plate>& plate, const Calibrator& calibrator,
+                                     Method method) {
   if (from.map || from.plate_image)
     return map_from(from, plate, method).and_then([&](const DistortionMap& map) {
       return with_map(exposure, map, plate);
     });
   if (plate) return rectify(exposure, *plate, {method, {}});
-  return without_plate(exposure);
+  const auto& pixel = exposure.acquisition.pixel_mm;
+  return without_plate(exposure, pixel ? ball_radii_px(calibrator, pixel->mean()).low : 0);
 }
 
 Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
@@ -78,19 +88,49 @@ std::optional<double> common_radius_bias(const std::vector<ViewResult>& views) {
   return surest ? std::optional(surest->radius_bias) : std::nullopt;
 }
 
-Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views, Method method) {
+Expected<CalibrationResult> calibrate_views(const std::vector<ViewResult>& views,
+                                            const Calibrator& calibrator, Method method,
+                                            const std::optional<MachineKnowledge>& machine) {
   std::vector<ViewFiducials> fiducials;
+  for (const ViewResult& view : views) fiducials.push_back(fiducials_of(view));
   CalibrationOptions options;
-  options.spread = spread_prior(*views.front().exposure, views.front().rectification->map);
-  for (const ViewResult& view : views)
-    fiducials.push_back({view.name, view.found->fiducials,
-                         intrinsics_prior(*view.exposure, view.rectification->map), view.found->view});
+  options.common = {unknown_machine(), calibrator.tolerance_mm};
+  if (machine) {
+    options.common.machine = machine->prior;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      fiducials[i].prior = known_prior(fiducials[i].prior, *machine, views[i].found->mirrored);
+  }
   return (method == Method::paper ? calibrate_paper(fiducials, options) : calibrate(fiducials, options))
       .and_then([](CalibrationResult calibration) -> Expected<CalibrationResult> {
         if (auto apart = check_views_apart(calibration.views, centre_of(calibration)); !apart)
           return tl::unexpected<Failure>(apart.error());
         return calibration;
       });
+}
+
+Expected<MachineKnowledge> recall_machine(const std::vector<ViewResult>& views, const Machine& machine) {
+  const IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
+  for (const ViewResult& view : views)
+    if (!fiducials_of(view).prior.focal_px)
+      return fail(Reason::bad_value,
+                  "a machine's history serves only pictures whose pixel size and source distance are known",
+                  {});
+  std::vector<MachineShot> earlier;
+  std::ranges::copy_if(machine.shots, std::back_inserter(earlier), [&](const MachineShot& shot) {
+    return std::ranges::none_of(views, [&](const ViewResult& view) {
+      return view.exposure->acquisition.instance_key == shot.picture;
+    });
+  });
+  return knowledge_of(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_machine());
+}
+
+std::vector<MachineShot> lessons_of(const std::vector<ViewResult>& views, const Calibrator& calibrator) {
+  std::vector<MachineShot> shots;
+  for (const ViewResult& view : views)
+    if (const auto shot = shot_of(fiducials_of(view), view.exposure->acquisition.instance_key,
+                                  {unknown_machine(), calibrator.tolerance_mm}))
+      shots.push_back(*shot);
+  return shots;
 }
 
 void keep_calibration(const CalibrationResult& calibration, Result& result) {

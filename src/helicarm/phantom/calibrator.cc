@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -21,6 +21,7 @@ constexpr std::size_t least_balls = 6;
 constexpr std::size_t most_balls = 1000;
 constexpr Range coordinate_range{-1000, 1000};
 constexpr Range diameter_range{0.5, 30};
+constexpr Range tolerance_range{0, 1};
 constexpr double least_extent_mm = 10;
 constexpr double least_distance_mm = 0.1;
 constexpr double least_flatness = 0.01;
@@ -104,7 +105,9 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
     throw BadInput(Reason::bad_value, fmt::format("{}: \"balls\": all within {} mm, at least {} mm (metres?)",
                                                   origin, extent, least_extent_mm));
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
-  const Eigen::Vector3d sizes = spread.jacobiSvd().singularValues() / std::sqrt(double(balls.size()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose() /
+                                                            double(balls.size()));
+  const Eigen::Vector3d sizes = axes.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
   if (sizes[2] < least_flatness * sizes[0])
     throw BadInput({Reason::coplanar_fiducials,
                     fmt::format("{}: the balls lie within {:.3g} mm rms of one plane, at least {:.3g} mm",
@@ -134,6 +137,7 @@ Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& o
       calibrator.balls.push_back(ball_from(ball));
     for (JsonReader& target : reader.objects("targets", false, most_balls))
       calibrator.targets.push_back(target_from(target));
+    if (reader.has("tolerance_mm")) calibrator.tolerance_mm = reader.number("tolerance_mm", tolerance_range);
     reader.finish();
     check_names(calibrator, origin);
     check_places(calibrator.balls, origin);
@@ -154,6 +158,7 @@ Expected<Calibrator> calibrator_named(const std::string& name_or_path, const std
 Json to_json(const Calibrator& calibrator) {
   constexpr const char* kinds[] = {"ball", "cross", "line_end"};
   Json json{{"name", calibrator.name}, {"balls", Json::array()}, {"targets", Json::array()}};
+  if (calibrator.tolerance_mm > 0) json["tolerance_mm"] = calibrator.tolerance_mm;
   for (const auto& ball : calibrator.balls)
     json["balls"].push_back({{"label", ball.label},
                              {"xyz_mm", numbers(ball.centre_in_calibrator)},

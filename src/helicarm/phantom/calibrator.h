@@ -36,6 +36,7 @@ struct Calibrator {
   std::string name;
   std::vector<CalibratorBall> balls;
   std::vector<CalibratorTarget> targets;
+  double tolerance_mm = 0;  ///< of the balls' places: standard deviation per axis
 };
 
 /// The built-in calibrator: twelve 4 mm balls on the conical helix of Eq. 9 at t = pi/6 + k pi/2, k = 0..11.
