@@ -30,6 +30,8 @@ ROOMS = {
                   " verification simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification simulation navigation",
+    "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
+             " verification simulation navigation",
 }
 FOR_TESTS = {"core", "simulation"}
 

@@ -20,6 +20,7 @@
 #include "run_command.h"
 #include "simulate_command.h"
 #include "solve_command.h"
+#include "study_command.h"
 
 namespace helicarm::cli {
 namespace {
@@ -67,7 +68,22 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("--method", a.method, "best, or paper: the published recipe")->capture_default_str();
   command->add_option("--max-error", a.max_error_mm, "Refuse when a point may be off by more, mm (95 %)")
       ->check(within(1e-6, 1000));
+  command->add_option("--machine", a.machine,
+                      "The C-arm's history (JSON): serves as prior, and this case's shots are added to it");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
+}
+
+void add_study(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "study", "Simulated experiments: the estimators against the statistical limit",
+                  "helicarm study limit --groups 10000 --seed 1 --out limit");
+  auto& a = arguments_of(command, action, study_command);
+  command->add_option("NAME", a.name, "limit: error over the Cramer-Rao bound, and coverage of error bars")
+      ->required();
+  command->add_option("--groups", a.groups, "Trials of each setting")
+      ->check(within(1, 1e6))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "Folder for limit.csv and limit.json")->capture_default_str();
 }
 
 void add_demo(CLI::App& app, Action& action) {
@@ -197,8 +213,8 @@ int run(int argc, char** argv) {
   app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")
       ->check(within(0, 1e19))
       ->capture_default_str();
-  for (const auto add : {add_demo, add_run, add_solve, add_locate, add_rectify, add_detect, add_import,
-                         add_simulate, add_phantom})
+  for (const auto add : {add_demo, add_run, add_study, add_solve, add_locate, add_rectify, add_detect,
+                         add_import, add_simulate, add_phantom})
     add(app, action);
   try {
     app.parse(argc, argv);

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace helicarm {
+
+struct LimitOptions {
+  int trials = 1000;  ///< of each setting
+  std::uint64_t seed = 1;
+  unsigned threads = 0;  ///< 0: all cores; the answer does not depend on it
+};
+
+/// One setting of the experiment: balls, noise, what is known of the intrinsics, and where the point is.
+struct LimitRow {
+  int balls;
+  double sigma_px;    ///< of ball centres, per axis
+  std::string model;  ///< free (11 numbers), square (f, u0, v0), prior, machine, known
+  std::string place;
+  bool point_exact;  ///< else the point's pixels carry the balls' noise
+  int trials = 0;
+  int failures = 0;     ///< refused or unlocated; left out of what follows
+  double bound_mm = 0;  ///< Cramer-Rao, rms
+  double error_mm = 0;  ///< rms
+  double dlt_mm = 0;    ///< rms of Eq. 7 and Eq. 8, on the same pixels
+  double coverage = 0;  ///< share of trials whose 95 % ellipsoid holds the truth
+  double efficiency() const { return error_mm / bound_mm; }
+};
+
+/// The estimators against the statistical limit, in the geometry of 2.3.3 (f 900 mm, 0.15 mm pixels, AP and
+/// lateral at 800 mm). `progress` is told the share done, in order.
+std::vector<LimitRow> study_limit(const LimitOptions& options,
+                                  const std::function<void(double share)>& progress);
+
+/// limit.csv: a head and one line for each row, full precision.
+std::string to_csv(const std::vector<LimitRow>& rows);
+
+}  // namespace helicarm
