@@ -175,7 +175,7 @@ int report(const Failure& failure, const Console& console) {
   const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
   console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view, failure.message);
   if (console.json)
-    console.out << Json{{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}}.dump(2)
+    console.out << to_text({{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}})
                 << '\n';
   return exit;
 }

@@ -35,9 +35,13 @@ struct RectificationOptions {
 };
 
 /// Finds the plate in the picture and fits the map (2.1). Refuses a blank or saturated picture, a missing
-/// plate and a plate whose pitch is not the file's.
+/// plate and a plate whose lattice or pitch is not the file's.
 Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
                                 const RectificationOptions& options);
+
+/// The same, had the plate balls for holes or holes for balls: the balls' candidates are then of the other
+/// polarity.
+Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification);
 
 /// For a flat panel: no distortion; all dots are candidates.
 Expected<Rectification> without_plate(const Exposure& exposure);
