@@ -21,6 +21,10 @@ using Eigen::Vector2d;
 
 constexpr double pitch_tolerance = 0.04;  // measured against expected
 constexpr std::size_t least_dots = 10;
+/// Where no plate is described, one may be in the picture all the same: more dots than a calibrator's balls
+/// and some stray ones could feign.
+constexpr std::size_t least_dots_of_any_plate = 20;
+const Plate any_plate{"", DotKind::balls, Lattice::square, {}, 2.5, {}, {}};
 constexpr double max_ball_radius = 0.04;  // of the picture's width: nothing larger is a ball
 
 /// Pixels per plate millimetre in the middle of the picture, where the file and the plate tell.
@@ -274,13 +278,11 @@ Rectification with_metal_inverted(const Exposure& exposure, Rectification rectif
 }
 
 Expected<Rectification> without_plate(const Exposure& exposure) {
-  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
-  Rectification result;
   const auto& pixel = exposure.acquisition.pixel_mm;
-  result.map = identity_map(exposure.pixels.width(), exposure.pixels.height(),
-                            pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
-  result.other_dots = find_dots(exposure, dot_options(exposure, Polarity::dark));
-  return result;
+  return with_map(exposure,
+                  identity_map(exposure.pixels.width(), exposure.pixels.height(),
+                               pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt),
+                  {});
 }
 
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
@@ -289,20 +291,22 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
                             exposure.pixels.width(), exposure.pixels.height()));
-  auto result = without_plate(exposure);
-  if (!result) return result;
-  result->map = map;
-  if (!plate || plate->kind == DotKind::holes) return result;
+  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
+  Rectification result;
+  result.map = map;
+  result.other_dots = find_dots(exposure, dot_options(exposure, Polarity::dark));
+  const Plate sought = plate.value_or(any_plate);
+  if (sought.kind == DotKind::holes) return result;
   // A plate in the picture tells whether the map still holds: rectified, its dots must stand on a lattice.
-  const SeenLattice seen = seen_lattice(result->other_dots, *plate, expected_scale(exposure, *plate));
-  if (seen.lattice.dots.size() < least_dots) return result;
+  const SeenLattice seen = seen_lattice(result.other_dots, sought, expected_scale(exposure, sought));
+  if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) {
     const Dot& dot = seen.dots[d.dot];
     members.push_back(dot);
     if (const auto uv = map.rectified_from_raw(dot.centre_px))
-      dots.push_back({lattice_point(d.index, plate->lattice), *uv, dot.sigma_px});
+      dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.sigma_px});
   }
   MapOptions straight;
   straight.order = 1;
@@ -313,11 +317,11 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
     return fail(
         Reason::plate_mismatch,
         fmt::format(
-            "the map does not fit the plate in the picture: its rectified dots are {:.2f} px rms off a "
-            "lattice, limit {:.2f}",
+            "{} the plate in the picture: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
+            map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
-  result->other_dots = without(result->other_dots, members);
+  result.other_dots = without(result.other_dots, members);
   return result;
 }
 

@@ -43,10 +43,10 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
 /// polarity.
 Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification);
 
-/// For a flat panel: no distortion; all dots are candidates.
+/// For a flat panel: the identity as a known map. plate_mismatch where a plate in the picture is bent.
 Expected<Rectification> without_plate(const Exposure& exposure);
 
-/// For a map known already (from a plate shot apart or a file): only the dots are found.
+/// For a map known already (from a plate shot apart or a file); plate_mismatch where it leaves a plate bent.
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
                                  const std::optional<Plate>& plate);
 

@@ -269,8 +269,20 @@ TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
-TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
+TEST(WithoutPlate, BentPlateInThePictureIsAMismatch) {
   const auto result = without_plate(exposure_of(room().views[0]));
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+}
+
+TEST(WithMap, PlateThatIsNotDescribedIsSeenAllTheSame) {
+  const auto result = with_map(exposure_of(room().views[0]), rectified_ap().map, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT(result->other_dots.size(), 25u);
+}
+
+TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
+  const auto result = without_plate(exposure_of(small_case(5, simulation::CaseKind::flat).views[0]));
   ASSERT_TRUE(result);
   EXPECT_TRUE(result->map.is_identity());
   EXPECT_NEAR(*result->map.rectified_pixel_mm, room().views[0].shot.pixel_mm(), 1e-12);
