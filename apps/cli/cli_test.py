@@ -139,6 +139,14 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertEqual(json.loads(done.stdout)["failure"]["code"], "missing_file")
 
+    def test_message_shows_no_control_character_of_a_file(self):
+        matrix = self.root / "matrix.txt"
+        matrix.write_text("1 0 0 0\n0 1 0 0\n0 0 1 \x1b[31m\n")
+        done = run("import", matrix)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("?[31m", done.stderr)
+        self.assertNotIn("\x1b", done.stderr)
+
     def test_detect_finds_the_metal(self):
         done = run("detect", self.root / "case/AP.dcm", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -282,10 +282,11 @@ TEST(WithMap, PlateThatIsNotDescribedIsSeenAllTheSame) {
 }
 
 TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
-  const auto result = without_plate(exposure_of(small_case(5, simulation::CaseKind::flat).views[0]));
+  const SimulatedCase flat = small_case(5, simulation::CaseKind::flat);
+  const auto result = without_plate(exposure_of(flat.views[0]));
   ASSERT_TRUE(result);
   EXPECT_TRUE(result->map.is_identity());
-  EXPECT_NEAR(*result->map.rectified_pixel_mm, room().views[0].shot.pixel_mm(), 1e-12);
+  EXPECT_NEAR(*result->map.rectified_pixel_mm, flat.views[0].shot.pixel_mm(), 1e-12);
   EXPECT_FALSE(result->dots_expected);
 }
 
