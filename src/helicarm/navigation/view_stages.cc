@@ -70,17 +70,23 @@ Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& f
 
 Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
                                                               const Calibrator& calibrator, Method method) {
-  auto found = find_fiducials(*view.exposure, *view.rectification, calibrator, method);
-  if (found) return std::optional(std::move(*found));
-  if (found.error().reason == Reason::ambiguous_labels) return std::optional<FoundFiducials>();
-  // The plate's kind tells how metal shows: were it the other kind, the calibrator might be seen.
   const Rectification& plate = *view.rectification;
-  if (plate.dots_found > 0 &&
-      find_fiducials(*view.exposure, with_metal_inverted(*view.exposure, plate), calibrator, method))
-    return fail(
-        Reason::plate_mismatch,
-        "the calibrator is seen if the plate's dots are taken for holes instead of balls or for balls "
-        "instead of holes");
+  const auto ambiguous = [](const auto& found) {
+    return !found && found.error().reason == Reason::ambiguous_labels;
+  };
+  auto found = find_fiducials(*view.exposure, plate, calibrator, method);
+  if (found) return std::optional(std::move(*found));
+  if (ambiguous(found)) return std::optional<FoundFiducials>();
+  // The plate's kind tells how metal shows: were it the other kind, the calibrator might be seen.
+  if (plate.dots_found > 0) {
+    const auto inverted = with_metal_inverted(*view.exposure, plate);
+    const auto other = find_fiducials(*view.exposure, inverted, calibrator, method);
+    if (other || ambiguous(other))
+      return fail(
+          Reason::plate_mismatch,
+          "the calibrator is seen if the plate's dots are taken for holes instead of balls or for balls "
+          "instead of holes");
+  }
   return tl::unexpected<Failure>(found.error());
 }
 
