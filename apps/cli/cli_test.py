@@ -4,6 +4,7 @@
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,7 +14,7 @@ PROGRAM = sys.argv.pop(1)
 
 
 def run(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, errors="replace")
 
 
 class CommandLine(unittest.TestCase):
@@ -110,6 +111,42 @@ class CommandLine(unittest.TestCase):
             self.assertAlmostEqual(point["u"], u, 6)
             self.assertAlmostEqual(point["v"], v, 6)
 
+    def test_rectify_carries_nothing_from_off_the_picture(self):
+        out = self.root / "rectified_twice"
+        run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out, "--quiet")
+        points = self.root / "off.csv"
+        points.write_text("u_px,v_px\n5000,5000\n256,256\n-40,200\n")
+        for way in ((), ("--inverse",)):
+            answer = json.loads(run("rectify", "--map", out / "map.json", "--points", points, "--json", *way).stdout)
+            self.assertEqual([point["u"] is None for point in answer["points"]], [True, False, True])
+            self.assertIsNone(answer["points"][0]["v"])
+
+    def test_run_that_cannot_write_its_overlays_leaves_nothing(self):
+        out = self.root / "blocked"
+        (out / "LAT_overlay.png/in the way").mkdir(parents=True)
+        done = run("run", self.root / "case", "--out", out, "--quiet")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("cannot_write", done.stderr)
+        self.assertEqual([path.name for path in out.iterdir()], ["LAT_overlay.png"])
+
+    def test_check_of_the_rules_says_the_same_in_both_forms(self):
+        rules = json.loads(run("phantom", "check", "--json").stdout)["rules"]
+        lines = run("phantom", "check").stdout.splitlines()
+        self.assertEqual([rule["passed"] for rule in rules], [line.startswith("kept") for line in lines[:len(rules)]])
+
+    def test_file_name_that_is_no_utf8_is_refused_like_any_other(self):
+        done = run("detect", b"\xff.dcm".decode(errors="surrogateescape"), "--json")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["failure"]["code"], "missing_file")
+
+    def test_message_shows_no_control_character_of_a_file(self):
+        matrix = self.root / "matrix.txt"
+        matrix.write_text("1 0 0 0\n0 1 0 0\n0 0 1 \x1b[31m\n")
+        done = run("import", matrix)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("\"?", done.stderr)
+        self.assertNotIn("\x1b", done.stderr)
+
     def test_detect_finds_the_metal(self):
         done = run("detect", self.root / "case/AP.dcm", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -126,6 +163,26 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         for a, b in zip(json.loads(done.stdout)["points"][0]["xyz_mm"], target["xyz_mm"]):
             self.assertAlmostEqual(a, b, 2)
+
+    def test_locate_answers_raw_picks_as_run_does(self):
+        case = self.root / "picked"
+        shutil.copytree(self.root / "case", case)
+        clicks = [("near", "AP", 250.3, 240.1, None), ("near", "LAT", 255.9, 241.7, 1.5),
+                  ("apart", "AP", 300, 200, 0), ("apart", "LAT", 310, 260, 0.2)]
+        description = json.loads((case / "case.json").read_text())
+        description["picks"] = [{"name": name, "view": view, "uv": [u, v], "sigma_px": sigma}
+                                for name, view, u, v, sigma in clicks]
+        (case / "case.json").write_text(json.dumps(description))
+        self.assertEqual(run("run", case, "--out", case / "out", "--no-report", "--quiet").returncode, 0)
+        picks = self.root / "raw.csv"
+        picks.write_text("name,view,u_px,v_px,sigma_px\n" + "".join(
+            f"{name},{view},{u},{v},{'' if sigma is None else sigma}\n" for name, view, u, v, sigma in clicks))
+        done = run("locate", "--calibration", case / "out/result.json", "--picks", picks, "--raw", "--json")
+        known = json.loads((case / "out/result.json").read_text())["points"]
+        for here, there in zip(json.loads(done.stdout)["points"], known):
+            self.assertEqual(here["name"], there["name"])
+            for a, b in zip(here["xyz_mm"] + sum(here["covariance_mm2"], []), there["xyz_mm"] + sum(there["covariance_mm2"], [])):
+                self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(b)))
 
 
 if __name__ == "__main__":

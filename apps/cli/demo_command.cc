@@ -46,7 +46,7 @@ void print(const Comparison& comparison, const std::filesystem::path& report, Co
                  {"ball_rms_px", comparison.ball_rms_px},
                  {"point_error_mm", comparison.point_error_mm},
                  {"report", report.string()}};
-    console.out << json.dump(2) << '\n';
+    console.out << to_text(json) << '\n';
     return;
   }
   console.out << fmt::format("\n  Against the truth: {} images of balls, {:.3f} px rms off\n",

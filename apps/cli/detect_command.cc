@@ -50,7 +50,7 @@ CommandResult detect_command(const DetectArguments& arguments, Console& console)
                         {"v", dot.centre_px.y()},
                         {"sigma_px", dot.sigma_px},
                         {"radius_px", dot.radius_px}});
-      console.out << Json{{"dots", std::move(list)}}.dump(2) << '\n';
+      console.out << to_text(Json{{"dots", std::move(list)}}) << '\n';
       return;
     }
     console.out << fmt::format("{:>10} {:>10} {:>9} {:>9}\n", "u px", "v px", "sigma px", "radius px");

@@ -41,7 +41,7 @@ CommandResult import_command(const ImportArguments& arguments, Console& console)
   const auto imported = import_matrix(arguments.file, arguments.unit == "cm" ? 10 : 1);
   if (!imported) return tl::unexpected<Failure>(imported.error());
   if (console.json)
-    console.out << json_of(*imported).dump(2) << '\n';
+    console.out << to_text(json_of(*imported)) << '\n';
   else
     print_table(*imported, console.out);
   return {};

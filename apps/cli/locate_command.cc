@@ -2,70 +2,68 @@
 #include "locate_command.h"
 
 #include <algorithm>
-#include <utility>
+#include <optional>
+#include <set>
 #include <vector>
 
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/core/csv.h"
+#include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
 
 namespace helicarm::cli {
 namespace {
 
-constexpr double default_sigma_px = 0.5;
+/// One point as it was picked, in the order of the first picks.
+struct PickedPoint {
+  std::string name;
+  std::vector<PointPicture> pictures;
+  std::optional<Failure> unseen = {};  ///< why the last picture missing here is so
+};
 
-/// Name and pictures, in the order of their first pick.
-using Picks = std::vector<std::pair<std::string, std::vector<PointPicture>>>;
-
-/// A raw pixel with its noise as a rectified one with the map's noise as well.
-PointPicture rectified(PointPicture picture, const DistortionMap& map, const std::string& where) {
-  const auto uv = map.rectified_from_raw(picture.uv);
-  if (!uv)
-    throw BadInput(Reason::bad_value, fmt::format("{}: lies outside what the view's map covers", where));
-  const Eigen::Matrix2d rectified_by_raw = map.jacobian(*uv).inverse();
-  const double sigma = map.sigma_px(*uv);
-  picture.uv = *uv;
-  picture.covariance_px2 = rectified_by_raw * picture.covariance_px2 * rectified_by_raw.transpose() +
-                           sigma * sigma * Eigen::Matrix2d::Identity();
-  return picture;
-}
-
-PointPicture picture_from(const CsvTable& table, std::size_t row, const SavedCalibration& calibration,
-                          bool raw) {
+/// As `run` sees the picks of its case; rectified ones are taken as they are.
+Expected<PointPicture> picture_from(const CsvTable& table, std::size_t row,
+                                    const SavedCalibration& calibration, bool raw) {
   const std::string where = fmt::format("picks: row {}", row + 1);
-  const std::string& name = table.text(row, "view");
-  const auto same = [&](const CalibratedView& view) { return view.name == name; };
-  const auto found = std::find_if(calibration.views.begin(), calibration.views.end(), same);
+  const auto found = std::ranges::find(calibration.views, table.text(row, "view"), &CalibratedView::name);
   if (found == calibration.views.end())
-    throw BadInput(Reason::bad_value,
-                   fmt::format("{}: view: the calibration has no view \"{}\"", where, name));
-  const double sigma = table.optional_number(row, "sigma_px").value_or(default_sigma_px);
-  if (sigma < 0) throw BadInput(Reason::bad_value, fmt::format("{}: sigma_px: {} is negative", where, sigma));
+    throw BadInput(Reason::bad_value, fmt::format("{}: view: the calibration has no view \"{}\"", where,
+                                                  table.text(row, "view")));
+  const auto given_sigma = table.optional_number(row, "sigma_px");
+  if (given_sigma && *given_sigma < 0)
+    throw BadInput(Reason::bad_value, fmt::format("{}: sigma_px: {} is negative", where, *given_sigma));
   const auto view = static_cast<std::size_t>(found - calibration.views.begin());
-  const PointPicture picture{view,
-                             {table.number(row, "u_px"), table.number(row, "v_px")},
-                             sigma * sigma * Eigen::Matrix2d::Identity()};
+  const Eigen::Vector2d uv{table.number(row, "u_px"), table.number(row, "v_px")};
   const auto& map = calibration.maps[view];
-  return raw && map ? rectified(picture, *map, where) : picture;
+  if (raw && map && !map->shows(uv))
+    throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the picture of {} x {} pixels",
+                                                  where, uv.x(), uv.y(), map->width, map->height));
+  return (raw && map ? see_click(*map, uv, given_sigma)
+                     : SeenPoint{uv, uv, given_sigma.value_or(click_sigma_px)})
+      .map([&](const SeenPoint& seen) {
+        return PointPicture{view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
+      });
 }
 
-Picks picks_from(const CsvTable& table, const SavedCalibration& calibration, bool raw) {
-  Picks picks;
+std::vector<PickedPoint> picked_points(const CsvTable& table, const SavedCalibration& calibration, bool raw) {
+  std::vector<PickedPoint> points;
+  std::set<std::pair<std::string, std::string>> clicks;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const PointPicture picture = picture_from(table, row, calibration, raw);
-    const std::string& name = table.text(row, "name");
-    auto pick = std::find_if(picks.begin(), picks.end(), [&](const auto& p) { return p.first == name; });
-    if (pick == picks.end()) pick = picks.insert(picks.end(), {name, {}});
-    for (const PointPicture& other : pick->second)
-      if (other.view == picture.view)
-        throw BadInput(Reason::name_clash, fmt::format("picks: row {}: \"{}\" is picked twice in view \"{}\"",
-                                                       row + 1, name, calibration.views[picture.view].name));
-    pick->second.push_back(picture);
+    const auto picture = picture_from(table, row, calibration, raw);
+    const std::string &name = table.text(row, "name"), &view = table.text(row, "view");
+    if (!clicks.emplace(name, view).second)
+      throw BadInput(Reason::name_clash, fmt::format("picks: row {}: \"{}\" is picked twice in view \"{}\"",
+                                                     row + 1, name, view));
+    auto point = std::ranges::find(points, name, &PickedPoint::name);
+    if (point == points.end()) point = points.insert(points.end(), {name, {}});
+    if (picture)
+      point->pictures.push_back(*picture);
+    else
+      point->unseen = picture.error();
   }
-  return picks;
+  return points;
 }
 
 Json located(const LocateArguments& arguments, std::ostream& progress) {
@@ -75,10 +73,11 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   Json points = Json::array();
-  for (const auto& [name, pictures] : picks_from(table, calibration, arguments.raw)) {
+  for (const auto& [name, pictures, unseen] : picked_points(table, calibration, arguments.raw)) {
     const auto point = locate(name, PointSource::pick, pictures, calibration);
-    points.push_back(point ? point_json(*point) : point_json(name, PointSource::pick, point.error().reason));
-    if (!point) progress << fmt::format("{}: {}\n", name, point.error().message);
+    const auto why = point ? point->doubt : unseen ? unseen : std::optional(point.error());
+    points.push_back(point ? point_json(*point) : point_json(name, PointSource::pick, why->reason));
+    if (why) progress << fmt::format("{}: {}\n", name, why->message);
   }
   return points;
 }
@@ -104,7 +103,7 @@ CommandResult locate_command(const LocateArguments& arguments, Console& console)
   const auto points = guarded([&] { return located(arguments, console.progress); });
   if (!points) return tl::unexpected<Failure>(points.error());
   if (console.json)
-    console.out << Json{{"points", *points}}.dump(2) << '\n';
+    console.out << to_text(Json{{"points", *points}}) << '\n';
   else
     print_table(*points, console.out);
   return {};

@@ -87,6 +87,9 @@ TEST(LocateCommand, BadInputIsNamed) {
     return locate_in(calibration, picks).result.error().reason;
   };
   EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px\nT,PA,1,2\n"), Reason::bad_value);
+  EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px\nT\x1b[31m,AP,1,2\n"), Reason::bad_value);
+  EXPECT_EQ(locate_in(result_json(), "name,view,u_px,v_px\nT,AP,1,2000\n", true).result.error().reason,
+            Reason::bad_value);
   EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px\nT,AP,1,2\nT,AP,3,4\n"), Reason::name_clash);
   EXPECT_EQ(reason_of(result_json(), "name,view,u_px,v_px,sigma_px\nT,AP,1,2,-1\n"), Reason::bad_value);
   Json refused = result_json();

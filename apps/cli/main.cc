@@ -12,6 +12,7 @@
 #include "demo_command.h"
 #include "detect_command.h"
 #include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
 #include "helicarm/navigation/result.h"
 #include "import_command.h"
 #include "locate_command.h"
@@ -189,9 +190,10 @@ void add_phantom(CLI::App& app, Action& action) {
 int report(const Failure& failure, const Console& console) {
   const int exit = exit_code(failure.reason);
   const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
-  console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view, failure.message);
+  console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
+                                  without_control_characters(failure.message));
   if (console.json)
-    console.out << Json{{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}}.dump(2)
+    console.out << to_text({{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}})
                 << '\n';
   return exit;
 }

@@ -30,7 +30,7 @@ Plate plate_of(const PhantomArguments& arguments) {
 
 void show(const Calibrator& calibrator, Console& console) {
   if (console.json) {
-    console.out << to_json(calibrator).dump(2) << "\n";
+    console.out << to_text(to_json(calibrator)) << "\n";
     return;
   }
   console.out << fmt::format("{}: {} balls, {} targets\n\n{:<12}{:>10}{:>10}{:>10}{:>12}\n", calibrator.name,
@@ -47,7 +47,7 @@ void show(const Calibrator& calibrator, Console& console) {
 
 void show(const Plate& plate, Console& console) {
   if (console.json) {
-    console.out << to_json(plate).dump(2) << "\n";
+    console.out << to_text(to_json(plate)) << "\n";
     return;
   }
   const auto number = [](const std::optional<double>& value) {
@@ -79,15 +79,15 @@ void check(const Calibrator& calibrator, Console& console) {
                                {"limit", f.limit},
                                {"unit", f.unit},
                                {"passed", f.passed()}});
-    console.out << json.dump(2) << "\n";
-  }
-  for (const auto& f : console.json ? std::vector<RuleFinding>{} : findings)
-    console.out << fmt::format("{:<7}{:>9.3f} {} {:>6.2f} {:<6} {}\n", f.passed() ? "kept" : "BROKEN",
-                               f.figure, f.bound == Bound::at_most ? "<=" : ">=", f.limit, f.unit,
-                               f.sentence);
-  if (!console.json)
+    console.out << to_text(json) << "\n";
+  } else {
+    for (const auto& f : findings)
+      console.out << fmt::format("{:<7}{:>9.3f} {} {:>6.2f} {:<6} {}\n", f.passed() ? "kept" : "BROKEN",
+                                 f.figure, f.bound == Bound::at_most ? "<=" : ">=", f.limit, f.unit,
+                                 f.sentence);
     console.out << fmt::format("\n{}: {}; uniformity (Eq. 13) {:.3f}\n", calibrator.name,
                                passed ? "keeps all rules" : "breaks a rule", spread);
+  }
   if (!passed) throw BadInput(Reason::rules_broken, fmt::format("{} breaks a design rule", calibrator.name));
 }
 
@@ -95,7 +95,7 @@ Files exported(const Calibrator& calibrator, const PhantomArguments& arguments) 
   Files files;
   if (arguments.stl) files.emplace_back(*arguments.stl, to_stl(value_or_throw(printable_body(calibrator))));
   if (arguments.svg) files.emplace_back(*arguments.svg, drawing_of(calibrator));
-  if (arguments.file) files.emplace_back(*arguments.file, to_json(calibrator).dump(2) + "\n");
+  if (arguments.file) files.emplace_back(*arguments.file, to_text(to_json(calibrator)) + "\n");
   return files;
 }
 
@@ -103,7 +103,7 @@ Files exported(const Plate& plate, const PhantomArguments& arguments) {
   if (arguments.stl) throw BadInput(Reason::usage, "--stl: only the calibrator has a printable body");
   Files files;
   if (arguments.svg) files.emplace_back(*arguments.svg, value_or_throw(drawing_of(plate)));
-  if (arguments.file) files.emplace_back(*arguments.file, to_json(plate).dump(2) + "\n");
+  if (arguments.file) files.emplace_back(*arguments.file, to_text(to_json(plate)) + "\n");
   return files;
 }
 
@@ -116,7 +116,7 @@ void write(const Files& files, Console& console) {
   if (!console.json) return;
   Json written = Json::array();
   for (const auto& file : files) written.push_back(file.first.string());
-  console.out << Json{{"written", written}}.dump(2) << "\n";
+  console.out << to_text(Json{{"written", written}}) << "\n";
 }
 
 }  // namespace

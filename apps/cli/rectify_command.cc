@@ -74,10 +74,10 @@ void rectify_picture(const RectifyArguments& arguments, Console& console) {
   without_dots.pixels = inpainted(exposure.pixels, r.plate_dots);
   value_or_throw(write_dicom(arguments.out / "inpainted.dcm",
                              rectified_image(without_dots, r.map, "rectified, plate hidden")));
-  value_or_throw(write_file(arguments.out / "map.json", to_json(r.map).dump(2) + "\n"));
+  value_or_throw(write_file(arguments.out / "map.json", to_text(to_json(r.map)) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)
-    console.out << figures_of(r).dump(2) << '\n';
+    console.out << to_text(figures_of(r)) << '\n';
   else if (!console.quiet)
     console.out << fmt::format(
         "{}: {} dots, residual {:.3f} px rms, {:.3f} max, held out {:.3f}; written to {}\n", r.map.model,
@@ -91,13 +91,12 @@ void map_points(const RectifyArguments& arguments, Console& console) {
   Json points = Json::array();
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const Eigen::Vector2d given{table.number(row, "u_px"), table.number(row, "v_px")};
-    const auto mapped =
-        arguments.inverse ? std::optional(map.raw_from_rectified(given)) : map.rectified_from_raw(given);
+    const auto mapped = arguments.inverse ? raw_in_picture(map, given) : rectified_in_picture(map, given);
     points.push_back(mapped ? Json{{"u", mapped->x()}, {"v", mapped->y()}}
                             : Json{{"u", nullptr}, {"v", nullptr}});
   }
   if (console.json) {
-    console.out << Json{{"points", std::move(points)}}.dump(2) << '\n';
+    console.out << to_text(Json{{"points", std::move(points)}}) << '\n';
     return;
   }
   console.out << "u_px,v_px\n";
@@ -111,10 +110,10 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
     return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
   };
   if (console.json)
-    console.out
-        << Json{{"raw", json_of(grid.raw)}, {"rectified", json_of(grid.rectified)}, {"n", grid.crosses}}.dump(
-               2)
-        << '\n';
+    console.out << to_text(Json{{"raw", json_of(grid.raw)},
+                                {"rectified", json_of(grid.rectified)},
+                                {"n", grid.crosses}})
+                << '\n';
   else
     console.out << fmt::format(
         "{} crosses; raw {:.3f} px mean, {:.3f} max; rectified {:.3f} mean, {:.3f} max\n", grid.crosses,

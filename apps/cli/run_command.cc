@@ -8,6 +8,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/navigation/case.h"
 #include "helicarm/navigation/run_case.h"
+#include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 
 namespace helicarm::cli {
@@ -23,8 +24,8 @@ std::string statistics_line(std::string_view what, const Statistics& s) {
                      s.n);
 }
 
-/// A result of an earlier run must never pass for the answer of one that failed.
-void forget_earlier(const std::filesystem::path& out) {
+/// What an earlier run left, or one that could write only a part, must never pass for an answer.
+void forget(const std::filesystem::path& out) {
   std::error_code ignored;
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
 }
@@ -44,7 +45,19 @@ Expected<void> remember(const std::filesystem::path& path, Machine machine,
   for (const MachineShot& shot : shots)
     if (std::ranges::find(machine.shots, shot.picture, &MachineShot::picture) == machine.shots.end())
       machine.shots.push_back(shot);
-  return write_file(path, to_json(machine).dump(2) + "\n");
+  return write_file(path, to_text(to_json(machine)) + "\n");
+}
+
+/// The result goes last: where it lies, all that belongs to it lies there too.
+Expected<void> write(const Result& result, const RunArguments& arguments) {
+  auto written = arguments.no_report ? Expected<void>() : write_report(result, arguments.out);
+  if (written) written = write_file(arguments.out / "result.json", to_text(to_json(result)) + "\n");
+  if (written) return written;
+  forget(arguments.out);
+  std::error_code ignored;
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    std::filesystem::remove(arguments.out / overlay_name(result.views[i].name, i), ignored);
+  return written;
 }
 
 /// A case whose description already allows no answer (a flat calibrator, say) is refused like any other.
@@ -96,12 +109,11 @@ Expected<Result> run_and_write(const RunArguments& arguments, Console& console) 
   return guarded([&] {
     const RunOptions options{value_or_throw(method_named(arguments.method)), arguments.max_error_mm,
                              console.threads, value_or_throw(machine_at(arguments.machine))};
-    forget_earlier(arguments.out);
+    forget(arguments.out);
     const Result result = value_or_throw(result_of(arguments.folder, options));
-    value_or_throw(write_file(arguments.out / "result.json", to_json(result).dump(2) + "\n"));
+    value_or_throw(write(result, arguments));
     if (arguments.machine && !result.failure)
       value_or_throw(remember(*arguments.machine, *options.machine, result.shots));
-    if (!arguments.no_report) value_or_throw(write_report(result, arguments.out));
     if (!console.quiet)
       for (const Warning& warning : result.warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
@@ -115,7 +127,7 @@ CommandResult run_command(const RunArguments& arguments, Console& console) {
   if (!result) return tl::unexpected<Failure>(result.error());
   if (result->failure) return tl::unexpected<Failure>(*result->failure);
   if (console.json)
-    console.out << to_json(*result).dump(2) << '\n';
+    console.out << to_text(to_json(*result)) << '\n';
   else if (!console.quiet)
     console.out << summary_of(*result) << fmt::format("\n  written to {}\n", arguments.out.string());
   return {};

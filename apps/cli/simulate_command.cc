@@ -50,7 +50,7 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     value_or_throw(simulation::write_case(arguments.folder, simulated));
     const Json written = summary(arguments, simulated);
     if (console.json) {
-      console.out << written.dump(2) << '\n';
+      console.out << to_text(written) << '\n';
       return;
     }
     if (console.quiet) return;

@@ -112,7 +112,7 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   if (!solution) return tl::unexpected<Failure>(solution.error());
   const double rms_px = reprojection_rms(solution->view, pairs);
   if (console.json)
-    console.out << json_of(*solution, rms_px).dump(2) << '\n';
+    console.out << to_text(json_of(*solution, rms_px)) << '\n';
   else
     print_table(*solution, rms_px, *points, console.out);
   return {};

@@ -21,7 +21,7 @@ struct IntrinsicsPrior {
   std::optional<double> focal_px = {};  ///< nominal mean of |fx| and fy
   std::optional<Eigen::Vector2d> principal_px = {};
   double unit_px = 1;  ///< the unit of MachinePrior in this view: px / mm on the receiver, or 1
-  std::optional<Belief> aspect = {};             ///< |fx| / fy: 1 for square pixels
+  std::optional<Belief> aspect = {};              ///< |fx| / fy: 1 for square pixels
   std::optional<Belief> skew = Belief{0, 1e-12};  ///< over fy. Nothing: free
 };
 

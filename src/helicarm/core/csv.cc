@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/text.h"
 
 namespace helicarm {
 namespace {
@@ -73,6 +74,9 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
   while (std::getline(lines, line)) {
     if (trimmed(line).empty() || line[0] == '#') continue;
     auto fields = split(line);
+    if (std::ranges::any_of(fields, holds_control_character))
+      return fail(Reason::bad_value,
+                  fmt::format("{}: row {}: holds a control character", table.origin_, table.rows() + 1));
     if (table.columns_.empty()) {
       table.columns_ = std::move(fields);
       continue;

@@ -31,7 +31,7 @@ class CsvTable {
 };
 
 /// Reads a comma-separated file. Every `required` column must be there; a column in neither list is
-/// unknown_key.
+/// unknown_key, a control character bad_value.
 Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_list<const char*> required,
                             std::initializer_list<const char*> optional);
 

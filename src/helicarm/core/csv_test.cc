@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/csv.h"
 
+#include <locale>
+
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -33,6 +35,26 @@ TEST(ReadCsv, MissingAndUnknownColumnsAreNamed) {
 }
 
 TEST(ReadCsv, RowOfOtherLengthIsRefused) { EXPECT_FALSE(table_of("u_px,v_px\n1,2,3\n").has_value()); }
+
+TEST(ReadCsv, ControlCharactersAreRefused) {
+  for (const char* text : {"u_px,v_px\n1,\x1b[31m2\n", "u_px,v_px\n1,2\t3\n", "u_px,v\x7f\n1,2\n"}) {
+    const auto table = table_of(text);
+    ASSERT_FALSE(table.has_value()) << text;
+    EXPECT_EQ(table.error().reason, Reason::bad_value);
+    EXPECT_EQ(table.error().message.find('\x1b'), std::string::npos);
+  }
+}
+
+TEST(ReadCsv, NumbersHaveAPointWhateverTheLocale) {
+  struct Comma : std::numpunct<char> {
+    char do_decimal_point() const override { return ','; }
+  };
+  const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
+  const auto table = table_of("u_px,v_px\n1.5,2\n");
+  std::locale::global(before);
+  ASSERT_TRUE(table.has_value());
+  EXPECT_EQ(table->number(0, "u_px"), 1.5);
+}
 
 TEST(ReadCsv, FieldsThatAreNoFiniteNumberAreRefused) {
   const auto table = table_of("u_px,v_px\nnan,1e999\nx,\n");

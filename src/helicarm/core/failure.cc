@@ -75,6 +75,10 @@ std::string_view code(Reason reason) {
       return "tag_disagrees";
     case Reason::spacing_missing:
       return "spacing_missing";
+    case Reason::lossy_picture:
+      return "lossy_picture";
+    case Reason::uid_reused:
+      return "uid_reused";
     case Reason::few_fiducials:
       return "few_fiducials";
     case Reason::rules_broken:

@@ -52,6 +52,8 @@ enum class Reason {
   bone_taken_as_fixed,
   tag_disagrees,
   spacing_missing,
+  lossy_picture,
+  uid_reused,
   few_fiducials,
   rules_broken,
 };

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/text.h"
 
 template class nlohmann::basic_json<nlohmann::ordered_map>;
 
@@ -49,7 +50,7 @@ Expected<Json> parse_json(std::string_view text, const std::string& origin) {
   try {
     Json value = Json::parse(text.begin(), text.end(), watch);
     if (!twice.empty())
-      return fail(Reason::bad_json, fmt::format("{}: key \"{}\" is given twice", origin, twice));
+      return fail(Reason::bad_json, fmt::format("{}: key {} is given twice", origin, shorten(twice)));
     return value;
   } catch (const BadInput& bad) {
     return tl::unexpected<Failure>(bad.failure());
@@ -70,6 +71,8 @@ Expected<Json> read_json(const std::filesystem::path& path) {
   if (!text) return tl::unexpected<Failure>(text.error());
   return parse_json(*text, path.filename().string());
 }
+
+std::string to_text(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 JsonReader::JsonReader(const Json& value, std::string where) : value_(&value), where_(std::move(where)) {
   if (!value.is_object())
@@ -128,7 +131,7 @@ std::string JsonReader::text(const char* key, std::size_t max_length) {
   auto text = value.get<std::string>();
   if (text.size() > max_length)
     refuse(Reason::bad_value, key, fmt::format("{} characters, limit {}", text.size(), max_length));
-  if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }))
+  if (holds_control_character(text))
     refuse(Reason::bad_value, key, fmt::format("{} holds a control character", shorten(value)));
   return text;
 }
@@ -195,8 +198,8 @@ std::size_t JsonReader::choice(const char* key, std::initializer_list<std::strin
 void JsonReader::finish() const {
   for (const auto& [key, value] : value_->items())
     if (std::find(asked_.begin(), asked_.end(), key) == asked_.end())
-      throw BadInput(Reason::unknown_key, fmt::format("{}: \"{}\" is not a known key (known: {})", where_,
-                                                      key, fmt::join(asked_, ", ")));
+      throw BadInput(Reason::unknown_key, fmt::format("{}: {} is not a known key (known: {})", where_,
+                                                      shorten(key), fmt::join(asked_, ", ")));
 }
 
 }  // namespace helicarm

@@ -29,6 +29,9 @@ namespace helicarm {
 Expected<Json> parse_json(std::string_view text, const std::string& origin);
 Expected<Json> read_json(const std::filesystem::path& path);
 
+/// Indented text for a person or a file. What is no UTF-8 (the name of a file may be so) is replaced.
+std::string to_text(const Json& json);
+
 struct Range {
   double low;
   double high;

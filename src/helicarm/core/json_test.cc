@@ -58,6 +58,11 @@ TEST(JsonReader, KeyNobodyAskedForIsUnknown) {
   EXPECT_EQ(failure.reason, Reason::unknown_key);
 }
 
+TEST(JsonReader, UnknownKeyIsShownWithoutItsControlCharacters) {
+  EXPECT_EQ(failure_of(R"({"\u001b[31m": 5})", [](JsonReader&) {}).message,
+            "x.json: \"\\u001b[31m\" is not a known key (known: )");
+}
+
 TEST(JsonReader, KnownKeysAreListedOnce) {
   const Failure failure = failure_of(R"({"kind": "b", "sise": 5})", [](JsonReader& r) {
     if (!r.raw("kind").is_null()) r.choice("kind", {"a", "b"});
@@ -81,6 +86,10 @@ TEST(JsonReader, MatrixOfWrongShapeIsBadValue) {
                        })
                 .reason,
             Reason::bad_value);
+}
+
+TEST(ToText, BytesThatAreNoUtf8AreReplaced) {
+  EXPECT_EQ(to_text(Json{{"file", "\xff.dcm"}}), "{\n  \"file\": \"\xEF\xBF\xBD.dcm\"\n}");
 }
 
 }  // namespace

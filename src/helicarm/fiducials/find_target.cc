@@ -256,6 +256,15 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
       std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
+Expected<SeenPoint> see_click(const DistortionMap& map, const Vector2d& click_raw,
+                              std::optional<double> sigma_px) {
+  const auto uv = map.rectified_from_raw(click_raw);
+  if (!uv)
+    return fail(Reason::not_seen, fmt::format("({:.1f}, {:.1f}) lies where the map cannot be inverted",
+                                              click_raw.x(), click_raw.y()));
+  return SeenPoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
+}
+
 Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
                                  double depth_mm, const Vector2d& click_raw, double diameter_mm) {
   Dot start;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 
 #include "helicarm/core/failure.h"
@@ -24,6 +25,14 @@ struct SeenPoint {
 /// are discs to leave out. target_not_found; not_seen when it falls outside the picture.
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
                                 const CalibratorTarget& target, std::span<const Disc> others);
+
+/// Standard deviation of a click per axis, where none is given.
+inline constexpr double click_sigma_px = 0.5;
+
+/// A click as it is (picks with "snap": "none"), its noise joined with the map's. not_seen where the map
+/// cannot be inverted.
+Expected<SeenPoint> see_click(const DistortionMap& map, const Eigen::Vector2d& click_raw,
+                              std::optional<double> sigma_px);
 
 /// The image of the centre of the ball nearest to a click (picks with "snap": "ball"). The ball is taken to
 /// be at `depth_mm` from the source. target_not_found where no such ball is within its own radius of the

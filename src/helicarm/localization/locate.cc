@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "helicarm/calibration/centred_view.h"
 #include "helicarm/geometry/triangulation.h"
 
@@ -23,6 +25,19 @@ Eigen::MatrixXd calibration_noise(const Eigen::Vector3d& point_in_anchor,
                             picture.calibrator_from_anchor * point_in_anchor);
   }
   return jacobian * calibration.joint_covariance * jacobian.transpose();
+}
+
+void enlarge_if_rays_miss(LocatedPoint& located) {
+  constexpr double largest_excess = 9;  // three standard deviations
+  const double excess = located.chi2 / double(2 * located.views.size() - 3);
+  if (!(excess > largest_excess)) return;
+  located.covariance_in_anchor *= excess;
+  located.doubt = Warning{
+      Reason::residual_too_large,
+      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain",
+                  located.name, located.ray_gap_mm, std::sqrt(excess)),
+      {},
+      {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
 }
 
 }  // namespace
@@ -51,6 +66,7 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   located.covariance_in_anchor = found->covariance;
   located.ray_gap_mm = found->ray_gap_mm;
   located.chi2 = found->chi2;
+  if (calibration.joint_covariance.size() > 0) enlarge_if_rays_miss(located);
   return located;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,12 +34,14 @@ struct LocatedPoint {
   double ray_gap_mm = 0;
   double chi2 = 0;  ///< 2n - 3 degrees of freedom
   std::vector<std::string> views = {};
+  std::optional<Warning> doubt = {};  ///< residual_too_large: the covariance has been enlarged
 
   double predicted_rms_mm() const;
 };
 
 /// Least reprojection error over n >= 2 views, each pixel weighted by its own noise and by the calibration's.
-/// Refuses as `intersect`.
+/// Rays that miss each other by more than their errors allow show that one of them is not of this point: its
+/// covariance is then enlarged until they do. Refuses as `intersect`.
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
                               std::span<const PointPicture> pictures, const Calibration& calibration);
 

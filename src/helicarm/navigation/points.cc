@@ -12,7 +12,6 @@
 namespace helicarm {
 namespace {
 
-constexpr double click_sigma_px = 0.5;
 constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
 
 Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eigen::Vector3d& centre) {
@@ -24,20 +23,15 @@ Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eig
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
-  const auto uv = map.rectified_from_raw(pick.uv_raw);
-  if (!uv)
-    return fail(Reason::not_seen, fmt::format("\"{}\" lies where the map cannot be inverted", pick.name));
-  return SeenPoint{pick.uv_raw, *uv, std::hypot(pick.sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
+  return see_click(map, pick.uv_raw, pick.sigma_px);
 }
 
-void check_inside(const Pick& pick, const Exposure& exposure) {
-  const double width = exposure.pixels.width();
-  const double height = exposure.pixels.height();
-  if (pick.uv_raw.x() > width - 0.5 || pick.uv_raw.y() > height - 0.5)
+void check_inside(const Pick& pick, const DistortionMap& map) {
+  if (!map.shows(pick.uv_raw))
     throw BadInput(
         {Reason::bad_value,
-         fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the picture of {:g} x {:g} pixels",
-                     pick.name, pick.uv_raw.x(), pick.uv_raw.y(), width, height),
+         fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the picture of {} x {} pixels",
+                     pick.name, pick.uv_raw.x(), pick.uv_raw.y(), map.width, map.height),
          pick.view,
          {}});
 }
@@ -88,21 +82,6 @@ std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) 
   return tasks;
 }
 
-/// Rays that miss each other by more than their errors allow show that one of them is not of this point: the
-/// point's covariance is then enlarged until they do.
-std::optional<Warning> doubt(LocatedPoint& located) {
-  constexpr double largest_excess = 9;  // three standard deviations
-  const double excess = located.chi2 / double(2 * located.views.size() - 3);
-  if (!(excess > largest_excess)) return std::nullopt;
-  located.covariance_in_anchor *= excess;
-  return Warning{
-      Reason::residual_too_large,
-      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain",
-                  located.name, located.ray_gap_mm, std::sqrt(excess)),
-      {},
-      {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
-}
-
 struct Located {
   LocatedPoint point;
   std::optional<Bone> anchor;
@@ -144,7 +123,7 @@ Expected<std::vector<PointResult>> see_points(const Case& given, const Result& r
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)
-      if (task.pick) check_inside(*task.pick, *result.views[task.view].exposure);
+      if (task.pick) check_inside(*task.pick, result.views[task.view].rectification->map);
   });
   if (!done) return tl::unexpected<Failure>(done.error());
   parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
@@ -176,8 +155,7 @@ std::vector<Warning> locate_points(const Case& given, const Calibration& calibra
       continue;
     }
     point.reason.reset();
-    const bool errors_known = calibration.joint_covariance.size() > 0;
-    if (auto warning = errors_known ? doubt(located->point) : std::nullopt) warnings.push_back(*warning);
+    if (located->point.doubt) warnings.push_back(*located->point.doubt);
     point.ray_gap_mm = located->point.ray_gap_mm;
     point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
                          located->views},

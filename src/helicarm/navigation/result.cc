@@ -224,9 +224,9 @@ Json json_of(const std::optional<MachineKnowledge>& machine) {
     return Json{{"common_mm", d.common}, {"of_view_mm", d.of_view}};
   };
   return Json{{"focal_mm", machine->mean_mm.x()},
-          {"principal_mm", vector(machine->mean_mm.tail<2>())},
-          {"focal_sigma", departure(*machine->prior.focal)},
-          {"principal_sigma", departure(*machine->prior.principal)}};
+              {"principal_mm", vector(machine->mean_mm.tail<2>())},
+              {"focal_sigma", departure(*machine->prior.focal)},
+              {"principal_sigma", departure(*machine->prior.principal)}};
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ void run_stages(const Case& given, Result& result) {
   each_view(time.read, [&](const CaseView& from, ViewResult& view) {
     view.exposure = value_or_throw(read_exposure(from.image, from.name, from.frame));
   });
-  value_or_throw(check_pictures_belong_together(result.views));
+  append(result.warnings, value_or_throw(check_pictures_belong_together(result.views)));
 
   each_view(time.rectify, [&](const CaseView& from, ViewResult& view) {  // 2.1, Eq. 1-3
     view.rectification =

@@ -79,6 +79,28 @@ TEST_F(SimulatedNavigation, BlankPictureTwiceIsBlankFirst) {
   EXPECT_EQ(checked.error().reason, Reason::blank_image);
 }
 
+TEST_F(SimulatedNavigation, DifferentPicturesOfOneUidAreTwoWithAWarning) {
+  ViewResult ap{"AP", Exposure{}, {}, {}, {}}, lat{"LAT", Exposure{}, {}, {}, {}};
+  ap.exposure->acquisition.instance_key = "one";
+  lat.exposure->acquisition.instance_key = "other";
+  ap.exposure->acquisition.uid_key = "same";
+  lat.exposure->acquisition.uid_key = "same";
+  const auto checked = check_pictures_belong_together({ap, lat});
+  ASSERT_TRUE(checked.has_value()) << checked.error().message;
+  ASSERT_EQ(checked->size(), 1u);
+  EXPECT_EQ(checked->front().reason, Reason::uid_reused);
+  lat.exposure->acquisition.uid_key = "another";
+  EXPECT_TRUE(check_pictures_belong_together({ap, lat})->empty());
+}
+
+TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {
+  given_.plate->kind = DotKind::holes;
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::plate_mismatch) << result->failure->message;
+}
+
 TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {
   const auto result = run_case(given_, {Method::best, 1e-4, 0});
   ASSERT_TRUE(result->failure);

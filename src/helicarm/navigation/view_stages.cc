@@ -14,6 +14,8 @@
 namespace helicarm {
 namespace {
 
+constexpr double plate_share = 0.6;  // a plate's balls, should there be one, are this much smaller at most
+
 Expected<DistortionMap> map_from(const CaseView& from, const std::optional<Plate>& plate, Method method) {
   return guarded([&] {
     if (from.map)
@@ -44,7 +46,8 @@ ViewFiducials fiducials_of(const ViewResult& view) {
 
 }  // namespace
 
-Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& views) {
+Expected<std::vector<Warning>> check_pictures_belong_together(const std::vector<ViewResult>& views) {
+  std::vector<Warning> warnings;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const Acquisition& a = views[j].exposure->acquisition;
@@ -52,13 +55,17 @@ Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& vie
       if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
         return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
                                                           views[j].name, views[i].name));
-      if (a.instance_key.empty() || a.instance_key != b.instance_key) continue;
-      return check_usable(*views[i].exposure).and_then([&]() -> Expected<void> {
-        return fail(Reason::views_too_close,
-                    fmt::format("{} and {} are the same picture", views[j].name, views[i].name));
-      });
+      if (!a.instance_key.empty() && a.instance_key == b.instance_key)
+        return check_usable(*views[i].exposure).and_then([&]() -> Expected<std::vector<Warning>> {
+          return fail(Reason::views_too_close,
+                      fmt::format("{} and {} are the same picture", views[j].name, views[i].name));
+        });
+      if (!a.uid_key.empty() && a.uid_key == b.uid_key)
+        warnings.push_back({Reason::uid_reused,
+                            fmt::format("{} and {} differ, but bear the same SOP Instance UID (0008,0018)",
+                                        views[j].name, views[i].name)});
     }
-  return {};
+  return warnings;
 }
 
 Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
@@ -70,14 +77,28 @@ Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& f
     });
   if (plate) return rectify(exposure, *plate, {method, {}});
   const auto& pixel = exposure.acquisition.pixel_mm;
-  return without_plate(exposure, pixel ? ball_radii_px(calibrator, pixel->mean()).low : 0);
+  return without_plate(exposure, pixel ? plate_share * ball_radii_px(calibrator, pixel->mean()).low : 0);
 }
 
 Expected<std::optional<FoundFiducials>> find_unless_ambiguous(const ViewResult& view,
                                                               const Calibrator& calibrator, Method method) {
-  auto found = find_fiducials(*view.exposure, *view.rectification, calibrator, method);
+  const Rectification& plate = *view.rectification;
+  const auto ambiguous = [](const auto& found) {
+    return !found && found.error().reason == Reason::ambiguous_labels;
+  };
+  auto found = find_fiducials(*view.exposure, plate, calibrator, method);
   if (found) return std::optional(std::move(*found));
-  if (found.error().reason == Reason::ambiguous_labels) return std::optional<FoundFiducials>();
+  if (ambiguous(found)) return std::optional<FoundFiducials>();
+  // The plate's kind tells how metal shows: were it the other kind, the calibrator might be seen.
+  if (plate.dots_found > 0) {
+    const auto inverted = with_metal_inverted(*view.exposure, plate);
+    const auto other = find_fiducials(*view.exposure, inverted, calibrator, method);
+    if (other || ambiguous(other))
+      return fail(
+          Reason::plate_mismatch,
+          "the calibrator is seen if the plate's dots are taken for holes instead of balls or for balls "
+          "instead of holes");
+  }
   return tl::unexpected<Failure>(found.error());
 }
 

@@ -11,8 +11,8 @@
 namespace helicarm {
 
 /// Refuses `patient_mismatch` where two pictures name different patients or studies, `views_too_close` where
-/// two are one and the same picture.
-Expected<void> check_pictures_belong_together(const std::vector<ViewResult>& views);
+/// two are one and the same picture. Warns (uid_reused) where two different ones bear one UID.
+Expected<std::vector<Warning>> check_pictures_belong_together(const std::vector<ViewResult>& views);
 
 /// By the plate in the picture, by a plate shot apart, by a known map, or not at all (flat panel).
 Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,

@@ -42,6 +42,10 @@ Vector2d pair_of(JsonReader& reader, const char* key) {
 
 }  // namespace
 
+bool DistortionMap::shows(const Vector2d& raw) const {
+  return (raw.array() >= -0.5).all() && raw.x() <= width - 0.5 && raw.y() <= height - 0.5;
+}
+
 Vector2d DistortionMap::raw_from_rectified(const Vector2d& rectified) const {
   if (is_identity()) return rectified;
   const Vector2d t = (rectified - centre) / scale;
@@ -82,6 +86,16 @@ double DistortionMap::sigma_px(const Vector2d& rectified) const {
   const Vector2d t = (rectified - centre) / scale;
   const Eigen::VectorXd row = basis_row(t, order, knots, kernel_length);
   return std::sqrt(std::max(0.0, row.dot(coefficient_covariance * row)));
+}
+
+std::optional<Vector2d> rectified_in_picture(const DistortionMap& map, const Vector2d& raw) {
+  return map.shows(raw) ? map.rectified_from_raw(raw) : std::nullopt;
+}
+
+std::optional<Vector2d> raw_in_picture(const DistortionMap& map, const Vector2d& rectified) {
+  const Vector2d raw = map.raw_from_rectified(rectified);
+  const auto back = rectified_in_picture(map, raw);
+  return back && (*back - rectified).norm() < 1e-6 ? std::optional(raw) : std::nullopt;
 }
 
 DistortionMap identity_map(int width, int height, std::optional<double> pixel_mm) {

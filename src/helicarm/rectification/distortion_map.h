@@ -39,6 +39,8 @@ struct DistortionMap {
   int width = 0;  ///< of the picture it belongs to
   int height = 0;
 
+  /// Whether a raw place lies on the picture.
+  bool shows(const Eigen::Vector2d& raw) const;
   bool is_identity() const { return order == 0; }
   Eigen::Vector2d raw_from_rectified(const Eigen::Vector2d& rectified) const;
   /// Newton on the map above; nothing where it does not converge (far outside the plate).
@@ -48,6 +50,11 @@ struct DistortionMap {
   /// Standard deviation per axis of the map itself at a point, rectified pixels.
   double sigma_px(const Eigen::Vector2d& rectified) const;
 };
+
+/// Places carried across the map, and nothing for those off the picture or where the map folds: it is not
+/// extrapolated, and what is given leads back.
+std::optional<Eigen::Vector2d> rectified_in_picture(const DistortionMap& map, const Eigen::Vector2d& raw);
+std::optional<Eigen::Vector2d> raw_in_picture(const DistortionMap& map, const Eigen::Vector2d& rectified);
 
 DistortionMap identity_map(int width, int height, std::optional<double> pixel_mm);
 

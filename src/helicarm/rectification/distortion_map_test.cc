@@ -97,6 +97,26 @@ TEST(DistortionMap, SigmaIsTheBasisRowsForm) {
   EXPECT_EQ(map.sigma_px({100, 300}), 0);
 }
 
+TEST(DistortionMap, CarriesNothingThatIsOffThePicture) {
+  const DistortionMap map = curved_map();
+  for (const Vector2d& raw : {Vector2d(-0.4, 100), Vector2d(511.4, 511.4), Vector2d(300, 200)}) {
+    const auto there = rectified_in_picture(map, raw);
+    ASSERT_TRUE(there);
+    const auto back = raw_in_picture(map, *there);
+    ASSERT_TRUE(back);
+    EXPECT_LT((*back - raw).norm(), 1e-9);
+  }
+  for (const Vector2d& off : {Vector2d(-0.6, 100), Vector2d(100, 511.6), Vector2d(-300, 5000)})
+    EXPECT_FALSE(rectified_in_picture(map, off));
+  EXPECT_FALSE(raw_in_picture(map, {530, 530}));
+  EXPECT_FALSE(raw_in_picture(map, {1e6, -1e6}));
+  DistortionMap folded = map;  // x beyond its fold leads back into the picture
+  folded.coefficients(3, 0) = -100;
+  const Vector2d beyond = folded.centre + folded.scale * Vector2d(2, 0);
+  ASSERT_TRUE(folded.shows(folded.raw_from_rectified(beyond)));
+  EXPECT_FALSE(raw_in_picture(folded, beyond));
+}
+
 TEST(IdentityMap, LeavesPointsWhereTheyAre) {
   const DistortionMap map = identity_map(640, 480, 0.2);
   EXPECT_TRUE(map.is_identity());

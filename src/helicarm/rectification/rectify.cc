@@ -21,6 +21,10 @@ using Eigen::Vector2d;
 
 constexpr double pitch_tolerance = 0.04;  // measured against expected
 constexpr std::size_t least_dots = 10;
+/// Where no plate is described, one may be in the picture all the same: more dots than a calibrator's balls
+/// and some stray ones could feign.
+constexpr std::size_t least_dots_of_any_plate = 20;
+const Plate any_plate{"", DotKind::balls, Lattice::square, {}, 2.5, {}, {}};
 constexpr double max_ball_radius = 0.04;  // of the picture's width: nothing larger is a ball
 
 /// Pixels per plate millimetre in the middle of the picture, where the file and the plate tell.
@@ -150,11 +154,6 @@ std::vector<Dot> without(const std::vector<Dot>& dots, const std::vector<Dot>& t
   return rest;
 }
 
-struct Attempt {
-  std::vector<Dot> all;
-  SeenLattice seen;
-};
-
 std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity polarity, Method method,
                         std::optional<double> scale) {
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * exposure.pixels.width();
@@ -166,34 +165,63 @@ std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity p
   return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.7 * radius, 1.35 * radius);
 }
 
+/// What is as dark (or bright) as metal and not of the plate.
+std::vector<Dot> balls_beside(const Exposure& exposure, const Rectification& plate) {
+  return without(find_dots(exposure, dot_options(exposure, plate.metal)), plate.plate_dots);
+}
+
+struct Attempt {
+  Polarity polarity;
+  std::vector<Dot> all;
+  SeenLattice seen;
+  std::size_t size() const { return seen.lattice.dots.size(); }
+};
+
+/// Metal is dark and a hole bright, unless the whole picture is inverted.
+Attempt find_lattice(const Exposure& exposure, const Plate& plate, Method method,
+                     std::optional<double> scale) {
+  const auto attempt = [&](Polarity polarity) {
+    Attempt now{polarity, search(exposure, plate, polarity, method, scale), {}};
+    now.seen = seen_lattice(now.all, plate, scale);
+    return now;
+  };
+  const Polarity expected = plate.kind == DotKind::balls ? Polarity::dark : Polarity::bright;
+  Attempt first = attempt(expected);
+  if (first.size() >= least_dots) return first;
+  Attempt second = attempt(opposite(expected));
+  return second.size() > first.size() ? second : first;
+}
+
+/// Why the plate's lattice was not found: there is none, or one of the other kind.
+Failure without_lattice(const Exposure& exposure, Plate plate, Method method, std::optional<double> scale,
+                        std::size_t found) {
+  const bool square = plate.lattice == Lattice::square;
+  plate.lattice = square ? Lattice::hexagonal : Lattice::square;
+  const std::size_t of_other_kind = find_lattice(exposure, plate, method, scale).size();
+  if (of_other_kind >= least_dots)
+    return {Reason::plate_mismatch,
+            fmt::format("{} dots stand on a {} lattice, that of \"{}\" is {}", of_other_kind,
+                        square ? "hexagonal" : "square", plate.name, square ? "square" : "hexagonal"),
+            {},
+            {{"dots_found", double(of_other_kind)}}};
+  return {Reason::plate_not_found,
+          fmt::format("only {} dots stand on a lattice like that of \"{}\", at least {} are needed", found,
+                      plate.name, least_dots),
+          {},
+          {{"dots_found", double(found)}}};
+}
+
 }  // namespace
 
 Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
                                 const RectificationOptions& options) {
   if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
   const auto scale = expected_scale(exposure, plate);
-  const Polarity expected = plate.kind == DotKind::balls ? Polarity::dark : Polarity::bright;
   const int width = exposure.pixels.width();
   const int height = exposure.pixels.height();
-
-  // Metal is dark and a hole bright, unless the whole picture is inverted.
-  Attempt attempt;
-  Polarity polarity = expected;
-  for (const Polarity trial : {expected, opposite(expected)}) {
-    Attempt now;
-    now.all = search(exposure, plate, trial, options.method, scale);
-    now.seen = seen_lattice(now.all, plate, scale);
-    if (now.seen.lattice.dots.size() > attempt.seen.lattice.dots.size()) {
-      attempt = std::move(now);
-      polarity = trial;
-    }
-    if (attempt.seen.lattice.dots.size() >= least_dots) break;
-  }
-  if (attempt.seen.lattice.dots.size() < least_dots)
-    return fail(Reason::plate_not_found,
-                fmt::format("only {} dots stand on a lattice like that of \"{}\", at least {} are needed",
-                            attempt.seen.lattice.dots.size(), plate.name, least_dots),
-                {{"dots_found", double(attempt.seen.lattice.dots.size())}});
+  Attempt attempt = find_lattice(exposure, plate, options.method, scale);
+  if (attempt.size() < least_dots)
+    return tl::unexpected<Failure>(without_lattice(exposure, plate, options.method, scale, attempt.size()));
 
   if (options.method == Method::best) sharpen(exposure, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
@@ -235,46 +263,52 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   result.dots_found = static_cast<int>(result.plate_dots.size());
   result.raw_mean_px /= std::max(1, result.dots_found);
   if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
-  result.metal = plate.kind == DotKind::balls ? polarity : opposite(polarity);
+  result.metal = plate.kind == DotKind::balls ? attempt.polarity : opposite(attempt.polarity);
   if (options.method == Method::best && plate.kind == DotKind::balls)
     result.other_dots = without(attempt.all, result.plate_dots);
   else
-    result.other_dots = without(find_dots(exposure, dot_options(exposure, result.metal)), result.plate_dots);
+    result.other_dots = balls_beside(exposure, result);
   return result;
+}
+
+Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification) {
+  rectification.metal = opposite(rectification.metal);
+  rectification.other_dots = balls_beside(exposure, rectification);
+  return rectification;
 }
 
 Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px) {
-  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
-  Rectification result;
   const auto& pixel = exposure.acquisition.pixel_mm;
-  result.map = identity_map(exposure.pixels.width(), exposure.pixels.height(),
-                            pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
-  DotOptions dots = dot_options(exposure, Polarity::dark);
-  dots.min_radius_px = std::max(dots.min_radius_px, least_radius_px);
-  result.other_dots = find_dots(exposure, dots);
-  return result;
+  return with_map(exposure,
+                  identity_map(exposure.pixels.width(), exposure.pixels.height(),
+                               pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt),
+                  {}, least_radius_px);
 }
 
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
-                                 const std::optional<Plate>& plate) {
+                                 const std::optional<Plate>& plate, double least_radius_px) {
   if (map.width != exposure.pixels.width() || map.height != exposure.pixels.height())
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
                             exposure.pixels.width(), exposure.pixels.height()));
-  auto result = without_plate(exposure, 0);
-  if (!result) return result;
-  result->map = map;
-  if (!plate || plate->kind == DotKind::holes) return result;
+  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
+  DotOptions dot_search = dot_options(exposure, Polarity::dark);
+  dot_search.min_radius_px = std::max(dot_search.min_radius_px, least_radius_px);
+  Rectification result;
+  result.map = map;
+  result.other_dots = find_dots(exposure, dot_search);
+  const Plate sought = plate.value_or(any_plate);
+  if (sought.kind == DotKind::holes) return result;
   // A plate in the picture tells whether the map still holds: rectified, its dots must stand on a lattice.
-  const SeenLattice seen = seen_lattice(result->other_dots, *plate, expected_scale(exposure, *plate));
-  if (seen.lattice.dots.size() < least_dots) return result;
+  const SeenLattice seen = seen_lattice(result.other_dots, sought, expected_scale(exposure, sought));
+  if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) {
     const Dot& dot = seen.dots[d.dot];
     members.push_back(dot);
     if (const auto uv = map.rectified_from_raw(dot.centre_px))
-      dots.push_back({lattice_point(d.index, plate->lattice), *uv, dot.sigma_px});
+      dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.sigma_px});
   }
   MapOptions straight;
   straight.order = 1;
@@ -285,11 +319,11 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
     return fail(
         Reason::plate_mismatch,
         fmt::format(
-            "the map does not fit the plate in the picture: its rectified dots are {:.2f} px rms off a "
-            "lattice, limit {:.2f}",
+            "{} the plate in the picture: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
+            map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
-  result->other_dots = without(result->other_dots, members);
+  result.other_dots = without(result.other_dots, members);
   return result;
 }
 

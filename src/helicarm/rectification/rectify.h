@@ -35,16 +35,21 @@ struct RectificationOptions {
 };
 
 /// Finds the plate in the picture and fits the map (2.1). Refuses a blank or saturated picture, a missing
-/// plate and a plate whose pitch is not the file's.
+/// plate and a plate whose lattice or pitch is not the file's.
 Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
                                 const RectificationOptions& options);
 
-/// For a flat panel: no distortion; all dots from a radius on are candidates.
+/// The same, had the plate balls for holes or holes for balls: the balls' candidates are then of the other
+/// polarity.
+Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification);
+
+/// For a flat panel: the identity as a known map, and all dots from a radius on. plate_mismatch where a plate
+/// in the picture is bent.
 Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px);
 
-/// For a map known already (from a plate shot apart or a file): only the dots are found.
+/// For a map known already (from a plate shot apart or a file); plate_mismatch where it leaves a plate bent.
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
-                                 const std::optional<Plate>& plate);
+                                 const std::optional<Plate>& plate, double least_radius_px = 0);
 
 /// The picture resampled to rectified pixels (Eq. 3), same size; outside the raw picture it is `lowest`.
 Image<float> resample(const Exposure& exposure, const DistortionMap& map);

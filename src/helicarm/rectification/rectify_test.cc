@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/rectification/lattice.h"
 #include "helicarm/rectification/simulated_exposure_test.h"
 
 namespace helicarm {
@@ -166,6 +167,28 @@ TEST(Rectify, PlateOfAnotherPitchIsAMismatch) {
   EXPECT_NEAR(result.error().figures.at("pitch_mm"), 25, 0.5);
 }
 
+TEST(Rectify, PlateOfTheOtherLatticeIsAMismatch) {
+  Plate hexagonal = plate48();
+  hexagonal.lattice = Lattice::hexagonal;
+  hexagonal.dots_mm.clear();
+  const auto result = rectify(exposure_of(room().views[0]), hexagonal, {});
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+
+  drawn::Shade shade(384, 384);
+  for (int row = -3; row <= 3; ++row)
+    for (int column = -3; column <= 3; ++column)
+      drawn::add_ball(shade,
+                      Vector2d(191, 193) + 50 * lattice_point({column - row / 2, row}, Lattice::hexagonal), 5,
+                      0.9, 3);
+  Image<float> picture = drawn::grey(shade, 1200);
+  RandomStream random(1, 1);
+  drawn::add_noise(picture, 10, random);
+  const auto square = rectify(drawn::exposure(std::move(picture)), plate48(), {});
+  ASSERT_FALSE(square);
+  EXPECT_EQ(square.error().reason, Reason::plate_mismatch);
+}
+
 TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
   for (const auto& ball : room().views[0].balls) {
     if (ball.visibility != simulation::Visibility::clear) continue;
@@ -247,11 +270,24 @@ TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
-TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
+TEST(WithoutPlate, BentPlateInThePictureIsAMismatch) {
   const auto result = without_plate(exposure_of(room().views[0]), 0);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
+}
+
+TEST(WithMap, PlateThatIsNotDescribedIsSeenAllTheSame) {
+  const auto result = with_map(exposure_of(room().views[0]), rectified_ap().map, {});
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT(result->other_dots.size(), 25u);
+}
+
+TEST(WithoutPlate, MapIsTheIdentityWithTheDetectorsPixels) {
+  const SimulatedCase flat = small_case(5, simulation::CaseKind::flat);
+  const auto result = without_plate(exposure_of(flat.views[0]), 0);
   ASSERT_TRUE(result);
   EXPECT_TRUE(result->map.is_identity());
-  EXPECT_NEAR(*result->map.rectified_pixel_mm, room().views[0].shot.pixel_mm(), 1e-12);
+  EXPECT_NEAR(*result->map.rectified_pixel_mm, flat.views[0].shot.pixel_mm(), 1e-12);
   EXPECT_FALSE(result->dots_expected);
 }
 

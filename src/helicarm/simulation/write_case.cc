@@ -74,7 +74,7 @@ void add_navigation(Json& json, const SimulatedCase& simulated) {
 }
 
 Expected<void> write_json(const std::filesystem::path& path, const Json& json) {
-  return write_file(path, json.dump(2) + "\n");
+  return write_file(path, to_text(json) + "\n");
 }
 
 }  // namespace

@@ -122,6 +122,8 @@ TEST_F(Compressed, OddScanHeaderOfASequentialJpegIsMended) {
   const auto exposure = read_dicom(odd, "x.dcm", {});
   ASSERT_TRUE(exposure) << exposure.error().message;
   EXPECT_EQ(greatest_difference(*exposure, *read_dicom(sound, "x.dcm", {})), 0);
+  ASSERT_FALSE(exposure->warnings.empty());
+  EXPECT_EQ(exposure->warnings[0].reason, Reason::lossy_picture);
 }
 
 TEST_F(Compressed, FramesAreFoundByCountAndByOffsetTable) {

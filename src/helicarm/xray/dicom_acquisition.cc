@@ -47,6 +47,13 @@ bool flipped(const DicomElements& elements) {
   return flip == "YES";
 }
 
+/// By JPEG's processes 1, 2 and 4, now or earlier.
+bool lossy(const DicomElements& elements) {
+  return elements.text(tags::lossy_compression) == "01" ||
+         elements.transfer_syntax == "1.2.840.10008.1.2.4.50" ||
+         elements.transfer_syntax == "1.2.840.10008.1.2.4.51";
+}
+
 }  // namespace
 
 Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
@@ -58,6 +65,9 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
         one(elements, tags::source_detector, min_source_detector_mm, max_source_detector_mm);
     a.primary_angle_deg = one(elements, tags::primary_angle, -360, 360);
     a.secondary_angle_deg = one(elements, tags::secondary_angle, -360, 360);
+    if (lossy(elements))
+      read.warnings.push_back(
+          {Reason::lossy_picture, fmt::format("{}: the picture was compressed with loss", elements.origin)});
     a.flip_hint = flipped(elements);
     a.rotation_hint_deg = one(elements, tags::field_rotation, -360, 360).value_or(0);
     const std::string_view relationship = elements.text(tags::intensity_relationship);

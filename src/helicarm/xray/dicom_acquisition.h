@@ -13,7 +13,7 @@ inline constexpr double min_pixel_mm = 0.01, max_pixel_mm = 2;
 inline constexpr double min_source_detector_mm = 200, max_source_detector_mm = 3000;
 
 struct AcquisitionRead {
-  Acquisition acquisition;  ///< without `instance_key`
+  Acquisition acquisition;  ///< without `instance_key` and `uid_key`
   std::vector<Warning> warnings;
 };
 

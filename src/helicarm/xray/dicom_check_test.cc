@@ -161,6 +161,19 @@ TEST(DicomCheck, ElementsTwiceAndUnknownRepresentations) {
   EXPECT_EQ(reason(DicomBuilder().raw(0x00020013, "Q ", "ab")), "bad_value");
 }
 
+TEST(DicomCheck, UnknownRepresentationInTheMetaGroup) {
+  const std::string sound = DicomBuilder().bytes();
+  for (const char* vr : {"ZZ", "Q ", "\xff\xff"}) {
+    std::string bytes = sound;
+    bytes.replace(148, 2, vr);  // of the Transfer Syntax UID
+    EXPECT_EQ(reason(bytes), "bad_value");
+    // A long form of 4 GB.
+    bytes = sound.substr(0, 144) + DicomBuilder::tag_bytes(0x00020001) + vr + std::string("\0\0", 2) +
+            DicomBuilder::number(-2, 4) + sound.substr(144);
+    EXPECT_EQ(reason(bytes), "bad_value");
+  }
+}
+
 TEST(DicomCheck, InvalidUids) {
   for (const auto& uid : {"../../../tmp/x"s, "1.2\0.3"s, std::string(65, '1'), "1.2.x"s, ""s})
     EXPECT_EQ(reason(DicomBuilder().text(0x00080018, "UI", uid)), "bad_value") << uid;

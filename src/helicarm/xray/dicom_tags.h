@@ -33,6 +33,7 @@ inline constexpr DicomTag high_bit{0x00280102, "High Bit"};
 inline constexpr DicomTag pixel_representation{0x00280103, "Pixel Representation"};
 inline constexpr DicomTag intensity_relationship{0x00281040, "Pixel Intensity Relationship"};
 inline constexpr DicomTag intensity_sign{0x00281041, "Pixel Intensity Relationship Sign"};
+inline constexpr DicomTag lossy_compression{0x00282110, "Lossy Image Compression"};
 inline constexpr DicomTag lut_shape{0x20500020, "Presentation LUT Shape"};
 inline constexpr DicomTag pixel_data{0x7FE00010, "Pixel Data"};
 

@@ -28,6 +28,7 @@ struct Acquisition {
   std::string study_key;               ///< digest of the study's UID; empty where the file names none
   std::string frame_of_reference_key;  ///< likewise
   std::string instance_key;            ///< digest of the pixels
+  std::string uid_key;  ///< digest of SOP Instance UID and frame; empty where the file is no DICOM
 };
 
 /// One X-ray as stored. Grey values are the displayed ones: MONOCHROME1 is inverted so that metal is usually

@@ -5,6 +5,7 @@
 
 #include "helicarm/xray/dicom_acquisition.h"
 #include "helicarm/xray/dicom_frame.h"
+#include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/polarity.h"
 
@@ -56,6 +57,8 @@ Expected<Exposure> read_dicom(std::string_view bytes, const std::string& origin,
     if (polarity.invert) invert(exposure);
     if (!polarity.certain) make_metal_dark(exposure, origin);
     exposure.acquisition.instance_key = picture_key(exposure.pixels);
+    exposure.acquisition.uid_key =
+        digest(fmt::format("{} {}", outline.elements.text(tags::sop_instance), index));
     return exposure;
   });
 }

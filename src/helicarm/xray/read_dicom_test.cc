@@ -102,6 +102,13 @@ TEST(ReadDicom, ImagerSpacingWinsOverADifferingPixelSpacing) {
   EXPECT_TRUE(warned(*exposure, Reason::tag_disagrees));
 }
 
+TEST(ReadDicom, LossyCompressionIsToldEvenAfterwards) {
+  const auto once_lossy = read(DicomBuilder().text(0x00282110, "CS", "01"));
+  ASSERT_TRUE(once_lossy);
+  EXPECT_TRUE(warned(*once_lossy, Reason::lossy_picture));
+  EXPECT_FALSE(warned(*read(DicomBuilder().text(0x00282110, "CS", "00")), Reason::lossy_picture));
+}
+
 TEST(ReadDicom, SeveralFramesNeedAFrame) {
   std::vector<std::uint16_t> values(96, 1);
   std::fill(values.begin() + 48, values.end(), std::uint16_t{2});
@@ -112,6 +119,7 @@ TEST(ReadDicom, SeveralFramesNeedAFrame) {
   EXPECT_NE(unsaid.error().message.find("2 frames"), std::string::npos);
   EXPECT_EQ(read(cine, 1)->pixels(0, 0), 1);
   EXPECT_EQ(read(cine, 2)->pixels(7, 5), 2);
+  EXPECT_NE(read(cine, 1)->acquisition.uid_key, read(cine, 2)->acquisition.uid_key);
   EXPECT_EQ(reason(cine, 3), "bad_value");
   EXPECT_EQ(reason(cine, 0), "bad_value");
   EXPECT_EQ(reason(DicomBuilder(), 1), "ok");
@@ -189,6 +197,8 @@ TEST(ReadDicom, KeysTellPatientsStudiesAndPicturesApart) {
   EXPECT_NE(one.patient_key, other.patient_key);
   EXPECT_NE(one.study_key, other.study_key);
   EXPECT_EQ(one.instance_key, other.instance_key);
+  EXPECT_EQ(one.uid_key, other.uid_key);
+  EXPECT_NE(one.uid_key, read(DicomBuilder().text(0x00080018, "UI", "2.25.18"))->acquisition.uid_key);
   EXPECT_TRUE(one.frame_of_reference_key.empty());
   EXPECT_EQ(one.patient_key.find("ANON"), std::string::npos);
   EXPECT_TRUE(read(DicomBuilder().erase(0x00100010).erase(0x00100020))->acquisition.patient_key.empty());
