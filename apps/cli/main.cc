@@ -17,6 +17,7 @@
 #include "import_command.h"
 #include "locate_command.h"
 #include "phantom_command.h"
+#include "predict_command.h"
 #include "rectify_command.h"
 #include "run_command.h"
 #include "simulate_command.h"
@@ -72,6 +73,27 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("--machine", a.machine,
                       "The C-arm's history (JSON): serves as prior, and this case's shots are added to it");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
+}
+
+void add_predict(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "predict", "How far off a point would be, before it is picked",
+                              "helicarm predict my-case --at 0,0,40 --at 60,0,40 --map tre");
+  auto& a = arguments_of(command, action, predict_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--at", a.at,
+                      "x,y,z in the calibrator's frame, mm; may be given again. Default: its middle");
+  command->add_option("--sigma-px", a.sigma_px, "Noise of a pick, per axis")
+      ->check(within(0, 100))
+      ->capture_default_str();
+  command->add_option("--max-error", a.max_error_mm, "Limit of the decision, mm (95 %)")
+      ->check(within(1e-6, 1000))
+      ->capture_default_str();
+  command->add_option("--machine", a.machine, "The C-arm's history (JSON), which is left as it is");
+  command->add_option("--map", a.map, "Folder for a map about the calibrator: tre.csv, tre.vtk, tre.svg");
+  command->add_option("--half", a.half_mm, "The map reaches so far, mm")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  command->add_option("--step", a.step_mm, "of the map, mm")->check(within(0.5, 100))->capture_default_str();
 }
 
 void add_study(CLI::App& app, Action& action) {
@@ -215,8 +237,8 @@ int run(int argc, char** argv) {
   app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")
       ->check(within(0, 1e19))
       ->capture_default_str();
-  for (const auto add : {add_demo, add_run, add_study, add_solve, add_locate, add_rectify, add_detect,
-                         add_import, add_simulate, add_phantom})
+  for (const auto add : {add_demo, add_run, add_predict, add_study, add_solve, add_locate, add_rectify,
+                         add_detect, add_import, add_simulate, add_phantom})
     add(app, action);
   try {
     app.parse(argc, argv);

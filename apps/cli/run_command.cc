@@ -30,15 +30,6 @@ void forget(const std::filesystem::path& out) {
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
 }
 
-/// A history that is not there yet is empty.
-Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path) {
-  if (!path) return std::optional<Machine>();
-  if (!std::filesystem::exists(*path)) return std::optional(Machine());
-  return read_json(*path)
-      .and_then([&](const Json& json) { return machine_from_json(json, path->filename().string()); })
-      .map([](Machine machine) { return std::optional(std::move(machine)); });
-}
-
 /// Each picture once.
 Expected<void> remember(const std::filesystem::path& path, Machine machine,
                         const std::vector<MachineShot>& shots) {
@@ -72,6 +63,14 @@ Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions
 }
 
 }  // namespace
+
+Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path) {
+  if (!path) return std::optional<Machine>();
+  if (!std::filesystem::exists(*path)) return std::optional(Machine());
+  return read_json(*path)
+      .and_then([&](const Json& json) { return machine_from_json(json, path->filename().string()); })
+      .map([](Machine machine) { return std::optional(std::move(machine)); });
+}
 
 Expected<Method> method_named(const std::string& name) {
   if (name == "best") return Method::best;

@@ -26,6 +26,9 @@ CommandResult run_command(const RunArguments& arguments, Console& console);
 /// The same, and the result for the caller to look at; prints nothing to `console.out`.
 Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
 
+/// A C-arm's history, where a file is named; one that is not there yet is empty.
+Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path);
+
 /// "best" or "paper"; usage otherwise.
 Expected<Method> method_named(const std::string& name);
 

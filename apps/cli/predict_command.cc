@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "predict_command.h"
+
+#include <charconv>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/localization/locate.h"
+#include "helicarm/localization/tre_volume.h"
+#include "helicarm/navigation/accuracy.h"
+#include "helicarm/navigation/case.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/report/tre_figure.h"
+#include "run_command.h"
+
+namespace helicarm::cli {
+namespace {
+
+constexpr double most_points_per_edge = 201;
+
+Eigen::Vector3d place_from(const std::string& word) {
+  Eigen::Vector3d place;
+  const char* at = word.data();
+  const char* const end = at + word.size();
+  for (int k = 0; k < 3; ++k) {
+    const auto [next, error] = std::from_chars(at, end, place(k));
+    const bool separated = k == 2 ? next == end : next != end && *next == ',';
+    if (error != std::errc() || !separated || !(std::abs(place(k)) <= 1e4))
+      throw BadInput(Reason::usage, fmt::format("--at: \"{}\" is not x,y,z in mm within 10000", word));
+    at = next + 1;
+  }
+  return place;
+}
+
+Eigen::Vector3d middle_of(const Calibrator& calibrator) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
+  return sum / double(calibrator.balls.size());
+}
+
+Json prediction(const Eigen::Vector3d& place, const Calibration& calibration,
+                const PredictArguments& arguments) {
+  Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
+  const auto covariance = predict_covariance(place, arguments.sigma_px, calibration);
+  if (!covariance) {
+    json["decision"] = "refuse";
+    json["reason"] = code(covariance.error().reason);
+    return json;
+  }
+  const double within = length_at_95(*covariance);
+  json["tre_mm"] = std::sqrt(covariance->trace());
+  json["error_95_mm"] = within;
+  json["covariance_mm2"] = json_rows(*covariance);
+  json["decision"] = within <= arguments.max_error_mm ? "accept" : "refuse";
+  json["reason"] = within <= arguments.max_error_mm ? Json(nullptr) : Json(code(Reason::uncertain));
+  return json;
+}
+
+void write_map(const TreVolume& volume, const std::filesystem::path& folder) {
+  value_or_throw(write_file(folder / "tre.csv", to_csv(volume)));
+  value_or_throw(write_file(folder / "tre.vtk", to_vtk(volume)));
+  value_or_throw(write_file(folder / "tre.svg", tre_figure(volume)));
+}
+
+}  // namespace
+
+CommandResult predict_command(const PredictArguments& arguments, Console& console) {
+  return guarded([&] {
+    if (2 * arguments.half_mm / arguments.step_mm + 1 > most_points_per_edge)
+      throw BadInput(Reason::usage,
+                     fmt::format("--step: {:g} mm over +-{:g} mm is more than {:g} points an edge",
+                                 arguments.step_mm, arguments.half_mm, most_points_per_edge));
+    std::vector<Eigen::Vector3d> places;
+    for (const std::string& word : arguments.at) places.push_back(place_from(word));
+    Case given = value_or_throw(read_case(arguments.folder));
+    given.picks.clear();
+    given.tunnels.clear();
+    given.tool_lines.clear();
+    const Eigen::Vector3d middle = middle_of(given.calibrator);
+    if (places.empty()) places.push_back(middle);
+    RunOptions options;
+    options.threads = console.threads;
+    options.machine = value_or_throw(machine_at(arguments.machine));
+    const Result result = value_or_throw(run_case(given, options));
+    if (result.failure) throw BadInput(*result.failure);
+    Calibration calibration{{}, result.joint_covariance};
+    for (const ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
+
+    Json points = Json::array();
+    for (const Eigen::Vector3d& place : places) points.push_back(prediction(place, calibration, arguments));
+    if (arguments.map)
+      write_map(predict_tre(calibration, middle, arguments.half_mm, arguments.step_mm, arguments.sigma_px,
+                            console.threads),
+                *arguments.map);
+    if (console.json) {
+      console.out << to_text(Json{{"sigma_px", arguments.sigma_px},
+                                  {"max_error_mm", arguments.max_error_mm},
+                                  {"points", points}})
+                  << '\n';
+      return;
+    }
+    console.out << fmt::format("{:>10} {:>10} {:>10} {:>10} {:>14}  decision\n", "x mm", "y mm", "z mm",
+                               "TRE mm rms", "95 % within mm");
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const Json& point = points[i];
+      const auto number = [&](const char* key) {
+        return point.contains(key) ? fmt::format("{:.3f}", point[key].get<double>()) : std::string("-");
+      };
+      console.out << fmt::format("{:10.2f} {:10.2f} {:10.2f} {:>10} {:>14}  {}\n", places[i].x(),
+                                 places[i].y(), places[i].z(), number("tre_mm"), number("error_95_mm"),
+                                 point["decision"].get<std::string>());
+    }
+    if (arguments.map && !console.quiet)
+      console.out << fmt::format("\n  map written to {}\n", arguments.map->string());
+  });
+}
+
+}  // namespace helicarm::cli
