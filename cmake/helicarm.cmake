@@ -23,15 +23,19 @@ target_precompile_headers(helicarm_precompiled PRIVATE
   <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>
   <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
 
-# helicarm_room(NAME SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
+# helicarm_room(NAME [APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
+# A room's files are compiled as one unit; APART: file by file, as they use one name for several things.
 function(helicarm_room name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
     add_library(helicarm_${name} STATIC ${ARG_SOURCES})
     target_link_libraries(helicarm_${name} PUBLIC helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})
     target_precompile_headers(helicarm_${name} REUSE_FROM helicarm_precompiled)
+    if(NOT ARG_APART)
+      set_target_properties(helicarm_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+    endif()
   else()
     add_library(helicarm_${name} INTERFACE)
     target_link_libraries(helicarm_${name} INTERFACE helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})

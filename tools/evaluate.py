@@ -42,6 +42,15 @@ def balls_of(truth, view):
     return {b.get("name", b.get("label")): b["raw"] for b in balls if b.get("raw")}
 
 
+def is_covered(error, covariance):
+    """Whether the 95 % ellipsoid of a covariance holds an error (chi-square, three degrees of freedom)."""
+    a, b, c = covariance
+    cross = lambda p, q: [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+    dot = lambda p, q: sum(x * y for x, y in zip(p, q))
+    solution = [dot(cross(b, c), error), dot(cross(c, a), error), dot(cross(a, b), error)]
+    return dot(error, solution) / dot(a, cross(b, c)) < 7.8147
+
+
 def judge(folder, result, truth):
     squares, wrong = [], 0
     for view in result["views"]:
@@ -55,8 +64,10 @@ def judge(folder, result, truth):
     checks = [p["name"] for p in result["points"] if p["name"][0] == "T" and p["name"][1:].isdigit()]
     if folder.name.startswith("n") or not checks:
         checks = ["FS", "FE", "TS", "TE"]
-    errors = [distance(p["xyz_mm"], places[p["name"]]) for p in result["points"]
-              if p["name"] in checks and p["name"] in places and p["xyz_mm"]]
+    located = [p for p in result["points"] if p["name"] in checks and p["name"] in places and p["xyz_mm"]]
+    errors = [distance(p["xyz_mm"], places[p["name"]]) for p in located]
+    covered = sum(is_covered([x - y for x, y in zip(p["xyz_mm"], places[p["name"]])], p["covariance_mm2"])
+                  for p in located)
     return {
         "wrong": wrong,
         "balls": len(squares),
@@ -65,6 +76,7 @@ def judge(folder, result, truth):
         "tre": sum(errors) / len(errors) if errors else math.nan,
         "tre_max": max(errors, default=math.nan),
         "n": len(errors),
+        "covered": covered,
         "ms": result["timing_ms"]["total"],
     }
 
@@ -91,31 +103,32 @@ def simulate(helicarm, folder, count):
 
 def evaluate(helicarm, cases, method):
     """Rows of the cases, and a table of the groups."""
-    lines = ["| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | ms |",
-             "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
+    lines = ["| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | in 95 % | ms |",
+             "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     groups = defaultdict(list)
     for case in cases:
         result, message = run(helicarm, case, method)
         if result is None or result["status"] != "ok":
             code = result["failure"]["code"] if result else message
-            lines.append(f"| {case.name} | refused: {code} | | | | | | | |")
+            lines.append(f"| {case.name} | refused: {code} | | | | | | | | |")
             continue
         row = judge(case, result, json.loads((case / "truth.json").read_text()))
         groups[case.name[0]].append(row)
         lines.append(f"| {case.name} | {row['wrong']} | {row['balls']} | {row['ball_px']:.3f} | {row['fre']:.4f} | "
-                     f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['ms']:.0f} |")
+                     f"{row['tre']:.4f} | {row['tre_max']:.4f} | {row['n']} | {row['covered']} | {row['ms']:.0f} |")
     return lines, groups
 
 
-GROUP_HEAD = ["| method | group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max |",
-              "| --- | --- | --- | --- | --- | --- | --- | --- |"]
+GROUP_HEAD = ["| method | group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | in 95 % ellipsoid |",
+              "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
 
 
 def group_lines(method, groups):
     for name, rows in sorted(groups.items()):
         mean = lambda key: sum(r[key] for r in rows) / len(rows)  # noqa: E731
         yield (f"| {method} | {name} | {len(rows)} | {sum(r['wrong'] for r in rows)} | {mean('ball_px'):.3f} | "
-               f"{mean('fre'):.4f} | {mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} |")
+               f"{mean('fre'):.4f} | {mean('tre'):.4f} | {max(r['tre_max'] for r in rows):.4f} | "
+               f"{sum(r['covered'] for r in rows)} of {sum(r['n'] for r in rows)} |")
 
 
 def renew(readme, marker, lines):

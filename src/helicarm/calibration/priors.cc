@@ -11,13 +11,11 @@
 namespace helicarm {
 namespace {
 
-constexpr int n = view_parameters;
-
 /// Numbers of one view that priors speak of, by its step.
 enum : Eigen::Index { focal, aspect, principal_u, principal_v, skew };
 struct Known {
   Eigen::Vector<double, 5> values;
-  Eigen::Matrix<double, 5, n> by_step;
+  Eigen::Matrix<double, 5, view_parameters> by_step;
 };
 
 Known known_of(const CentredView& view) {
@@ -34,13 +32,14 @@ Known known_of(const CentredView& view) {
 
 class Rows {
  public:
-  explicit Rows(std::span<const CentredView> views) : columns_(n * Eigen::Index(views.size())) {
+  explicit Rows(std::span<const CentredView> views) : columns_(view_parameters * Eigen::Index(views.size())) {
     for (const CentredView& view : views) known_.push_back(known_of(view));
   }
 
   void add_own(std::size_t view, Eigen::Index which, const Belief& belief) {
     residuals_.push_back((known_[view].values(which) - belief.value) / belief.sigma);
-    rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_)).segment<n>(n * Eigen::Index(view)) =
+    rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_))
+        .segment<view_parameters>(view_parameters * Eigen::Index(view)) =
         known_[view].by_step.row(which) / belief.sigma;
   }
 
@@ -57,7 +56,8 @@ class Rows {
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto& [view, value, unit] = nominal[std::size_t(i)];
       residuals(i) = (known_[view].values(which) - value) / unit;
-      rows.row(i).segment<n>(n * Eigen::Index(view)) = known_[view].by_step.row(which) / unit;
+      rows.row(i).segment<view_parameters>(view_parameters * Eigen::Index(view)) =
+          known_[view].by_step.row(which) / unit;
     }
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, departure.common * departure.common);
     covariance.diagonal().array() += departure.of_view * departure.of_view;

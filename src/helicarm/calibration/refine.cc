@@ -15,8 +15,6 @@ constexpr double least_gain = 1e-10;  // of chi2, before one last full step
 constexpr double least_damping = 1e-12;
 constexpr double most_damping = 1e12;
 
-constexpr int n = view_parameters;
-
 /// Rows at given views and departures; false where a point is not before its source. Without priors rho may
 /// pass through zero on the way: nothing happens there.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
@@ -33,7 +31,7 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
       common.machine.focal || common.machine.principal ||
       std::any_of(beliefs.begin(), beliefs.end(), [](const auto& belief) { return belief.aspect; });
   if (needs_source && !has_source) return false;
-  const Eigen::Index steps = n * Eigen::Index(problems.size());
+  const Eigen::Index steps = view_parameters * Eigen::Index(problems.size());
   const Eigen::Index own = at.departures.size();
   at.residuals.resize(count + priors.residuals.size() + own);
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
@@ -46,7 +44,8 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
       const Picture picture = picture_of(at.views[i], place);
       if (!(picture.relative_depth > 0)) return false;
       at.residuals.segment<2>(row) = (picture.pixel - seen.pixel) / seen.sigma_px;
-      at.jacobian.block<2, n>(row, n * Eigen::Index(i)) = picture.by_step / seen.sigma_px;
+      at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
+          picture.by_step / seen.sigma_px;
       if (own > 0)
         at.jacobian.block<2, 3>(row, steps + ball) =
             common.ball_tolerance_mm / seen.sigma_px * picture.by_place;
@@ -63,7 +62,8 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
 
 void move(const Refinement& from, const Eigen::VectorXd& step, Refinement& to) {
   for (std::size_t i = 0; i < from.views.size(); ++i)
-    to.views.push_back(moved(from.views[i], step.segment<n>(n * Eigen::Index(i))));
+    to.views.push_back(
+        moved(from.views[i], step.segment<view_parameters>(view_parameters * Eigen::Index(i))));
   to.departures = from.departures + step.tail(from.departures.size());
 }
 

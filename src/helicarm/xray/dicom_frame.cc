@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/dicom_frame.h"
 
-#include <cstring>
-
 #include <fmt/format.h>
 
+#include "helicarm/xray/bytes.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/rle.h"
 
 namespace helicarm {
 namespace {
-
-std::uint32_t number_at(std::string_view bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, bytes.data() + at, 4);
-  return value;
-}
 
 std::string joined(const std::vector<std::string_view>& fragments, std::size_t first, std::size_t last) {
   std::string bytes;

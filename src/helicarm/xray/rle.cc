@@ -2,20 +2,16 @@
 #include "helicarm/xray/rle.h"
 
 #include <cstdint>
-#include <cstring>
 
 #include <fmt/format.h>
+
+#include "helicarm/xray/bytes.h"
+
 
 namespace helicarm {
 namespace {
 
 constexpr std::size_t header_bytes = 64;
-
-std::uint32_t number_at(std::string_view bytes, std::size_t at) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, bytes.data() + at, 4);
-  return value;
-}
 
 /// PackBits into every `step`-th byte of `out`; true when it yields just `pixels` bytes.
 bool unpack(std::string_view packed, std::size_t pixels, std::size_t step, char* out) {
