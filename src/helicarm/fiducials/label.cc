@@ -13,10 +13,14 @@
 namespace helicarm {
 namespace {
 
-constexpr int least_balls = 6;
-constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
-constexpr double most_deviation = 3.3;     // of chi2, in sigmas: one honest view in 2000
+constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
 constexpr std::size_t loose_triples = 30;
+
+/// Six balls among up to ten false blobs escape with a chance below 1e-3.
+std::size_t triples_to_try(std::size_t candidates) {
+  const double n = std::min(candidates, std::size_t{16});
+  return static_cast<std::size_t>(std::ceil(std::log(1e3) * n * (n - 1) * (n - 2) / (6.0 * 5 * 4)));
+}
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -212,7 +216,7 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
-  explore(search, most_triples, [&](const Hypothesis& h) { return surely(h, options); });
+  explore(search, triples_to_try(n), [&](const Hypothesis& h) { return surely(h, options); });
   if (!search.ranking().empty()) challenge(search);
   auto failure = objection(scene, search.ranking(), prior, options);
   if (failure) return tl::unexpected(*std::move(failure));
