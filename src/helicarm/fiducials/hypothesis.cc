@@ -16,9 +16,11 @@ constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or me
 constexpr double radius_range = 0.2;         // of ln radius: how evenly false blobs are thought to spread
 constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the nearest distance thinkable
 
-/// Cauchy's weights: one false match among the true ones must not bend the fit to itself.
-void doubt_the_far(std::vector<Sighting>& sightings, const View& view) {
-  for (auto& s : sightings) s.sigma_px = std::hypot(s.sigma_px, (view.project(s.point) - s.uv).norm());
+/// Cauchy's weights: one false match among the true ones must not bend the fit to itself. Nor must the three
+/// that made the pose and fit it best: what lies within a third of the gate counts alike.
+void doubt_the_far(std::vector<Sighting>& sightings, const View& view, double gate_px) {
+  for (auto& s : sightings)
+    s.sigma_px = std::hypot(s.sigma_px, gate_px / 3, (view.project(s.point) - s.uv).norm());
 }
 
 struct RadiusVerdict {
@@ -153,14 +155,14 @@ Hypothesis settle(const Scene& scene, const View& rough) {
   constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
     const bool narrow = turn >= narrowing;
-    auto matches =
-        narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, rough_gate_px(scene) / (1 + turn));
+    const double gate_px = rough_gate_px(scene) / (1 + turn);
+    auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < 4) return h;
-    if (!narrow) doubt_the_far(sightings, h.fit.view);
+    if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
