@@ -84,7 +84,7 @@ DiscView random_discs(const Calibrator& calibrator, const DiscOptions& options, 
   const Vector2d origin(random.uniform(0, lattice_px), random.uniform(0, lattice_px));
   const double turn = random.uniform(0, std::numbers::pi / 2);
   const auto false_place = [&](int i) -> Vector2d {
-    if (options.kind == FalseDiscs::imitating && i < std::min(options.hidden, balls))
+    if (options.kind == FalseDiscs::imitating && i == 0 && options.hidden > 0)
       return exact[order[i]] + Vector2d(4 * random.normal(), 4 * random.normal());
     if (options.kind == FalseDiscs::lattice) {
       const Vector2d steps(static_cast<int>(random.index(9)) - 4, static_cast<int>(random.index(9)) - 4);

@@ -21,7 +21,7 @@ struct Disc {
 
 enum class FalseDiscs {
   strewn,     ///< anywhere in the field, half of them among the balls
-  imitating,  ///< a few pixels from where hidden balls would be, then as strewn
+  imitating,  ///< the first a few pixels from where a hidden ball would be, the others strewn
   lattice     ///< on a square lattice, as a plate's dots taken for balls
 };
 
