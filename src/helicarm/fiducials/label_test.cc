@@ -62,9 +62,9 @@ TEST(LabelBalls, NoisyCentresFromAnySideAreNeverNamedWrong) {
   EXPECT_GE(tally.good_solved, 0.93 * tally.good_views);
 }
 
-TEST(LabelBalls, BallsThatARoughPoseMissesAreWonBack) {
-  // In these the first fit leaves true balls outside the noise of the discs, inside that of the fit.
-  for (const int trial : {241, 1639, 3976, 4259, 4680}) {
+TEST(LabelBalls, PartsOfTheTruthGiveWayToAllOfIt) {
+  // In these the first fit misses true balls that lie within its own error, or names a few of them as others.
+  for (const int trial : {241, 1639, 3544, 3976, 4259, 4680}) {
     const auto picture = any_picture(udcsc(), trial, 0.5);
     const auto labelling = label_balls(udcsc(), picture.candidates, nominal);
     EXPECT_TRUE(labelling && right(*labelling, picture, udcsc())) << trial;

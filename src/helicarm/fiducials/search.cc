@@ -193,13 +193,13 @@ void LabelSearch::keep(Hypothesis hypothesis) {
 }
 
 void explore(LabelSearch& search, std::size_t triples,
-             const std::function<bool(const Hypothesis&)>& will_do) {
+             const std::function<bool(const Hypothesis&, std::size_t)>& will_do) {
   std::vector<int> all(search.scene().candidates.size());
   std::iota(all.begin(), all.end(), 0);
   TripleDealer dealer(all);
   for (std::size_t i = 0; i < triples; ++i) {
     search.try_triple(dealer.deal());
-    if (!search.ranking().empty() && will_do(search.ranking().front())) return;
+    if (!search.ranking().empty() && will_do(search.ranking().front(), i + 1)) return;
   }
 }
 

@@ -68,8 +68,9 @@ class LabelSearch {
   Ranking ranking_;
 };
 
-/// Tries up to `triples` random triples of the candidates, until the best hypothesis will do.
-void explore(LabelSearch& search, std::size_t triples, const std::function<bool(const Hypothesis&)>& will_do);
+/// Tries up to `triples` random triples of the candidates, until the best hypothesis will do after so many.
+void explore(LabelSearch& search, std::size_t triples,
+             const std::function<bool(const Hypothesis&, std::size_t tried)>& will_do);
 
 /// Seeks rivals of the best hypothesis on triples of its own candidates, and of whichever unseats it. A rival
 /// almost as good shares all but one or two of its candidates, so it holds several of these triples whole.

@@ -42,7 +42,7 @@ Expected<Labelling> label(const Calibrator& calibrator, const std::vector<Disc>&
   return label_balls(calibrator, candidates, nominal_prior());
 }
 
-/// A false disc may pass for a hidden ball where the true ones' noise leaves it open: 4 sigma.
+/// A false disc may pass for a hidden ball unless a fit to the true ones puts that 4 sigma away.
 Verdict judge(const Labelling& labelling, const DiscView& picture, const Calibrator& calibrator) {
   if (labelling.mirrored != picture.mirrored()) return Verdict::wrong;
   std::vector<Sighting> seen;
@@ -52,14 +52,14 @@ Verdict judge(const Labelling& labelling, const DiscView& picture, const Calibra
   const LabellingPrior prior = nominal_prior();
   const PoseFit known =
       fit_pose(picture.view, seen,
-               {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px}, 0);
+               {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px}, 20);
   Verdict verdict = Verdict::right;
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     if (labelling.candidate_of_ball[k] < 0) continue;
     const Disc& disc = picture.discs[labelling.candidate_of_ball[k]];
     if (disc.ball == static_cast<int>(k)) continue;
     const Eigen::Vector3d& centre = calibrator.balls[k].centre_in_calibrator;
-    const Eigen::Vector2d off = disc.uv - picture.view.project(centre);
+    const Eigen::Vector2d off = disc.uv - known.view.project(centre);
     const Eigen::Matrix2d noise = disc.sigma_px * disc.sigma_px * Eigen::Matrix2d::Identity();
     if (!(off.dot((noise + prediction_covariance(known, centre)).inverse() * off) <= 4 * 4))
       return Verdict::wrong;
