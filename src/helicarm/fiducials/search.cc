@@ -61,9 +61,9 @@ Neighbourhood::Neighbourhood(const Scene& scene) {
       }
     }
   }
+  balls_.resize((scene.balls.size() + 7) / 8);
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
-    if (k % 8 == 0) balls_.push_back({});
-    auto& eight = balls_.back();
+    auto& eight = balls_[k / 8];
     const Eigen::Vector3f centre = scene.balls[k].centre.cast<float>();
     eight.x.tail(8 - k % 8) = centre.x();
     eight.y.tail(8 - k % 8) = centre.y();

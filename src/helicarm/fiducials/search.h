@@ -28,8 +28,8 @@ class Neighbourhood {
  private:
   using Eight = Eigen::Array<float, 8, 1>;
   struct EightBalls {
-    Eight x, y, z;
-    int used;
+    Eight x = Eight::Zero(), y = x, z = x;
+    int used = 0;
   };
   std::vector<EightBalls> balls_;
   Eigen::Matrix3d cell_from_px_;
