@@ -175,6 +175,8 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
   found.view = labelling->view;
   found.mirrored = labelling->mirrored;
   found.margin = labelling->margin;
+  found.runner_up_matched = labelling->runner_up_matched;
+  found.runner_up_rms_px = labelling->runner_up_rms_px;
   found.radius_bias = labelling->radius_bias;
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)

@@ -19,7 +19,9 @@ struct FoundFiducials {
   std::vector<Dot> false_blobs;     ///< of a ball's size, but no ball of the calibrator
   View view;                        ///< pose estimate from the labelling: a start for the calibration
   bool mirrored = false;
-  double margin = 0;       ///< log odds of the labelling against the best other one
+  double margin = 0;          ///< log odds of the labelling against the best other one
+  int runner_up_matched = 0;  ///< balls that the best other one names; 0: there is none
+  double runner_up_rms_px = 0;
   double radius_bias = 0;  ///< of the balls' radii in the picture, relative
   std::vector<Warning> warnings;
 };

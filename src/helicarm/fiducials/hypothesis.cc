@@ -11,13 +11,16 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double radius_sigmas = 4;
+constexpr double match_sigmas = 4.5;         // where a ball ceases to pay for itself; loses one in 25,000
 constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or metal is no better known
 constexpr double radius_range = 0.2;         // of ln radius: how evenly false blobs are thought to spread
 constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the nearest distance thinkable
 
-/// Cauchy's weights: one false match among the true ones must not bend the fit to itself.
-void doubt_the_far(std::vector<Sighting>& sightings, const View& view) {
-  for (auto& s : sightings) s.sigma_px = std::hypot(s.sigma_px, (view.project(s.point) - s.uv).norm());
+/// Cauchy's weights: one false match among the true ones must not bend the fit to itself. Nor must the three
+/// that made the pose and fit it best: what lies within a third of the gate counts alike.
+void doubt_the_far(std::vector<Sighting>& sightings, const View& view, double gate_px) {
+  for (auto& s : sightings)
+    s.sigma_px = std::hypot(s.sigma_px, gate_px / 3, (view.project(s.point) - s.uv).norm());
 }
 
 struct RadiusVerdict {
@@ -69,6 +72,52 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   return odds + fit.log_volume + 3 * log_2pi;
 }
 
+/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never.
+template <class Cost>
+std::vector<int> pair_up(const Scene& scene, const View& view, const Cost& cost_of) {
+  struct Pair {
+    double cost;
+    int ball;
+    int candidate;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    const double depth = view.depth(scene.balls[k].centre);
+    if (depth <= 0) continue;
+    const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
+    for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
+      const auto& candidate = scene.candidates[i];
+      const double cost = cost_of(k, candidate, candidate.uv - uv);
+      if (cost < infinity &&
+          scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
+        pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.cost < q.cost; });
+  std::vector<int> candidate_of_ball(scene.balls.size(), -1);
+  std::vector<bool> taken(scene.candidates.size(), false);
+  for (const auto& pair : pairs) {
+    if (candidate_of_ball[pair.ball] >= 0 || taken[pair.candidate]) continue;
+    candidate_of_ball[pair.ball] = pair.candidate;
+    taken[pair.candidate] = true;
+  }
+  return candidate_of_ball;
+}
+
+/// Within the noise of the candidate and, for a ball that had no say in the fit, that of the fit.
+std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
+  std::vector<Eigen::Matrix2d> doubt(scene.balls.size(), Eigen::Matrix2d::Zero());
+  for (std::size_t k = 0; k < scene.balls.size(); ++k)
+    if (h.candidate_of_ball[k] < 0) doubt[k] = prediction_covariance(h.fit, scene.balls[k].centre);
+  return pair_up(
+      scene, h.fit.view, [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+        if (off.norm() > rough_gate_px(scene)) return infinity;
+        const double noise = candidate.sigma_px * candidate.sigma_px;
+        const double cost = off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
+        return cost < match_sigmas * match_sigmas ? cost : infinity;
+      });
+}
+
 }  // namespace
 
 std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
@@ -89,37 +138,12 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
           radius > spread ? ball.radius_mm / (radius - spread) : infinity};
 }
 
-std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas) {
-  struct Pair {
-    double cost;
-    int ball;
-    int candidate;
-  };
-  std::vector<Pair> pairs;
-  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
-    const double depth = view.depth(scene.balls[k].centre);
-    if (depth <= 0) continue;
-    const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
-    for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
-      const auto& candidate = scene.candidates[i];
-      const double distance2 = (candidate.uv - uv).squaredNorm();
-      if (distance2 > gate_px * gate_px) continue;
-      const double cost = distance2 / (candidate.sigma_px * candidate.sigma_px);
-      if (cost > gate_sigmas * gate_sigmas) continue;
-      if (!scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
-        continue;
-      pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
-    }
-  }
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.cost < q.cost; });
-  std::vector<int> candidate_of_ball(scene.balls.size(), -1);
-  std::vector<bool> taken(scene.candidates.size(), false);
-  for (const auto& pair : pairs) {
-    if (candidate_of_ball[pair.ball] >= 0 || taken[pair.candidate]) continue;
-    candidate_of_ball[pair.ball] = pair.candidate;
-    taken[pair.candidate] = true;
-  }
-  return candidate_of_ball;
+std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
+  return pair_up(scene, view, [&](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+    return off.squaredNorm() < gate_px * gate_px
+               ? off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px)
+               : infinity;
+  });
 }
 
 Hypothesis settle(const Scene& scene, const View& rough) {
@@ -131,14 +155,14 @@ Hypothesis settle(const Scene& scene, const View& rough) {
   constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
     const bool narrow = turn >= narrowing;
-    auto matches = narrow ? match(scene, h.fit.view, infinity, match_sigmas)
-                          : match(scene, h.fit.view, rough_gate_px(scene) / (1 + turn), infinity);
+    const double gate_px = rough_gate_px(scene) / (1 + turn);
+    auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < 4) return h;
-    if (!narrow) doubt_the_far(sightings, h.fit.view);
+    if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();

@@ -57,12 +57,11 @@ struct Hypothesis {
   bool mirrored() const { return fit.view.intrinsics.fx < 0; }
 };
 
-/// Pairs balls and candidates one to one, nearest first, when within `gate_px` and `gate_sigmas` of each
-/// other and at a distance from the source that fits the candidate's radius.
-std::vector<int> match(const Scene& scene, const View& view, double gate_px, double gate_sigmas);
+/// Pairs balls and candidates one to one, nearest first, when within `gate_px` of each other and at a
+/// distance from the source that fits the candidate's radius.
+std::vector<int> match(const Scene& scene, const View& view, double gate_px);
 
-constexpr double match_sigmas = 3.5;  ///< between a ball and its candidate; loses one ball in 460
-constexpr int fit_steps = 10;         ///< at most
+constexpr int fit_steps = 10;  ///< at most
 
 /// The matched balls, as a fit wants them.
 std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball);

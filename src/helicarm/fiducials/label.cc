@@ -13,10 +13,17 @@
 namespace helicarm {
 namespace {
 
-constexpr int least_balls = 6;
-constexpr std::size_t most_triples = 400;  // six balls among ten false blobs escape with a chance below 1e-6
-constexpr double most_deviation = 3.3;     // of chi2, in sigmas: one honest view in 2000
+constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
 constexpr std::size_t loose_triples = 30;
+constexpr std::size_t most_candidates = 16;  // that the search is measured by
+constexpr int many_balls = 8;
+
+/// So many that `balls` balls among the candidates escape with a chance below 1e-3.
+std::size_t triples_to_meet(int balls, std::size_t candidates) {
+  const double n = static_cast<double>(std::min(candidates, most_candidates));
+  return static_cast<std::size_t>(std::log(1e3) * n * (n - 1) * (n - 2) /
+                                  (balls * (balls - 1) * (balls - 2)));
+}
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -127,7 +134,7 @@ Hypothesis loose_best(const Scene& scene, const Hypothesis& best, const Labellin
   const auto could_match = static_cast<double>(std::min(scene.candidates.size(), scene.balls.size()));
   if (best.matched >= 0.75 * could_match || near_best.log_odds > best.log_odds) return near_best;
   LabelSearch search(loose, focals_to_try(prior));
-  explore(search, loose_triples, [&](const Hypothesis& h) { return surely(h, options); });
+  explore(search, loose_triples, [&](const Hypothesis& h, std::size_t) { return surely(h, options); });
   if (search.ranking().empty() || search.ranking().front().log_odds < near_best.log_odds) return near_best;
   return search.ranking().front();
 }
@@ -137,6 +144,17 @@ tl::unexpected<Failure> too_few(int balls, int candidates) {
       Reason::too_few_fiducials,
       fmt::format("only {} balls of the calibrator could be recognised; {} are needed", balls, least_balls),
       {{"n", balls}, {"candidates", candidates}, {"needed", least_balls}});
+}
+
+/// Chi-square beyond chance, and not for one false disc's sake that posed as a ball.
+bool misfits(const Scene& scene, const Hypothesis& h) {
+  if (deviate(h.fit.chi2, 2 * h.matched - 6) < most_deviation) return false;
+  Hypothesis kept = h;
+  drop_doubtful(scene, kept);
+  const int named = count_named(kept);
+  if (named < std::max(least_balls, h.matched - 1)) return true;
+  const auto seen = sightings_of(scene, kept.candidate_of_ball);
+  return deviate(fit_pose(h.fit.view, seen, scene.camera, fit_steps).chi2, 2 * named - 6) > most_deviation;
 }
 
 /// Why not even the best hypothesis is to be believed, if so.
@@ -153,8 +171,7 @@ std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, con
   const Hypothesis& best = ranking.front();
   const int dof = 2 * best.matched - 6;
   const Hypothesis loose = loose_best(scene, best, prior, options);
-  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) ||
-      deviate(best.fit.chi2, dof) > most_deviation) {
+  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || misfits(scene, best)) {
     return fail(Reason::calibrator_mismatch,
                 fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
                             std::sqrt(loose.residual2_px2 / loose.matched)),
@@ -212,7 +229,12 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
-  explore(search, most_triples, [&](const Hypothesis& h) { return surely(h, options); });
+  // A few balls may be part of many under other names: these are then met first.
+  explore(search, triples_to_meet(least_balls, candidates.size()),
+          [&](const Hypothesis& h, std::size_t tried) {
+            return surely(h, options) &&
+                   (h.matched >= many_balls || tried >= triples_to_meet(many_balls, candidates.size()));
+          });
   if (!search.ranking().empty()) challenge(search);
   auto failure = objection(scene, search.ranking(), prior, options);
   if (failure) return tl::unexpected(*std::move(failure));

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 namespace helicarm {
@@ -33,29 +32,33 @@ struct Normal {
   Vector9 gradient = Vector9::Zero();
 };
 
-/// Unknowns: rotation (applied from the left), translation, ln f, u0, v0.
+/// Of a point's image. Unknowns: rotation (applied from the left), translation, ln f, u0, v0.
+Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& point) {
+  const Intrinsics& k = view.intrinsics;
+  const Eigen::Vector3d turned = view.camera_from_world.rotation * point;
+  const Eigen::Vector3d p = turned + view.camera_from_world.translation;
+  const double x = p.x() / p.z();
+  const double y = p.y() / p.z();
+  Eigen::Matrix<double, 2, 3> by_point;
+  by_point << k.fx, 0, -k.fx * x, 0, k.fy, -k.fy * y;
+  by_point /= p.z();
+  Eigen::Matrix<double, 2, 9> j;
+  j.col(0) = by_point.col(2) * turned.y() - by_point.col(1) * turned.z();
+  j.col(1) = by_point.col(0) * turned.z() - by_point.col(2) * turned.x();
+  j.col(2) = by_point.col(1) * turned.x() - by_point.col(0) * turned.y();
+  j.middleCols<3>(3) = by_point;
+  j.rightCols<3>() << k.fx * x, 1, 0, k.fy * y, 0, 1;
+  return j;
+}
+
 Normal normal_equations(const View& view, const std::vector<Sighting>& sightings, const CameraPrior& prior) {
   Normal normal;
   const Intrinsics& k = view.intrinsics;
-  Eigen::Matrix<double, 2, 9> j = Eigen::Matrix<double, 2, 9>::Zero();
   for (const auto& s : sightings) {
-    const Eigen::Vector3d turned = view.camera_from_world.rotation * s.point;
-    const Eigen::Vector3d p = turned + view.camera_from_world.translation;
-    const double x = p.x() / p.z();
-    const double y = p.y() / p.z();
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << k.fx, 0, -k.fx * x, 0, k.fy, -k.fy * y;
-    by_point /= p.z();
-    j.col(0) = by_point.col(2) * turned.y() - by_point.col(1) * turned.z();
-    j.col(1) = by_point.col(0) * turned.z() - by_point.col(2) * turned.x();
-    j.col(2) = by_point.col(1) * turned.x() - by_point.col(0) * turned.y();
-    j.middleCols<3>(3) = by_point;
-    j.col(6) = Eigen::Vector2d(k.fx * x, k.fy * y);
-    j(0, 7) = j(1, 8) = 1;
-    const double weight = 1 / (s.sigma_px * s.sigma_px);
-    const Eigen::Vector2d residual(k.fx * x + k.u0 - s.uv.x(), k.fy * y + k.v0 - s.uv.y());
-    normal.information.noalias() += weight * j.transpose() * j;
-    normal.gradient.noalias() += weight * j.transpose() * residual;
+    const Eigen::Matrix<double, 2, 9> j = jacobian(view, s.point) / s.sigma_px;
+    const Eigen::Vector2d residual = (view.project(s.point) - s.uv) / s.sigma_px;
+    normal.information += j.transpose().lazyProduct(j);
+    normal.gradient += j.transpose().lazyProduct(residual);
   }
   const Eigen::Vector3d sigma(prior.focal_sigma, prior.principal_sigma_px, prior.principal_sigma_px);
   normal.information.diagonal().tail<3>().array() += sigma.array().inverse().square();
@@ -88,7 +91,7 @@ PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, cons
   for (int step = 0; step < most_steps && damping < 1e3; ++step) {
     Matrix9 damped = normal.information;
     damped.diagonal() *= 1 + damping;
-    const View next = moved(fit.view, -damped.ldlt().solve(normal.gradient));
+    const View next = moved(fit.view, -damped.llt().solve(normal.gradient));
     const double chi2 = chi2_of(next, sightings, prior);
     if (!(chi2 <= fit.chi2)) {
       damping = damping * 30 + 1e-3;
@@ -101,8 +104,15 @@ PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, cons
     normal = normal_equations(fit.view, sightings, prior);
     if (gain < 1e-3) break;
   }
-  fit.log_volume = -0.5 * normal.information.ldlt().vectorD().array().log().sum();
+  fit.information.compute(normal.information);
+  fit.log_volume = -fit.information.matrixLLT().diagonal().array().log().sum();
   return fit;
+}
+
+Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d& point) {
+  const Eigen::Matrix<double, 9, 2> j =
+      fit.information.matrixL().solve(jacobian(fit.view, point).transpose());
+  return j.transpose() * j;
 }
 
 }  // namespace helicarm

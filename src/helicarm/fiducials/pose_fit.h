@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "helicarm/geometry/view.h"
@@ -28,7 +29,11 @@ struct PoseFit {
   View view;
   double chi2 = 0;        ///< residuals and the camera's departure from its prior
   double log_volume = 0;  ///< 0.5 ln det of the covariance of (rotation rad, translation mm, ln f, u0, v0)
+  Eigen::LLT<Eigen::Matrix<double, 9, 9>> information = {};  ///< the inverse of that covariance
 };
+
+/// What the fit's own error does to a point's image, px^2.
+Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d& point);
 
 /// The most probable pose, focal length and principal point (square pixels, the mirroring of `start` kept),
 /// by Levenberg-Marquardt from `start`. The covariance is finite only with three or more sightings.

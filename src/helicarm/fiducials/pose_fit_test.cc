@@ -75,6 +75,30 @@ TEST(FitPose, GradientVanishesAtTheFit) {
   }
 }
 
+TEST(PredictionCovariance, IsWhatNoiseMakesOfThePrediction) {
+  // Over many fits to the same points: the simple way to the same numbers.
+  const Eigen::Vector3d elsewhere(40, -60, 10);
+  const auto seen = sightings(8, 0.5);
+  const PoseFit fit = fit_pose(truth(), seen, prior, 20);
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  constexpr int fits = 2000;
+  for (int trial = 0; trial < fits; ++trial) {
+    RandomStream random(6, 0, trial);
+    CameraPrior drawn = prior;
+    drawn.focal_px *= std::exp(prior.focal_sigma * random.normal());
+    drawn.principal_px += prior.principal_sigma_px * Eigen::Vector2d(random.normal(), random.normal());
+    auto noisy = seen;
+    for (auto& s : noisy)
+      s.uv = fit.view.project(s.point) + 0.5 * Eigen::Vector2d(random.normal(), random.normal());
+    const Eigen::Vector2d off =
+        fit_pose(fit.view, noisy, drawn, 20).view.project(elsewhere) - fit.view.project(elsewhere);
+    scatter += off * off.transpose() / fits;
+  }
+  const Eigen::Matrix2d predicted = prediction_covariance(fit, elsewhere);
+  EXPECT_NEAR(scatter(0, 0) / predicted(0, 0), 1, 0.15);
+  EXPECT_NEAR(scatter(1, 1) / predicted(1, 1), 1, 0.15);
+}
+
 TEST(FitPose, TwiceTheNoiseMakesTheVolumeLarger) {
   const auto fine = fit_pose(truth(), sightings(12, 0.1), prior, 20);
   const auto coarse = fit_pose(truth(), sightings(12, 0.2), prior, 20);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -37,13 +36,6 @@ class TripleDealer {
   RandomStream random_{1, 0};
 };
 
-/// The fewest supporters (two or three) that chance gives to less than one pose in fifty.
-int support_needed(const Scene& scene) {
-  const double gate = rough_gate_px(scene) / scene.field_radius_px;
-  const double mean = static_cast<double>(scene.balls.size() * scene.candidates.size()) * gate * gate;
-  return 1 - std::exp(-mean) * (1 + mean) < 0.02 ? 2 : 3;
-}
-
 }  // namespace
 
 Neighbourhood::Neighbourhood(const Scene& scene) {
@@ -57,28 +49,47 @@ Neighbourhood::Neighbourhood(const Scene& scene) {
   }
   low -= (reach + 1) * cell_px;
   const Eigen::Array2i cells = ((high - low) / cell_px).cast<int>() + reach + 2;
-  left_ = static_cast<float>(low.x());
-  top_ = static_cast<float>(low.y());
-  cells_per_px_ = static_cast<float>(1 / cell_px);
-  columns_ = cells.x();
-  rows_ = cells.y();
-  marked_.assign(static_cast<std::size_t>(columns_) * rows_, 0);
+  cell_from_px_ << 1 / cell_px, 0, -low.x() / cell_px, 0, 1 / cell_px, -low.y() / cell_px, 0, 0, 1;
+  last_column_ = static_cast<float>(cells.x() - 1);
+  last_row_ = static_cast<float>(cells.y() - 1);
+  marked_.assign(static_cast<std::size_t>(cells.prod()), 0);
   for (const auto& candidate : scene.candidates) {
     const Eigen::Array2i at = ((candidate.uv.array() - low) / cell_px).cast<int>();
     for (int dy = -reach; dy <= reach; ++dy) {
       for (int dx = -reach; dx <= reach; ++dx) {
-        if (dx * dx + dy * dy <= reach * reach) marked_[(at.y() + dy) * columns_ + at.x() + dx] = 1;
+        if (dx * dx + dy * dy <= reach * reach) marked_[(at.y() + dy) * cells.x() + at.x() + dx] = 1;
       }
     }
   }
+  balls_.resize((scene.balls.size() + 7) / 8);
+  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
+    auto& eight = balls_[k / 8];
+    const Eigen::Vector3f centre = scene.balls[k].centre.cast<float>();
+    eight.x.tail(8 - k % 8) = centre.x();
+    eight.y.tail(8 - k % 8) = centre.y();
+    eight.z.tail(8 - k % 8) = centre.z();
+    eight.used = static_cast<int>(k % 8) + 1;
+  }
+}
+
+bool Neighbourhood::holds(const View& view, int wanted) const {
+  const Eigen::Matrix<float, 3, 4> p = (cell_from_px_ * view.projection()).cast<float>();
+  for (const auto& eight : balls_) {
+    const auto row = [&](int i) -> Eight {
+      return p(i, 0) * eight.x + p(i, 1) * eight.y + p(i, 2) * eight.z + p(i, 3);
+    };
+    const Eight depth = row(2);
+    const Eight column = (row(0) / depth).max(0).min(last_column_).floor();
+    const Eight line = (row(1) / depth).max(0).min(last_row_).floor();
+    const Eigen::Array<int, 8, 1> cell = (line * (last_column_ + 1) + column).cast<int>();
+    for (int i = 0; i < eight.used; ++i) wanted -= marked_[cell[i]];
+    if (wanted <= 0) return true;
+  }
+  return false;
 }
 
 LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
-    : scene_(scene),
-      focals_px_(std::move(focals_px)),
-      flat_px_(0.04 * scene.field_radius_px),
-      support_(support_needed(scene)),
-      near_(scene) {
+    : scene_(scene), focals_px_(std::move(focals_px)), flat_px_(0.04 * scene.field_radius_px), near_(scene) {
   const int balls = static_cast<int>(scene.balls.size());
   for (int i = 0; i < balls; ++i) {
     for (int j = 0; j < balls; ++j) {
@@ -90,14 +101,24 @@ LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
       }
     }
   }
-  for (const auto& ball : scene.balls) centres_.push_back(ball.centre.homogeneous().cast<float>());
+  const auto count = static_cast<Eigen::Index>(triangles_.size());
+  a_.resize(count);
+  b_.resize(count);
+  c_.resize(count);
+  for (Eigen::Index t = 0; t < count; ++t) {
+    a_[t] = static_cast<float>(triangles_[t].a);
+    b_[t] = static_cast<float>(triangles_[t].b);
+    c_[t] = static_cast<float>(triangles_[t].c);
+  }
   for (const auto& candidate : scene.candidates) {
     for (const auto& ball : scene.balls)
       scales_.push_back(scale_by_radius(scene, candidate, ball, radius_sigmas));
   }
 }
 
-bool LabelSearch::try_triple(const std::array<int, 3>& candidates) {
+bool LabelSearch::try_triple(std::array<int, 3> candidates) {
+  std::sort(candidates.begin(), candidates.end());
+  if (!triples_.insert(candidates).second) return false;
   const Eigen::Vector2d e1 = scene_.candidates[candidates[1]].uv - scene_.candidates[candidates[0]].uv;
   const Eigen::Vector2d e2 = scene_.candidates[candidates[2]].uv - scene_.candidates[candidates[0]].uv;
   const double longest = std::max({e1.norm(), e2.norm(), (e2 - e1).norm()});
@@ -120,44 +141,35 @@ void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_p
   const double a = e1.squaredNorm();
   const double b = e2.squaredNorm();
   const double c = e1.dot(e2);
-  for (const auto& triangle : triangles_) {
-    const Scale& s0 = scales[0][triangle.balls[0]];
+  const Eigen::ArrayXf mm_per_px =
+      static_cast<float>(1 / focal_px) / inverse_distance2(a_, b_, c_, a, b, c).sqrt();
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const ModelTriangle& triangle = triangles_[t];
+    if (!scales[0][triangle.balls[0]].holds(mm_per_px[t])) continue;
     const Scale& s1 = scales[1][triangle.balls[1]];
     const Scale& s2 = scales[2][triangle.balls[2]];
-    const double mm_per_px = 1 / (focal_px * std::sqrt(inverse_distance2(triangle, a, b, c)));
-    if (!s0.holds(mm_per_px)) continue;
     const auto away = orthography(triangle, a, b, c);
     for (const double lean : {1.0, -1.0}) {
       const Orthography start{away.inverse_distance2, lean * away.behind1, lean * away.behind2};
-      if (!s1.holds(mm_per_px * (1 + start.behind1)) || !s2.holds(mm_per_px * (1 + start.behind2))) continue;
-      for (const auto* image : {&upright, &mirrored}) {
-        const auto pose = three_point_pose(triangle, *image, start);
-        if (!pose) continue;
-        const Eigen::Vector2d& centre = scene_.camera.principal_px;
-        const double fx = image == &mirrored ? -focal_px : focal_px;
-        try_pose(View{{fx, focal_px, centre.x(), centre.y()}, *pose}, lean);
-      }
+      if (!s1.holds(mm_per_px[t] * (1 + start.behind1)) || !s2.holds(mm_per_px[t] * (1 + start.behind2)))
+        continue;
+      const auto depths = three_point_depths(triangle, upright, start);
+      if (!depths) continue;
+      const Eigen::Vector2d& centre = scene_.camera.principal_px;
+      try_pose({{focal_px, focal_px, centre.x(), centre.y()}, three_point_pose(triangle, upright, *depths)},
+               lean);
+      try_pose({{-focal_px, focal_px, centre.x(), centre.y()}, three_point_pose(triangle, mirrored, *depths)},
+               lean);
     }
   }
 }
 
-bool LabelSearch::supported(const View& rough) const {
-  const int best = ranking_.empty() ? 0 : ranking_.front().matched;
-  int wanted = 3 + std::max(support_, best / 2 - 2);
-  int left = static_cast<int>(scene_.balls.size());
-  Eigen::Matrix4f projection = Eigen::Matrix4f::Zero();
-  projection.topRows<3>() = rough.projection().cast<float>();
-  for (const auto& centre : centres_) {
-    if (left-- < wanted) return false;
-    const Eigen::Vector4f p = projection * centre;
-    if (near_.holds(p.x() / p.z(), p.y() / p.z()) && --wanted == 0) return true;
-  }
-  return false;
-}
-
 void LabelSearch::try_pose(const View& rough, double lean) {
-  if (!supported(rough)) return;
-  auto key = match(scene_, rough, rough_gate_px(scene_), std::numeric_limits<double>::infinity());
+  const int best = ranking_.empty() ? 0 : ranking_.front().matched;
+  const int wanted = std::max(least_balls - 1, best - 3);
+  if (!near_.holds(rough, wanted)) return;
+  auto key = match(scene_, rough, rough_gate_px(scene_));
+  if (std::count_if(key.begin(), key.end(), [](int i) { return i >= 0; }) < wanted) return;
   key.push_back(rough.intrinsics.fx < 0 ? -1 : 1);
   key.push_back(lean < 0 ? -1 : 1);
   if (tried_.insert(std::move(key)).second) keep(settle(scene_, rough));
@@ -181,13 +193,13 @@ void LabelSearch::keep(Hypothesis hypothesis) {
 }
 
 void explore(LabelSearch& search, std::size_t triples,
-             const std::function<bool(const Hypothesis&)>& will_do) {
+             const std::function<bool(const Hypothesis&, std::size_t)>& will_do) {
   std::vector<int> all(search.scene().candidates.size());
   std::iota(all.begin(), all.end(), 0);
   TripleDealer dealer(all);
   for (std::size_t i = 0; i < triples; ++i) {
     search.try_triple(dealer.deal());
-    if (!search.ranking().empty() && will_do(search.ranking().front())) return;
+    if (!search.ranking().empty() && will_do(search.ranking().front(), i + 1)) return;
   }
 }
 

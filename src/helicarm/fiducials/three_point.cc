@@ -31,50 +31,44 @@ std::optional<ModelTriangle> model_triangle(const std::array<int, 3>& balls,
   return ModelTriangle{balls, points[0], frame_of(e1, e2), e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2)};
 }
 
-double inverse_distance2(const ModelTriangle& model, double a, double b, double c) {
-  // a + h1^2 = w A, b + h2^2 = w B, c + h1 h2 = w C; the depths h1, h2 eliminated, the larger root is the
-  // real one.
-  const double q2 = model.a * model.b - model.c * model.c;
-  const double q1 = 0.5 * (model.a * b + a * model.b) - model.c * c;
-  const double q0 = a * b - c * c;
-  return (q1 + std::sqrt(std::max(0.0, q1 * q1 - q2 * q0))) / q2;
-}
-
 Orthography orthography(const ModelTriangle& model, double a, double b, double c) {
-  const double w = inverse_distance2(model, a, b, c);
+  const double w = inverse_distance2(model.a, model.b, model.c, a, b, c);
   const double h1 = std::sqrt(std::max(0.0, w * model.a - a));
   const double h2 = std::sqrt(std::max(0.0, w * model.b - b));
   return {w, h1, w * model.c < c ? -h2 : h2};
 }
 
-std::optional<RigidTransform> three_point_pose(const ModelTriangle& model,
-                                               const std::array<Eigen::Vector2d, 3>& image,
-                                               const Orthography& start) {
-  double w = 0;
+std::optional<Orthography> three_point_depths(const ModelTriangle& model,
+                                              const std::array<Eigen::Vector2d, 3>& image,
+                                              const Orthography& start) {
   double h1 = start.behind1;
   double h2 = start.behind2;
-  Eigen::Vector2d e1;
-  Eigen::Vector2d e2;
   constexpr int most_turns = 12;
-  for (int turn = 0;; ++turn) {
-    if (turn == most_turns || !(std::max(std::abs(h1), std::abs(h2)) < 0.7)) return std::nullopt;
-    e1 = (1 + h1) * image[1] - image[0];
-    e2 = (1 + h2) * image[2] - image[0];
-    const auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
-    const double same_lean = next.behind1 * h1 + next.behind2 * h2 < 0 ? -1 : 1;
-    const double moved =
-        std::max(std::abs(same_lean * next.behind1 - h1), std::abs(same_lean * next.behind2 - h2));
-    w = next.inverse_distance2;
-    h1 = same_lean * next.behind1;
-    h2 = same_lean * next.behind2;
-    if (moved < settled) break;
+  for (int turn = 0; turn < most_turns && std::max(std::abs(h1), std::abs(h2)) < 0.7; ++turn) {
+    const Eigen::Vector2d e1 = (1 + h1) * image[1] - image[0];
+    const Eigen::Vector2d e2 = (1 + h2) * image[2] - image[0];
+    auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
+    if (next.behind1 * h1 + next.behind2 * h2 < 0) {
+      next.behind1 = -next.behind1;
+      next.behind2 = -next.behind2;
+    }
+    const double moved = std::max(std::abs(next.behind1 - h1), std::abs(next.behind2 - h2));
+    if (moved < settled) return next;
+    h1 = next.behind1;
+    h2 = next.behind2;
   }
-  const double depth = 1 / std::sqrt(w);
-  const Eigen::Vector3d corner(image[0].x(), image[0].y(), 1);
-  const Eigen::Matrix3d axes = frame_of({e1.x(), e1.y(), h1}, {e2.x(), e2.y(), h2});
+  return std::nullopt;
+}
+
+RigidTransform three_point_pose(const ModelTriangle& model, const std::array<Eigen::Vector2d, 3>& image,
+                                const Orthography& depths) {
+  const Eigen::Vector2d e1 = (1 + depths.behind1) * image[1] - image[0];
+  const Eigen::Vector2d e2 = (1 + depths.behind2) * image[2] - image[0];
+  const Eigen::Matrix3d axes = frame_of({e1.x(), e1.y(), depths.behind1}, {e2.x(), e2.y(), depths.behind2});
   RigidTransform pose;
-  pose.rotation = axes * model.axes.transpose();
-  pose.translation = depth * corner - pose.rotation * model.corner;
+  pose.rotation.noalias() = axes.lazyProduct(model.axes.transpose());
+  pose.translation =
+      image[0].homogeneous() / std::sqrt(depths.inverse_distance2) - pose.rotation * model.corner;
   return pose;
 }
 

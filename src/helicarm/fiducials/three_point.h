@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <optional>
 
 #include <Eigen/Core>
@@ -29,19 +30,31 @@ struct Orthography {
   double behind2;
 };
 
-/// 1/mm^2. The triangle seen as image edges with products a, b, c in normalised coordinates (Alter 1994):
-/// there is always just one such distance.
-double inverse_distance2(const ModelTriangle& model, double a, double b, double c);
+/// 1/mm^2, for numbers or arrays of them. A triangle with products A, B, C of its edges, seen as image edges
+/// with products a, b, c in normalised coordinates (Alter 1994): a + h1^2 = w A, b + h2^2 = w B,
+/// c + h1 h2 = w C; the depths h1, h2 eliminated, the larger root is the real one.
+template <class T>
+auto inverse_distance2(const T& A, const T& B, const T& C, double a, double b, double c) {
+  using std::sqrt;
+  const T q2 = A * B - C * C;
+  const T q1 = 0.5 * (A * b + a * B) - C * c;
+  const T discriminant = q1 * q1 - q2 * (a * b - c * c);
+  return T((q1 + sqrt(0.5 * (discriminant + abs(discriminant)))) / q2);
+}
 
 /// The whole of it: there are two ways to lean, to the source or away; this one has behind1 >= 0.
 Orthography orthography(const ModelTriangle& model, double a, double b, double c);
 
-/// Pose of a triangle from its normalised image points x/z, y/z: scaled orthography, repeated from `start`
-/// with the points put at their depths until these stand still, which makes it exact (the idea of POSIT,
-/// DeMenthon and Davis 1995). The two leans lead to the two poses that a triangle has when seen from afar.
-/// Nothing where the repetition does not settle.
-std::optional<RigidTransform> three_point_pose(const ModelTriangle& model,
-                                               const std::array<Eigen::Vector2d, 3>& image,
-                                               const Orthography& start);
+/// Of a triangle's normalised image points x/z, y/z: scaled orthography, repeated from `start` with the
+/// points put at their depths until these stand still, which makes it exact (the idea of POSIT, DeMenthon and
+/// Davis 1995). The two leans lead to the two poses that a triangle has when seen from afar; a mirrored image
+/// has the same depths. Nothing where the repetition does not settle.
+std::optional<Orthography> three_point_depths(const ModelTriangle& model,
+                                              const std::array<Eigen::Vector2d, 3>& image,
+                                              const Orthography& start);
+
+/// The pose that puts the triangle at these depths.
+RigidTransform three_point_pose(const ModelTriangle& model, const std::array<Eigen::Vector2d, 3>& image,
+                                const Orthography& depths);
 
 }  // namespace helicarm

@@ -97,6 +97,10 @@ Json json_of(const ViewResult& view) {
     for (const Fiducial& fiducial : view.found->fiducials) json["fiducials"].push_back(json_of(fiducial));
   json["false_blobs"] = view.found ? Json(view.found->false_blobs.size()) : Json(nullptr);
   json["mirrored"] = view.found ? Json(view.found->mirrored) : Json(nullptr);
+  json["labelling"] = view.found ? Json{{"margin", view.found->margin},
+                                        {"runner_up_matched", view.found->runner_up_matched},
+                                        {"runner_up_rms_px", view.found->runner_up_rms_px}}
+                                 : Json(nullptr);
   for (const char* key : {"projection", "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px",
                           "chi2", "dof", "condition"})
     json[key] = nullptr;

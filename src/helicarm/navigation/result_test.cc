@@ -42,8 +42,8 @@ TEST(ResultJson, HoldsEveryKeyOfTheContract) {
   EXPECT_EQ(json["status"], "ok");
   EXPECT_TRUE(json["failure"].is_null());
   expect_keys(json["views"][0],
-              {"name", "image_size", "rectification", "fiducials", "false_blobs", "projection", "dlt",
-               "intrinsics", "camera_from_calibrator", "reprojection_rms_px", "chi2", "dof"});
+              {"name", "image_size", "rectification", "fiducials", "false_blobs", "labelling", "projection",
+               "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px", "chi2", "dof"});
   EXPECT_EQ(json["views"][0]["image_size"], Json({8, 6}));
   expect_keys(json["views"][0]["rectification"],
               {"model", "dots_found", "dots_expected", "residual_rms_px", "residual_max_px",

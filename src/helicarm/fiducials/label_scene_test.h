@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Random pictures of a calibrator for the labelling's tests.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/fiducials/label.h"
+#include "helicarm/simulation/discs.h"
+
+namespace helicarm::label_scene {
+
+inline constexpr double pi = std::numbers::pi;
+
+/// Twelve balls on the conical helix of Eq. 9, from t0 in steps of a quarter turn.
+inline Calibrator helix(double t0 = pi / 6, double height_mm = 87.5, double radius_mm = 60) {
+  Calibrator calibrator{"helix", {}, {}};
+  for (int k = 0; k < 12; ++k) {
+    const double t = t0 + k * pi / 2;
+    const double r = radius_mm * std::exp(-t / 31.529);
+    calibrator.balls.push_back(
+        {fmt::format("P{}", k + 1), {r * std::cos(t), r * std::sin(t), height_mm * t / (7 * pi)}, 4.0});
+  }
+  return calibrator;
+}
+
+inline Calibrator scattered(int balls, std::uint64_t seed) {
+  RandomStream random(seed, 7);
+  Calibrator calibrator{"scattered", {}, {}};
+  for (int k = 0; k < balls; ++k) {
+    const Eigen::Vector3d centre(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(-35, 35));
+    calibrator.balls.push_back({fmt::format("B{}", k), centre, k % 2 == 0 ? 4.0 : 3.0});
+  }
+  return calibrator;
+}
+
+inline const LabellingPrior nominal{.focal_px = 4345, .principal_px = {511.5, 511.5}, .field_radius_px = 504};
+
+struct Picture : simulation::DiscView {
+  std::vector<BallCandidate> candidates;
+
+  double axis_deg() const {  ///< between the central ray and the calibrator's z
+    return std::acos(std::abs(view.camera_from_world.rotation(2, 2))) * 180 / pi;
+  }
+};
+
+inline Picture picture_of(const Calibrator& calibrator, const simulation::DiscOptions& options,
+                          RandomStream& random) {
+  Picture picture{simulation::random_discs(calibrator, options, random), {}};
+  for (const auto& disc : picture.discs)
+    picture.candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
+  return picture;
+}
+
+/// Whether the mirroring is right and each named ball's candidate is that ball's disc or lies where it is.
+inline bool right(const Labelling& labelling, const Picture& picture, const Calibrator& calibrator) {
+  bool all = labelling.mirrored == picture.mirrored();
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const int i = labelling.candidate_of_ball[k];
+    if (i < 0 || picture.discs[i].ball == static_cast<int>(k)) continue;
+    const Eigen::Vector2d exact = picture.view.project(calibrator.balls[k].centre_in_calibrator);
+    all &= (picture.discs[i].uv - exact).norm() < 4 * std::hypot(picture.discs[i].sigma_px, 0.2);
+  }
+  return all;
+}
+
+}  // namespace helicarm::label_scene

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/labelling.h"
+
+#include <algorithm>
+#include <ctime>
+#include <optional>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/fiducials/label.h"
+
+namespace helicarm {
+namespace {
+
+using simulation::Disc;
+using simulation::DiscView;
+
+constexpr std::uint32_t views_stream = 2000;
+constexpr int many_balls = 8;
+constexpr double spread_margin = 35;  // M - 3.1 sqrt(2 M) = 9.2
+
+enum class Verdict { right, imitated, wrong };
+
+struct Trial {
+  int visible = 0;
+  bool spread = false;
+  Verdict verdict = Verdict::right;
+  std::optional<Reason> refused;
+  double ms = 0;
+};
+
+LabellingPrior nominal_prior() {
+  const simulation::NominalDiscCamera camera;
+  return {.focal_px = camera.focal_px,
+          .principal_px = camera.principal_px,
+          .field_radius_px = camera.field_radius_px};
+}
+
+Expected<Labelling> label(const Calibrator& calibrator, const std::vector<Disc>& discs) {
+  std::vector<BallCandidate> candidates;
+  for (const Disc& disc : discs)
+    candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
+  return label_balls(calibrator, candidates, nominal_prior());
+}
+
+/// A false disc may pass for a hidden ball unless a fit to the true ones puts that 4 sigma away.
+Verdict judge(const Labelling& labelling, const DiscView& picture, const Calibrator& calibrator) {
+  if (labelling.mirrored != picture.mirrored()) return Verdict::wrong;
+  std::vector<Sighting> seen;
+  for (const Disc& disc : picture.discs)
+    if (disc.ball >= 0)
+      seen.push_back({calibrator.balls[disc.ball].centre_in_calibrator, disc.uv, disc.sigma_px});
+  const LabellingPrior prior = nominal_prior();
+  const PoseFit known =
+      fit_pose(picture.view, seen,
+               {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px}, 20);
+  Verdict verdict = Verdict::right;
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    if (labelling.candidate_of_ball[k] < 0) continue;
+    const Disc& disc = picture.discs[labelling.candidate_of_ball[k]];
+    if (disc.ball == static_cast<int>(k)) continue;
+    const Eigen::Vector3d& centre = calibrator.balls[k].centre_in_calibrator;
+    const Eigen::Vector2d off = disc.uv - known.view.project(centre);
+    const Eigen::Matrix2d noise = disc.sigma_px * disc.sigma_px * Eigen::Matrix2d::Identity();
+    if (!(off.dot((noise + prediction_covariance(known, centre)).inverse() * off) <= 4 * 4))
+      return Verdict::wrong;
+    verdict = Verdict::imitated;
+  }
+  return verdict;
+}
+
+bool is_spread(const Calibrator& calibrator, const DiscView& picture) {
+  std::vector<Disc> clean;
+  for (Disc disc : picture.discs) {
+    if (disc.ball < 0) continue;
+    const CalibratorBall& ball = calibrator.balls[disc.ball];
+    disc.uv = picture.view.project(ball.centre_in_calibrator);
+    disc.radius_px =
+        picture.view.intrinsics.fy * ball.diameter_mm / 2 / picture.view.depth(ball.centre_in_calibrator);
+    clean.push_back(disc);
+  }
+  const auto labelling = label(calibrator, clean);
+  return labelling && labelling->margin >= spread_margin;
+}
+
+double thread_ms() {
+  std::timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+Trial try_view(const Calibrator& calibrator, const LabellingStudy& study, std::uint64_t number) {
+  RandomStream random(study.seed, views_stream, number);
+  const int hidden = static_cast<int>(random.index(study.most_hidden + 1));
+  const int false_discs = static_cast<int>(random.index(study.most_false + 1));
+  const auto picture = simulation::random_discs(
+      calibrator,
+      {.hidden = hidden, .false_discs = false_discs, .kind = study.false_discs, .noise_px = study.noise_px},
+      random);
+  Trial trial;
+  trial.visible = picture.visible;
+  const double start = thread_ms();
+  const auto labelling = label(calibrator, picture.discs);
+  trial.ms = thread_ms() - start;
+  if (labelling)
+    trial.verdict = judge(*labelling, picture, calibrator);
+  else
+    trial.refused = labelling.error().reason;
+  trial.spread = picture.visible >= many_balls && is_spread(calibrator, picture);
+  return trial;
+}
+
+void count(LabellingCount& into, const Trial& trial) {
+  ++into.views;
+  if (trial.refused) {
+    ++into.refused[*trial.refused];
+  } else {
+    into.solved += trial.verdict != Verdict::wrong;
+    into.imitated += trial.verdict == Verdict::imitated;
+    into.wrong += trial.verdict == Verdict::wrong;
+  }
+}
+
+}  // namespace
+
+LabellingTally study_labelling(const Calibrator& calibrator, const LabellingStudy& study) {
+  std::vector<Trial> trials(study.views);
+  parallel_for(trials.size(), study.threads,
+               [&](std::size_t i) { trials[i] = try_view(calibrator, study, i); });
+  LabellingTally tally;
+  tally.by_visible.resize(calibrator.balls.size() + 1);
+  std::vector<double> ms;
+  for (const Trial& trial : trials) {
+    count(tally.all, trial);
+    count(tally.by_visible[trial.visible], trial);
+    if (trial.visible >= many_balls) count(trial.spread ? tally.spread : tally.not_spread, trial);
+    ms.push_back(trial.ms);
+  }
+  std::sort(ms.begin(), ms.end());
+  if (!ms.empty()) {
+    tally.median_ms = ms[ms.size() / 2];
+    tally.p99_ms = ms[ms.size() * 99 / 100];
+  }
+  return tally;
+}
+
+}  // namespace helicarm
