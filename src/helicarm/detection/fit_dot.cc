@@ -419,8 +419,10 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     move = 0;
     for (std::size_t k = 0; k < starts.size(); ++k) {
       const Index contrast_index = Model::contrast_of(k);
-      move = std::max({move, step.segment<2>(contrast_index + 1).norm(), std::abs(step[contrast_index + 3])});
-      share = std::min(share, 0.35 * starts[k].radius_px / std::max(move, 1e-12));
+      const double moved = step.segment<2>(contrast_index + 1).norm();
+      const double longest = std::max({moved, std::abs(step[contrast_index + 3]), 1e-12});
+      share = std::min(share, 0.35 * starts[k].radius_px / longest);
+      move = std::max(move, moved);
     }
     p += float(share) * step.cast<float>();
     for (std::size_t k = 0; k < starts.size(); ++k) {

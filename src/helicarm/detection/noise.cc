@@ -43,6 +43,7 @@ const Quadratic& quadratics() {
 
 /// From the pixels that are open (1, else 0).
 Lags lags_of(const Block& block, const Block& open) {
+  const bool all_open = open.minCoeff() > 0;
   const auto covariance_at = [&](int dx, int dy) {
     const int nx = side - std::abs(dx);
     const int ny = side - dy;
@@ -50,7 +51,7 @@ Lags lags_of(const Block& block, const Block& open) {
     const auto product = [&](const Block& of) {
       return double(of.block(0, x0, ny, nx).cwiseProduct(of.block(dy, x0 + dx, ny, nx)).sum());
     };
-    return product(block) / std::max(1.0, product(open));
+    return product(block) / std::max(1.0, all_open ? double(nx * ny) : product(open));
   };
   Lags lags;
   lags.open = open.sum();
@@ -174,7 +175,7 @@ Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows
     PixelRows spread(rows.rows(), rows.cols());
     const auto smooth = [&](const Eigen::ArrayXf& from, Eigen::ArrayXf& to, int step) {
       to.segment(rim, size) = from.segment(rim, size);
-      for (int d = 1; d <= reach; ++d)
+      for (int d = 1; d <= reach && noise.along[static_cast<std::size_t>(d)] > 0; ++d)
         to.segment(rim, size) += noise.along[static_cast<std::size_t>(d)] *
                                  (from.segment(rim - d * step, size) + from.segment(rim + d * step, size));
     };
