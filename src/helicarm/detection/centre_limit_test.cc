@@ -180,6 +180,12 @@ Dot start_at(const Vector2d& place, double radius) {
   return start;
 }
 
+/// For --gtest_output=xml.
+void record(const Answer& answer) {
+  testing::Test::RecordProperty("error_over_bound", std::to_string(answer.over_bound));
+  testing::Test::RecordProperty("error_over_sigma", std::to_string(answer.z));
+}
+
 class CentreLimit : public testing::TestWithParam<Situation> {};
 
 TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreTrue) {
@@ -192,6 +198,7 @@ TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreTrue) {
     options.noise = *noise;
     return fit_dot(exposure.pixels, start_at(place, s.radius), profile, {}, options);
   });
+  record(answer);
   EXPECT_LT(answer.over_bound, 1.2);
   EXPECT_GT(answer.z, 0.9);
   EXPECT_LT(answer.z, 1.1);
@@ -214,6 +221,7 @@ TEST_P(OverlapLimit, OverlapOfHalfARadiusCostsLittle) {
     const auto dots = refit_dots(exposure, {both[0]}, look, both);
     return dots.empty() ? std::nullopt : std::optional(dots[0]);
   });
+  record(answer);
   EXPECT_LT(answer.over_bound, 1.3);
   EXPECT_GT(answer.z, 0.8);
   EXPECT_LT(answer.z, 1.25);
