@@ -71,6 +71,9 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
         (values_[after] - values_[before]) * per_unit_ / float(after - before);
   }
   slopes_.front() = 0;
+  slopes_.back() = 0;
+  values_.push_back(0);  // one beyond, for the interpolation at the end
+  slopes_.push_back(0);
 }
 
 }  // namespace helicarm

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 namespace helicarm {
@@ -19,15 +20,13 @@ class BallProfile {
     float slope;  ///< d value / d s
   };
   Sample at(float s) const {
-    const float x = s * per_unit_;
+    // Without a branch, so that the compiler can look up several at once.
+    const float x = std::min(s * per_unit_, static_cast<float>(last_));
     const int i = static_cast<int>(x);
-    if (i >= last_) return {0, 0};
     const float t = x - static_cast<float>(i);
-    const float a = values_[static_cast<std::size_t>(i)];
-    const float b = values_[static_cast<std::size_t>(i) + 1];
-    const float da = slopes_[static_cast<std::size_t>(i)];
-    const float db = slopes_[static_cast<std::size_t>(i) + 1];
-    return {a + t * (b - a), da + t * (db - da)};
+    const float* a = values_.data() + i;
+    const float* d = slopes_.data() + i;
+    return {a[0] + t * (a[1] - a[0]), d[0] + t * (d[1] - d[0])};
   }
   /// Beyond this s the profile is nought.
   float reach() const { return static_cast<float>(last_) / per_unit_; }

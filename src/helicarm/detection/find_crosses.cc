@@ -10,6 +10,7 @@
 #include <Eigen/Dense>
 
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/detection/robust.h"
 
 namespace helicarm {
 namespace {
@@ -109,18 +110,6 @@ struct Pixel {
   double x, y, grey, weight;
 };
 
-void reweight(std::vector<Pixel>& pixels, const std::vector<double>& residuals, double least) {
-  std::vector<double> sizes(residuals.size());
-  std::transform(residuals.begin(), residuals.end(), sizes.begin(), [](double r) { return std::abs(r); });
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double cut = 4.7 * std::max(1.4826 * *middle, least);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double t = residuals[i] / cut;
-    pixels[i].weight = std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
-  }
-}
-
 std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width,
                              const Arms& arms, std::span<const Disc> discs) {
   const int u0 = static_cast<int>(std::lround(start.x()));
@@ -185,7 +174,9 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
       }
       variance = squares / std::max(1.0, weight - n_parameters);
       if (pass == 0) {
-        reweight(pixels, residuals, std::max(0.05, 0.4 * std::pow(0.6, i)) * std::abs(arms.depth));
+        const double least = std::max(0.05, 0.4 * std::pow(0.6, i)) * std::abs(arms.depth);
+        const double cut = tukey_cut<double>(residuals, least);
+        for (std::size_t k = 0; k < pixels.size(); ++k) pixels[k].weight = tukey_weight(residuals[k], cut);
         continue;
       }
       Normal damped = normal;

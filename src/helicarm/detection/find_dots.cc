@@ -39,6 +39,31 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
   return discs;
 }
 
+/// Behind its neighbours' discs, or together with those that overlap it, whichever tells the centre better.
+std::optional<Dot> refit(const Exposure& exposure, const Dot& dot, const DotLook& look,
+                         const std::vector<Dot>& neighbours) {
+  auto best = fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options);
+  std::vector<Dot> group{dot};
+  std::vector<Dot> others;
+  for (const Dot& other : neighbours) {
+    const double distance = (other.centre_px - dot.centre_px).norm();
+    if (distance <= 0.5 * dot.radius_px) continue;  // the dot itself
+    (distance < dot.radius_px + other.radius_px + 1.5 ? group : others).push_back(other);
+  }
+  if (group.size() == 1 || group.size() > max_dots_together) return best;
+  std::vector<BallProfile> profiles;
+  std::vector<Disc> discs;
+  for (const Dot& member : group) {
+    const double ratio = member.radius_px / dot.radius_px;  // of one metal, behind one blur
+    profiles.emplace_back(look.profile.blur() / ratio, look.profile.absorbance() * ratio);
+    const auto beside = discs_beside(member, others);
+    discs.insert(discs.end(), beside.begin(), beside.end());
+  }
+  const auto together = fit_dots_together(exposure.pixels, group, profiles, discs, look.options);
+  if (together && (!best || together->front().sigma_px < best->sigma_px)) best = together->front();
+  return best;
+}
+
 }  // namespace
 
 DotFitOptions fit_options_for(const Exposure& exposure) {
@@ -54,7 +79,7 @@ DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
                    [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
-  const DotFitOptions options = fit_options_for(exposure);
+  DotFitOptions options = fit_options_for(exposure);
   double blur = 1;
   double absorbance = 2;
   const auto total = [&] {
@@ -90,6 +115,7 @@ DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
     try_values(blur, scaled, 0.3, 0.6 * radius + 0.3);
     try_values(absorbance, scaled_twice, 0.1, 60);
   }
+  options.noise = noise_correlation(exposure, options.floor, options.ceiling);
   return {BallProfile(blur / radius, absorbance), options};
 }
 
@@ -144,9 +170,7 @@ std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& do
                             const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
-    if (const auto better =
-            fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options))
-      refitted.push_back(*better);
+    if (const auto better = refit(exposure, dot, look, neighbours)) refitted.push_back(*better);
   return refitted;
 }
 

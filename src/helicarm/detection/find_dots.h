@@ -38,7 +38,7 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options);
 /// As `find_dots`, for a reader who wants no doubtful ones: dots of one size are fitted again with a look of
 /// their own, and what then stays uncertain (sigma over `clear_sigma_px`) is left out.
 std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& options,
-                                 double clear_sigma_px = 0.08);
+                                 double clear_sigma_px = 0.15);
 
 /// Fits every dot again with the look of its kind and with its neighbours masked; those that fail are left
 /// out.

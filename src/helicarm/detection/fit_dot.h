@@ -3,11 +3,13 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include "helicarm/detection/ball_profile.h"
 #include "helicarm/detection/dot.h"
+#include "helicarm/detection/noise.h"
 #include "helicarm/image/image.h"
 
 namespace helicarm {
@@ -26,8 +28,9 @@ struct DotFitOptions {
   double margin_share = 0.1;  ///< and as a share of the radius
   double tolerance = 0.03;    ///< misfit, as a share of the contrast, that the profile itself may cause
   int iterations = 12;
-  float floor = -1e30f;   ///< pixels at or below are outside the field: left out
-  float ceiling = 1e30f;  ///< pixels at or above are saturated: the model may exceed them freely
+  float floor = -1e30f;      ///< pixels at or below are outside the field: left out
+  float ceiling = 1e30f;     ///< pixels at or above are saturated: the model may exceed them freely
+  NoiseCorrelation noise{};  ///< for the sigma: white unless told otherwise
 };
 
 /// Fits the image of a ball, on a quadratic background, to the pixels around `start` by robust least squares
@@ -37,5 +40,13 @@ struct DotFitOptions {
 /// settle.
 std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
                            std::span<const Disc> others, const DotFitOptions& options);
+
+constexpr std::size_t max_dots_together = 4;
+
+/// As `fit_dot`, several dots at once, for those that overlap. What two absorb in common is fitted along:
+/// nothing in a logarithmic picture, their product in a linear one.
+std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std::span<const Dot> starts,
+                                                  std::span<const BallProfile> profiles,
+                                                  std::span<const Disc> others, const DotFitOptions& options);
 
 }  // namespace helicarm

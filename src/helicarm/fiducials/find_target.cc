@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/detection/find_dots.h"
+#include "helicarm/detection/robust.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/solid_template.h"
 
@@ -32,6 +33,7 @@ struct Pixel {
   Vector2d offset;  ///< rectified, from the predicted image of the target's point
   double grey;
   double weight;
+  int cell;  ///< place in the patch's grid of raw pixels
 };
 
 /// raw -> rectified by a biquadratic through 3 x 3 exact points: the map is smooth and a patch is small.
@@ -76,6 +78,8 @@ struct Fit {
 struct Patch {
   std::vector<Pixel> pixels;
   double window;
+  int side;
+  NoiseCorrelation noise;
 };
 
 struct Sums {
@@ -85,9 +89,9 @@ struct Sums {
   double weight = 0;
 };
 
-Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
-                std::vector<double>& residuals) {
-  Sums sums;
+/// Hands over each pixel's number, the model's derivatives there and the residual.
+template <class Take>
+void each_row(const Patch& patch, const SolidTemplate& shade, const Vector& p, Take&& take) {
   for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
     const Pixel& pixel = patch.pixels[i];
     const double x = pixel.offset.x() / patch.window;
@@ -96,41 +100,33 @@ Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
     Vector row;
     const double contrast = p[n_background];
     row << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y, -value, contrast * slope;
-    residuals[i] = pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) - contrast * value);
-    sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, pixel.weight);
-    sums.right += pixel.weight * residuals[i] * row;
-    sums.squares += pixel.weight * residuals[i] * residuals[i];
-    sums.weight += pixel.weight;
+    take(i, row, pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) - contrast * value));
   }
+}
+
+Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
+                std::vector<double>& residuals) {
+  Sums sums;
+  each_row(patch, shade, p, [&](std::size_t i, const Vector& row, double residual) {
+    const double weight = patch.pixels[i].weight;
+    residuals[i] = residual;
+    sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
+    sums.right += weight * residual * row;
+    sums.squares += weight * residual * residual;
+    sums.weight += weight;
+  });
   return sums;
 }
 
-void reweight(Patch& patch, const std::vector<double>& residuals, double least) {
-  std::vector<double> sizes(residuals.size());
-  std::transform(residuals.begin(), residuals.end(), sizes.begin(), [](double r) { return std::abs(r); });
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double cut = 4.7 * std::max(1.4826 * *middle, least);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const double t = residuals[i] / cut;
-    patch.pixels[i].weight = std::abs(t) < 1 ? (1 - t * t) * (1 - t * t) : 0;
-  }
-}
-
-/// By how much neighbours that err together (blurred noise, background, wire) enlarge a variance that takes
-/// them for independent: ((1 + r) / (1 - r))^2 for a correlation r from pixel to pixel both ways.
-double correlation_factor(const Patch& patch, const std::vector<double>& residuals) {
-  double together = 0;
-  double alone = 0;
-  for (std::size_t i = 0; i + 1 < residuals.size(); ++i) {
-    const double weight = patch.pixels[i].weight * patch.pixels[i + 1].weight;
-    const bool neighbours = (patch.pixels[i + 1].offset - patch.pixels[i].offset).norm() < 1.2;
-    if (!neighbours || weight == 0) continue;
-    together += weight * residuals[i] * residuals[i + 1];
-    alone += 0.5 * weight * (residuals[i] * residuals[i] + residuals[i + 1] * residuals[i + 1]);
-  }
-  const double r = alone > 0 ? std::clamp(together / alone, 0.0, 0.6) : 0;
-  return std::pow((1 + r) / (1 - r), 2);
+/// The covariance's middle: what noise that neighbours share does to the right side.
+Normal noise_of(const Patch& patch, const SolidTemplate& shade, const Vector& p) {
+  PixelRows rows(n_parameters, static_cast<Eigen::Index>(patch.pixels.size()));
+  std::vector<int> cells(patch.pixels.size());
+  each_row(patch, shade, p, [&](std::size_t i, const Vector& row, double) {
+    rows.col(static_cast<Eigen::Index>(i)) = (patch.pixels[i].weight * row).cast<float>();
+    cells[i] = patch.pixels[i].cell;
+  });
+  return correlated_normal(patch.noise, rows, cells, patch.side);
 }
 
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
@@ -148,7 +144,10 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   Vector2d before = Vector2d::Zero();
   for (int i = 0; i < 20; ++i) {
     accumulate(patch, shade, p, residuals);
-    reweight(patch, residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
+    const double cut =
+        tukey_cut<double>(residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
+    for (std::size_t k = 0; k < residuals.size(); ++k)
+      patch.pixels[k].weight = tukey_weight(residuals[k], cut);
     sums = accumulate(patch, shade, p, residuals);
     Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
@@ -163,15 +162,15 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   }
   if (move > 0.05) return std::nullopt;
   const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
-  const double enlarged = variance * correlation_factor(patch, residuals);
   const Normal inverse = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
+  const Normal covariance = inverse * noise_of(patch, shade, p) * inverse;
   double squares = 0;
   for (const double r : residuals) squares += r * r;
   Fit fit;
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background];
   fit.sigma_px =
-      std::sqrt(std::max(0.0, 0.5 * enlarged * (inverse(linear, linear) + inverse(linear + 1, linear + 1))));
+      std::sqrt(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;
@@ -191,8 +190,8 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
   const auto inverse = LocalInverse::make(map, raw, half_width);
   if (!inverse) return not_seen();
   const DotFitOptions limits = fit_options_for(exposure);
-  Patch patch{{}, half_width};
   const int half = static_cast<int>(std::ceil(half_width));
+  Patch patch{{}, half_width, 2 * half + 1, noise_correlation(exposure, limits.floor, limits.ceiling)};
   const int u0 = static_cast<int>(std::lround(raw.x()));
   const int v0 = static_cast<int>(std::lround(raw.y()));
   int inside = 0;
@@ -207,7 +206,8 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
       const bool hidden = std::any_of(others.begin(), others.end(), [&](const Disc& disc) {
         return (disc.centre - Vector2d(u, v)).squaredNorm() < disc.radius * disc.radius;
       });
-      if (!hidden) patch.pixels.push_back({offset, double(grey), 1});
+      const int cell = (v - v0 + half) * patch.side + u - u0 + half;
+      if (!hidden) patch.pixels.push_back({offset, double(grey), 1, cell});
     }
   if (2 * patch.pixels.size() < static_cast<std::size_t>(inside) || patch.pixels.size() < 40)
     return not_seen();
@@ -272,6 +272,7 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
   const double reach = std::max(5.0, start.radius_px);
   const BallProfile profile(0.9 / start.radius_px, 3);
   DotFitOptions options = fit_options_for(exposure);
+  options.noise = noise_correlation(exposure, options.floor, options.ceiling);
   DotFitOptions wide = options;
   wide.tolerance = 0.1;
   wide.margin_share = 0.35;

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+namespace helicarm {
+
+/// Beyond this residual Tukey's weight is nought: 4.7 robust standard deviations (95 % efficient for normal
+/// noise), of which each is taken as `least` at least. A few hundred residuals, evenly picked, stand for all.
+template <class Real>
+Real tukey_cut(std::span<const Real> residuals, Real least) {
+  constexpr std::size_t enough = 400;
+  std::vector<Real> sizes;
+  const std::size_t stride = 1 + residuals.size() / enough;
+  sizes.reserve(residuals.size() / stride + 1);
+  for (std::size_t i = 0; i < residuals.size(); i += stride) sizes.push_back(std::abs(residuals[i]));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  return Real(4.7) * std::max(Real(1.4826) * *middle, least);
+}
+
+/// Tukey's biweight.
+template <class Real>
+Real tukey_weight(Real residual, Real cut) {
+  const Real inside = std::max(Real(0), 1 - (residual / cut) * (residual / cut));
+  return inside * inside;
+}
+
+}  // namespace helicarm
