@@ -29,6 +29,34 @@ class CommandLine(unittest.TestCase):
     def tearDownClass(cls):
         cls.folder.cleanup()
 
+    def test_predict_decides_and_writes_a_map(self):
+        done = run("predict", self.root / "case", "--at", "0,0,40", "--at", "400,0,40", "--max-error", "0.5",
+                   "--map", self.root / "tre", "--half", 40, "--step", 20, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        near, far = json.loads(done.stdout)["points"]
+        self.assertLess(near["error_95_mm"], far["error_95_mm"])
+        self.assertEqual((near["decision"], far["decision"]), ("accept", "refuse"))
+        self.assertEqual(len((self.root / "tre/tre.csv").read_text().splitlines()), 1 + 5 ** 3)
+        self.assertIn("<svg", (self.root / "tre/tre.svg").read_text())
+        self.assertEqual(run("predict", self.root / "case", "--at", "1,2").returncode, 2)
+
+    def test_machine_remembers_each_picture_once(self):
+        machine = self.root / "machine.json"
+        for _ in range(2):
+            done = run("run", self.root / "case", "--out", self.root / "known", "--no-report", "--machine", machine)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([shot["view"] for shot in json.loads(machine.read_text())["shots"]], ["AP", "LAT"])
+        machine.write_text("{}")
+        self.assertEqual(run("run", self.root / "case", "--machine", machine).returncode, 2)
+
+    def test_study_writes_the_same_bytes_on_any_number_of_threads(self):
+        for threads in (1, 3):
+            done = run("study", "limit", "--groups", 1, "--seed", 4, "--threads", threads, "--quiet",
+                       "--out", self.root / f"limit{threads}")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.root / "limit1/limit.csv").read_bytes(), (self.root / "limit3/limit.csv").read_bytes())
+        self.assertEqual(run("study", "fortune").returncode, 2)
+
     def test_run_writes_result_report_and_overlays(self):
         done = run("run", self.root / "case", "--out", self.root / "out", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -27,12 +27,15 @@ using Parameters = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, max_parameters, 1>
 using Normal = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_parameters, max_parameters>;
 using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_parameters, 1>;
 
+/// Aligned, so that sums add up in the same order wherever they lie.
+using Floats = std::vector<float, Eigen::aligned_allocator<float>>;
+
 /// The pixels around the dots as columns, filled up with weightless ones to a multiple of the registers'
 /// width.
 struct Patch {
   Index count = 0;
-  std::vector<float> x, y;  ///< from the patch's origin, px
-  std::vector<float> grey, weight;
+  Floats x, y;  ///< from the patch's origin, px
+  Floats grey, weight;
   std::vector<char> clipped;  ///< the true value is at least `grey`
   std::vector<int> cell;      ///< place in a grid of width `side`
   int side = 0;
@@ -43,7 +46,7 @@ struct Patch {
 struct Model {
   std::span<const BallProfile> profiles;
   PixelRows rows;  ///< the model's derivatives
-  std::vector<float> residual, open, scratch;
+  Floats residual, open, scratch;
 
   std::size_t dots() const { return profiles.size(); }
   static Index contrast_of(std::size_t dot) { return of_dot + per_dot * static_cast<Index>(dot); }

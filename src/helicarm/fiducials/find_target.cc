@@ -89,32 +89,59 @@ struct Sums {
   double weight = 0;
 };
 
-/// Hands over each pixel's number, the model's derivatives there and the residual.
-template <class Take>
-void each_row(const Patch& patch, const SolidTemplate& shade, const Vector& p, Take&& take) {
-  for (std::size_t i = 0; i < patch.pixels.size(); ++i) {
-    const Pixel& pixel = patch.pixels[i];
-    const double x = pixel.offset.x() / patch.window;
-    const double y = pixel.offset.y() / patch.window;
-    const auto [value, slope] = shade.at(pixel.offset - p.tail<2>());
-    Vector row;
-    const double contrast = p[n_background];
-    row << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y, -value, contrast * slope;
-    take(i, row, pixel.grey - (row.head<n_background>().dot(p.head<n_background>()) - contrast * value));
-  }
+/// What residual and derivatives at one pixel are made of.
+struct Shade {
+  Vector row;  ///< the model's derivatives
+  double residual;
+};
+
+Shade shade_at(const Patch& patch, const SolidTemplate& shade, const Vector& p, const Pixel& pixel) {
+  const double x = pixel.offset.x() / patch.window;
+  const double y = pixel.offset.y() / patch.window;
+  const auto [value, slope] = shade.at(pixel.offset - p.tail<2>());
+  const double contrast = p[n_background];
+  Shade at;
+  at.row << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y, -value,
+      contrast * slope;
+  at.residual = pixel.grey - (at.row.head<n_background>().dot(p.head<n_background>()) - contrast * value);
+  return at;
 }
 
-Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
-                std::vector<double>& residuals) {
+/// Derivatives of a block of pixels side by side, for wide registers.
+constexpr int block = 64;
+using Rows = Eigen::Matrix<double, n_parameters, block, Eigen::RowMajor>;
+
+void find_residuals(const Patch& patch, const SolidTemplate& shade, const Vector& p,
+                    std::vector<double>& residuals) {
+  for (std::size_t i = 0; i < residuals.size(); ++i)
+    residuals[i] = shade_at(patch, shade, p, patch.pixels[i]).residual;
+}
+
+Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p) {
   Sums sums;
-  each_row(patch, shade, p, [&](std::size_t i, const Vector& row, double residual) {
-    const double weight = patch.pixels[i].weight;
-    residuals[i] = residual;
-    sums.normal.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
-    sums.right += weight * residual * row;
-    sums.squares += weight * residual * residual;
-    sums.weight += weight;
-  });
+  Rows rows;
+  Eigen::Matrix<double, 1, block> weights, residuals;
+  for (std::size_t first = 0; first < patch.pixels.size(); first += block) {
+    rows.setZero();
+    weights.setZero();
+    residuals.setZero();
+    const std::size_t count = std::min<std::size_t>(block, patch.pixels.size() - first);
+    for (std::size_t k = 0; k < count; ++k) {
+      const Pixel& pixel = patch.pixels[first + k];
+      if (pixel.weight == 0) continue;
+      const Shade at = shade_at(patch, shade, p, pixel);
+      rows.col(Eigen::Index(k)) = at.row;
+      weights[Eigen::Index(k)] = pixel.weight;
+      residuals[Eigen::Index(k)] = at.residual;
+    }
+    for (int a = 0; a < n_parameters; ++a) {
+      const Eigen::Matrix<double, 1, block> weighted = rows.row(a).cwiseProduct(weights);
+      for (int b = 0; b <= a; ++b) sums.normal(a, b) += weighted.dot(rows.row(b));
+      sums.right[a] += weighted.dot(residuals);
+    }
+    sums.squares += weights.cwiseProduct(residuals).dot(residuals);
+    sums.weight += weights.sum();
+  }
   return sums;
 }
 
@@ -122,17 +149,18 @@ Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p,
 Normal noise_of(const Patch& patch, const SolidTemplate& shade, const Vector& p) {
   PixelRows rows(n_parameters, static_cast<Eigen::Index>(patch.pixels.size()));
   std::vector<int> cells(patch.pixels.size());
-  each_row(patch, shade, p, [&](std::size_t i, const Vector& row, double) {
-    rows.col(static_cast<Eigen::Index>(i)) = (patch.pixels[i].weight * row).cast<float>();
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Vector row = patch.pixels[i].weight * shade_at(patch, shade, p, patch.pixels[i]).row;
+    rows.col(static_cast<Eigen::Index>(i)) = row.cast<float>();
     cells[i] = patch.pixels[i].cell;
-  });
+  }
   return correlated_normal(patch.noise, rows, cells, patch.side);
 }
 
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   std::vector<double> residuals(patch.pixels.size());
   Vector p = Vector::Zero();
-  Sums sums = accumulate(patch, shade, p, residuals);
+  Sums sums = accumulate(patch, shade, p);
   constexpr int linear = n_background + 1;
   const Eigen::Matrix<double, linear, 1> start =
       sums.normal.topLeftCorner<linear, linear>().selfadjointView<Eigen::Lower>().ldlt().solve(
@@ -143,12 +171,12 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   double damping = 1;
   Vector2d before = Vector2d::Zero();
   for (int i = 0; i < 20; ++i) {
-    accumulate(patch, shade, p, residuals);
+    find_residuals(patch, shade, p, residuals);
     const double cut =
         tukey_cut<double>(residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
     for (std::size_t k = 0; k < residuals.size(); ++k)
       patch.pixels[k].weight = tukey_weight(residuals[k], cut);
-    sums = accumulate(patch, shade, p, residuals);
+    sums = accumulate(patch, shade, p);
     Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     // The drawn template has kinks: a step that turns back overshot.

@@ -79,18 +79,22 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
   });
 }
 
-Expected<void> check_certain(const std::vector<PointResult>& points, std::optional<double> max_error_mm) {
-  if (!max_error_mm) return {};
+Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
+                                             std::optional<double> max_error_mm) {
+  constexpr double usual_limit_mm = 2;
+  const double limit = max_error_mm.value_or(usual_limit_mm);
+  std::vector<Warning> warnings;
   for (const PointResult& point : points) {
     if (!point.place) continue;
     const double error = length_at_95(point.place->covariance_in_calibrator);
-    if (!(error <= *max_error_mm))
-      return fail(Reason::uncertain,
-                  fmt::format("\"{}\" may be off by {:.3g} mm (95 %), over the limit of {:g} mm", point.name,
-                              error, *max_error_mm),
-                  {{"error_95_mm", error}, {"limit_mm", *max_error_mm}});
+    if (error <= limit) continue;
+    const std::string message = fmt::format(
+        "\"{}\" may be off by {:.3g} mm (95 %), over the limit of {:g} mm", point.name, error, limit);
+    const std::map<std::string, double> figures{{"error_95_mm", error}, {"limit_mm", limit}};
+    if (max_error_mm) return fail(Reason::uncertain, message, figures);
+    warnings.push_back({Reason::uncertain, message, {}, figures});
   }
-  return {};
+  return warnings;
 }
 
 }  // namespace helicarm

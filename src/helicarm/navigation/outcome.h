@@ -26,7 +26,9 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
                                                       const std::vector<CalibratedView>& views,
                                                       const Result& result);
 
-/// `uncertain` where more than 5 % of a located point's errors would exceed the limit.
-Expected<void> check_certain(const std::vector<PointResult>& points, std::optional<double> max_error_mm);
+/// `uncertain` where more than 5 % of a located point's errors would exceed the limit: refused over a limit
+/// that is given, warned of over the usual 2 mm.
+Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
+                                             std::optional<double> max_error_mm);
 
 }  // namespace helicarm

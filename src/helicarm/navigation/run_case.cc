@@ -57,7 +57,7 @@ void run_stages(const Case& given, Result& result) {
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   result.tunnels = value_or_throw(plan_tunnels(given.tunnels, result));                        // Eq. 16
   result.verifications = value_or_throw(verify_tool_lines(given, calibration.views, result));  // Eq. 17
-  value_or_throw(check_certain(result.points, options.max_error_mm));
+  append(result.warnings, value_or_throw(check_certain(result.points, options.max_error_mm)));
 }
 
 }  // namespace
