@@ -7,7 +7,6 @@
 
 #include "helicarm/xray/bytes.h"
 
-
 namespace helicarm {
 namespace {
 
