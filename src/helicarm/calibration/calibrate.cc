@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/outliers.h"
@@ -38,6 +39,23 @@ Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<Poin
       [&](const DltResult& dlt) { return drawn_to_prior(centred(dlt.view, centre), view.prior); });
 }
 
+/// Splits each sigma into the ball's own and the map's, which is shared: its covariance is made of
+/// independent errors along its eigenvectors.
+void give_map_errors(std::vector<Observation>& observations, const Eigen::MatrixXd& covariance_px2) {
+  constexpr double least_own_share = 0.1;  // of the variance
+  if (covariance_px2.size() == 0 || covariance_px2.isZero()) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_px2);
+  const Eigen::MatrixXd modes =
+      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const auto k = Eigen::Index(i);
+    const double variance = observations[i].sigma_px * observations[i].sigma_px;
+    observations[i].sigma_px =
+        std::sqrt(std::max(variance - covariance_px2(k, k), least_own_share * variance));
+    observations[i].by_map = modes.row(k);
+  }
+}
+
 Expected<ViewProblem> problem_of(const ViewFiducials& view) {
   std::vector<Observation> observations;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -51,6 +69,7 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view) {
     centre += f.centre_in_calibrator;
   }
   centre /= std::max(1.0, double(observations.size()));
+  give_map_errors(observations, view.map_covariance_px2);
   const auto start = start_of(view, pairs_of(view.fiducials), centre);
   if (!start) return tl::unexpected<Failure>(start.error());
   return ViewProblem{*start, std::move(observations), view.prior};
@@ -177,12 +196,16 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
       return in_view(
           {Reason::uncertain, "the balls do not tell how far the X-ray source is", {}, {{"per_mm", rho}}},
           views[i].name);
-    const Eigen::Index rows = 2 * Eigen::Index(clean->problems[i].observations.size());
-    const auto j = fit.jacobian.middleRows(row, rows);
-    view->dof = int(std::lround(double(rows) - (j * fit.covariance * j.transpose()).trace()));
+    double fitted = 0;
+    for (const Observation& seen : clean->problems[i].observations) {
+      const auto j = fit.jacobian.block(row, 0, 2, numbers);
+      const double own_share = 1 / (1 + seen.by_map.squaredNorm() / (seen.sigma_px * seen.sigma_px));
+      fitted += own_share * (j * fit.covariance.topLeftCorner(numbers, numbers) * j.transpose()).trace();
+      row += 2;
+    }
+    view->dof = int(std::lround(2 * double(clean->problems[i].observations.size()) - fitted));
     view->covariance = block_of(result.joint_covariance, i);
     result.views.push_back(*std::move(view));
-    row += rows;
   }
   rescale_if_belied(result);
   warn_of_few(result);

@@ -20,6 +20,9 @@ struct ViewFiducials {
   std::vector<Fiducial> fiducials;  ///< those `used` count
   IntrinsicsPrior prior = {};
   std::optional<View> start = {};  ///< else the homogeneous DLT
+  /// Of the map among the used fiducials, per axis (n x n, px^2), their sigmas holding its diagonal already.
+  /// Empty: they err each alone.
+  Eigen::MatrixXd map_covariance_px2 = {};
 };
 
 struct CalibrationOptions {

@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "helicarm/calibration/centred_view.h"
 #include "helicarm/calibration/views_test.h"
 
 namespace helicarm {
@@ -80,6 +81,54 @@ TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
   }
   EXPECT_NEAR(distance2, 22, 1.3);
   EXPECT_NEAR(chi2 / dof, 1, 0.04);
+}
+
+TEST(Calibrate, ErrorsThatTheMapSharesAreInTheCovariance) {
+  CalibrationOptions options;
+  options.rejection_probability = 0;
+  const double own = 0.05, map = 0.2, reach_px = 150;
+  const int trials = 300;
+  double together = 0, alone = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    auto views = pair_of_views(own, std::uint64_t(trial));
+    RandomStream random(16, 0, std::uint64_t(trial));
+    for (auto& view : views) {
+      const auto n = Eigen::Index(view.fiducials.size());
+      Eigen::MatrixXd covariance(n, n);
+      for (Eigen::Index i = 0; i < n; ++i)
+        for (Eigen::Index j = 0; j < n; ++j)
+          covariance(i, j) =
+              map * map *
+              std::exp(-0.5 *
+                       (view.fiducials[std::size_t(i)].uv - view.fiducials[std::size_t(j)].uv).squaredNorm() /
+                       (reach_px * reach_px));
+      const Eigen::MatrixXd root = covariance.llt().matrixL();
+      for (int axis = 0; axis < 2; ++axis) {
+        Eigen::VectorXd error(n);
+        for (Eigen::Index i = 0; i < n; ++i) error(i) = random.normal();
+        error = root * error;
+        for (Eigen::Index i = 0; i < n; ++i) view.fiducials[std::size_t(i)].uv[axis] += error(i);
+      }
+      for (auto& f : view.fiducials) f.sigma_px = std::hypot(own, map);
+      view.prior.aspect = Belief{1, 1e-3};
+      view.map_covariance_px2 = covariance;
+    }
+    const auto distance2 = [&] {
+      const auto result = calibrate(views, options);
+      EXPECT_TRUE(result.has_value());
+      const View& view = result->views[0].view;
+      Eigen::Vector3d error =
+          view.project({0, 0, 40}).homogeneous() - paper_view(0).project({0, 0, 40}).homogeneous();
+      const auto by_numbers = pixel_by_parameters(view, {0, 0, 40});
+      const Eigen::Matrix2d noise = by_numbers * result->views[0].covariance * by_numbers.transpose();
+      return error.head<2>().dot(noise.ldlt().solve(error.head<2>()));
+    };
+    together += distance2() / trials;
+    for (auto& view : views) view.map_covariance_px2.resize(0, 0);
+    alone += distance2() / trials;
+  }
+  EXPECT_NEAR(together, 2, 0.4);
+  EXPECT_GT(alone, 4);  // what it costs to take them for independent
 }
 
 TEST(Calibrate, ConvergesWithoutAnyPriorInTheNoiseOfThePaper) {

@@ -15,6 +15,17 @@ constexpr double least_gain = 1e-10;  // of chi2, before one last full step
 constexpr double least_damping = 1e-12;
 constexpr double most_damping = 1e12;
 
+Eigen::Index ball_count(const std::vector<ViewProblem>& problems) {
+  std::size_t count = 0;
+  for (const ViewProblem& problem : problems)
+    for (const Observation& seen : problem.observations) count = std::max(count, seen.ball + 1);
+  return Eigen::Index(count);
+}
+
+Eigen::Index map_modes(const ViewProblem& problem) {
+  return problem.observations.empty() ? 0 : problem.observations.front().by_map.size();
+}
+
 /// Rows at given views and departures; false where a point is not before its source. Without priors rho may
 /// pass through zero on the way: nothing happens there.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
@@ -35,22 +46,32 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
   const Eigen::Index own = at.departures.size();
   at.residuals.resize(count + priors.residuals.size() + own);
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
+  const bool tolerant = common.ball_tolerance_mm > 0;
   Eigen::Index row = 0;
-  for (std::size_t i = 0; i < problems.size(); ++i)
+  Eigen::Index map = tolerant ? 3 * ball_count(problems) : 0;
+  for (std::size_t i = 0; i < problems.size(); ++i) {
+    const Eigen::Index modes = map_modes(problems[i]);
     for (const Observation& seen : problems[i].observations) {
-      const Eigen::Index ball = own > 0 ? 3 * Eigen::Index(seen.ball) : 0;
+      const Eigen::Index ball = 3 * Eigen::Index(seen.ball);
       Eigen::Vector3d place = seen.point_in_world;
-      if (own > 0) place += common.ball_tolerance_mm * at.departures.segment<3>(ball);
-      const Picture picture = picture_of(at.views[i], place);
+      if (tolerant) place += common.ball_tolerance_mm * at.departures.segment<3>(ball);
+      Picture picture = picture_of(at.views[i], place);
       if (!(picture.relative_depth > 0)) return false;
+      for (Eigen::Index axis = 0; axis < (modes > 0 ? 2 : 0); ++axis) {
+        const Eigen::Index first = map + axis * modes;
+        picture.pixel[axis] += seen.by_map.dot(at.departures.segment(first, modes));
+        at.jacobian.block(row + axis, steps + first, 1, modes) = seen.by_map / seen.sigma_px;
+      }
       at.residuals.segment<2>(row) = (picture.pixel - seen.pixel) / seen.sigma_px;
       at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
           picture.by_step / seen.sigma_px;
-      if (own > 0)
+      if (tolerant)
         at.jacobian.block<2, 3>(row, steps + ball) =
             common.ball_tolerance_mm / seen.sigma_px * picture.by_place;
       row += 2;
     }
+    map += 2 * modes;
+  }
   at.residuals.segment(count, priors.residuals.size()) = priors.residuals;
   at.jacobian.block(count, 0, priors.residuals.size(), steps) = priors.jacobian;
   at.residuals.tail(own) = at.departures;
@@ -85,12 +106,12 @@ std::optional<Eigen::MatrixXd> covariance_of(const Eigen::MatrixXd& jacobian) {
 
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
   Refinement at;
-  std::size_t balls = 0;
+  Eigen::Index own = common.ball_tolerance_mm > 0 ? 3 * ball_count(problems) : 0;
   for (const ViewProblem& problem : problems) {
     at.views.push_back(problem.start);
-    for (const Observation& seen : problem.observations) balls = std::max(balls, seen.ball + 1);
+    own += 2 * map_modes(problem);
   }
-  if (common.ball_tolerance_mm > 0) at.departures = Eigen::VectorXd::Zero(3 * Eigen::Index(balls));
+  at.departures = Eigen::VectorXd::Zero(own);
   if (!evaluate(problems, common, at)) return open_views(at);
   double damping = 1e-3;
   bool done = false;

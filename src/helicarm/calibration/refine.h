@@ -15,7 +15,8 @@ struct Observation {
   std::size_t ball;  ///< the same in all views
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d pixel;
-  double sigma_px;
+  double sigma_px;                 ///< its own, without what the map does
+  Eigen::RowVectorXd by_map = {};  ///< what the map's independent errors of one sigma do to either axis
 };
 
 struct ViewProblem {
@@ -25,11 +26,12 @@ struct ViewProblem {
 };
 
 /// The fit of all views at once. Rows are the observations' u and v, view by view, then the priors, each over
-/// its standard deviation. Columns are the steps of all views, then, if there is a tolerance, the balls'
-/// departures from the drawing, over it.
+/// its standard deviation. Columns are the steps of all views, then, each over its standard deviation: the
+/// balls' departures from the drawing, if there is a tolerance, and each view's errors of the map in u and in
+/// v.
 struct Refinement {
   std::vector<CentredView> views;
-  Eigen::VectorXd departures;  ///< of the balls; empty without tolerance
+  Eigen::VectorXd departures;  ///< of balls and maps
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
   Eigen::MatrixXd covariance;  ///< of all columns, the sigmas taken at their word

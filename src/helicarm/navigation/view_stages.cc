@@ -40,8 +40,12 @@ Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
 }
 
 ViewFiducials fiducials_of(const ViewResult& view) {
-  return {view.name, view.found->fiducials, intrinsics_prior(*view.exposure, view.rectification->map),
-          view.found->view};
+  const DistortionMap& map = view.rectification->map;
+  std::vector<Eigen::Vector2d> used;
+  for (const Fiducial& ball : view.found->fiducials)
+    if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
+  return {view.name, view.found->fiducials, intrinsics_prior(*view.exposure, map), view.found->view,
+          map.covariance_px2(used)};
 }
 
 }  // namespace

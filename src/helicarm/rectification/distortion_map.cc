@@ -88,6 +88,16 @@ double DistortionMap::sigma_px(const Vector2d& rectified) const {
   return std::sqrt(std::max(0.0, row.dot(coefficient_covariance * row)));
 }
 
+Eigen::MatrixXd DistortionMap::covariance_px2(std::span<const Vector2d> rectified) const {
+  const auto n = static_cast<Eigen::Index>(rectified.size());
+  if (is_identity() || coefficient_covariance.size() == 0) return Eigen::MatrixXd::Zero(n, n);
+  Eigen::MatrixXd rows(n, coefficient_covariance.rows());
+  for (Eigen::Index i = 0; i < n; ++i)
+    rows.row(i) =
+        basis_row((rectified[static_cast<std::size_t>(i)] - centre) / scale, order, knots, kernel_length);
+  return rows * coefficient_covariance * rows.transpose();
+}
+
 std::optional<Vector2d> rectified_in_picture(const DistortionMap& map, const Vector2d& raw) {
   return map.shows(raw) ? map.rectified_from_raw(raw) : std::nullopt;
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,8 @@ struct DistortionMap {
   Eigen::Matrix2d jacobian(const Eigen::Vector2d& rectified) const;
   /// Standard deviation per axis of the map itself at a point, rectified pixels.
   double sigma_px(const Eigen::Vector2d& rectified) const;
+  /// Covariance per axis of the map itself among points (n x n, px^2): near ones err together.
+  Eigen::MatrixXd covariance_px2(std::span<const Eigen::Vector2d> rectified) const;
 };
 
 /// Places carried across the map, and nothing for those off the picture or where the map folds: it is not
