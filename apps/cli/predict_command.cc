@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/calibration/machine.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/localization/locate.h"
@@ -83,7 +84,9 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     if (places.empty()) places.push_back(middle);
     RunOptions options;
     options.threads = console.threads;
-    options.machine = value_or_throw(machine_at(arguments.machine));
+    if (arguments.machine)
+      options.machine = value_or_throw(machine_from_json(value_or_throw(read_json(*arguments.machine)),
+                                                         arguments.machine->filename().string()));
     const Result result = value_or_throw(run_case(given, options));
     if (result.failure) throw BadInput(*result.failure);
     Calibration calibration{{}, result.joint_covariance};

@@ -32,10 +32,15 @@ void forget(const std::filesystem::path& out) {
 
 /// Each picture once.
 Expected<void> remember(const std::filesystem::path& path, Machine machine,
-                        const std::vector<MachineShot>& shots) {
+                        const std::vector<MachineShot>& shots, Console& console) {
+  const std::size_t earlier = machine.shots.size();
   for (const MachineShot& shot : shots)
     if (std::ranges::find(machine.shots, shot.picture, &MachineShot::picture) == machine.shots.end())
       machine.shots.push_back(shot);
+  if (!console.quiet)
+    console.progress << fmt::format("helicarm: {}: {} earlier shots, {} added{}\n", path.string(), earlier,
+                                    machine.shots.size() - earlier,
+                                    shots.empty() ? ": the residuals belie this case" : "");
   return write_file(path, to_text(to_json(machine)) + "\n");
 }
 
@@ -112,7 +117,7 @@ Expected<Result> run_and_write(const RunArguments& arguments, Console& console) 
     const Result result = value_or_throw(result_of(arguments.folder, options));
     value_or_throw(write(result, arguments));
     if (arguments.machine && !result.failure)
-      value_or_throw(remember(*arguments.machine, *options.machine, result.shots));
+      value_or_throw(remember(*arguments.machine, *options.machine, result.shots, console));
     if (!console.quiet)
       for (const Warning& warning : result.warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,

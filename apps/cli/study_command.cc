@@ -48,6 +48,9 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
   if (arguments.name != "limit")
     return fail(Reason::usage, fmt::format("study: \"{}\" is none of: limit", arguments.name));
   return guarded([&] {
+    std::error_code error;
+    if (std::filesystem::create_directories(arguments.out, error); error)
+      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", arguments.out.string(), error.message()));
     const auto tell = [&](double share) {
       if (!console.quiet)
         console.progress << fmt::format("\rhelicarm: {:.0f} % done", 100 * share) << std::flush;

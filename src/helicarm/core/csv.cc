@@ -69,6 +69,8 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
   if (!bytes) return tl::unexpected<Failure>(bytes.error());
   CsvTable table;
   table.origin_ = path.filename().string();
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (bytes->starts_with(byte_order_mark)) bytes->erase(0, byte_order_mark.size());
   std::istringstream lines(*bytes);
   std::string line;
   while (std::getline(lines, line)) {

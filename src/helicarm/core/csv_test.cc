@@ -29,6 +29,12 @@ TEST(ReadCsv, ColumnsMayStandInAnyOrder) {
   EXPECT_FALSE(table->optional_number(0, "sigma_px").has_value());
 }
 
+TEST(ReadCsv, ByteOrderMarkOfASpreadsheetIsPassedOver) {
+  const auto table = table_of("\xEF\xBB\xBFu_px,v_px\n1,2\n");
+  ASSERT_TRUE(table.has_value());
+  EXPECT_EQ(table->number(0, "u_px"), 1);
+}
+
 TEST(ReadCsv, MissingAndUnknownColumnsAreNamed) {
   EXPECT_EQ(table_of("u_px\n1\n").error().reason, Reason::bad_value);
   EXPECT_EQ(table_of("u_px,v_px,w\n1,2,3\n").error().reason, Reason::unknown_key);

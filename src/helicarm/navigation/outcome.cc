@@ -79,6 +79,41 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
   });
 }
 
+std::vector<Warning> doubts_of(const Calibrator& calibrator, const Result& result) {
+  constexpr double most_lengths = 3;
+  std::vector<Warning> warnings;
+  for (const TargetError& target : result.accuracy.targets)
+    if (target.error_mm > most_lengths * target.predicted_95_mm)
+      warnings.push_back(
+          {Reason::residual_too_large,
+           fmt::format("check target \"{}\" is found {:.3g} mm from its place, where 95 % of errors "
+                       "should be below {:.3g}: the calibrator is not as its file says",
+                       target.name, target.error_mm, target.predicted_95_mm),
+           {},
+           {{"error_mm", target.error_mm}, {"predicted_95_mm", target.predicted_95_mm}}});
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const auto rejected = std::ranges::count_if(result.views, [&](const ViewResult& view) {
+      return view.found->fiducials[k].status == FiducialStatus::rejected;
+    });
+    if (rejected > 1)
+      warnings.push_back(
+          {Reason::residual_too_large,
+           fmt::format("ball {} is out of place in {} views: is its place in the calibrator's file "
+                       "right?",
+                       calibrator.balls[k].label, rejected),
+           {},
+           {{"views", double(rejected)}}});
+  }
+  if (std::ranges::all_of(result.views, [](const ViewResult& view) {
+        return view.found->mirrored && !view.exposure->acquisition.flip_hint;
+      }))
+    warnings.push_back({Reason::tag_disagrees,
+                        "all pictures look mirrored and no file says so: is the calibrator's file mirrored?",
+                        {},
+                        {}});
+  return warnings;
+}
+
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
                                              std::optional<double> max_error_mm) {
   constexpr double usual_limit_mm = 2;

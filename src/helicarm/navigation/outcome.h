@@ -26,6 +26,10 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
                                                       const std::vector<CalibratedView>& views,
                                                       const Result& result);
 
+/// What an answer that holds together still gives to doubt: check targets far from their places, balls out of
+/// place in several views, a calibrator's file that may be mirrored.
+std::vector<Warning> doubts_of(const Calibrator& calibrator, const Result& result);
+
 /// `uncertain` where more than 5 % of a located point's errors would exceed the limit: refused over a limit
 /// that is given, warned of over the usual 2 mm.
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,

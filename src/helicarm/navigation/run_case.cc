@@ -54,6 +54,7 @@ void run_stages(const Case& given, Result& result) {
     append(result.warnings, locate_points(given, calibration, result.points));
   });
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
+  append(result.warnings, doubts_of(given.calibrator, result));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   result.tunnels = value_or_throw(plan_tunnels(given.tunnels, result));                        // Eq. 16
   result.verifications = value_or_throw(verify_tool_lines(given, calibration.views, result));  // Eq. 17

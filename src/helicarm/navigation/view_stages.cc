@@ -14,7 +14,7 @@
 namespace helicarm {
 namespace {
 
-constexpr double plate_share = 0.6;  // a plate's balls, should there be one, are this much smaller at most
+constexpr double plate_share = 0.5;  // a plate's balls, should there be one, are this much smaller at most
 
 Expected<DistortionMap> map_from(const CaseView& from, const std::optional<Plate>& plate, Method method) {
   return guarded([&] {
