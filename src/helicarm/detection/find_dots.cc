@@ -73,6 +73,11 @@ DotFitOptions fit_options_for(const Exposure& exposure) {
   return options;
 }
 
+NoiseCorrelation noise_correlation(const Exposure& exposure) {
+  const DotFitOptions limits = fit_options_for(exposure);
+  return noise_correlation(exposure, limits.floor, limits.ceiling);
+}
+
 DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(),
@@ -115,7 +120,7 @@ DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
     try_values(blur, scaled, 0.3, 0.6 * radius + 0.3);
     try_values(absorbance, scaled_twice, 0.1, 60);
   }
-  options.noise = noise_correlation(exposure, options.floor, options.ceiling);
+  options.noise = noise_correlation(exposure);
   return {BallProfile(blur / radius, absorbance), options};
 }
 

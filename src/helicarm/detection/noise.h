@@ -22,6 +22,9 @@ struct NoiseCorrelation {
 /// too few blocks lie inside the field.
 NoiseCorrelation noise_correlation(const Exposure& exposure, float floor, float ceiling);
 
+/// The same within the exposure's own limits.
+NoiseCorrelation noise_correlation(const Exposure& exposure);
+
 /// One row for each parameter, one column for each pixel.
 using PixelRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

@@ -207,7 +207,7 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
 /// The pixels within a few pixels of the metal: further off the background is another one.
 Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre,
                        double half_width, const PathPicture& picture, std::span<const Disc> others,
-                       const std::string& name) {
+                       const NoiseCorrelation& noise, const std::string& name) {
   const SolidTemplate neighbourhood(picture, 1, 2.5);
   const auto not_seen = [&] {
     return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
@@ -219,7 +219,7 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
   if (!inverse) return not_seen();
   const DotFitOptions limits = fit_options_for(exposure);
   const int half = static_cast<int>(std::ceil(half_width));
-  Patch patch{{}, half_width, 2 * half + 1, noise_correlation(exposure, limits.floor, limits.ceiling)};
+  Patch patch{{}, half_width, 2 * half + 1, noise};
   const int u0 = static_cast<int>(std::lround(raw.x()));
   const int v0 = static_cast<int>(std::lround(raw.y()));
   int inside = 0;
@@ -245,7 +245,8 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
 }  // namespace
 
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                const CalibratorTarget& target, std::span<const Disc> others) {
+                                const CalibratorTarget& target, std::span<const Disc> others,
+                                const NoiseCorrelation& noise) {
   const double depth = view.depth(target.point_in_calibrator);
   if (!(depth > 0))
     return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
@@ -259,7 +260,7 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
                               : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
   const PathPicture picture = picture_of_target(target, view, half_width + max_shift_px);
-  const auto patch = gather(exposure, map, centre, half_width, picture, others, target.name);
+  const auto patch = gather(exposure, map, centre, half_width, picture, others, noise, target.name);
   if (!patch) return tl::unexpected<Failure>(patch.error());
   std::optional<Fit> best;
   const auto consider = [&](double attenuation, double blur) {
@@ -294,13 +295,14 @@ Expected<SeenPoint> see_click(const DistortionMap& map, const Vector2d& click_ra
 }
 
 Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                 double depth_mm, const Vector2d& click_raw, double diameter_mm) {
+                                 double depth_mm, const Vector2d& click_raw, double diameter_mm,
+                                 const NoiseCorrelation& noise) {
   Dot start;
   start.radius_px = 0.5 * diameter_mm * std::abs(view.intrinsics.fy) / depth_mm;
   const double reach = std::max(5.0, start.radius_px);
   const BallProfile profile(0.9 / start.radius_px, 3);
   DotFitOptions options = fit_options_for(exposure);
-  options.noise = noise_correlation(exposure, options.floor, options.ceiling);
+  options.noise = noise;
   DotFitOptions wide = options;
   wide.tolerance = 0.1;
   wide.margin_share = 0.35;

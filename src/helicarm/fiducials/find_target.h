@@ -6,6 +6,7 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/detection/fit_dot.h"
+#include "helicarm/detection/noise.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/distortion_map.h"
@@ -22,9 +23,11 @@ struct SeenPoint {
 
 /// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts
 /// it: the absorption of the solid itself, drawn for this view, is shifted until it fits the pixels. `others`
-/// are discs to leave out. target_not_found; not_seen when it falls outside the picture.
+/// are discs to leave out, `noise` is that of the exposure. target_not_found; not_seen when it falls outside
+/// the picture.
 Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                const CalibratorTarget& target, std::span<const Disc> others);
+                                const CalibratorTarget& target, std::span<const Disc> others,
+                                const NoiseCorrelation& noise);
 
 /// Standard deviation of a click per axis, where none is given.
 inline constexpr double click_sigma_px = 0.5;
@@ -38,6 +41,7 @@ Expected<SeenPoint> see_click(const DistortionMap& map, const Eigen::Vector2d& c
 /// be at `depth_mm` from the source. target_not_found where no such ball is within its own radius of the
 /// click.
 Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                 double depth_mm, const Eigen::Vector2d& click_raw, double diameter_mm);
+                                 double depth_mm, const Eigen::Vector2d& click_raw, double diameter_mm,
+                                 const NoiseCorrelation& noise);
 
 }  // namespace helicarm

@@ -69,7 +69,8 @@ void expect_found(std::size_t k) {
     View off = bench.view;
     off.intrinsics.u0 += 1.3;
     off.intrinsics.v0 -= 0.8;
-    const auto found = find_target(bench.exposure, identity_map(256, 256, {}), off, bench.targets[k], {});
+    const auto found = find_target(bench.exposure, identity_map(256, 256, {}), off, bench.targets[k], {},
+                                   noise_correlation(bench.exposure));
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_LT((found->uv - bench.view.project(bench.targets[k].point_in_calibrator)).norm(), 0.1) << mirrored;
     EXPECT_EQ(found->uv, found->uv_raw);
@@ -86,7 +87,7 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
     for (const std::size_t k : {1u, 2u}) {
       if (view.targets[k].visibility != Visibility::clear) continue;
       const auto found = find_target(exposure_of(view), straight(), view.shot.stored_view(),
-                                     room().calibrator.targets[k], {});
+                                     room().calibrator.targets[k], {}, noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << found.error().message;
       EXPECT_LT((found->uv - view.targets[k].ideal).norm(), 0.1)
           << view.shot.name << " " << view.targets[k].name;
@@ -96,8 +97,8 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
 TEST(FindTarget, NothingThereIsNotFound) {
   CalibratorTarget absent = room().calibrator.targets[0];
   absent.point_in_calibrator += Vector3d(14, 5, -20);
-  const auto found =
-      find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(), absent, {});
+  const auto found = find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(),
+                                 absent, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
@@ -105,8 +106,8 @@ TEST(FindTarget, NothingThereIsNotFound) {
 TEST(FindTarget, OutsideThePictureIsNotSeen) {
   CalibratorTarget outside = room().calibrator.targets[0];
   outside.point_in_calibrator += Vector3d(0, 400, 0);
-  const auto found =
-      find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(), outside, {});
+  const auto found = find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(),
+                                 outside, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::not_seen);
 }
@@ -115,7 +116,7 @@ TEST(FindTarget, BehindTheSourceIsRefused) {
   const View view = room().views[0].shot.stored_view();
   CalibratorTarget behind = room().calibrator.targets[0];
   behind.point_in_calibrator = view.camera_from_world.inverse() * Vector3d(0, 0, -50);
-  const auto found = find_target(exposure_of(room().views[0]), straight(), view, behind, {});
+  const auto found = find_target(exposure_of(room().views[0]), straight(), view, behind, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::behind_source);
 }
@@ -125,8 +126,9 @@ TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
     const View stored = view.shot.stored_view();
     for (const auto& ball : view.balls) {
       if (ball.visibility != Visibility::clear) continue;
-      const auto found = snap_to_ball(exposure_of(view), straight(), stored, stored.depth(ball.in_calibrator),
-                                      ball.raw + Vector2d(2.1, -1.6), 4);
+      const auto found =
+          snap_to_ball(exposure_of(view), straight(), stored, stored.depth(ball.in_calibrator),
+                       ball.raw + Vector2d(2.1, -1.6), 4, noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << view.shot.name << " " << ball.name;
       EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.shot.name << " " << ball.name;
     }
@@ -135,7 +137,8 @@ TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
 
 TEST(SnapToBall, NoBallNearTheClickIsNotFound) {
   const SimulatedView& view = room().views[0];
-  const auto found = snap_to_ball(exposure_of(view), straight(), view.shot.stored_view(), 640, {20, 20}, 4);
+  const auto found =
+      snap_to_ball(exposure_of(view), straight(), view.shot.stored_view(), 640, {20, 20}, 4, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }

@@ -14,12 +14,13 @@ namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
 
-Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eigen::Vector3d& centre) {
+Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eigen::Vector3d& centre,
+                             const NoiseCorrelation& noise) {
   const DistortionMap& map = view.rectification->map;
   if (pick.snap == Snap::ball) {
     const View& camera = view.calibrated->view;
     auto seen =
-        snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm);
+        snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm, noise);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
@@ -126,12 +127,15 @@ Expected<std::vector<PointResult>> see_points(const Case& given, const Result& r
       if (task.pick) check_inside(*task.pick, result.views[task.view].rectification->map);
   });
   if (!done) return tl::unexpected<Failure>(done.error());
+  std::vector<NoiseCorrelation> noise(tasks.empty() ? 0 : result.views.size());
+  parallel_for(noise.size(), result.options.threads,
+               [&](std::size_t i) { noise[i] = noise_correlation(*result.views[i].exposure); });
   parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
     const Task& task = tasks[i];
     const ViewResult& view = result.views[task.view];
-    const auto seen = task.pick ? see_pick(*task.pick, view, centre)
+    const auto seen = task.pick ? see_pick(*task.pick, view, centre, noise[task.view])
                                 : find_target(*view.exposure, view.rectification->map, view.calibrated->view,
-                                              *task.target, discs_of(view));
+                                              *task.target, discs_of(view), noise[task.view]);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else
