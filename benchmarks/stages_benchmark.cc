@@ -40,7 +40,8 @@ const Rectification& rectification() {
 }
 
 void read_file(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(read_exposure(simulated_case().views[0].image, "AP", {}));
+  const std::filesystem::path& image = simulated_case().views[0].image;
+  for (auto _ : state) benchmark::DoNotOptimize(read_exposure(image, "AP", {}));
 }
 BENCHMARK(read_file)->Unit(benchmark::kMillisecond);
 

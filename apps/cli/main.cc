@@ -151,7 +151,7 @@ void add_rectify(CLI::App& app, Action& action) {
   command->add_flag("--inverse", a.inverse, "The points are rectified pixels; give raw ones");
   command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
       ->check(within(0.1, 1000));
-  command->add_option("--out", a.out, "Folder for rectified.dcm, map.json and residuals.csv")
+  command->add_option("--out", a.out, "Folder for rectified.dcm, inpainted.dcm, map.json and residuals.csv")
       ->capture_default_str();
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
       ->capture_default_str();
