@@ -42,13 +42,17 @@ struct Scale {
   double share(double value) const { return (value - low) / (high - low); }
 };
 
+/// Over the two slices that are shown.
 Scale scale_of(const TreVolume& volume) {
   double low = 1e300, high = 0;
-  for (const double value : volume.rms_mm) {
-    if (!std::isfinite(value)) continue;
-    low = std::min(low, value);
-    high = std::max(high, value);
-  }
+  const int middle = volume.side / 2;
+  for (int i = 0; i < volume.side; ++i)
+    for (int j = 0; j < volume.side; ++j)
+      for (const double value : {volume.at(i, j, middle), volume.at(i, middle, j)}) {
+        if (!std::isfinite(value)) continue;
+        low = std::min(low, value);
+        high = std::max(high, value);
+      }
   if (!(high > low)) return {low - 0.5, low + 0.5, 0.5};
   const double step = round_step(high - low, 6);
   return {std::floor(low / step) * step, std::ceil(high / step) * step, step};
@@ -72,10 +76,11 @@ class Slice {
                          x_of(column - 0.5), y_of(row + 0.5), cell_ + 0.3, cell_ + 0.3,
                          colour_of(scale_.share(value)));
     for (double level = scale_.low + scale_.step; level < scale_.high - 1e-9; level += scale_.step)
-      fmt::format_to(put,
-                     R"(<path d="{}" stroke="#fff" stroke-opacity="0.7" fill="none"/>)"
-                     "\n",
-                     isoline(level));
+      if (const std::string path = isoline(level); !path.empty())
+        fmt::format_to(put,
+                       R"(<path d="{}" stroke="#fff" stroke-opacity="0.7" fill="none"/>)"
+                       "\n",
+                       path);
     const Eigen::Vector3d low = place(0, 0), high = place(last, last);
     const int up = upright_ ? 2 : 1;
     const double step = round_step(high.x() - low.x(), 6);
