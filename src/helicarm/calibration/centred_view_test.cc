@@ -130,5 +130,18 @@ TEST(PriorRows, DeparturesOfTwoViewsGoTogether) {
   EXPECT_NEAR(rows.residuals.squaredNorm(), first * first / (100 + 4.0 / 2), 1e-9);
 }
 
+TEST(PriorRows, MirroredViewDepartsTheOtherWay) {
+  View plain = example, mirrored = example;
+  plain.intrinsics.fx = 6000;
+  plain.intrinsics.u0 = 512 + 30;
+  mirrored.intrinsics.u0 = 512 - 30;
+  plain.intrinsics.v0 = mirrored.intrinsics.v0 = 512;
+  IntrinsicsPrior prior{std::nullopt, Eigen::Vector2d(512, 512), 4};
+  prior.skew.reset();
+  const PriorRows rows = prior_rows(std::vector{centred(plain, centre), centred(mirrored, centre)},
+                                    std::vector{prior, prior}, {std::nullopt, Departure{7, 4}});
+  EXPECT_NEAR(rows.residuals.squaredNorm(), 7.5 * 7.5 / (49 + 16.0 / 2), 1e-9);
+}
+
 }  // namespace
 }  // namespace helicarm

@@ -113,7 +113,9 @@ PriorRows prior_rows(std::span<const CentredView> views, std::span<const Intrins
     if (prior.skew) rows.add_own(i, skew, *prior.skew);
     if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});
     if (!prior.principal_px) continue;
-    principals_u.push_back({i, prior.principal_px->x(), prior.unit_px});
+    // In a mirrored picture the machine's own departure points the other way.
+    const double hand = views[i].ax < 0 ? -1 : 1;
+    principals_u.push_back({i, prior.principal_px->x(), hand * prior.unit_px});
     principals_v.push_back({i, prior.principal_px->y(), prior.unit_px});
   }
   if (machine.focal) rows.add_common(focals, focal, *machine.focal);
