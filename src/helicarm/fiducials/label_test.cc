@@ -90,7 +90,7 @@ TEST(LabelBalls, FindsTheMirroringAndThePose) {
     EXPECT_NEAR(labelling->view.camera_from_world.rotation.determinant(), 1, 1e-9);
     EXPECT_GT(labelling->view.depth({0, 0, 0}), 0);
     for (std::size_t k = 0; k < 12; ++k) {
-      const auto& centre = helix().balls[k].centre_in_calibrator;
+      const Eigen::Vector3d centre = helix().balls[k].centre_in_calibrator;
       EXPECT_LT((labelling->view.project(centre) - picture.view.project(centre)).norm(), 0.5);
     }
   }

@@ -39,8 +39,8 @@ double path(const Image<float>& picture, int u, int v, double per_mm) {
 
 TEST(RenderView, EmptySceneIsTheOpenBeam) {
   const VirtualDetector detector = small_detector();
-  for (float pixel : render_view({}, detector, straight_view(detector), 1).pixels())
-    EXPECT_FLOAT_EQ(pixel, 1);
+  const Image<float> picture = render_view({}, detector, straight_view(detector), 1);
+  for (float pixel : picture.pixels()) EXPECT_FLOAT_EQ(pixel, 1);
 }
 
 TEST(RenderView, BallsChordFollowsTheClosedFormFromCentreToEdge) {
