@@ -36,12 +36,6 @@ Eigen::Vector3d place_from(const std::string& word) {
   return place;
 }
 
-Eigen::Vector3d middle_of(const Calibrator& calibrator) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
-  return sum / double(calibrator.balls.size());
-}
-
 Json prediction(const Eigen::Vector3d& place, const Calibration& calibration,
                 const PredictArguments& arguments) {
   Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
@@ -84,9 +78,7 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     if (places.empty()) places.push_back(middle);
     RunOptions options;
     options.threads = console.threads;
-    if (arguments.machine)
-      options.machine = value_or_throw(machine_from_json(value_or_throw(read_json(*arguments.machine)),
-                                                         arguments.machine->filename().string()));
+    if (arguments.machine) options.machine = value_or_throw(read_machine(*arguments.machine));
     const Result result = value_or_throw(run_case(given, options));
     if (result.failure) throw BadInput(*result.failure);
     Calibration calibration{{}, result.joint_covariance};

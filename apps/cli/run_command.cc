@@ -72,9 +72,7 @@ Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions
 Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path) {
   if (!path) return std::optional<Machine>();
   if (!std::filesystem::exists(*path)) return std::optional(Machine());
-  return read_json(*path)
-      .and_then([&](const Json& json) { return machine_from_json(json, path->filename().string()); })
-      .map([](Machine machine) { return std::optional(std::move(machine)); });
+  return read_machine(*path).map([](Machine machine) { return std::optional(std::move(machine)); });
 }
 
 Expected<Method> method_named(const std::string& name) {

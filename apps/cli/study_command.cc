@@ -26,6 +26,7 @@ Json json_of(const std::vector<LimitRow>& rows, const StudyArguments& arguments,
                             {"error_mm", row.error_mm},
                             {"ratio", row.efficiency()},
                             {"dlt_mm", row.dlt_mm},
+                            {"dlt_ratio", row.dlt_mm / row.bound_mm},
                             {"coverage", row.coverage}});
   return json;
 }

@@ -115,6 +115,11 @@ IntrinsicsPrior known_prior(IntrinsicsPrior prior, const MachineKnowledge& knowl
   return prior;
 }
 
+Expected<Machine> read_machine(const std::filesystem::path& path) {
+  return read_json(path).and_then(
+      [&](const Json& json) { return machine_from_json(json, path.filename().string()); });
+}
+
 Expected<Machine> machine_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);

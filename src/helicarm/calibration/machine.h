@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -48,6 +49,7 @@ std::optional<MachineShot> shot_of(const ViewFiducials& view, const std::string&
 IntrinsicsPrior known_prior(IntrinsicsPrior prior, const MachineKnowledge& knowledge, bool mirrored);
 
 /// machine.json (docs/formats.md).
+Expected<Machine> read_machine(const std::filesystem::path& path);
 Expected<Machine> machine_from_json(const Json& json, const std::string& origin);
 Json to_json(const Machine& machine);
 

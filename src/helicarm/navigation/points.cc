@@ -57,12 +57,6 @@ struct Task {
   const CalibratorTarget* target;  ///< or this
 };
 
-Eigen::Vector3d mean_place(const Calibrator& calibrator) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
-  return sum / double(calibrator.balls.size());
-}
-
 std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) {
   const std::size_t views = given.views.size();
   const auto add = [&](const std::string& name, PointSource source, std::optional<Bone> moves_with) {
@@ -120,7 +114,7 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
 Expected<std::vector<PointResult>> see_points(const Case& given, const Result& result) {
   std::vector<PointResult> points;
   const std::vector<Task> tasks = tasks_of(given, points);
-  const Eigen::Vector3d centre = mean_place(given.calibrator);
+  const Eigen::Vector3d centre = middle_of(given.calibrator);
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)

@@ -175,6 +175,12 @@ Json to_json(const Calibrator& calibrator) {
   return json;
 }
 
+Eigen::Vector3d middle_of(const Calibrator& calibrator) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
+  return sum / double(calibrator.balls.size());
+}
+
 bool same_places(const Calibrator& a, const Calibrator& b) {
   std::map<std::string, Eigen::Vector3d> places;
   for (const auto& ball : b.balls) places[ball.label] = ball.centre_in_calibrator;

@@ -54,6 +54,9 @@ Expected<Calibrator> calibrator_named(const std::string& name_or_path, const std
 /// What read_calibrator reads.
 Json to_json(const Calibrator& calibrator);
 
+/// Mean place of the balls, mm.
+Eigen::Vector3d middle_of(const Calibrator& calibrator);
+
 /// The same labels in any order, each ball within 0.01 mm.
 bool same_places(const Calibrator& a, const Calibrator& b);
 

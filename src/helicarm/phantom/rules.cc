@@ -19,12 +19,6 @@ constexpr double degree = std::numbers::pi / 180;
 
 using Points = std::vector<Eigen::Vector3d>;
 
-Eigen::Vector3d middle_of(const Calibrator& calibrator) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const auto& ball : calibrator.balls) sum += ball.centre_in_calibrator;
-  return sum / double(calibrator.balls.size());
-}
-
 /// The balls P1..P12 in that order; empty where a label is missing.
 Points numbered(const Calibrator& calibrator) {
   std::map<std::string, Eigen::Vector3d> places;

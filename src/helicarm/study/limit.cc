@@ -15,6 +15,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
+#include "helicarm/navigation/prior.h"
 #include "helicarm/phantom/conical_helix.h"
 #include "helicarm/study/cramer_rao.h"
 
@@ -37,7 +38,7 @@ constexpr int shots_of_machine = 12;
 const Vector3d centre(0, 0, 40);
 
 /// What the experiment's C-arms are like: an unknown one of its make, and one that sags little.
-const MachinePrior make{Departure{10, 1.4}, Departure{7, 4.2}};
+const MachinePrior make = unknown_machine();
 const MachinePrior stiff{Departure{10, 0.3}, Departure{7, 0.5}};
 
 enum class Model { free, square, prior, machine, known };
