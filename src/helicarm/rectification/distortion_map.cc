@@ -61,8 +61,7 @@ Matrix2d DistortionMap::jacobian(const Vector2d& rectified) const {
   Matrix2d slope = coefficients.transpose() * monomial_slopes(t, order);
   for (Eigen::Index k = 0; k < knots.rows(); ++k) {
     const Vector2d d = t - knots.row(k).transpose();
-    slope -= kernel(d.squaredNorm(), kernel_length) / (kernel_length * kernel_length) *
-             weights.row(k).transpose() * d.transpose();
+    slope += kernel_slope(d.squaredNorm(), kernel_length) * weights.row(k).transpose() * d.transpose();
   }
   return slope / scale;
 }
@@ -85,7 +84,7 @@ double DistortionMap::sigma_px(const Vector2d& rectified) const {
   if (is_identity() || coefficient_covariance.size() == 0) return 0;
   const Vector2d t = (rectified - centre) / scale;
   const Eigen::VectorXd row = basis_row(t, order, knots, kernel_length);
-  return std::sqrt(std::max(0.0, row.dot(coefficient_covariance * row)));
+  return std::sqrt(std::max(0.0, kernel_sigma_px * kernel_sigma_px + row.dot(coefficient_covariance * row)));
 }
 
 Eigen::MatrixXd DistortionMap::covariance_px2(std::span<const Vector2d> rectified) const {
@@ -95,7 +94,17 @@ Eigen::MatrixXd DistortionMap::covariance_px2(std::span<const Vector2d> rectifie
   for (Eigen::Index i = 0; i < n; ++i)
     rows.row(i) =
         basis_row((rectified[static_cast<std::size_t>(i)] - centre) / scale, order, knots, kernel_length);
-  return rows * coefficient_covariance * rows.transpose();
+  Eigen::MatrixXd covariance = rows * coefficient_covariance * rows.transpose();
+  if (kernel_sigma_px > 0)
+    for (Eigen::Index j = 0; j < n; ++j)
+      for (Eigen::Index i = 0; i < n; ++i)
+        covariance(i, j) +=
+            kernel_sigma_px * kernel_sigma_px *
+            kernel((rectified[static_cast<std::size_t>(i)] - rectified[static_cast<std::size_t>(j)])
+                           .squaredNorm() /
+                       (scale * scale),
+                   kernel_length);
+  return covariance;
 }
 
 std::optional<Vector2d> rectified_in_picture(const DistortionMap& map, const Vector2d& raw) {
@@ -127,7 +136,9 @@ Json to_json(const DistortionMap& map) {
   json["centre"] = {map.centre.x(), map.centre.y()};
   json["scale"] = map.scale;
   json["coefficients"] = rows_of(map.coefficients);
+  json["kernel"] = "matern-5/2";
   json["kernel_length"] = map.kernel_length;
+  json["kernel_sigma_px"] = map.kernel_sigma_px;
   json["knots"] = rows_of(map.knots);
   json["weights"] = rows_of(map.weights);
   json["covariance"] = rows_of(map.coefficient_covariance);
@@ -155,7 +166,9 @@ Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::st
     map.centre = pair_of(reader, "centre");
     map.scale = reader.number("scale", {1e-6, 1e6});
     map.coefficients = matrix_of(reader, "coefficients", 2, 200);
+    reader.choice("kernel", {"matern-5/2"});
     map.kernel_length = reader.number("kernel_length", {0, 1e3});
+    map.kernel_sigma_px = reader.number("kernel_sigma_px", {0, 1e4});
     map.knots = matrix_of(reader, "knots", 2, 2000);
     map.weights = matrix_of(reader, "weights", 2, 2000);
     const auto terms = map.coefficients.rows() + map.knots.rows();

@@ -17,9 +17,9 @@ namespace helicarm {
 enum class RectifiedPlane { detector, plate };
 
 /// The intensifier's distortion: rectified (x, y) -> raw (u, v) as in Eq. 1, by a polynomial of any order
-/// and, where the data carry it, a smooth remainder (Gaussian kernels at knots). Points go the other way by
-/// numerical inversion, so both directions agree. Rectified pixels have the raw scale and no rotation at the
-/// image centre.
+/// and, where the data carry it, a smooth remainder (Matern kernels at knots: universal kriging). Points go
+/// the other way by numerical inversion, so both directions agree. Rectified pixels have the raw scale and no
+/// rotation at the image centre.
 struct DistortionMap {
   std::string model = "identity";
   int order = 0;                                     ///< of the polynomial; 0: the identity (flat panel)
@@ -28,11 +28,15 @@ struct DistortionMap {
   Eigen::MatrixX2d coefficients;  ///< terms x 2, in the order of monomials of docs/method.md
   Eigen::MatrixX2d knots;         ///< m x 2, normalised
   double kernel_length = 0;       ///< normalised
+  double kernel_sigma_px = 0;     ///< of the remainder itself, before any dot is seen, per axis
   Eigen::MatrixX2d weights;       ///< m x 2
   double residual_rms_px = 0;     ///< per point, over the dots used
   double residual_max_px = 0;
   double held_out_rms_px = 0;
-  Eigen::MatrixXd coefficient_covariance;  ///< of terms and weights, per axis, px^2; empty: taken as exact
+  /// Per axis, px^2; empty: taken as exact. With b(p) the basis (terms, then kernels) the map's covariance
+  /// between p and q is kernel_sigma_px^2 k(p, q) + b(p)' C b(q): C is what the dots took away, and away from
+  /// them the remainder is as uncertain as before.
+  Eigen::MatrixXd coefficient_covariance;
   Eigen::Vector2d hull_low = Eigen::Vector2d::Zero();  ///< rectified box that the dots cover
   Eigen::Vector2d hull_high = Eigen::Vector2d::Zero();
   std::optional<double> rectified_pixel_mm;

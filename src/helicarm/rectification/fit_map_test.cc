@@ -138,7 +138,7 @@ TEST(FitMap, RemainderFollowsALocalBump) {
   for (const Correspondence& dot : plate(24, bumpy))
     most = std::max(
         most, (full->map.raw_from_rectified(full->rectified_from_plate * dot.place_mm) - dot.raw_px).norm());
-  EXPECT_LT(most, 0.25);
+  EXPECT_LT(most, 0.1);
 }
 
 TEST(FitMap, OutliersAreRejectedAndNothingElse) {

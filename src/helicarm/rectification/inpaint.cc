@@ -12,6 +12,7 @@ namespace helicarm {
 
 Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots) {
   constexpr double rim_px = 2;  // the blur about a dot
+  constexpr int reach_px = 3;
   Image<std::uint8_t> hidden(image.width(), image.height());
   cv::Mat mask = as_mat(hidden);
   for (const Dot& dot : dots) {
@@ -19,9 +20,24 @@ Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots) 
                            static_cast<int>(std::lround(dot.centre_px.y())));
     cv::circle(mask, centre, static_cast<int>(std::ceil(dot.radius_px + rim_px)), 255, cv::FILLED);
   }
-  Image<float> filled(image.width(), image.height());
+  Image<float> filled = image;
   cv::Mat target = as_mat(filled);
-  cv::inpaint(as_mat(image), mask, target, 3, cv::INPAINT_TELEA);
+  // Patch by patch: over a whole picture of holes OpenCV's front is a list that it walks from the start.
+  cv::Mat labels;
+  cv::Mat boxes;
+  cv::Mat centroids;
+  const int patches = cv::connectedComponentsWithStats(mask, labels, boxes, centroids);
+  for (int patch = 1; patch < patches; ++patch) {
+    const auto side = [&](int which) { return boxes.at<int>(patch, which); };
+    constexpr int margin = 3 * reach_px;
+    const cv::Rect box =
+        cv::Rect(side(cv::CC_STAT_LEFT) - margin, side(cv::CC_STAT_TOP) - margin,
+                 side(cv::CC_STAT_WIDTH) + 2 * margin, side(cv::CC_STAT_HEIGHT) + 2 * margin) &
+        cv::Rect(0, 0, mask.cols, mask.rows);
+    cv::Mat repaired;
+    cv::inpaint(as_mat(image)(box), mask(box), repaired, reach_px, cv::INPAINT_TELEA);
+    repaired.copyTo(target(box), labels(box) == patch);
+  }
   return filled;
 }
 
