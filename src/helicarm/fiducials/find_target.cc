@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -157,6 +158,32 @@ Normal noise_of(const Patch& patch, const SolidTemplate& shade, const Vector& p)
   return correlated_normal(patch.noise, rows, cells, patch.side);
 }
 
+/// The spread of the shift when each sector of the patch in turn is left out (delete-a-group jackknife, one
+/// Gauss-Newton step each): what is wrong with the model on one side only, such as an edge of the body nearby,
+/// shows here and not in the noise.
+double jackknife_variance(const Patch& patch, const SolidTemplate& shade, const Vector& p, const Sums& all) {
+  constexpr int sectors = 8;
+  std::array<Sums, sectors> left_out;
+  Patch sector{{}, patch.window, patch.side, patch.noise};
+  std::array<std::vector<Pixel>, sectors> pixels;
+  for (const Pixel& pixel : patch.pixels) {
+    const Vector2d from = pixel.offset - p.tail<2>();
+    const double turn = std::atan2(from.y(), from.x()) / (2 * std::numbers::pi) + 0.5;
+    pixels[static_cast<std::size_t>(std::min(sectors - 1.0, sectors * turn))].push_back(pixel);
+  }
+  Vector2d sum = Vector2d::Zero();
+  double squares = 0;
+  for (int k = 0; k < sectors; ++k) {
+    sector.pixels = pixels[static_cast<std::size_t>(k)];
+    const Sums own = accumulate(sector, shade, p);
+    const Normal rest = all.normal - own.normal;
+    const Vector step = rest.selfadjointView<Eigen::Lower>().ldlt().solve(all.right - own.right);
+    sum += step.tail<2>();
+    squares += step.tail<2>().squaredNorm();
+  }
+  return 0.5 * (sectors - 1.0) / sectors * (squares - sum.squaredNorm() / sectors);
+}
+
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   std::vector<double> residuals(patch.pixels.size());
   Vector p = Vector::Zero();
@@ -198,7 +225,8 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background];
   fit.sigma_px =
-      std::sqrt(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)));
+      std::sqrt(std::max(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
+                         jackknife_variance(patch, shade, p, sums)));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;

@@ -34,16 +34,15 @@ inline Eigen::MatrixX2d monomial_slopes(const Eigen::Vector2d& t, int order) {
   return slopes;
 }
 
-/// Matern's covariance of smoothness 5/2: twice differentiable, as rough between dots as real screens are.
+/// Matern's covariance of smoothness 3/2: as rough between dots as real screens are.
 inline double kernel(double squared_distance, double length) {
-  const double s = std::sqrt(5 * squared_distance) / length;
-  return (1 + s * (1 + s / 3)) * std::exp(-s);
+  const double s = std::sqrt(3 * squared_distance) / length;
+  return (1 + s) * std::exp(-s);
 }
 
 /// Its gradient over the offset.
 inline double kernel_slope(double squared_distance, double length) {
-  const double s = std::sqrt(5 * squared_distance) / length;
-  return -5 / (3 * length * length) * (1 + s) * std::exp(-s);
+  return -3 / (length * length) * std::exp(-std::sqrt(3 * squared_distance) / length);
 }
 
 /// Monomials followed by the kernels at the knots.

@@ -136,7 +136,7 @@ Json to_json(const DistortionMap& map) {
   json["centre"] = {map.centre.x(), map.centre.y()};
   json["scale"] = map.scale;
   json["coefficients"] = rows_of(map.coefficients);
-  json["kernel"] = "matern-5/2";
+  json["kernel"] = "matern-3/2";
   json["kernel_length"] = map.kernel_length;
   json["kernel_sigma_px"] = map.kernel_sigma_px;
   json["knots"] = rows_of(map.knots);
@@ -166,7 +166,7 @@ Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::st
     map.centre = pair_of(reader, "centre");
     map.scale = reader.number("scale", {1e-6, 1e6});
     map.coefficients = matrix_of(reader, "coefficients", 2, 200);
-    reader.choice("kernel", {"matern-5/2"});
+    reader.choice("kernel", {"matern-3/2"});
     map.kernel_length = reader.number("kernel_length", {0, 1e3});
     map.kernel_sigma_px = reader.number("kernel_sigma_px", {0, 1e4});
     map.knots = matrix_of(reader, "knots", 2, 2000);

@@ -191,7 +191,7 @@ Roughness roughness_of(const Data& data, const MatrixXd& rows, const MatrixXd& g
 /// Universal kriging: a polynomial trend and a Matern remainder.
 Model smooth_model(const Data& data, int order, const MatrixX2d& knots) {
   Roughness best;
-  for (const double length : {0.1, 0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6}) {
+  for (const double length : {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2}) {
     const Roughness roughness =
         roughness_of(data, rows_for(data, order, knots, length), gram_of(knots, length), length);
     if (roughness.misfit < best.misfit) best = roughness;
