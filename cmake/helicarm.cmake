@@ -1,6 +1,8 @@
 # Flags shared by every unit of the project. The instruction set is uniform because Eigen's alignment is ABI.
 add_library(helicarm_flags INTERFACE)
 target_compile_options(helicarm_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-aggressive-loop-optimizations)
+# Nobody reads errno or floating-point flags: without them loops with a root or a comparison become vectors.
+target_compile_options(helicarm_flags INTERFACE -fno-math-errno -fno-trapping-math)
 target_include_directories(helicarm_flags INTERFACE ${CMAKE_SOURCE_DIR}/src)
 target_compile_definitions(helicarm_flags INTERFACE HELICARM_VERSION="${PROJECT_VERSION}")
 if(HELICARM_WERROR)

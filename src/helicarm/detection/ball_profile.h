@@ -19,15 +19,21 @@ class BallProfile {
     float value;
     float slope;  ///< d value / d s
   };
-  Sample at(float s) const {
-    // Without a branch, so that the compiler can look up several at once.
-    const float x = std::min(s * per_unit_, static_cast<float>(last_));
-    const int i = static_cast<int>(x);
-    const float t = x - static_cast<float>(i);
-    const float* a = values_.data() + i;
-    const float* d = slopes_.data() + i;
-    return {a[0] + t * (a[1] - a[0]), d[0] + t * (d[1] - d[0])};
-  }
+  /// By value, so that a loop over pixels can look up several at once.
+  struct Table {
+    const float* values;
+    const float* slopes;
+    float per_unit;
+    float last;
+    Sample at(float s) const {
+      const float x = std::min(s * per_unit, last);
+      const int i = static_cast<int>(x);
+      const float t = x - static_cast<float>(i);
+      return {values[i] + t * (values[i + 1] - values[i]), slopes[i] + t * (slopes[i + 1] - slopes[i])};
+    }
+  };
+  Table table() const { return {values_.data(), slopes_.data(), per_unit_, static_cast<float>(last_)}; }
+  Sample at(float s) const { return table().at(s); }
   /// Beyond this s the profile is nought.
   float reach() const { return static_cast<float>(last_) / per_unit_; }
   double blur() const { return blur_; }

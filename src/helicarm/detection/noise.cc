@@ -160,8 +160,8 @@ NoiseCorrelation noise_correlation(const Exposure& exposure, float floor, float 
 
 Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows& rows,
                                   std::span<const int> cells, int width) {
-  Eigen::MatrixXf normal = Eigen::MatrixXf::Zero(rows.rows(), rows.rows());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(rows, 1 - noise.share);
+  const std::vector<float> white(cells.size(), 1 - noise.share);
+  Eigen::MatrixXd normal = weighted_products(rows, white);
   if (noise.share > 0) {
     // A rim of `reach` cells on the right of each row and around all keeps every step inside the grid.
     const int stride = width + reach;
@@ -172,7 +172,7 @@ Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows
     Eigen::ArrayXf second(size + 2 * rim);
     std::vector<int> places;
     for (const int cell : cells) places.push_back(rim + cell / width * stride + cell % width);
-    PixelRows spread(rows.rows(), rows.cols());
+    PixelRows spread(rows.rows(), static_cast<Eigen::Index>(cells.size()));
     const auto smooth = [&](const Eigen::ArrayXf& from, Eigen::ArrayXf& to, int step) {
       to.segment(rim, size) = from.segment(rim, size);
       for (int d = 1; d <= reach && noise.along[static_cast<std::size_t>(d)] > 0; ++d)
@@ -187,9 +187,9 @@ Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows
       smooth(first, second, stride);
       for (std::size_t i = 0; i < places.size(); ++i) spread(k, Eigen::Index(i)) = second[places[i]];
     }
-    normal.triangularView<Eigen::Lower>() += noise.share * rows * spread.transpose();
+    normal += (noise.share * rows.leftCols(spread.cols()) * spread.transpose()).cast<double>();
   }
-  return normal.cast<double>().selfadjointView<Eigen::Lower>();
+  return normal;
 }
 
 }  // namespace helicarm

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/detection/products.h"
 #include "helicarm/xray/exposure.h"
 
 namespace helicarm {
@@ -24,9 +25,6 @@ NoiseCorrelation noise_correlation(const Exposure& exposure, float floor, float 
 
 /// The same within the exposure's own limits.
 NoiseCorrelation noise_correlation(const Exposure& exposure);
-
-/// One row for each parameter, one column for each pixel.
-using PixelRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Sum over all pairs of pixels of their correlation times row_i row_j': what stands between two inverse
 /// normal matrices in a covariance. `cells`: each pixel's place in a grid of the given width, row by row.

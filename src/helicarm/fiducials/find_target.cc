@@ -159,8 +159,8 @@ Normal noise_of(const Patch& patch, const SolidTemplate& shade, const Vector& p)
 }
 
 /// The spread of the shift when each sector of the patch in turn is left out (delete-a-group jackknife, one
-/// Gauss-Newton step each): what is wrong with the model on one side only, such as an edge of the body nearby,
-/// shows here and not in the noise.
+/// Gauss-Newton step each): what is wrong with the model on one side only, such as an edge of the body
+/// nearby, shows here and not in the noise.
 double jackknife_variance(const Patch& patch, const SolidTemplate& shade, const Vector& p, const Sums& all) {
   constexpr int sectors = 8;
   std::array<Sums, sectors> left_out;
@@ -224,9 +224,9 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   Fit fit;
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background];
-  fit.sigma_px =
-      std::sqrt(std::max(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
-                         jackknife_variance(patch, shade, p, sums)));
+  fit.sigma_px = std::sqrt(
+      believed_variance(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
+                        jackknife_variance(patch, shade, p, sums)));
   fit.noise = std::sqrt(variance);
   fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
   return fit;
