@@ -213,9 +213,9 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     Dot dot;
     dot.centre_px = Eigen::Vector2d(u, v) + p.segment<2>(contrast_index + 1).cast<double>();
     dot.radius_px = double(p[contrast_index + 3]);
-    dot.sigma_px = std::sqrt(believed_variance(0.5 * (covariance(contrast_index + 1, contrast_index + 1) +
-                                                      covariance(contrast_index + 2, contrast_index + 2)),
-                                               0.5 * jackknife.segment<2>(contrast_index + 1).sum()));
+    dot.sigma_px = std::sqrt(0.5 * (covariance(contrast_index + 1, contrast_index + 1) +
+                                    covariance(contrast_index + 2, contrast_index + 2)));
+    dot.one_sided_px = std::sqrt(std::max(0.0, 0.5 * jackknife.segment<2>(contrast_index + 1).sum()));
     dot.contrast = contrast * double(patch->scale);
     dot.misfit = std::sqrt(squares / double(patch->count)) / std::abs(contrast);
     if (!dot.centre_px.allFinite() || !std::isfinite(dot.sigma_px)) return std::nullopt;

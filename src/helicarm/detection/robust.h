@@ -29,11 +29,4 @@ Real tukey_weight(Real residual, Real cut) {
   return inside * inside;
 }
 
-/// A variance by the noise, or by a jackknife of eight groups where that is more than chance would have it
-/// (above the 95th percentile for two axes).
-inline double believed_variance(double noise, double jackknife) {
-  constexpr double chance = 1.69;
-  return jackknife > chance * noise ? jackknife : noise;
-}
-
 }  // namespace helicarm

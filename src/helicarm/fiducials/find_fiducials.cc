@@ -123,7 +123,7 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
   fiducial.uv = *uv;
   const double map_sigma = map.sigma_px(*uv);
   fiducial.sigma_px =
-      std::sqrt(dot.sigma_px * dot.sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
+      std::sqrt(dot.error_px() * dot.error_px() + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
 }
 
 /// In the paper's mode a ball lies where the Hough transform sees its circle.

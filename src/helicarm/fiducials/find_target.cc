@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "helicarm/detection/dot.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/detection/robust.h"
 #include "helicarm/fiducials/centre_offset.h"
@@ -355,9 +356,9 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
   const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
   const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
   const double map_sigma = map.sigma_px(uv);
-  return SeenPoint{
-      raw, uv,
-      std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
+  return SeenPoint{raw, uv,
+                   std::sqrt(best->error_px() * best->error_px() + map_sigma * map_sigma +
+                             sigma_floor_px * sigma_floor_px)};
 }
 
 }  // namespace helicarm

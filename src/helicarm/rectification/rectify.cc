@@ -137,7 +137,7 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
     if ((dot[0].centre_px - start.centre_px).norm() > 1.5 || std::abs(dot[0].radius_px / radius - 1) > 0.15)
       continue;
-    seen.push_back({place, dot[0].centre_px, dot[0].sigma_px});
+    seen.push_back({place, dot[0].centre_px, dot[0].error_px()});
     plate_dots.push_back(dot[0]);
   }
 }
@@ -233,7 +233,7 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   for (const PlateDot& d : *matched) {
     const Dot& dot = attempt.seen.dots[d.dot];
     dots.push_back(dot);
-    seen.push_back({d.place_mm, dot.centre_px, dot.sigma_px});
+    seen.push_back({d.place_mm, dot.centre_px, dot.error_px()});
   }
   MapOptions map_options;
   map_options.order = options.method == Method::paper ? std::optional(2) : options.order;
@@ -308,7 +308,7 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
     const Dot& dot = seen.dots[d.dot];
     members.push_back(dot);
     if (const auto uv = map.rectified_from_raw(dot.centre_px))
-      dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.sigma_px});
+      dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.error_px()});
   }
   MapOptions straight;
   straight.order = 1;
