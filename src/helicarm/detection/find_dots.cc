@@ -78,13 +78,14 @@ NoiseCorrelation noise_correlation(const Exposure& exposure) {
   return noise_correlation(exposure, limits.floor, limits.ceiling);
 }
 
-DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
+DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(),
                    [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
   DotFitOptions options = fit_options_for(exposure);
+  options.rough = 0.1;
   double blur = 1;
   double absorbance = 2;
   const auto total = [&] {
@@ -120,7 +121,8 @@ DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots) {
     try_values(blur, scaled, 0.3, 0.6 * radius + 0.3);
     try_values(absorbance, scaled_twice, 0.1, 60);
   }
-  options.noise = noise_correlation(exposure);
+  options.rough = DotFitOptions{}.rough;
+  options.noise = noise;
   return {BallProfile(blur / radius, absorbance), options};
 }
 
@@ -157,6 +159,7 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
 std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& options, double clear_sigma_px) {
   constexpr double same_size = 1.15;
   std::vector<Dot> found = find_dots(exposure, options);
+  const NoiseCorrelation noise = noise_correlation(exposure);
   std::stable_sort(found.begin(), found.end(),
                    [](const Dot& a, const Dot& b) { return a.radius_px < b.radius_px; });
   std::vector<Dot> clear;
@@ -164,7 +167,7 @@ std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& opt
     const auto last = std::find_if(
         first, found.end(), [&](const Dot& dot) { return dot.radius_px > same_size * first->radius_px; });
     const std::vector<Dot> size(first, last);
-    for (const Dot& dot : refit_dots(exposure, size, estimate_look(exposure, size), found))
+    for (const Dot& dot : refit_dots(exposure, size, estimate_look(exposure, noise, size), found))
       if (dot.sigma_px < clear_sigma_px && dot.misfit < options.max_misfit) clear.push_back(dot);
     first = last;
   }

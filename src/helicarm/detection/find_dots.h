@@ -29,7 +29,7 @@ struct DotLook {
 };
 
 /// The look that fits the given dots of one size best: blur and absorbance of least total sigma.
-DotLook estimate_look(const Exposure& exposure, std::vector<Dot> dots);
+DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, std::vector<Dot> dots);
 
 /// All round dots of one polarity, each with the fitted sub-pixel centre, its standard deviation and its
 /// radius.

@@ -112,7 +112,7 @@ TEST(EstimateLook, RefitWithTheBallsOwnLookIsExact) {
   for (Ball& ball : balls) ball.radius = 6;
   const Exposure exposure = noisy(drawn::grey(shade_of(balls), 1200), 4);
   const auto rough = find_dots(exposure, {});
-  const DotLook look = estimate_look(exposure, rough);
+  const DotLook look = estimate_look(exposure, noise_correlation(exposure), rough);
   EXPECT_NEAR(look.profile.blur() * 6, std::sqrt(0.81 + 1.0 / 12), 0.3);
   const auto dots = refit_dots(exposure, rough, look, rough);
   ASSERT_EQ(dots.size(), balls.size());
@@ -120,7 +120,7 @@ TEST(EstimateLook, RefitWithTheBallsOwnLookIsExact) {
 }
 
 TEST(EstimateLook, NoDotsGiveAnOrdinaryLook) {
-  const DotLook look = estimate_look(drawn::exposure(Image<float>(64, 64, 1000)), {});
+  const DotLook look = estimate_look(drawn::exposure(Image<float>(64, 64, 1000)), {}, {});
   EXPECT_GT(look.profile.blur(), 0);
 }
 

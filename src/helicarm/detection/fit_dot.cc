@@ -171,11 +171,11 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     double contrast = 0;
     for (std::size_t k = 0; k < starts.size(); ++k)
       contrast = std::max(contrast, double(std::abs(p[DotModel::contrast_of(k)])));
-    // Outliers are told from a rough start only by and by.
-    const double tolerance = std::max(options.tolerance, 0.3 * std::pow(0.5, i));
+    const double roughness = options.rough * std::pow(0.5, i);
+    const double tolerance = std::max(options.tolerance, roughness);
     cut = reweight(*patch, model, float(tolerance * contrast));
     sums = equations(false);
-    if ((i >= 4 && move < 4e-3) || i == options.iterations) break;
+    if ((roughness < options.tolerance && move < 4e-3) || i == options.iterations) break;
     const Vector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     double share = 1;

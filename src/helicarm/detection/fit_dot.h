@@ -27,6 +27,7 @@ struct DotFitOptions {
   double margin_px = 2.5;     ///< ring of background around the dot
   double margin_share = 0.1;  ///< and as a share of the radius
   double tolerance = 0.03;    ///< misfit, as a share of the contrast, that the profile itself may cause
+  double rough = 0.3;         ///< and that the start may cause: outliers are told from it only by and by
   int iterations = 12;
   float floor = -1e30f;      ///< pixels at or below are outside the field: left out
   float ceiling = 1e30f;     ///< pixels at or above are saturated: the model may exceed them freely

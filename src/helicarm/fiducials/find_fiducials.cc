@@ -58,7 +58,9 @@ double predicted_radius(const View& view, const CalibratorBall& ball) {
 class BallFitter {
  public:
   BallFitter(const Exposure& exposure, const Rectification& rectification, const std::vector<Dot>& named)
-      : exposure_(exposure), look_(estimate_look(exposure, named)), neighbours_(rectification.other_dots) {
+      : exposure_(exposure),
+        look_(estimate_look(exposure, rectification.noise, named)),
+        neighbours_(rectification.other_dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
     for (const Dot& dot : named) contrasts.push_back(dot.contrast);

@@ -121,15 +121,12 @@ Expected<std::vector<PointResult>> see_points(const Case& given, const Result& r
       if (task.pick) check_inside(*task.pick, result.views[task.view].rectification->map);
   });
   if (!done) return tl::unexpected<Failure>(done.error());
-  std::vector<NoiseCorrelation> noise(tasks.empty() ? 0 : result.views.size());
-  parallel_for(noise.size(), result.options.threads,
-               [&](std::size_t i) { noise[i] = noise_correlation(*result.views[i].exposure); });
   parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
     const Task& task = tasks[i];
     const ViewResult& view = result.views[task.view];
-    const auto seen = task.pick ? see_pick(*task.pick, view, centre, noise[task.view])
+    const auto seen = task.pick ? see_pick(*task.pick, view, centre, view.rectification->noise)
                                 : find_target(*view.exposure, view.rectification->map, view.calibrated->view,
-                                              *task.target, discs_of(view), noise[task.view]);
+                                              *task.target, discs_of(view), view.rectification->noise);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

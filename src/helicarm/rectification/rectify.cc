@@ -84,16 +84,18 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Fits the lattice's dots again with a profile of their own and their neighbours masked.
-void sharpen(const Exposure& exposure, const std::vector<Dot>& all, SeenLattice& seen) {
+DotLook sharpen(const Exposure& exposure, const NoiseCorrelation& noise, const std::vector<Dot>& all,
+                SeenLattice& seen) {
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
-  const DotLook look = estimate_look(exposure, members);
+  const DotLook look = estimate_look(exposure, noise, members);
   for (const IndexedDot& d : seen.lattice.dots) {
     const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
     if (!refitted.empty() &&
         (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
   }
+  return look;
 }
 
 Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, std::optional<double> scale,
@@ -223,7 +225,9 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   if (attempt.size() < least_dots)
     return tl::unexpected<Failure>(without_lattice(exposure, plate, options.method, scale, attempt.size()));
 
-  if (options.method == Method::best) sharpen(exposure, attempt.all, attempt.seen);
+  const NoiseCorrelation noise = noise_correlation(exposure);
+  std::optional<DotLook> look;
+  if (options.method == Method::best) look = sharpen(exposure, noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -243,13 +247,14 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   if (!fit) return tl::unexpected<Failure>(fit.error());
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
-  if (options.method == Method::best && dots.size() < plate.dots_mm.size()) {
-    rescue(exposure, plate, *fit, estimate_look(exposure, dots), attempt.all, dots, seen);
+  if (look && dots.size() < plate.dots_mm.size()) {
+    rescue(exposure, plate, *fit, *look, attempt.all, dots, seen);
     if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
   }
 
   Rectification result;
   result.map = fit->map;
+  result.noise = noise;
   set_metric(result.map, exposure, plate, fit->px_per_mm);
   for (std::size_t i = 0; i < dots.size(); ++i) {
     if (!fit->used[i]) continue;
@@ -296,6 +301,7 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
   dot_search.min_radius_px = std::max(dot_search.min_radius_px, least_radius_px);
   Rectification result;
   result.map = map;
+  result.noise = noise_correlation(exposure);
   result.other_dots = find_dots(exposure, dot_search);
   const Plate sought = plate.value_or(any_plate);
   if (sought.kind == DotKind::holes) return result;

@@ -6,6 +6,7 @@
 
 #include "helicarm/detection/blobs.h"
 #include "helicarm/detection/dot.h"
+#include "helicarm/detection/noise.h"
 #include "helicarm/phantom/plate.h"
 #include "helicarm/rectification/distortion_map.h"
 #include "helicarm/rectification/fit_map.h"
@@ -26,6 +27,7 @@ struct Rectification {
   double raw_max_px = 0;
   Polarity metal = Polarity::dark;  ///< how metal shows in this picture
   std::vector<Dot> other_dots;      ///< metal dots that are not the plate's: ball candidates
+  NoiseCorrelation noise;           ///< of the picture
   std::vector<Warning> warnings;
 };
 
