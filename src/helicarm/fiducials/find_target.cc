@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -30,13 +31,6 @@ constexpr int n_background = 10;
 constexpr int n_parameters = n_background + 3;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
-
-struct Pixel {
-  Vector2d offset;  ///< rectified, from the predicted image of the target's point
-  double grey;
-  double weight;
-  int cell;  ///< place in the patch's grid of raw pixels
-};
 
 /// raw -> rectified by a biquadratic through 3 x 3 exact points: the map is smooth and a patch is small.
 class LocalInverse {
@@ -77,108 +71,72 @@ struct Fit {
   double misfit = 0;
 };
 
+/// The pixels about a target as columns.
 struct Patch {
-  std::vector<Pixel> pixels;
+  std::vector<Vector2d> offsets;  ///< rectified, from the predicted image of the target's point
+  std::vector<float> grey;        ///< over `scale`
+  std::vector<float> weights;
+  std::vector<int> cells;  ///< place in the patch's grid of raw pixels
+  PixelRows rows;          ///< the model's derivatives, and below them the residuals
+  double scale;
   double window;
   int side;
   NoiseCorrelation noise;
 };
 
 struct Sums {
-  Normal normal = Normal::Zero();
-  Vector right = Vector::Zero();
-  double squares = 0;
-  double weight = 0;
+  Normal normal;
+  Vector right;
+  double squares;
+  double weight;
 };
 
-/// What residual and derivatives at one pixel are made of.
-struct Shade {
-  Vector row;  ///< the model's derivatives
-  double residual;
-};
-
-Shade shade_at(const Patch& patch, const SolidTemplate& shade, const Vector& p, const Pixel& pixel) {
-  const double x = pixel.offset.x() / patch.window;
-  const double y = pixel.offset.y() / patch.window;
-  const auto [value, slope] = shade.at(pixel.offset - p.tail<2>());
-  const double contrast = p[n_background];
-  Shade at;
-  at.row << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y, -value,
-      contrast * slope;
-  at.residual = pixel.grey - (at.row.head<n_background>().dot(p.head<n_background>()) - contrast * value);
-  return at;
-}
-
-/// Derivatives of a block of pixels side by side, for wide registers.
-constexpr int block = 64;
-using Rows = Eigen::Matrix<double, n_parameters, block, Eigen::RowMajor>;
-
-void find_residuals(const Patch& patch, const SolidTemplate& shade, const Vector& p,
-                    std::vector<double>& residuals) {
-  for (std::size_t i = 0; i < residuals.size(); ++i)
-    residuals[i] = shade_at(patch, shade, p, patch.pixels[i]).residual;
-}
-
-Sums accumulate(const Patch& patch, const SolidTemplate& shade, const Vector& p) {
-  Sums sums;
-  Rows rows;
-  Eigen::Matrix<double, 1, block> weights, residuals;
-  for (std::size_t first = 0; first < patch.pixels.size(); first += block) {
-    rows.setZero();
-    weights.setZero();
-    residuals.setZero();
-    const std::size_t count = std::min<std::size_t>(block, patch.pixels.size() - first);
-    for (std::size_t k = 0; k < count; ++k) {
-      const Pixel& pixel = patch.pixels[first + k];
-      if (pixel.weight == 0) continue;
-      const Shade at = shade_at(patch, shade, p, pixel);
-      rows.col(Eigen::Index(k)) = at.row;
-      weights[Eigen::Index(k)] = pixel.weight;
-      residuals[Eigen::Index(k)] = at.residual;
-    }
-    for (int a = 0; a < n_parameters; ++a) {
-      const Eigen::Matrix<double, 1, block> weighted = rows.row(a).cwiseProduct(weights);
-      for (int b = 0; b <= a; ++b) sums.normal(a, b) += weighted.dot(rows.row(b));
-      sums.right[a] += weighted.dot(residuals);
-    }
-    sums.squares += weights.cwiseProduct(residuals).dot(residuals);
-    sums.weight += weights.sum();
+/// Derivatives and residuals at the given parameters.
+void evaluate(Patch& patch, const SolidTemplate& shade, const Vector& p) {
+  const Vector2d shift = p.tail<2>();
+  const auto contrast = static_cast<float>(p[n_background]);
+  const auto row = [&](int k) { return patch.rows.row(k).data(); };
+  float* by_contrast = row(n_background);
+  float* by_u = row(n_background + 1);
+  float* by_v = row(n_background + 2);
+  float* residual = row(n_parameters);
+  for (std::size_t i = 0; i < patch.offsets.size(); ++i) {
+    const auto [value, slope] = shade.at(patch.offsets[i] - shift);
+    by_contrast[i] = -static_cast<float>(value);
+    by_u[i] = contrast * static_cast<float>(slope.x());
+    by_v[i] = contrast * static_cast<float>(slope.y());
+    residual[i] = patch.grey[i] - contrast * by_contrast[i];
   }
-  return sums;
+  patch.rows.row(n_parameters) -=
+      p.head<n_background>().cast<float>().transpose() * patch.rows.topRows<n_background>();
 }
 
-/// The covariance's middle: what noise that neighbours share does to the right side.
-Normal noise_of(const Patch& patch, const SolidTemplate& shade, const Vector& p) {
-  PixelRows rows(n_parameters, static_cast<Eigen::Index>(patch.pixels.size()));
-  std::vector<int> cells(patch.pixels.size());
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const Vector row = patch.pixels[i].weight * shade_at(patch, shade, p, patch.pixels[i]).row;
-    rows.col(static_cast<Eigen::Index>(i)) = row.cast<float>();
-    cells[i] = patch.pixels[i].cell;
-  }
-  return correlated_normal(patch.noise, rows, cells, patch.side);
+Sums accumulate(const Patch& patch, std::span<const float> weights) {
+  const Eigen::MatrixXd products = weighted_products(patch.rows, weights);
+  return {products.topLeftCorner<n_parameters, n_parameters>(),
+          products.col(n_parameters).head<n_parameters>(), products(n_parameters, n_parameters),
+          products(0, 0)};
 }
 
 /// The spread of the shift when each sector of the patch in turn is left out (delete-a-group jackknife, one
 /// Gauss-Newton step each): what is wrong with the model on one side only, such as an edge of the body
 /// nearby, shows here and not in the noise.
-double jackknife_variance(const Patch& patch, const SolidTemplate& shade, const Vector& p, const Sums& all) {
+double jackknife_variance(const Patch& patch, const Vector& p) {
   constexpr int sectors = 8;
-  std::array<Sums, sectors> left_out;
-  Patch sector{{}, patch.window, patch.side, patch.noise};
-  std::array<std::vector<Pixel>, sectors> pixels;
-  for (const Pixel& pixel : patch.pixels) {
-    const Vector2d from = pixel.offset - p.tail<2>();
+  std::vector<int> sector(patch.offsets.size());
+  for (std::size_t i = 0; i < sector.size(); ++i) {
+    const Vector2d from = patch.offsets[i] - p.tail<2>();
     const double turn = std::atan2(from.y(), from.x()) / (2 * std::numbers::pi) + 0.5;
-    pixels[static_cast<std::size_t>(std::min(sectors - 1.0, sectors * turn))].push_back(pixel);
+    sector[i] = static_cast<int>(std::min(sectors - 1.0, sectors * turn));
   }
   Vector2d sum = Vector2d::Zero();
   double squares = 0;
   for (int k = 0; k < sectors; ++k) {
-    sector.pixels = pixels[static_cast<std::size_t>(k)];
-    const Sums own = accumulate(sector, shade, p);
-    const Normal rest = all.normal - own.normal;
-    const Vector step = rest.selfadjointView<Eigen::Lower>().ldlt().solve(all.right - own.right);
+    std::vector<float> rest = patch.weights;
+    for (std::size_t i = 0; i < rest.size(); ++i)
+      if (sector[i] == k) rest[i] = 0;
+    const Sums sums = accumulate(patch, rest);
+    const Vector step = sums.normal.ldlt().solve(sums.right);
     sum += step.tail<2>();
     squares += step.tail<2>().squaredNorm();
   }
@@ -186,26 +144,25 @@ double jackknife_variance(const Patch& patch, const SolidTemplate& shade, const 
 }
 
 std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
-  std::vector<double> residuals(patch.pixels.size());
   Vector p = Vector::Zero();
-  Sums sums = accumulate(patch, shade, p);
+  evaluate(patch, shade, p);
+  Sums sums = accumulate(patch, patch.weights);
   constexpr int linear = n_background + 1;
   const Eigen::Matrix<double, linear, 1> start =
-      sums.normal.topLeftCorner<linear, linear>().selfadjointView<Eigen::Lower>().ldlt().solve(
-          sums.right.head<linear>());
+      sums.normal.topLeftCorner<linear, linear>().ldlt().solve(sums.right.head<linear>());
   if (!start.allFinite()) return std::nullopt;
   p.head<linear>() = start;
+  const std::span residuals(patch.rows.row(n_parameters).data(), patch.offsets.size());
   double move = 0;
   double damping = 1;
   Vector2d before = Vector2d::Zero();
   for (int i = 0; i < 20; ++i) {
-    find_residuals(patch, shade, p, residuals);
-    const double cut =
-        tukey_cut<double>(residuals, std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background]));
-    for (std::size_t k = 0; k < residuals.size(); ++k)
-      patch.pixels[k].weight = tukey_weight(residuals[k], cut);
-    sums = accumulate(patch, shade, p);
-    Vector step = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(sums.right);
+    evaluate(patch, shade, p);
+    const float cut = tukey_cut<float>(
+        residuals, float(std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background])));
+    for (std::size_t k = 0; k < residuals.size(); ++k) patch.weights[k] = tukey_weight(residuals[k], cut);
+    sums = accumulate(patch, patch.weights);
+    Vector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     // The drawn template has kinks: a step that turns back overshot.
     if (step.tail<2>().dot(before) < 0) damping *= 0.5;
@@ -217,19 +174,24 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
     if (i >= 5 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
+  evaluate(patch, shade, p);
+  sums = accumulate(patch, patch.weights);
   const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
-  const Normal inverse = sums.normal.selfadjointView<Eigen::Lower>().ldlt().solve(Normal::Identity());
-  const Normal covariance = inverse * noise_of(patch, shade, p) * inverse;
-  double squares = 0;
-  for (const double r : residuals) squares += r * r;
+  const Normal inverse = sums.normal.ldlt().solve(Normal::Identity());
+  PixelRows weighted = patch.rows.topRows<n_parameters>();
+  weighted.array().rowwise() *=
+      Eigen::Map<const Eigen::ArrayXf>(patch.weights.data(), Eigen::Index(patch.weights.size())).transpose();
+  const Normal covariance =
+      inverse * correlated_normal(patch.noise, weighted, patch.cells, patch.side) * inverse;
   Fit fit;
   fit.shift = p.tail<2>();
-  fit.contrast = p[n_background];
+  fit.contrast = p[n_background] * patch.scale;
   fit.sigma_px = std::sqrt(
       believed_variance(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
-                        jackknife_variance(patch, shade, p, sums)));
-  fit.noise = std::sqrt(variance);
-  fit.misfit = std::sqrt(squares / double(residuals.size())) / std::max(1e-9, std::abs(fit.contrast));
+                        jackknife_variance(patch, p)));
+  fit.noise = std::sqrt(variance) * patch.scale;
+  fit.misfit = double(patch.rows.row(n_parameters).norm()) / std::sqrt(double(residuals.size())) /
+               std::max(1e-9, std::abs(p[n_background]));
   return fit;
 }
 
@@ -248,10 +210,11 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
   if (!inverse) return not_seen();
   const DotFitOptions limits = fit_options_for(exposure);
   const int half = static_cast<int>(std::ceil(half_width));
-  Patch patch{{}, half_width, 2 * half + 1, noise};
+  Patch patch{{}, {}, {}, {}, {}, 1, half_width, 2 * half + 1, noise};
   const int u0 = static_cast<int>(std::lround(raw.x()));
   const int v0 = static_cast<int>(std::lround(raw.y()));
   int inside = 0;
+  double sum = 0;
   for (int v = v0 - half; v <= v0 + half; ++v)
     for (int u = u0 - half; u <= u0 + half; ++u) {
       const Vector2d offset = (*inverse)(Vector2d(u, v)) - centre;
@@ -264,10 +227,24 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
         return (disc.centre - Vector2d(u, v)).squaredNorm() < disc.radius * disc.radius;
       });
       const int cell = (v - v0 + half) * patch.side + u - u0 + half;
-      if (!hidden) patch.pixels.push_back({offset, double(grey), 1, cell});
+      if (hidden) continue;
+      patch.offsets.push_back(offset);
+      patch.grey.push_back(grey);
+      patch.cells.push_back(cell);
+      sum += std::abs(double(grey));
     }
-  if (2 * patch.pixels.size() < static_cast<std::size_t>(inside) || patch.pixels.size() < 40)
-    return not_seen();
+  const std::size_t count = patch.offsets.size();
+  if (2 * count < static_cast<std::size_t>(inside) || count < 40) return not_seen();
+  patch.scale = std::max(1e-3, sum / double(count));
+  patch.weights.assign(count, 1);
+  patch.rows.resize(n_parameters + 1, static_cast<Eigen::Index>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    patch.grey[i] /= float(patch.scale);
+    const float x = float(patch.offsets[i].x() / half_width);
+    const float y = float(patch.offsets[i].y() / half_width);
+    patch.rows.col(static_cast<Eigen::Index>(i)).head<n_background>() << 1, x, y, x * x, x * y, y * y,
+        x * x * x, x * x * y, x * y * y, y * y * y;
+  }
   return patch;
 }
 
