@@ -72,22 +72,26 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   return odds + fit.log_volume + 3 * log_2pi;
 }
 
-/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never.
+/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never, as does a distance
+/// beyond the gate.
 template <class Cost>
-std::vector<int> pair_up(const Scene& scene, const View& view, const Cost& cost_of) {
+std::vector<int> pair_up(const Scene& scene, const View& view, double gate_px, const Cost& cost_of) {
   struct Pair {
     double cost;
     int ball;
     int candidate;
   };
   std::vector<Pair> pairs;
+  pairs.reserve(scene.balls.size() + scene.candidates.size());
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     const double depth = view.depth(scene.balls[k].centre);
     if (depth <= 0) continue;
     const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
     for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
       const auto& candidate = scene.candidates[i];
-      const double cost = cost_of(k, candidate, candidate.uv - uv);
+      const Eigen::Vector2d off = candidate.uv - uv;
+      if (!(off.squaredNorm() < gate_px * gate_px)) continue;
+      const double cost = cost_of(k, candidate, off);
       if (cost < infinity &&
           scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
         pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
@@ -109,13 +113,13 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
   std::vector<Eigen::Matrix2d> doubt(scene.balls.size(), Eigen::Matrix2d::Zero());
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
     if (h.candidate_of_ball[k] < 0) doubt[k] = prediction_covariance(h.fit, scene.balls[k].centre);
-  return pair_up(
-      scene, h.fit.view, [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-        if (off.norm() > rough_gate_px(scene)) return infinity;
-        const double noise = candidate.sigma_px * candidate.sigma_px;
-        const double cost = off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
-        return cost < match_sigmas * match_sigmas ? cost : infinity;
-      });
+  return pair_up(scene, h.fit.view, rough_gate_px(scene),
+                 [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+                   const double noise = candidate.sigma_px * candidate.sigma_px;
+                   const double cost =
+                       off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
+                   return cost < match_sigmas * match_sigmas ? cost : infinity;
+                 });
 }
 
 }  // namespace
@@ -139,14 +143,13 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
-  return pair_up(scene, view, [&](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-    return off.squaredNorm() < gate_px * gate_px
-               ? off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px)
-               : infinity;
-  });
+  return pair_up(scene, view, gate_px,
+                 [](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+                   return off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px);
+                 });
 }
 
-Hypothesis settle(const Scene& scene, const View& rough) {
+Hypothesis settle(const Scene& scene, const View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
@@ -161,7 +164,7 @@ Hypothesis settle(const Scene& scene, const View& rough) {
     h.candidate_of_ball = std::move(matches);
     sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
-    if (h.matched < 4) return h;
+    if (h.matched < least) return h;
     if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }

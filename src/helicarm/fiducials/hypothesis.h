@@ -69,8 +69,8 @@ std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& c
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 
-/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With fewer
-/// than four matches it is worth nothing: log_odds = -infinity.
-Hypothesis settle(const Scene& scene, const View& rough);
+/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. Once it
+/// has fewer than `least` matches it is worth nothing: log_odds = -infinity.
+Hypothesis settle(const Scene& scene, const View& rough, int least = 4);
 
 }  // namespace helicarm

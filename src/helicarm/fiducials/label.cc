@@ -14,7 +14,7 @@ namespace helicarm {
 namespace {
 
 constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
-constexpr std::size_t loose_triples = 30;
+constexpr std::size_t most_loose = 24;  // poses; a calibrator much like the file's supports the first of them
 constexpr std::size_t most_candidates = 16;  // that the search is measured by
 constexpr int many_balls = 8;
 
@@ -124,19 +124,21 @@ double deviate(double chi2, int dof) {
 
 /// The best that the calibrator can do with its balls well off their places: better than `best` when the file
 /// is of a similar but different calibrator, of which a few balls happen to fit.
-Hypothesis loose_best(const Scene& scene, const Hypothesis& best, const LabellingPrior& prior,
-                      const LabellingOptions& options) {
-  Scene loose = scene;
+Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options) {
+  const Hypothesis& best = search.ranking().front();
+  Scene loose = search.scene();
   for (auto& candidate : loose.candidates) {
-    candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * scene.field_radius_px);
+    candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * loose.field_radius_px);
   }
-  Hypothesis near_best = settle(loose, best.fit.view);
-  const auto could_match = static_cast<double>(std::min(scene.candidates.size(), scene.balls.size()));
-  if (best.matched >= 0.75 * could_match || near_best.log_odds > best.log_odds) return near_best;
-  LabelSearch search(loose, focals_to_try(prior));
-  explore(search, loose_triples, [&](const Hypothesis& h, std::size_t) { return surely(h, options); });
-  if (search.ranking().empty() || search.ranking().front().log_odds < near_best.log_odds) return near_best;
-  return search.ranking().front();
+  Hypothesis found = settle(loose, best.fit.view);
+  const auto could_match = static_cast<double>(std::min(loose.candidates.size(), loose.balls.size()));
+  if (best.matched >= 0.75 * could_match) return found;
+  for (const View& rough : search.supported(best.matched, most_loose)) {
+    if (found.log_odds > best.log_odds && surely(found, options)) break;
+    Hypothesis other = settle(loose, rough, best.matched);
+    if (other.log_odds > found.log_odds) found = std::move(other);
+  }
+  return found;
 }
 
 tl::unexpected<Failure> too_few(int balls, int candidates) {
@@ -158,8 +160,9 @@ bool misfits(const Scene& scene, const Hypothesis& h) {
 }
 
 /// Why not even the best hypothesis is to be believed, if so.
-std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, const LabellingPrior& prior,
-                                 const LabellingOptions& options) {
+std::optional<Failure> objection(const LabelSearch& search, const LabellingOptions& options) {
+  const Scene& scene = search.scene();
+  const Ranking& ranking = search.ranking();
   const int n = static_cast<int>(scene.candidates.size());
   if (ranking.empty() || ranking.front().log_odds <= 0) {
     if (n < least_balls + 2) return too_few(ranking.empty() ? 0 : ranking.front().matched, n).value();
@@ -170,7 +173,7 @@ std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, con
   }
   const Hypothesis& best = ranking.front();
   const int dof = 2 * best.matched - 6;
-  const Hypothesis loose = loose_best(scene, best, prior, options);
+  const Hypothesis loose = loose_best(search, options);
   if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || misfits(scene, best)) {
     return fail(Reason::calibrator_mismatch,
                 fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
@@ -230,13 +233,13 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   // A few balls may be part of many under other names: these are then met first.
-  explore(search, triples_to_meet(least_balls, candidates.size()),
-          [&](const Hypothesis& h, std::size_t tried) {
-            return surely(h, options) &&
-                   (h.matched >= many_balls || tried >= triples_to_meet(many_balls, candidates.size()));
-          });
+  explore(
+      search, triples_to_meet(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {
+        return surely(h, options) && (h.matched >= many_balls || h.log_odds >= 2 * options.least_log_odds ||
+                                      tried >= triples_to_meet(many_balls, candidates.size()));
+      });
   if (!search.ranking().empty()) challenge(search);
-  auto failure = objection(scene, search.ranking(), prior, options);
+  auto failure = objection(search, options);
   if (failure) return tl::unexpected(*std::move(failure));
   const auto best = undisputed(scene, search.ranking(), options);
   if (!best) return tl::unexpected(best.error());
