@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace helicarm {
 namespace {
@@ -122,6 +123,31 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
                  });
 }
 
+/// Squared distance of a ball from where the others put it, in sigmas: its residual, studentised.
+double departure2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
+  const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
+  const Eigen::Vector3d& centre = scene.balls[ball].centre;
+  const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
+  const double noise = seen.sigma_px * seen.sigma_px;
+  constexpr double unchecked = 1e-3;  // a ball that alone holds the fit by one end is never off
+  const Eigen::Matrix2d spread =
+      (1 + unchecked) * noise * Eigen::Matrix2d::Identity() - prediction_covariance(h.fit, centre);
+  const double off2 = off.dot(spread.inverse() * off);
+  return std::isfinite(off2) ? off2 : infinity;
+}
+
+/// The balls farther than this from where the others put them, the farthest first.
+std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) {
+  std::vector<std::pair<double, int>> off2;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k)
+    if (h.candidate_of_ball[k] >= 0) off2.push_back({departure2(scene, h, k), static_cast<int>(k)});
+  std::sort(off2.rbegin(), off2.rend());
+  std::vector<int> balls;
+  for (const auto& [distance2, ball] : off2)
+    if (distance2 > sigmas * sigmas) balls.push_back(ball);
+  return balls;
+}
+
 }  // namespace
 
 std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
@@ -153,7 +179,6 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
-  std::vector<Sighting> sightings;
   constexpr int narrowing = 4;
   constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
@@ -162,17 +187,58 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
     auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
-    sightings = sightings_of(scene, h.candidate_of_ball);
+    auto sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
     if (h.matched < least) return h;
     if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }
+  while (h.fit.chi2 > match_sigmas * match_sigmas) {  // no ball's removal can take away more
+    const auto off = beyond(scene, h, match_sigmas);
+    if (off.empty()) break;
+    h = without(scene, std::move(h), off.front());
+  }
+  weigh(scene, h);
+  if (h.matched < least) h.log_odds = -infinity;
+  return h;
+}
+
+void weigh(const Scene& scene, Hypothesis& h) {
+  const auto sightings = sightings_of(scene, h.candidate_of_ball);
+  h.matched = static_cast<int>(sightings.size());
+  h.residual2_px2 = 0;
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);
   h.radius_excess = radii.excess;
   h.log_odds = log_odds(scene, sightings, h.fit) + radii.log_odds;
+}
+
+std::vector<int> doubted(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
+
+Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
+  h.candidate_of_ball[ball] = -1;
+  h.fit = fit_pose(h.fit.view, sightings_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
   return h;
+}
+
+std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate) {
+  Hypothesis all = h;
+  for (int& named : all.candidate_of_ball)
+    if (named == candidate) named = -1;
+  all.candidate_of_ball[ball] = candidate;
+  all.fit = fit_pose(h.fit.view, sightings_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+  std::vector<Hypothesis> rivals{all};
+  for (const int other : doubted(scene, all)) {
+    if (other == ball) continue;
+    Hypothesis rival = without(scene, all, other);
+    rivals.push_back(rival);
+    for (auto off = doubted(scene, rival); !off.empty() && off.front() != ball; off = doubted(scene, rival)) {
+      rival = without(scene, std::move(rival), off.front());
+      rivals.push_back(rival);
+    }
+  }
+  for (auto& rival : rivals) weigh(scene, rival);
+  return rivals;
 }
 
 }  // namespace helicarm

@@ -106,6 +106,18 @@ std::vector<View> LabelSearch::supported(int wanted, std::size_t most) const {
   return views;
 }
 
+void LabelSearch::try_near_misses(const Hypothesis& h) {
+  for (std::size_t k = 0; k < scene_.balls.size(); ++k) {
+    const Eigen::Vector2d uv = h.fit.view.project(scene_.balls[k].centre);
+    for (std::size_t i = 0; i < scene_.candidates.size(); ++i) {
+      if (h.candidate_of_ball[k] == static_cast<int>(i)) continue;
+      if ((scene_.candidates[i].uv - uv).norm() >= rough_gate_px(scene_)) continue;
+      for (auto& rival : with_pair(scene_, h, static_cast<int>(k), static_cast<int>(i)))
+        keep(std::move(rival));
+    }
+  }
+}
+
 void LabelSearch::keep(Hypothesis hypothesis) {
   if (!std::isfinite(hypothesis.log_odds)) return;
   const auto same = std::find_if(ranking_.begin(), ranking_.end(), [&](const Hypothesis& other) {
@@ -145,6 +157,7 @@ void challenge(LabelSearch& search) {
     for (int done = 0, dealt = 0; done < triples && dealt < 5 * triples; ++dealt) {
       done += search.try_triple(dealer.deal()) ? 1 : 0;
     }
+    search.try_near_misses(Hypothesis(search.ranking().front()));
   } while (search.ranking().front().candidate_of_ball != best);
 }
 

@@ -26,6 +26,10 @@ class LabelSearch {
   /// False, and nothing done, when the three lie too nearly in a line or have been tried before.
   bool try_triple(std::array<int, 3> candidates);
 
+  /// Weighs what becomes of `h` when a candidate near a ball, but not near enough for it, is that ball after
+  /// all. A false disc in a hidden ball's stead can bend the fit until a true one is missed.
+  void try_near_misses(const Hypothesis& h);
+
   const Ranking& ranking() const { return ranking_; }
 
   /// The poses met that have candidates near at least `wanted` balls, best supported first, up to `most`.
