@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace helicarm {
 namespace {
@@ -72,22 +73,26 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   return odds + fit.log_volume + 3 * log_2pi;
 }
 
-/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never.
+/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never, as does a distance
+/// beyond the gate.
 template <class Cost>
-std::vector<int> pair_up(const Scene& scene, const View& view, const Cost& cost_of) {
+std::vector<int> pair_up(const Scene& scene, const View& view, double gate_px, const Cost& cost_of) {
   struct Pair {
     double cost;
     int ball;
     int candidate;
   };
   std::vector<Pair> pairs;
+  pairs.reserve(scene.balls.size() + scene.candidates.size());
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     const double depth = view.depth(scene.balls[k].centre);
     if (depth <= 0) continue;
     const Eigen::Vector2d uv = view.project(scene.balls[k].centre);
     for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
       const auto& candidate = scene.candidates[i];
-      const double cost = cost_of(k, candidate, candidate.uv - uv);
+      const Eigen::Vector2d off = candidate.uv - uv;
+      if (!(off.squaredNorm() < gate_px * gate_px)) continue;
+      const double cost = cost_of(k, candidate, off);
       if (cost < infinity &&
           scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
         pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
@@ -109,13 +114,38 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
   std::vector<Eigen::Matrix2d> doubt(scene.balls.size(), Eigen::Matrix2d::Zero());
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
     if (h.candidate_of_ball[k] < 0) doubt[k] = prediction_covariance(h.fit, scene.balls[k].centre);
-  return pair_up(
-      scene, h.fit.view, [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-        if (off.norm() > rough_gate_px(scene)) return infinity;
-        const double noise = candidate.sigma_px * candidate.sigma_px;
-        const double cost = off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
-        return cost < match_sigmas * match_sigmas ? cost : infinity;
-      });
+  return pair_up(scene, h.fit.view, rough_gate_px(scene),
+                 [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+                   const double noise = candidate.sigma_px * candidate.sigma_px;
+                   const double cost =
+                       off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
+                   return cost < match_sigmas * match_sigmas ? cost : infinity;
+                 });
+}
+
+/// Squared distance of a ball from where the others put it, in sigmas: its residual, studentised.
+double departure2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
+  const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
+  const Eigen::Vector3d& centre = scene.balls[ball].centre;
+  const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
+  const double noise = seen.sigma_px * seen.sigma_px;
+  constexpr double unchecked = 1e-3;  // a ball that alone holds the fit by one end is never off
+  const Eigen::Matrix2d spread =
+      (1 + unchecked) * noise * Eigen::Matrix2d::Identity() - prediction_covariance(h.fit, centre);
+  const double off2 = off.dot(spread.inverse() * off);
+  return std::isfinite(off2) ? off2 : infinity;
+}
+
+/// The balls farther than this from where the others put them, the farthest first.
+std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) {
+  std::vector<std::pair<double, int>> off2;
+  for (std::size_t k = 0; k < scene.balls.size(); ++k)
+    if (h.candidate_of_ball[k] >= 0) off2.push_back({departure2(scene, h, k), static_cast<int>(k)});
+  std::sort(off2.rbegin(), off2.rend());
+  std::vector<int> balls;
+  for (const auto& [distance2, ball] : off2)
+    if (distance2 > sigmas * sigmas) balls.push_back(ball);
+  return balls;
 }
 
 }  // namespace
@@ -139,18 +169,16 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
-  return pair_up(scene, view, [&](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-    return off.squaredNorm() < gate_px * gate_px
-               ? off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px)
-               : infinity;
-  });
+  return pair_up(scene, view, gate_px,
+                 [](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
+                   return off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px);
+                 });
 }
 
-Hypothesis settle(const Scene& scene, const View& rough) {
+Hypothesis settle(const Scene& scene, const View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
-  std::vector<Sighting> sightings;
   constexpr int narrowing = 4;
   constexpr int most_turns = 10;
   for (int turn = 0; turn < most_turns; ++turn) {
@@ -159,17 +187,58 @@ Hypothesis settle(const Scene& scene, const View& rough) {
     auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
-    sightings = sightings_of(scene, h.candidate_of_ball);
+    auto sightings = sightings_of(scene, h.candidate_of_ball);
     h.matched = static_cast<int>(sightings.size());
-    if (h.matched < 4) return h;
+    if (h.matched < least) return h;
     if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
   }
+  while (h.fit.chi2 > match_sigmas * match_sigmas) {  // no ball's removal can take away more
+    const auto off = beyond(scene, h, match_sigmas);
+    if (off.empty()) break;
+    h = without(scene, std::move(h), off.front());
+  }
+  weigh(scene, h);
+  if (h.matched < least) h.log_odds = -infinity;
+  return h;
+}
+
+void weigh(const Scene& scene, Hypothesis& h) {
+  const auto sightings = sightings_of(scene, h.candidate_of_ball);
+  h.matched = static_cast<int>(sightings.size());
+  h.residual2_px2 = 0;
   for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);
   h.radius_excess = radii.excess;
   h.log_odds = log_odds(scene, sightings, h.fit) + radii.log_odds;
+}
+
+std::vector<int> doubted(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
+
+Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
+  h.candidate_of_ball[ball] = -1;
+  h.fit = fit_pose(h.fit.view, sightings_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
   return h;
+}
+
+std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate) {
+  Hypothesis all = h;
+  for (int& named : all.candidate_of_ball)
+    if (named == candidate) named = -1;
+  all.candidate_of_ball[ball] = candidate;
+  all.fit = fit_pose(h.fit.view, sightings_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+  std::vector<Hypothesis> rivals{all};
+  for (const int other : doubted(scene, all)) {
+    if (other == ball) continue;
+    Hypothesis rival = without(scene, all, other);
+    rivals.push_back(rival);
+    for (auto off = doubted(scene, rival); !off.empty() && off.front() != ball; off = doubted(scene, rival)) {
+      rival = without(scene, std::move(rival), off.front());
+      rivals.push_back(rival);
+    }
+  }
+  for (auto& rival : rivals) weigh(scene, rival);
+  return rivals;
 }
 
 }  // namespace helicarm

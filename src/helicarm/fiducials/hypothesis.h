@@ -69,8 +69,23 @@ std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& c
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 
-/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. With fewer
-/// than four matches it is worth nothing: log_odds = -infinity.
-Hypothesis settle(const Scene& scene, const View& rough);
+/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. Once it
+/// has fewer than `least` matches it is worth nothing: log_odds = -infinity.
+Hypothesis settle(const Scene& scene, const View& rough, int least = 4);
+
+/// Sets what follows from the matches and the fit: their number, residuals and log odds.
+void weigh(const Scene& scene, Hypothesis& h);
+
+/// The balls that lie off where the others put them, by 3.3 sigma of their candidates and of the prediction:
+/// one true ball of 230, and each false disc that anyone could tell from a ball (4 sigma, less what the
+/// systematic error adds). The farthest comes first.
+std::vector<int> doubted(const Scene& scene, const Hypothesis& h);
+
+/// `h` without a ball, fitted anew but not weighed.
+Hypothesis without(const Scene& scene, Hypothesis h, int ball);
+
+/// What becomes of `h` when this candidate is that ball after all: with all the others, and without each that
+/// this puts in doubt and those that are then still in doubt.
+std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate);
 
 }  // namespace helicarm

@@ -14,7 +14,7 @@ namespace helicarm {
 namespace {
 
 constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
-constexpr std::size_t loose_triples = 30;
+constexpr std::size_t most_loose = 24;  // poses; a calibrator much like the file's supports the first of them
 constexpr std::size_t most_candidates = 16;  // that the search is measured by
 constexpr int many_balls = 8;
 
@@ -65,21 +65,19 @@ bool surely(const Hypothesis& h, const LabellingOptions& options) {
   return h.matched >= least_balls && h.log_odds >= options.least_log_odds;
 }
 
-/// A ball is better left unnamed when the disc of another, unnamed ball covers it, when two candidates are in
-/// its reach, or when it bent the fit to suit itself: the geometric mean of its distances with and without a
-/// say is the studentised residual.
-void drop_doubtful(const Scene& scene, Hypothesis& h) {
+int count_named(const Hypothesis& h) {
+  return static_cast<int>(
+      std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; }));
+}
+
+/// A ball is better left unnamed when the disc of another, unnamed ball covers it, or when two candidates are
+/// in its reach.
+void drop_covered(const Scene& scene, Hypothesis& h) {
   const std::vector<int> named = h.candidate_of_ball;
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k] < 0) continue;
     const auto& own = scene.candidates[named[k]];
-    const auto distance = [&](const View& view) {
-      return (view.project(scene.balls[k].centre) - own.uv).norm();
-    };
-    auto others = named;
-    others[k] = -1;
-    const View without = fit_pose(h.fit.view, sightings_of(scene, others), scene.camera, fit_steps).view;
-    bool doubtful = std::sqrt(distance(h.fit.view) * distance(without)) > 3 * own.sigma_px;
+    bool doubtful = false;
     for (std::size_t other = 0; other < named.size(); ++other) {
       if (named[other] >= 0) continue;
       const Eigen::Vector2d uv = h.fit.view.project(scene.balls[other].centre);
@@ -94,20 +92,14 @@ void drop_doubtful(const Scene& scene, Hypothesis& h) {
   }
 }
 
-int count_named(const Hypothesis& h) {
-  return static_cast<int>(
-      std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; }));
-}
-
-/// Takes out of `h` each pair that `rival` contradicts.
+/// Takes out of `h` each pair that `rival` does not share, if `rival` names any ball otherwise than `h`.
 void keep_agreed(Hypothesis& h, const Hypothesis& rival) {
-  for (std::size_t k = 0; k < h.candidate_of_ball.size(); ++k) {
-    int& mine = h.candidate_of_ball[k];
-    for (std::size_t j = 0; j < rival.candidate_of_ball.size() && mine >= 0; ++j) {
-      const int theirs = rival.candidate_of_ball[j];
-      if (theirs >= 0 && (j == k) != (theirs == mine)) mine = -1;
-    }
-  }
+  const auto& mine = h.candidate_of_ball;
+  const auto& theirs = rival.candidate_of_ball;
+  bool other = false;
+  for (std::size_t k = 0; k < mine.size(); ++k) other |= theirs[k] >= 0 && theirs[k] != mine[k];
+  for (std::size_t k = 0; other && k < mine.size(); ++k)
+    if (theirs[k] != mine[k]) h.candidate_of_ball[k] = -1;
 }
 
 bool contradicts(const Hypothesis& rival, const Hypothesis& h) {
@@ -124,19 +116,21 @@ double deviate(double chi2, int dof) {
 
 /// The best that the calibrator can do with its balls well off their places: better than `best` when the file
 /// is of a similar but different calibrator, of which a few balls happen to fit.
-Hypothesis loose_best(const Scene& scene, const Hypothesis& best, const LabellingPrior& prior,
-                      const LabellingOptions& options) {
-  Scene loose = scene;
+Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options) {
+  const Hypothesis& best = search.ranking().front();
+  Scene loose = search.scene();
   for (auto& candidate : loose.candidates) {
-    candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * scene.field_radius_px);
+    candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * loose.field_radius_px);
   }
-  Hypothesis near_best = settle(loose, best.fit.view);
-  const auto could_match = static_cast<double>(std::min(scene.candidates.size(), scene.balls.size()));
-  if (best.matched >= 0.75 * could_match || near_best.log_odds > best.log_odds) return near_best;
-  LabelSearch search(loose, focals_to_try(prior));
-  explore(search, loose_triples, [&](const Hypothesis& h, std::size_t) { return surely(h, options); });
-  if (search.ranking().empty() || search.ranking().front().log_odds < near_best.log_odds) return near_best;
-  return search.ranking().front();
+  Hypothesis found = settle(loose, best.fit.view);
+  const auto could_match = static_cast<double>(std::min(loose.candidates.size(), loose.balls.size()));
+  if (best.matched >= 0.75 * could_match) return found;
+  for (const View& rough : search.supported(best.matched, most_loose)) {
+    if (found.log_odds > best.log_odds && surely(found, options)) break;
+    Hypothesis other = settle(loose, rough, best.matched);
+    if (other.log_odds > found.log_odds) found = std::move(other);
+  }
+  return found;
 }
 
 tl::unexpected<Failure> too_few(int balls, int candidates) {
@@ -150,16 +144,16 @@ tl::unexpected<Failure> too_few(int balls, int candidates) {
 bool misfits(const Scene& scene, const Hypothesis& h) {
   if (deviate(h.fit.chi2, 2 * h.matched - 6) < most_deviation) return false;
   Hypothesis kept = h;
-  drop_doubtful(scene, kept);
+  if (const auto off = doubted(scene, h); !off.empty()) kept = without(scene, h, off.front());
   const int named = count_named(kept);
-  if (named < std::max(least_balls, h.matched - 1)) return true;
-  const auto seen = sightings_of(scene, kept.candidate_of_ball);
-  return deviate(fit_pose(h.fit.view, seen, scene.camera, fit_steps).chi2, 2 * named - 6) > most_deviation;
+  return named < std::max(least_balls, h.matched - 1) ||
+         deviate(kept.fit.chi2, 2 * named - 6) > most_deviation;
 }
 
 /// Why not even the best hypothesis is to be believed, if so.
-std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, const LabellingPrior& prior,
-                                 const LabellingOptions& options) {
+std::optional<Failure> objection(const LabelSearch& search, const LabellingOptions& options) {
+  const Scene& scene = search.scene();
+  const Ranking& ranking = search.ranking();
   const int n = static_cast<int>(scene.candidates.size());
   if (ranking.empty() || ranking.front().log_odds <= 0) {
     if (n < least_balls + 2) return too_few(ranking.empty() ? 0 : ranking.front().matched, n).value();
@@ -170,7 +164,7 @@ std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, con
   }
   const Hypothesis& best = ranking.front();
   const int dof = 2 * best.matched - 6;
-  const Hypothesis loose = loose_best(scene, best, prior, options);
+  const Hypothesis loose = loose_best(search, options);
   if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || misfits(scene, best)) {
     return fail(Reason::calibrator_mismatch,
                 fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
@@ -196,24 +190,36 @@ std::optional<Failure> objection(const Scene& scene, const Ranking& ranking, con
   return std::nullopt;
 }
 
-/// The best hypothesis less whatever an almost as good one contradicts; refused when too little remains.
-Expected<Hypothesis> undisputed(const Scene& scene, const Ranking& ranking, const LabellingOptions& options) {
-  Hypothesis best = ranking.front();
+/// The best hypothesis less the balls in doubt and whatever an almost as good one contradicts; refused when
+/// too little remains.
+Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& options) {
+  const Scene& scene = search.scene();
+  Hypothesis best = search.ranking().front();
   const int dof = 2 * best.matched - 6;
+  // Where chi2 is larger than chance makes it (by 1.5 sigma), the odds are less sure in the same measure.
   const double asked =
-      options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 3 * std::sqrt(2.0 * dof)));
-  drop_doubtful(scene, best);
+      options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 1.5 * std::sqrt(2.0 * dof)));
+  const int matched = best.matched;
   const int n = static_cast<int>(scene.candidates.size());
+  // All in doubt go, since it need not be the farthest that is false; what they would be instead is weighed.
+  for (auto off = doubted(scene, best); !off.empty(); off = doubted(scene, best)) {
+    for (const int ball : off) best = without(scene, std::move(best), ball);
+    if (count_named(best) < least_balls) return too_few(count_named(best), n);
+    weigh(scene, best);
+    search.try_near_misses(best);
+  }
+  const double log_odds = best.log_odds;
+  drop_covered(scene, best);
   if (count_named(best) < least_balls) return too_few(count_named(best), n);
-  for (const auto& rival : ranking) {
-    if (ranking.front().log_odds - rival.log_odds >= asked) break;
+  for (const auto& rival : search.ranking()) {
+    if (log_odds - rival.log_odds >= asked) break;
     if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
     if (rival.mirrored() != best.mirrored() || count_named(best) < least_balls) {
       return fail(Reason::ambiguous_labels, "another labelling explains the image almost as well",
-                  {{"matched", best.matched},
+                  {{"matched", matched},
                    {"runner_up_matched", rival.matched},
                    {"mirror_differs", rival.mirrored() != best.mirrored()},
-                   {"margin", best.log_odds - rival.log_odds},
+                   {"margin", log_odds - rival.log_odds},
                    {"margin_needed", asked}});
     }
   }
@@ -230,15 +236,15 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   // A few balls may be part of many under other names: these are then met first.
-  explore(search, triples_to_meet(least_balls, candidates.size()),
-          [&](const Hypothesis& h, std::size_t tried) {
-            return surely(h, options) &&
-                   (h.matched >= many_balls || tried >= triples_to_meet(many_balls, candidates.size()));
-          });
+  explore(
+      search, triples_to_meet(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {
+        return surely(h, options) && (h.matched >= many_balls || h.log_odds >= 2 * options.least_log_odds ||
+                                      tried >= triples_to_meet(many_balls, candidates.size()));
+      });
   if (!search.ranking().empty()) challenge(search);
-  auto failure = objection(scene, search.ranking(), prior, options);
+  auto failure = objection(search, options);
   if (failure) return tl::unexpected(*std::move(failure));
-  const auto best = undisputed(scene, search.ranking(), options);
+  const auto best = undisputed(search, options);
   if (!best) return tl::unexpected(best.error());
 
   Labelling labelling;

@@ -71,6 +71,24 @@ TEST(LabelBalls, PartsOfTheTruthGiveWayToAllOfIt) {
   }
 }
 
+TEST(LabelBalls, ImitatedBallsDoNotBendTheNames) {
+  // In these a false disc near a hidden ball's place once cost a true ball its name, and kept its own.
+  struct Hard {
+    std::uint64_t seed, number;
+  };
+  for (const Hard hard : {Hard{1, 1040}, Hard{1, 2874}, Hard{1, 4800}, Hard{1, 6021}, Hard{1, 7785},
+                          Hard{2, 6155}, Hard{2, 6880}, Hard{5, 47}, Hard{5, 7049}}) {
+    RandomStream random(hard.seed, 2000, hard.number);  // as the study draws it
+    const int hidden = static_cast<int>(random.index(7));
+    const int false_discs = static_cast<int>(random.index(11));
+    const auto picture = picture_of(
+        udcsc(), {.hidden = hidden, .false_discs = false_discs, .kind = simulation::FalseDiscs::imitating},
+        random);
+    const auto labelling = label_balls(udcsc(), picture.candidates, nominal);
+    EXPECT_TRUE(!labelling || right(*labelling, picture, udcsc())) << hard.seed << " " << hard.number;
+  }
+}
+
 TEST(LabelBalls, ArbitraryPhantomsOfTwoBallSizes) {
   for (const int balls : {8, 16}) {
     const auto tally = monte_carlo(scattered(balls, 3), 60, 0.3);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/fiducials/pose_fit.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -10,27 +12,29 @@ namespace helicarm {
 namespace {
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
-using Matrix9 = Eigen::Matrix<double, 9, 9>;
 
-Eigen::Vector3d camera_departure(const Intrinsics& k, const CameraPrior& prior) {
-  return {std::log(k.fy / prior.focal_px) / prior.focal_sigma,
-          (k.u0 - prior.principal_px.x()) / prior.principal_sigma_px,
-          (k.v0 - prior.principal_px.y()) / prior.principal_sigma_px};
-}
+using Four = Eigen::Array4d;
 
-double chi2_of(const View& view, const std::vector<Sighting>& sightings, const CameraPrior& prior) {
-  double sum = camera_departure(view.intrinsics, prior).squaredNorm();
-  for (const auto& s : sightings) {
-    if (view.depth(s.point) <= 0) return std::numeric_limits<double>::infinity();
-    sum += (view.project(s.point) - s.uv).squaredNorm() / (s.sigma_px * s.sigma_px);
-  }
-  return sum;
-}
-
-struct Normal {
-  Matrix9 information = Matrix9::Zero();
-  Vector9 gradient = Vector9::Zero();
+/// Four sightings side by side; of the last four some may have no weight.
+struct FourSightings {
+  Four x, y, z, u, v, weight;
 };
+
+std::vector<FourSightings> in_fours(const std::vector<Sighting>& sightings) {
+  std::vector<FourSightings> fours((sightings.size() + 3) / 4);
+  for (std::size_t i = 0; i < 4 * fours.size(); ++i) {
+    const Sighting& s = sightings[std::min(i, sightings.size() - 1)];
+    FourSightings& four = fours[i / 4];
+    const auto lane = static_cast<Eigen::Index>(i % 4);
+    four.x[lane] = s.point.x();
+    four.y[lane] = s.point.y();
+    four.z[lane] = s.point.z();
+    four.u[lane] = s.uv.x();
+    four.v[lane] = s.uv.y();
+    four.weight[lane] = i < sightings.size() ? 1 / s.sigma_px : 0;
+  }
+  return fours;
+}
 
 /// Of a point's image. Unknowns: rotation (applied from the left), translation, ln f, u0, v0.
 Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& point) {
@@ -51,19 +55,79 @@ Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& po
   return j;
 }
 
-Normal normal_equations(const View& view, const std::vector<Sighting>& sightings, const CameraPrior& prior) {
-  Normal normal;
+/// A row of the Jacobian without its zeros, with the residual at its end.
+using Row = std::array<Four, 8>;
+using Products = std::array<Row, 8>;
+
+void add(Products& sums, const Row& row) {
+  for (std::size_t i = 0; i < row.size(); ++i)
+    for (std::size_t j = 0; j <= i; ++j) sums[i][j] += row[i] * row[j];
+}
+
+/// Lower triangle of the normal equations; row 9 is the gradient and (9, 9) chi2. The last two rows make up
+/// whole vectors.
+using Normal = Eigen::Matrix<double, 12, 10>;
+
+Normal normal_equations(const View& view, const std::vector<FourSightings>& fours, const CameraPrior& prior) {
+  constexpr std::array<int, 8> of_u{0, 1, 2, 3, 5, 6, 7, 9};
+  constexpr std::array<int, 8> of_v{0, 1, 2, 4, 5, 6, 8, 9};
+  Products u_sums;
+  for (Row& row : u_sums) row.fill(Four::Zero());
+  Products v_sums = u_sums;
+  const Eigen::Matrix3d& r = view.camera_from_world.rotation;
+  const Eigen::Vector3d& t = view.camera_from_world.translation;
   const Intrinsics& k = view.intrinsics;
-  for (const auto& s : sightings) {
-    const Eigen::Matrix<double, 2, 9> j = jacobian(view, s.point) / s.sigma_px;
-    const Eigen::Vector2d residual = (view.project(s.point) - s.uv) / s.sigma_px;
-    normal.information += j.transpose().lazyProduct(j);
-    normal.gradient += j.transpose().lazyProduct(residual);
+  bool before_source = true;
+  for (const FourSightings& s : fours) {
+    const Four x = r(0, 0) * s.x + r(0, 1) * s.y + r(0, 2) * s.z;
+    const Four y = r(1, 0) * s.x + r(1, 1) * s.y + r(1, 2) * s.z;
+    const Four z = r(2, 0) * s.x + r(2, 1) * s.y + r(2, 2) * s.z;
+    const Four depth = z + t.z();
+    before_source &= (depth > 0).all();
+    const Four px = (x + t.x()) / depth;
+    const Four py = (y + t.y()) / depth;
+    const Four fu = k.fx * s.weight / depth;
+    const Four fv = k.fy * s.weight / depth;
+    add(u_sums, {-fu * px * y, fu * (z + px * x), -fu * y, fu, -fu * px, k.fx * px * s.weight, s.weight,
+                 (k.fx * px + k.u0 - s.u) * s.weight});
+    add(v_sums, {-fv * (py * y + z), fv * py * x, fv * x, fv, -fv * py, k.fy * py * s.weight, s.weight,
+                 (k.fy * py + k.v0 - s.v) * s.weight});
   }
-  const Eigen::Vector3d sigma(prior.focal_sigma, prior.principal_sigma_px, prior.principal_sigma_px);
-  normal.information.diagonal().tail<3>().array() += sigma.array().inverse().square();
-  normal.gradient.tail<3>().array() += camera_departure(k, prior).array() / sigma.array();
+  Normal normal = Normal::Zero();
+  for (std::size_t i = 0; i < of_u.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      normal(of_u[i], of_u[j]) += u_sums[i][j].sum();
+      normal(of_v[i], of_v[j]) += v_sums[i][j].sum();
+    }
+  }
+  const std::array<double, 3> sigma{prior.focal_sigma, prior.principal_sigma_px, prior.principal_sigma_px};
+  const std::array<double, 3> departure{std::log(k.fy / prior.focal_px), k.u0 - prior.principal_px.x(),
+                                        k.v0 - prior.principal_px.y()};
+  for (int i = 0; i < 3; ++i) {
+    const double excess = departure[i] / sigma[i];
+    normal(6 + i, 6 + i) += 1 / (sigma[i] * sigma[i]);
+    normal(9, 6 + i) += excess / sigma[i];
+    normal(9, 9) += excess * excess;
+  }
+  if (!before_source) normal(9, 9) = std::numeric_limits<double>::infinity();
   return normal;
+}
+
+/// Cholesky's factor takes the place of the normal equations; what becomes of the gradient on the way is half
+/// of the solution.
+Vector9 descent(Normal a, double damping) {
+  a.diagonal().head<9>() *= 1 + damping;
+  for (int j = 0; j < 9; ++j) {
+    a.col(j) /= std::sqrt(a(j, j));
+    for (int k = j + 1; k < 9; ++k) a.col(k) -= a(k, j) * a.col(j);
+  }
+  Vector9 step;
+  for (int j = 8; j >= 0; --j) {
+    double rest = -a(9, j);
+    for (int i = j + 1; i < 9; ++i) rest -= a(i, j) * step[i];
+    step[j] = rest / a(j, j);
+  }
+  return step;
 }
 
 View moved(const View& view, const Vector9& step) {
@@ -85,26 +149,25 @@ View moved(const View& view, const Vector9& step) {
 
 PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, const CameraPrior& prior,
                  int most_steps) {
-  PoseFit fit{start, chi2_of(start, sightings, prior)};
-  Normal normal = normal_equations(fit.view, sightings, prior);
+  const auto fours = in_fours(sightings);
+  PoseFit fit{start};
+  Normal normal = normal_equations(fit.view, fours, prior);
   double damping = 1e-6;
   for (int step = 0; step < most_steps && damping < 1e3; ++step) {
-    Matrix9 damped = normal.information;
-    damped.diagonal() *= 1 + damping;
-    const View next = moved(fit.view, -damped.llt().solve(normal.gradient));
-    const double chi2 = chi2_of(next, sightings, prior);
-    if (!(chi2 <= fit.chi2)) {
+    const View next = moved(fit.view, descent(normal, damping));
+    const Normal there = normal_equations(next, fours, prior);
+    const double gain = normal(9, 9) - there(9, 9);
+    if (!(there(9, 9) <= normal(9, 9))) {
       damping = damping * 30 + 1e-3;
       continue;
     }
-    const double gain = fit.chi2 - chi2;
     fit.view = next;
-    fit.chi2 = chi2;
+    normal = there;
     damping *= 0.1;
-    normal = normal_equations(fit.view, sightings, prior);
     if (gain < 1e-3) break;
   }
-  fit.information.compute(normal.information);
+  fit.chi2 = normal(9, 9);
+  fit.information.compute(normal.topLeftCorner<9, 9>());
   fit.log_volume = -fit.information.matrixLLT().diagonal().array().log().sum();
   return fit;
 }

@@ -7,11 +7,11 @@
 #include <utility>
 
 #include "helicarm/core/random.h"
+#include "helicarm/fiducials/three_point.h"
 
 namespace helicarm {
 namespace {
 
-constexpr double radius_sigmas = 3;    // a true triple lost here is made good by the next
 constexpr std::size_t most_kept = 24;  // hypotheses
 
 /// Every item in turn, in random company, so that none is left out for long.
@@ -38,83 +38,11 @@ class TripleDealer {
 
 }  // namespace
 
-Neighbourhood::Neighbourhood(const Scene& scene) {
-  constexpr int reach = 3;  // cells
-  const double cell_px = rough_gate_px(scene) / reach;
-  Eigen::Array2d low = scene.candidates.front().uv.array();
-  Eigen::Array2d high = low;
-  for (const auto& candidate : scene.candidates) {
-    low = low.min(candidate.uv.array());
-    high = high.max(candidate.uv.array());
-  }
-  low -= (reach + 1) * cell_px;
-  const Eigen::Array2i cells = ((high - low) / cell_px).cast<int>() + reach + 2;
-  cell_from_px_ << 1 / cell_px, 0, -low.x() / cell_px, 0, 1 / cell_px, -low.y() / cell_px, 0, 0, 1;
-  last_column_ = static_cast<float>(cells.x() - 1);
-  last_row_ = static_cast<float>(cells.y() - 1);
-  marked_.assign(static_cast<std::size_t>(cells.prod()), 0);
-  for (const auto& candidate : scene.candidates) {
-    const Eigen::Array2i at = ((candidate.uv.array() - low) / cell_px).cast<int>();
-    for (int dy = -reach; dy <= reach; ++dy) {
-      for (int dx = -reach; dx <= reach; ++dx) {
-        if (dx * dx + dy * dy <= reach * reach) marked_[(at.y() + dy) * cells.x() + at.x() + dx] = 1;
-      }
-    }
-  }
-  balls_.resize((scene.balls.size() + 7) / 8);
-  for (std::size_t k = 0; k < scene.balls.size(); ++k) {
-    auto& eight = balls_[k / 8];
-    const Eigen::Vector3f centre = scene.balls[k].centre.cast<float>();
-    eight.x.tail(8 - k % 8) = centre.x();
-    eight.y.tail(8 - k % 8) = centre.y();
-    eight.z.tail(8 - k % 8) = centre.z();
-    eight.used = static_cast<int>(k % 8) + 1;
-  }
-}
-
-bool Neighbourhood::holds(const View& view, int wanted) const {
-  const Eigen::Matrix<float, 3, 4> p = (cell_from_px_ * view.projection()).cast<float>();
-  for (const auto& eight : balls_) {
-    const auto row = [&](int i) -> Eight {
-      return p(i, 0) * eight.x + p(i, 1) * eight.y + p(i, 2) * eight.z + p(i, 3);
-    };
-    const Eight depth = row(2);
-    const Eight column = (row(0) / depth).max(0).min(last_column_).floor();
-    const Eight line = (row(1) / depth).max(0).min(last_row_).floor();
-    const Eigen::Array<int, 8, 1> cell = (line * (last_column_ + 1) + column).cast<int>();
-    for (int i = 0; i < eight.used; ++i) wanted -= marked_[cell[i]];
-    if (wanted <= 0) return true;
-  }
-  return false;
-}
-
 LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
-    : scene_(scene), focals_px_(std::move(focals_px)), flat_px_(0.04 * scene.field_radius_px), near_(scene) {
-  const int balls = static_cast<int>(scene.balls.size());
-  for (int i = 0; i < balls; ++i) {
-    for (int j = 0; j < balls; ++j) {
-      for (int k = 0; k < balls; ++k) {
-        if (i == j || j == k || i == k) continue;
-        const auto triangle =
-            model_triangle({i, j, k}, {scene.balls[i].centre, scene.balls[j].centre, scene.balls[k].centre});
-        if (triangle) triangles_.push_back(*triangle);
-      }
-    }
-  }
-  const auto count = static_cast<Eigen::Index>(triangles_.size());
-  a_.resize(count);
-  b_.resize(count);
-  c_.resize(count);
-  for (Eigen::Index t = 0; t < count; ++t) {
-    a_[t] = static_cast<float>(triangles_[t].a);
-    b_[t] = static_cast<float>(triangles_[t].b);
-    c_[t] = static_cast<float>(triangles_[t].c);
-  }
-  for (const auto& candidate : scene.candidates) {
-    for (const auto& ball : scene.balls)
-      scales_.push_back(scale_by_radius(scene, candidate, ball, radius_sigmas));
-  }
-}
+    : scene_(scene),
+      focals_px_(std::move(focals_px)),
+      flat_px_(0.04 * scene.field_radius_px),
+      sieve_(scene) {}
 
 bool LabelSearch::try_triple(std::array<int, 3> candidates) {
   std::sort(candidates.begin(), candidates.end());
@@ -128,51 +56,66 @@ bool LabelSearch::try_triple(std::array<int, 3> candidates) {
 }
 
 void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_px) {
-  std::array<Eigen::Vector2d, 3> upright;
-  std::array<Eigen::Vector2d, 3> mirrored;
-  std::array<const Scale*, 3> scales;
-  for (int i = 0; i < 3; ++i) {
-    upright[i] = (scene_.candidates[candidates[i]].uv - scene_.camera.principal_px) / focal_px;
-    mirrored[i] = {-upright[i].x(), upright[i].y()};
-    scales[i] = &scales_[candidates[i] * scene_.balls.size()];
-  }
-  const Eigen::Vector2d e1 = upright[1] - upright[0];
-  const Eigen::Vector2d e2 = upright[2] - upright[0];
-  const double a = e1.squaredNorm();
-  const double b = e2.squaredNorm();
-  const double c = e1.dot(e2);
-  const Eigen::ArrayXf mm_per_px =
-      static_cast<float>(1 / focal_px) / inverse_distance2(a_, b_, c_, a, b, c).sqrt();
-  for (std::size_t t = 0; t < triangles_.size(); ++t) {
-    const ModelTriangle& triangle = triangles_[t];
-    if (!scales[0][triangle.balls[0]].holds(mm_per_px[t])) continue;
-    const Scale& s1 = scales[1][triangle.balls[1]];
-    const Scale& s2 = scales[2][triangle.balls[2]];
-    const auto away = orthography(triangle, a, b, c);
-    for (const double lean : {1.0, -1.0}) {
-      const Orthography start{away.inverse_distance2, lean * away.behind1, lean * away.behind2};
-      if (!s1.holds(mm_per_px[t] * (1 + start.behind1)) || !s2.holds(mm_per_px[t] * (1 + start.behind2)))
-        continue;
-      const auto depths = three_point_depths(triangle, upright, start);
-      if (!depths) continue;
-      const Eigen::Vector2d& centre = scene_.camera.principal_px;
-      try_pose({{focal_px, focal_px, centre.x(), centre.y()}, three_point_pose(triangle, upright, *depths)},
-               lean);
-      try_pose({{-focal_px, focal_px, centre.x(), centre.y()}, three_point_pose(triangle, mirrored, *depths)},
-               lean);
+  const Eigen::Vector2d& centre = scene_.camera.principal_px;
+  for (const SiftedPose& pose : sieve_.sift(candidates, focal_px, wanted())) {
+    std::array<Eigen::Vector2d, 3> image;
+    std::array<Eigen::Vector3d, 3> points;
+    for (int i = 0; i < 3; ++i) {
+      image[i] = (scene_.candidates[candidates[i]].uv - centre) / focal_px;
+      if (pose.mirrored) image[i].x() *= -1;
+      points[i] = scene_.balls[pose.balls[i]].centre;
     }
+    const auto triangle = model_triangle(pose.balls, points);
+    if (!triangle) continue;
+    const Eigen::Vector2d e1 = image[1] - image[0];
+    const Eigen::Vector2d e2 = image[2] - image[0];
+    Orthography start = orthography(*triangle, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
+    start.behind1 *= pose.lean;
+    start.behind2 *= pose.lean;
+    const auto depths = three_point_depths(*triangle, image, start);
+    if (!depths) continue;
+    const double fx = pose.mirrored ? -focal_px : focal_px;
+    try_pose({{fx, focal_px, centre.x(), centre.y()}, three_point_pose(*triangle, image, *depths)},
+             pose.lean);
   }
 }
 
+int LabelSearch::wanted() const {
+  return std::max(least_balls - 1, (ranking_.empty() ? 0 : ranking_.front().matched) - 3);
+}
+
 void LabelSearch::try_pose(const View& rough, double lean) {
-  const int best = ranking_.empty() ? 0 : ranking_.front().matched;
-  const int wanted = std::max(least_balls - 1, best - 3);
-  if (!near_.holds(rough, wanted)) return;
   auto key = match(scene_, rough, rough_gate_px(scene_));
-  if (std::count_if(key.begin(), key.end(), [](int i) { return i >= 0; }) < wanted) return;
+  const auto matched = static_cast<int>(std::count_if(key.begin(), key.end(), [](int i) { return i >= 0; }));
+  if (matched < wanted()) return;
   key.push_back(rough.intrinsics.fx < 0 ? -1 : 1);
   key.push_back(lean < 0 ? -1 : 1);
-  if (tried_.insert(std::move(key)).second) keep(settle(scene_, rough));
+  if (!tried_.insert(std::move(key)).second) return;
+  met_.push_back({matched, rough});
+  keep(settle(scene_, rough, wanted()));
+}
+
+std::vector<View> LabelSearch::supported(int wanted, std::size_t most) const {
+  std::vector<Rough> enough;
+  std::copy_if(met_.begin(), met_.end(), std::back_inserter(enough),
+               [&](const Rough& rough) { return rough.matched >= wanted; });
+  std::stable_sort(enough.begin(), enough.end(),
+                   [](const Rough& p, const Rough& q) { return p.matched > q.matched; });
+  std::vector<View> views;
+  for (std::size_t i = 0; i < std::min(most, enough.size()); ++i) views.push_back(enough[i].view);
+  return views;
+}
+
+void LabelSearch::try_near_misses(const Hypothesis& h) {
+  for (std::size_t k = 0; k < scene_.balls.size(); ++k) {
+    const Eigen::Vector2d uv = h.fit.view.project(scene_.balls[k].centre);
+    for (std::size_t i = 0; i < scene_.candidates.size(); ++i) {
+      if (h.candidate_of_ball[k] == static_cast<int>(i)) continue;
+      if ((scene_.candidates[i].uv - uv).norm() >= rough_gate_px(scene_)) continue;
+      for (auto& rival : with_pair(scene_, h, static_cast<int>(k), static_cast<int>(i)))
+        keep(std::move(rival));
+    }
+  }
 }
 
 void LabelSearch::keep(Hypothesis hypothesis) {
@@ -214,6 +157,7 @@ void challenge(LabelSearch& search) {
     for (int done = 0, dealt = 0; done < triples && dealt < 5 * triples; ++dealt) {
       done += search.try_triple(dealer.deal()) ? 1 : 0;
     }
+    search.try_near_misses(Hypothesis(search.ranking().front()));
   } while (search.ranking().front().candidate_of_ball != best);
 }
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "helicarm/fiducials/hypothesis.h"
-#include "helicarm/fiducials/three_point.h"
+#include "helicarm/fiducials/pose_sieve.h"
 
 namespace helicarm {
 
@@ -15,28 +15,6 @@ constexpr int least_balls = 6;  ///< that a labelling must name
 
 /// The hypotheses met so far, best first and all different.
 using Ranking = std::vector<Hypothesis>;
-
-/// Where balls have a candidate within the rough gate (to a third of it), at the cost of one look each. Eight
-/// balls go at a time, for the processor's sake.
-class Neighbourhood {
- public:
-  explicit Neighbourhood(const Scene& scene);
-
-  /// Whether at least `wanted` balls do.
-  bool holds(const View& view, int wanted) const;
-
- private:
-  using Eight = Eigen::Array<float, 8, 1>;
-  struct EightBalls {
-    Eight x = Eight::Zero(), y = x, z = x;
-    int used = 0;
-  };
-  std::vector<EightBalls> balls_;
-  Eigen::Matrix3d cell_from_px_;
-  float last_column_;
-  float last_row_;
-  std::vector<char> marked_;  ///< the outermost cells never are
-};
 
 /// Takes three candidates for every three balls in turn, mirrored and not, and settles each pose that others
 /// of the candidates support.
@@ -48,23 +26,34 @@ class LabelSearch {
   /// False, and nothing done, when the three lie too nearly in a line or have been tried before.
   bool try_triple(std::array<int, 3> candidates);
 
+  /// Weighs what becomes of `h` when a candidate near a ball, but not near enough for it, is that ball after
+  /// all. A false disc in a hidden ball's stead can bend the fit until a true one is missed.
+  void try_near_misses(const Hypothesis& h);
+
   const Ranking& ranking() const { return ranking_; }
+
+  /// The poses met that have candidates near at least `wanted` balls, best supported first, up to `most`.
+  std::vector<View> supported(int wanted, std::size_t most) const;
   const Scene& scene() const { return scene_; }
 
  private:
+  struct Rough {
+    int matched;
+    View view;
+  };
+
   void try_scale(const std::array<int, 3>& candidates, double focal_px);
+  int wanted() const;  ///< balls near candidates
   void try_pose(const View& rough, double lean);
   void keep(Hypothesis hypothesis);
 
   const Scene& scene_;
   std::vector<double> focals_px_;
   double flat_px_;  ///< least height of an image triangle
-  std::vector<ModelTriangle> triangles_;
-  Eigen::ArrayXf a_, b_, c_;   ///< of the triangles
-  std::vector<Scale> scales_;  ///< candidate by ball
-  Neighbourhood near_;
+  PoseSieve sieve_;
   std::set<std::array<int, 3>> triples_;  ///< tried
   std::set<std::vector<int>> tried_;      ///< matches of the poses settled
+  std::vector<Rough> met_;
   Ranking ranking_;
 };
 

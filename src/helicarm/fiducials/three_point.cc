@@ -9,9 +9,6 @@
 namespace helicarm {
 namespace {
 
-constexpr double settled =
-    2e-3;  // of the distance: the next turn would move the points far less than a pixel
-
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& e1, const Eigen::Vector3d& e2) {
   Eigen::Matrix3d axes;
   axes.col(0) = e1.normalized();
@@ -26,8 +23,7 @@ std::optional<ModelTriangle> model_triangle(const std::array<int, 3>& balls,
                                             const std::array<Eigen::Vector3d, 3>& points) {
   const Eigen::Vector3d e1 = points[1] - points[0];
   const Eigen::Vector3d e2 = points[2] - points[0];
-  const double longest = std::max({e1.squaredNorm(), e2.squaredNorm(), (e2 - e1).squaredNorm()});
-  if (!(e1.cross(e2).norm() > 0.05 * longest)) return std::nullopt;
+  if (is_flat(e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2))) return std::nullopt;
   return ModelTriangle{balls, points[0], frame_of(e1, e2), e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2)};
 }
 
@@ -43,8 +39,8 @@ std::optional<Orthography> three_point_depths(const ModelTriangle& model,
                                               const Orthography& start) {
   double h1 = start.behind1;
   double h2 = start.behind2;
-  constexpr int most_turns = 12;
-  for (int turn = 0; turn < most_turns && std::max(std::abs(h1), std::abs(h2)) < 0.7; ++turn) {
+  for (int turn = 0; turn < most_depth_turns && std::max(std::abs(h1), std::abs(h2)) < deepest_corner;
+       ++turn) {
     const Eigen::Vector2d e1 = (1 + h1) * image[1] - image[0];
     const Eigen::Vector2d e2 = (1 + h2) * image[2] - image[0];
     auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
@@ -53,7 +49,7 @@ std::optional<Orthography> three_point_depths(const ModelTriangle& model,
       next.behind2 = -next.behind2;
     }
     const double moved = std::max(std::abs(next.behind1 - h1), std::abs(next.behind2 - h2));
-    if (moved < settled) return next;
+    if (moved < depth_settled) return next;
     h1 = next.behind1;
     h2 = next.behind2;
   }

@@ -2,7 +2,9 @@
 #include "helicarm/study/labelling.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
+#include <numbers>
 #include <optional>
 
 #include "helicarm/core/parallel.h"
@@ -16,7 +18,6 @@ using simulation::DiscView;
 
 constexpr std::uint32_t views_stream = 2000;
 constexpr int many_balls = 8;
-constexpr double spread_margin = 35;  // M - 3.1 sqrt(2 M) = 9.2
 
 enum class Verdict { right, imitated, wrong };
 
@@ -68,18 +69,9 @@ Verdict judge(const Labelling& labelling, const DiscView& picture, const Calibra
   return verdict;
 }
 
-bool is_spread(const Calibrator& calibrator, const DiscView& picture) {
-  std::vector<Disc> clean;
-  for (Disc disc : picture.discs) {
-    if (disc.ball < 0) continue;
-    const CalibratorBall& ball = calibrator.balls[disc.ball];
-    disc.uv = picture.view.project(ball.centre_in_calibrator);
-    disc.radius_px =
-        picture.view.intrinsics.fy * ball.diameter_mm / 2 / picture.view.depth(ball.centre_in_calibrator);
-    clean.push_back(disc);
-  }
-  const auto labelling = label(calibrator, clean);
-  return labelling && labelling->margin >= spread_margin;
+double degrees_off_axis(const Calibrator& calibrator, const View& view) {
+  const Eigen::Vector3d ray = middle_of(calibrator) - view.source_in_world();
+  return std::acos(std::abs(ray.normalized().z())) * 180 / std::numbers::pi;
 }
 
 double thread_ms() {
@@ -105,7 +97,7 @@ Trial try_view(const Calibrator& calibrator, const LabellingStudy& study, std::u
     trial.verdict = judge(*labelling, picture, calibrator);
   else
     trial.refused = labelling.error().reason;
-  trial.spread = picture.visible >= many_balls && is_spread(calibrator, picture);
+  trial.spread = degrees_off_axis(calibrator, picture.view) >= spread_deg;
   return trial;
 }
 
