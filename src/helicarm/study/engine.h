@@ -28,7 +28,7 @@ struct EngineOptions {
   unsigned threads = 0;           ///< of each rank; 0: all cores, shared by the ranks
   std::filesystem::path journal;  ///< file that keeps what is done; empty: none
   bool resume = false;            ///< go on from the journal, where there is one
-  double journal_after_s = 1;     ///< a run that is shorter leaves none
+  double journal_after_s = 0.5;   ///< a run that is shorter leaves none
   std::function<void(double share)> progress = [](double) {};
 };
 

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/number.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/study/location.h"
+#include "helicarm/study/uniformity_study.h"
+
+namespace helicarm {
+namespace {
+
+const Ranks alone;
+
+std::vector<NumberRow> rows_of(const NumberOptions& options, unsigned threads = 2) {
+  EngineOptions engine;
+  engine.threads = threads;
+  return study_number(options, engine, alone).value();
+}
+
+const NumberRow& row(const std::vector<NumberRow>& rows, int balls, SigmaReading sigma, PixelReading reading,
+                     GroupError error) {
+  for (const NumberRow& r : rows)
+    if (r.balls == balls && r.sigma == sigma && r.reading == reading && r.error == error) return r;
+  throw std::out_of_range("no such row");
+}
+
+TEST(StudyNumber, AgreesWithKnownMedians) {
+  NumberOptions options;
+  options.balls = {6, 12, 20};
+  const auto rows = rows_of(options);
+  const struct {
+    int balls;
+    SigmaReading sigma;
+    PixelReading reading;
+    GroupError error;
+    double median;
+  } known[]{{6, SigmaReading::std, PixelReading::calibration_pixels, GroupError::fre, 0.0998},
+            {12, SigmaReading::std, PixelReading::calibration_pixels, GroupError::fre, 0.336},
+            {20, SigmaReading::std, PixelReading::calibration_pixels, GroupError::fre, 0.394},
+            {12, SigmaReading::std, PixelReading::fresh_noise, GroupError::fre, 0.556},
+            {20, SigmaReading::std, PixelReading::fresh_noise, GroupError::fre, 0.522}};
+  for (const auto& k : known) {
+    const ColumnStatistics& s = row(rows, k.balls, k.sigma, k.reading, k.error).of_groups;
+    EXPECT_NEAR(s.median, k.median, 3 * s.median_se) << k.balls;
+    EXPECT_LT(s.median_se, 0.012 * s.median);
+    EXPECT_EQ(s.left_out, 0);
+  }
+}
+
+TEST(StudyNumber, TreFallsWithTheNumberOfBallsInEveryReading) {
+  NumberOptions options;
+  options.groups = 1000;
+  options.balls = {6, 9, 12, 20};
+  const auto rows = rows_of(options);
+  for (const SigmaReading sigma : sigma_readings)
+    for (const PixelReading reading : {PixelReading::fresh_noise, PixelReading::exact})
+      for (const GroupError error : {GroupError::tre_ball, GroupError::tre_cone, GroupError::tre_centre}) {
+        double last = 1e9;
+        for (const int balls : options.balls) {
+          const double median = row(rows, balls, sigma, reading, error).of_groups.median;
+          EXPECT_LT(median, last);
+          last = median;
+        }
+      }
+}
+
+TEST(StudyNumber, WhatIsNotAskedForChangesNothing) {
+  NumberOptions all;
+  all.groups = 300;
+  all.balls = {6, 12};
+  NumberOptions one = all;
+  one.balls = {12};
+  one.sigmas = {SigmaReading::rms_distance};
+  one.readings = {PixelReading::fresh_noise};
+  const auto rows = rows_of(all), few = rows_of(one);
+  ASSERT_EQ(few.size(), 5u);
+  for (const NumberRow& r : few)
+    EXPECT_EQ(r.of_groups.mean, row(rows, 12, r.sigma, r.reading, r.error).of_groups.mean);
+}
+
+TEST(StudyNumber, BytesDoNotDependOnThreads) {
+  NumberOptions options;
+  options.groups = 1001;
+  options.balls = {6, 13};
+  const StudyFiles one = files_of(rows_of(options, 1), options),
+                   three = files_of(rows_of(options, 3), options);
+  EXPECT_EQ(one.csv, three.csv);
+  EXPECT_EQ(one.json, three.json);
+  EXPECT_EQ(one.svg, three.svg);
+  EXPECT_THAT(one.csv, ::testing::StartsWith("n,sigma,reading,error,mean,median,trimmed,p99,se\n"
+                                             "6,std,calibration_pixels,fre,"));
+}
+
+TEST(StudyNumber, NoNoiseNoError) {
+  NumberOptions options;
+  options.groups = 200;
+  options.balls = {12};
+  options.fle = 0;
+  for (const NumberRow& r : rows_of(options)) EXPECT_LT(r.of_groups.median, 1e-7);
+}
+
+TEST(StudyNumber, RefusesTooFewBallsEqualOnesAndNoGroups) {
+  NumberOptions options;
+  options.balls = {12, 5};
+  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+  options.balls = {12, 8, 12};
+  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+  options.balls = {12};
+  options.groups = 0;
+  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyNumber, FilesOfASingleNumberStandToo) {
+  NumberOptions options;
+  options.groups = 1;
+  options.balls = {12};
+  const StudyFiles files = files_of(rows_of(options), options);
+  EXPECT_THAT(files.svg, ::testing::StartsWith("<svg"));
+  EXPECT_EQ(files.svg.find("nan"), std::string::npos);
+  EXPECT_EQ(files.csv.find("nan"), std::string::npos);
+}
+
+TEST(StudyUniformity, EvennessGoesWithSmallErrors) {
+  UniformityOptions options;
+  options.groups = 150;
+  options.draws = 20;
+  EngineOptions one, three;
+  one.threads = 1;
+  three.threads = 3;
+  const StudyFiles files = files_of(study_uniformity(options, one, alone).value(), options);
+  EXPECT_EQ(files.csv, files_of(study_uniformity(options, three, alone).value(), options).csv);
+  for (const Json& entry : files.json["correlations"]) {
+    const std::string tre = entry["tre"];
+    if (tre.starts_with("mean_tre_ball")) {
+      EXPECT_GT(entry["spearman"], 0.5) << tre;
+    }
+  }
+  options.balls = 5;
+  EXPECT_EQ(study_uniformity(options, one, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyLocation, TreRisesAwayFromTheBalls) {
+  LocationOptions options;
+  options.groups = 203;
+  options.step_mm = 50;
+  EngineOptions one, three;
+  one.threads = 1;
+  three.threads = 3;
+  const LocationMap map = study_location(options, one, alone).value();
+  EXPECT_EQ(files_of(map, options).csv, files_of(study_location(options, three, alone).value(), options).csv);
+  ASSERT_EQ(map.side, 7);
+  ASSERT_EQ(map.points.size(), 98u);
+  const LocationPoint &middle = map.points[24], &corner = map.points[48];
+  EXPECT_LT((middle.place - map.centre).norm(), 1e-9);
+  EXPECT_LT(middle.tre_exact, middle.tre_fresh);
+  EXPECT_GT(corner.tre_fresh, 2 * middle.tre_fresh);
+  EXPECT_GT(middle.se_fresh, 0);
+  options.balls = {{0, 0, 0}};
+  EXPECT_EQ(study_location(options, one, alone).error().reason, Reason::bad_value);
+}
+
+}  // namespace
+}  // namespace helicarm
