@@ -3,6 +3,7 @@
 """The program from outside: exit codes, streams and files. Usage: cli_test.py PROGRAM"""
 
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -82,6 +83,26 @@ class CommandLine(unittest.TestCase):
             done = run("study", *wrong, "--out", self.root / "refused")
             self.assertEqual(done.returncode, 2, wrong)
             self.assertTrue(done.stderr.strip(), wrong)
+
+    @unittest.skipUnless(os.environ.get("HELICARM_MPIRUN"), "built without MPI")
+    def test_study_writes_the_same_bytes_on_any_number_of_ranks(self):
+        surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                        "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+        study = ("study", "number", "--groups", "3001", "--balls", "6,12", "--seed", "4", "--out")
+        self.assertEqual(run(*study, self.root / "alone", "--quiet").returncode, 0)
+        for ranks in ("1", "2", "3"):
+            folder = self.root / f"ranks{ranks}"
+            done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", ranks, PROGRAM, *study, str(folder)],
+                                  capture_output=True, text=True, env=surroundings)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stdout.count("written to"), 1)
+            self.assertEqual(f"{ranks} ranks" in done.stderr, ranks != "1")
+            for ending in ("csv", "json", "svg"):
+                self.assertEqual((folder / f"number.{ending}").read_bytes(),
+                                 (self.root / f"alone/number.{ending}").read_bytes())
+        done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", "2", PROGRAM, "study", "number", "--fle", "no"],
+                              capture_output=True, text=True, env=surroundings)
+        self.assertEqual(done.returncode, 2, done.stderr)
 
     def test_study_that_was_killed_goes_on_to_the_same_bytes(self):
         study = ("study", "uniformity", "--groups", 1000, "--seed", 3, "--quiet")

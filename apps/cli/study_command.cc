@@ -180,6 +180,8 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     if (std::filesystem::create_directories(out, error); error)
       throw BadInput(Reason::cannot_write, fmt::format("{}: {}", out.string(), error.message()));
     const Ranks ranks;
+    if (ranks.count() > 1 && ranks.leads() && !console.quiet)
+      console.progress << fmt::format("helicarm: {} ranks\n", ranks.count());
     StudyRun run{arguments, console, ranks, {}};
     run.engine.threads = console.threads;
     run.engine.journal = out / (arguments.name + ".partial");
