@@ -61,13 +61,23 @@ def location(options):
         yield f"| {name} | " + " | ".join(values) + f" | {result['spearman_with_distance']:.2f} |"
 
 
+def biplane(options):
+    rows, _ = study(options, "biplane")
+    yield "| calibrator | points | measure | max | min | mean | RMS |"
+    yield "| --- | --- | --- | ---: | ---: | ---: | ---: |"
+    for row in rows:
+        values = [f"{float(row[kind]):.2f}" + (f" ({float(row['printed_' + kind]):.2f})" if row["printed_" + kind] else "")
+                  for kind in ("max", "min", "mean", "rms")]
+        yield f"| {row['calibrator']} | {row['points']} | {row['measure']} | " + " | ".join(values) + " |"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
     page = ROOT / "docs/reproduction.md"
-    for table in (number, uniformity, location):
+    for table in (number, uniformity, location, biplane):
         renew(page, table.__name__, list(table(options)))
     print(f"renewed {page.relative_to(ROOT)}, seed {options.seed}")
 

@@ -11,6 +11,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/phantom/calibrator.h"
+#include "helicarm/study/biplane.h"
 #include "helicarm/study/limit.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/number.h"
@@ -66,7 +67,7 @@ void only(const StudyArguments& a, std::initializer_list<std::string_view> known
       refuse(fmt::format("{} has no {}; its options are: {}", a.name, option, fmt::join(known, ", ")));
 }
 
-/// What the paper's three simulations share.
+/// What the paper's experiments share.
 template <class Options>
 Options common_options(const StudyRun& run) {
   Options options;
@@ -74,8 +75,9 @@ Options common_options(const StudyRun& run) {
   if (a.groups) options.groups = *a.groups;
   options.seed = run.console.seed;
   if (a.fle) options.fle = *a.fle;
-  if (!a.origin.empty())
-    options.origin = named("--origin", a.origin, std::array{WorldOrigin::base, WorldOrigin::centre});
+  if constexpr (requires { options.origin; })
+    if (!a.origin.empty())
+      options.origin = named("--origin", a.origin, std::array{WorldOrigin::base, WorldOrigin::centre});
   if constexpr (requires { options.sigma; }) {
     if (a.sigmas.size() > 1) refuse(fmt::format("{} takes one --sigma", a.name));
     if (!a.sigmas.empty()) options.sigma = named("--sigma", a.sigmas[0], sigma_readings);
@@ -110,6 +112,13 @@ StudyFiles run_location(const StudyRun& run) {
       options.balls.push_back(ball.centre_in_calibrator);
   const auto map = value_or_throw(study_location(options, run.engine, run.ranks));
   return run.ranks.leads() ? files_of(map, options) : StudyFiles{};
+}
+
+StudyFiles run_biplane(const StudyRun& run) {
+  only(run.arguments, {"--sigma", "--fle"});
+  const auto options = common_options<BiplaneOptions>(run);
+  const auto rows = value_or_throw(study_biplane(options, run.engine, run.ranks));
+  return run.ranks.leads() ? files_of(rows, options) : StudyFiles{};
 }
 
 Json json_of(const std::vector<LimitRow>& rows, std::size_t groups, std::uint64_t seed) {
@@ -156,9 +165,10 @@ StudyFiles run_limit(const StudyRun& run) {
 }
 
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 4> studies{{{"number", run_number},
+constexpr std::array<std::pair<std::string_view, Study>, 5> studies{{{"number", run_number},
                                                                      {"uniformity", run_uniformity},
                                                                      {"location", run_location},
+                                                                     {"biplane", run_biplane},
                                                                      {"limit", run_limit}}};
 
 Study study_named(const std::string& name) {

@@ -43,8 +43,11 @@ class ChartDrawing {
       x_low = std::min(x_low, x), x_high = std::max(x_high, x);
       y_low = std::min(y_low, y), y_high = std::max(y_high, y);
     };
-    for (const ChartSeries& series : chart.series)
+    for (const ChartSeries& series : chart.series) {
       for (const auto& [x, y] : series.points) include(x, y);
+      for (std::size_t i = 0; i < series.ranges.size(); ++i)
+        for (const double y : series.ranges[i]) include(series.points[i][0], y);
+    }
     if (chart.field) {
       const ChartField& f = *chart.field;
       include(f.x_first, f.y_first);
@@ -54,7 +57,8 @@ class ChartDrawing {
     if (!(x_low <= x_high)) x_low = y_low = 0, x_high = y_high = 1;
     if (chart.y_from_zero) y_low = std::min(0.0, y_low);
     if (chart.y_most) y_high = std::min(y_high, *chart.y_most);
-    x_ = Axis::over(x_low, x_high);
+    x_ =
+        chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
     y_ = Axis::over(y_low, y_high);
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
     if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
@@ -94,7 +98,11 @@ class ChartDrawing {
         places.push_back(std::abs(at) < 1e-9 * axis.step ? 0 : at);
       return places;
     };
-    for (const double x : ticks(x_))
+    for (std::size_t i = 0; i < chart_.x_names.size(); ++i)
+      put(R"(<text x="{:.1f}" y="{}" class="middle">{}</text>)"
+          "\n",
+          px(double(i)), bottom + 18, escaped(chart_.x_names[i]));
+    for (const double x : chart_.x_names.empty() ? ticks(x_) : std::vector<double>{})
       put(R"(<path d="M{0:.1f} {1}V{2}" class="grid"/><text x="{0:.1f}" y="{3}" class="middle">{4:.6g}</text>)"
           "\n",
           px(x), top_margin, bottom, bottom + 18, x);
@@ -135,6 +143,12 @@ class ChartDrawing {
       text_ += "</g>\n";
       return;
     }
+    for (std::size_t i = 0; i < series.ranges.size(); ++i)
+      put(R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}" class="line" stroke="{3}"{5}/><circle cx="{0:.1f}" cy="{4:.1f}" r="4" fill="{3}"/>)"
+          "\n",
+          px(series.points[i][0]), py(series.ranges[i][0]), py(series.ranges[i][1]), colour,
+          py(series.points[i][1]), series.dashed ? " stroke-dasharray=\"6 4\"" : "");
+    if (!series.ranges.empty()) return;
     std::string path, marks;
     for (const auto& [x, y] : series.points) {
       if (!std::isfinite(x) || !std::isfinite(y)) continue;

@@ -21,7 +21,8 @@ class Run {
   Run(const std::vector<StudySetting>& settings, const std::string& identity, const EngineOptions& options,
       const Ranks& ranks)
       : settings_(settings), options_(options), ranks_(ranks), threads_(options.threads) {
-    if (threads_ == 0) threads_ = std::max(1u, std::thread::hardware_concurrency() / unsigned(ranks.on_this_machine()));
+    if (threads_ == 0)
+      threads_ = std::max(1u, std::thread::hardware_concurrency() / unsigned(ranks.on_this_machine()));
     for (const StudySetting& setting : settings) total_cost_ += setting.cost;
     if (!options.journal.empty() && ranks.leads()) journal_.emplace(options.journal, identity);
   }

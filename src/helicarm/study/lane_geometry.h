@@ -108,4 +108,16 @@ class LaneBalls {
   return normal.inverse() * right;
 }
 
+/// Distance of a point from the ray through a pixel.
+inline Lanes ray_distance(const LaneProjection& view, const LanePixel& pixel, const LanePoint& point) {
+  const auto plane = [&](const Lanes(&row)[4], Lanes at) {
+    return LanePoint{at * view.w[0] - row[0], at * view.w[1] - row[1], at * view.w[2] - row[2]};
+  };
+  const LanePoint u = plane(view.u, pixel.u), v = plane(view.v, pixel.v);
+  const Lanes off_u = dot(u, point) - (view.u[3] - pixel.u), off_v = dot(v, point) - (view.v[3] - pixel.v);
+  const Lanes uu = dot(u, u), uv = dot(u, v), vv = dot(v, v);
+  return square_root((vv * off_u * off_u - 2.0 * uv * off_u * off_v + uu * off_v * off_v) /
+                     (uu * vv - uv * uv));
+}
+
 }  // namespace helicarm

@@ -120,6 +120,23 @@ TEST(LaneIntersect, AgreesWithTheScalarOne) {
   }
 }
 
+TEST(LaneRay, DistanceIsThatOfTheRay) {
+  const View view = paper_views(WorldOrigin::base)[1];
+  const Projection p = view.projection() / view.projection()(2, 3);
+  LaneProjection four;
+  for (int i = 0; i < 4; ++i) {
+    four.u[i] = lanes(p(0, i));
+    four.v[i] = lanes(p(1, i));
+    if (i < 3) four.w[i] = lanes(p(2, i));
+  }
+  const Eigen::Vector3d on_ray(10, 20, 30), across = (on_ray - view.source_in_world()).unitOrthogonal();
+  const Eigen::Vector2d pixel = view.project(on_ray);
+  const Eigen::Vector3d point = on_ray + 2.5 * across;
+  EXPECT_NEAR(ray_distance(four, {lanes(pixel.x()), lanes(pixel.y())},
+                           {lanes(point.x()), lanes(point.y()), lanes(point.z())})[2],
+              2.5, 1e-9);
+}
+
 TEST(PaperScene, LanesProjectAsTheViewsDo) {
   const auto views = paper_views(WorldOrigin::centre);
   const LaneViews lanes_of(views);

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "helicarm/study/biplane.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/uniformity_study.h"
 
@@ -160,6 +161,31 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EXPECT_GT(middle.se_fresh, 0);
   options.balls = {{0, 0, 0}};
   EXPECT_EQ(study_location(options, one, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyBiplane, HasTheOrderOfTable1) {
+  BiplaneOptions options;
+  options.groups = 30;
+  EngineOptions one, three;
+  one.threads = 1;
+  three.threads = 3;
+  const auto rows = study_biplane(options, one, alone).value();
+  EXPECT_EQ(files_of(rows, options).csv, files_of(study_biplane(options, three, alone).value(), options).csv);
+  const auto mean = [&](std::string_view calibrator, std::string_view points, std::string_view measure) {
+    for (const BiplaneRow& r : rows)
+      if (r.calibrator == calibrator && r.points == points && r.measure == measure) return r.figures.mean;
+    throw std::out_of_range("no such row");
+  };
+  for (const char* points : {"centre", "on_udcsc"})
+    EXPECT_LT(3 * mean("udcsc", points, "intersection"), mean("biplane", points, "intersection"));
+  EXPECT_LT(3 * mean("biplane", "on_biplane", "ray"), mean("udcsc", "on_biplane", "intersection"));
+  EXPECT_LT(mean("biplane", "on_biplane", "ray"), mean("udcsc", "on_biplane", "ray"));
+  for (const BiplaneRow& r : rows) {
+    EXPECT_LT(r.figures.min, r.figures.mean);
+    EXPECT_LT(r.figures.rms, r.figures.max);
+  }
+  options.far_plate_mm = options.near_plate_mm;
+  EXPECT_EQ(study_biplane(options, one, alone).error().reason, Reason::bad_value);
 }
 
 }  // namespace

@@ -30,7 +30,8 @@ double sigma_px(SigmaReading reading, double fle);
 /// Stream numbers of the studies: the number of balls is added to `number_stream`.
 inline constexpr std::uint32_t number_stream = 20000;
 inline constexpr std::uint32_t uniformity_stream = 20100;
-inline constexpr std::uint32_t location_stream = 20200;
+inline constexpr std::uint32_t location_stream = 20200;  // and the next
+inline constexpr std::uint32_t biplane_stream = 20300;
 
 inline constexpr double cone_height_mm = 87.5;  // 2.3.1
 inline constexpr double cone_base_mm = 60;      // radii
