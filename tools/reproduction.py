@@ -71,13 +71,22 @@ def biplane(options):
         yield f"| {row['calibrator']} | {row['points']} | {row['measure']} | " + " | ".join(values) + " |"
 
 
+def calibration(options):
+    _, result = study(options, "calibration")
+    yield "| points | by | max | min | mean | RMS |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: |"
+    for row in result["rows"]:
+        for key, name in (("printed_mm", "the print"), ("paper_mm", "the printed recipe"), ("best_mm", "the best recipe")):
+            yield f"| {row['points']} | {name} | " + " | ".join(f"{row[key][kind]:.2f}" for kind in ("max", "min", "mean", "rms")) + " |"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
     page = ROOT / "docs/reproduction.md"
-    for table in (number, uniformity, location, biplane):
+    for table in (number, uniformity, location, biplane, calibration):
         renew(page, table.__name__, list(table(options)))
     print(f"renewed {page.relative_to(ROOT)}, seed {options.seed}")
 

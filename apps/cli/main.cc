@@ -109,6 +109,7 @@ void add_study(CLI::App& app, Action& action) {
                    "uniformity: E(A) against TRE (Fig. 6)\n"
                    "location: TRE by place of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
+                   "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
                    "limit: error over the Cramer-Rao bound, and coverage of error bars")
       ->required();
   command->add_option("--groups", a.groups, "Trials of each setting")->check(within(1, 1e6));

@@ -12,6 +12,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/study/biplane.h"
+#include "helicarm/study/calibration_study.h"
 #include "helicarm/study/limit.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/number.h"
@@ -64,7 +65,8 @@ void only(const StudyArguments& a, std::initializer_list<std::string_view> known
                                                            {"--calibrator", !a.calibrator.empty()}}};
   for (const auto& [option, is_given] : given)
     if (is_given && std::ranges::count(known, option) == 0)
-      refuse(fmt::format("{} has no {}; its options are: {}", a.name, option, fmt::join(known, ", ")));
+      refuse(fmt::format("{} has no {}; its options are: {}", a.name, option,
+                         known.size() > 0 ? fmt::format("{}", fmt::join(known, ", ")) : "none"));
 }
 
 /// What the paper's experiments share.
@@ -121,6 +123,16 @@ StudyFiles run_biplane(const StudyRun& run) {
   return run.ranks.leads() ? files_of(rows, options) : StudyFiles{};
 }
 
+StudyFiles run_calibration(const StudyRun& run) {
+  only(run.arguments, {});
+  CalibrationStudyOptions options;
+  if (run.arguments.groups) options.groups = *run.arguments.groups;
+  options.seed = run.console.seed;
+  options.folder = run.arguments.out;
+  const auto tests = value_or_throw(study_calibration(options, run.engine, run.ranks));
+  return run.ranks.leads() ? files_of(tests, options) : StudyFiles{};
+}
+
 Json json_of(const std::vector<LimitRow>& rows, std::size_t groups, std::uint64_t seed) {
   Json json{{"format", "helicarm-study/1"}, {"study", "limit"},     {"groups", groups}, {"seed", seed},
             {"version", HELICARM_VERSION},  {"rows", Json::array()}};
@@ -165,10 +177,11 @@ StudyFiles run_limit(const StudyRun& run) {
 }
 
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 5> studies{{{"number", run_number},
+constexpr std::array<std::pair<std::string_view, Study>, 6> studies{{{"number", run_number},
                                                                      {"uniformity", run_uniformity},
                                                                      {"location", run_location},
                                                                      {"biplane", run_biplane},
+                                                                     {"calibration", run_calibration},
                                                                      {"limit", run_limit}}};
 
 Study study_named(const std::string& name) {

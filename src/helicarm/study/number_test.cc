@@ -2,11 +2,14 @@
 #include "helicarm/study/number.h"
 
 #include <cmath>
+#include <filesystem>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "helicarm/study/biplane.h"
+#include "helicarm/study/calibration_study.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/uniformity_study.h"
 
@@ -186,6 +189,37 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
   }
   options.far_plate_mm = options.near_plate_mm;
   EXPECT_EQ(study_biplane(options, one, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
+  CalibrationStudyOptions options;
+  options.groups = 1;
+  options.size_px = 512;
+  options.folder = std::filesystem::path(::testing::TempDir()) / "study_calibration";
+  EngineOptions engine;
+  const auto tests = study_calibration(options, engine, alone).value();
+  ASSERT_EQ(tests.size(), 1u);
+  EXPECT_EQ(tests[0].best.refused, 0);
+  EXPECT_GE(tests[0].best.balls, 10);
+  for (const double error : tests[0].best.targets) EXPECT_LT(error, 0.3);
+  EXPECT_LT(tests[0].best.fre_mean, tests[0].paper.fre_mean);
+  EXPECT_TRUE(std::filesystem::is_empty(options.folder));
+  std::filesystem::remove_all(options.folder);
+  options.groups = 0;
+  EXPECT_EQ(study_calibration(options, engine, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyCalibration, RefusedTestsAreCountedAndLeftOut) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const CalibrationTest good{0, 12, 0.2, 0.4, 0.1, 0.25, {0.1, 0.2, 0.3, 0.4, nan}};
+  const CalibrationTest none{1, 0, nan, nan, nan, nan, {nan, nan, nan, nan, nan}};
+  const StudyFiles files = files_of({{7, none, good}, {8, none, none}}, {});
+  EXPECT_EQ(files.json["refused"]["paper"], 2);
+  EXPECT_EQ(files.json["refused"]["best"], 1);
+  EXPECT_NEAR(files.json["rows"][1]["best_mm"]["mean"], 0.1, 1e-15);
+  EXPECT_NEAR(files.json["rows"][2]["best_mm"]["mean"], (12 * 0.2 + 0.9) / 15, 1e-15);
+  EXPECT_EQ(files.csv.find("nan"), std::string::npos);
+  EXPECT_EQ(files.svg.find("nan"), std::string::npos);
 }
 
 }  // namespace

@@ -31,7 +31,8 @@ double sigma_px(SigmaReading reading, double fle);
 inline constexpr std::uint32_t number_stream = 20000;
 inline constexpr std::uint32_t uniformity_stream = 20100;
 inline constexpr std::uint32_t location_stream = 20200;  // and the next
-inline constexpr std::uint32_t biplane_stream = 20300;
+inline constexpr std::uint32_t biplane_stream = 20300;   // and the nine next
+inline constexpr std::uint32_t calibration_stream = 20400;
 
 inline constexpr double cone_height_mm = 87.5;  // 2.3.1
 inline constexpr double cone_base_mm = 60;      // radii
