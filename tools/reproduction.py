@@ -80,13 +80,24 @@ def calibration(options):
             yield f"| {row['points']} | {name} | " + " | ".join(f"{row[key][kind]:.2f}" for kind in ("max", "min", "mean", "rms")) + " |"
 
 
+def design(options):
+    yield "| surface | design | udcsc | best of the random sets | the best that keeps the rules | their median |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: |"
+    for surface in ("helix", "cone", "dome"):
+        _, result = study(options, "design", "--surface", surface)
+        ruled = result["best_random_that_keeps_rules"]
+        yield (f"| {surface} | {result['design']['tre_mm']:.3f} | {result['udcsc']['tre_mm']:.3f} | "
+               f"{result['best_random']['tre_mm']:.3f} | {ruled['tre_mm'] if ruled else float('nan'):.3f} | "
+               f"{result['median_random_mm']:.3f} |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
     page = ROOT / "docs/reproduction.md"
-    for table in (number, uniformity, location, biplane, calibration):
+    for table in (number, uniformity, location, biplane, calibration, design):
         renew(page, table.__name__, list(table(options)))
     print(f"renewed {page.relative_to(ROOT)}, seed {options.seed}")
 

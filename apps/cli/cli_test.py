@@ -61,13 +61,13 @@ class CommandLine(unittest.TestCase):
 
     def test_studies_of_the_paper_write_table_figure_and_summary(self):
         for name, more in (("number", ("--balls", "6,12")), ("uniformity", ("--draws", 3)),
-                           ("location", ("--calibrator", "udcsc")), ("biplane", ())):
+                           ("location", ("--calibrator", "udcsc")), ("biplane", ()), ("design", ("--surface", "dome"))):
             out = {}
             for threads in (1, 2):
                 folder = self.root / f"{name}{threads}"
                 done = run("study", name, "--groups", 70, *more, "--seed", 4, "--threads", threads, "--out", folder)
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertIn("Printed (", done.stdout)
+                self.assertIn("by design" if name == "design" else "Printed (", done.stdout)
                 out[threads] = {path.name: path.read_bytes() for path in folder.iterdir()}
             self.assertEqual(out[1], out[2])
             self.assertEqual(sorted(out[1]), [f"{name}.csv", f"{name}.json", f"{name}.svg"])

@@ -110,12 +110,13 @@ void add_study(CLI::App& app, Action& action) {
                    "location: TRE by place of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
+                   "design: ball positions of least TRE under the rules\n"
                    "limit: error over the Cramer-Rao bound, and coverage of error bars")
       ->required();
   command->add_option("--groups", a.groups, "Trials of each setting")->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
   command->add_flag("--resume", a.resume, "Go on where a run was stopped that wrote to the same folder");
-  command->add_option("--balls", a.balls, "number: 6,7,8; uniformity: one number")
+  command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")
       ->delimiter(',')
       ->check(within(6, 64));
   command
@@ -130,6 +131,7 @@ void add_study(CLI::App& app, Action& action) {
   command->add_option("--fle", a.fle, "Instead of 2.34")->check(within(0, 1000));
   command->add_option("--origin", a.origin, "World's origin on the cone's axis: base (as printed) or centre");
   command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
+  command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome");
   command->add_option("--calibrator", a.calibrator,
                       "location: a built-in's name or a file; else random balls");
 }

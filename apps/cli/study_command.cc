@@ -13,6 +13,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/study/biplane.h"
 #include "helicarm/study/calibration_study.h"
+#include "helicarm/study/design.h"
 #include "helicarm/study/limit.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/number.h"
@@ -56,13 +57,14 @@ void choose(std::vector<Value>& chosen, const char* option, const std::vector<st
 
 /// An option this study does not know is an error, not a silence.
 void only(const StudyArguments& a, std::initializer_list<std::string_view> known) {
-  const std::array<std::pair<const char*, bool>, 7> given{{{"--balls", !a.balls.empty()},
+  const std::array<std::pair<const char*, bool>, 8> given{{{"--balls", !a.balls.empty()},
                                                            {"--sigma", !a.sigmas.empty()},
                                                            {"--reading", !a.readings.empty()},
                                                            {"--fle", a.fle.has_value()},
                                                            {"--origin", !a.origin.empty()},
                                                            {"--draws", a.draws.has_value()},
-                                                           {"--calibrator", !a.calibrator.empty()}}};
+                                                           {"--calibrator", !a.calibrator.empty()},
+                                                           {"--surface", !a.surface.empty()}}};
   for (const auto& [option, is_given] : given)
     if (is_given && std::ranges::count(known, option) == 0)
       refuse(fmt::format("{} has no {}; its options are: {}", a.name, option,
@@ -133,6 +135,17 @@ StudyFiles run_calibration(const StudyRun& run) {
   return run.ranks.leads() ? files_of(tests, options) : StudyFiles{};
 }
 
+StudyFiles run_design(const StudyRun& run) {
+  only(run.arguments, {"--balls", "--surface", "--sigma", "--fle"});
+  auto options = common_options<DesignOptions>(run);
+  if (run.arguments.balls.size() > 1) refuse("design takes one number of --balls");
+  if (!run.arguments.balls.empty()) options.balls = run.arguments.balls[0];
+  if (!run.arguments.surface.empty())
+    options.surface = named("--surface", run.arguments.surface, design_surfaces);
+  const auto answer = value_or_throw(study_design(options, run.engine, run.ranks));
+  return run.ranks.leads() ? files_of(answer, options) : StudyFiles{};
+}
+
 Json json_of(const std::vector<LimitRow>& rows, std::size_t groups, std::uint64_t seed) {
   Json json{{"format", "helicarm-study/1"}, {"study", "limit"},     {"groups", groups}, {"seed", seed},
             {"version", HELICARM_VERSION},  {"rows", Json::array()}};
@@ -177,11 +190,12 @@ StudyFiles run_limit(const StudyRun& run) {
 }
 
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 6> studies{{{"number", run_number},
+constexpr std::array<std::pair<std::string_view, Study>, 7> studies{{{"number", run_number},
                                                                      {"uniformity", run_uniformity},
                                                                      {"location", run_location},
                                                                      {"biplane", run_biplane},
                                                                      {"calibration", run_calibration},
+                                                                     {"design", run_design},
                                                                      {"limit", run_limit}}};
 
 Study study_named(const std::string& name) {

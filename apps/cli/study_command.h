@@ -12,7 +12,7 @@ namespace helicarm::cli {
 
 /// What is not given has the default of the study's own options.
 struct StudyArguments {
-  std::string name;  ///< number, uniformity, location, biplane, calibration or limit
+  std::string name;  ///< number, uniformity, location, biplane, calibration, design or limit
   std::optional<std::size_t> groups;
   std::filesystem::path out = "helicarm-study";
   bool resume = false;
@@ -23,6 +23,7 @@ struct StudyArguments {
   std::string origin;
   std::optional<int> draws;
   std::string calibrator;
+  std::string surface;
 };
 
 /// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (limit: no SVG). The

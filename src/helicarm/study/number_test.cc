@@ -10,6 +10,7 @@
 
 #include "helicarm/study/biplane.h"
 #include "helicarm/study/calibration_study.h"
+#include "helicarm/study/design.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/uniformity_study.h"
 
@@ -189,6 +190,26 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
   }
   options.far_plate_mm = options.near_plate_mm;
   EXPECT_EQ(study_biplane(options, one, alone).error().reason, Reason::bad_value);
+}
+
+TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
+  DesignOptions options;
+  options.groups = 300;
+  options.restarts = 2;
+  options.steps = 300;
+  EngineOptions one, three;
+  one.threads = 1;
+  three.threads = 3;
+  const DesignAnswer answer = study_design(options, one, alone).value();
+  EXPECT_TRUE(answer.design.keeps_rules);
+  EXPECT_EQ(answer.design.calibrator.balls.size(), 12u);
+  EXPECT_LT(answer.design.tre_mm, 0.95 * answer.udcsc.tre_mm);
+  EXPECT_LT(answer.design.tre_mm, answer.median_random_mm);
+  const StudyFiles files = files_of(answer, options);
+  EXPECT_EQ(files.csv, files_of(study_design(options, three, alone).value(), options).csv);
+  EXPECT_TRUE(calibrator_from_json(files.json["calibrator"], "design"));
+  options.balls = 5;
+  EXPECT_EQ(study_design(options, one, alone).error().reason, Reason::bad_value);
 }
 
 TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {

@@ -160,4 +160,14 @@ Lanes LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProj
   return sum / double(end - begin);
 }
 
+Lanes LaneTargets::mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const {
+  Lanes sum{};
+  for (std::size_t i = begin; i < end; ++i) {
+    const LanePoint off =
+        intersect(views[0], exact_.of_view[0][i], views[1], exact_.of_view[1][i]) - points_[i];
+    sum += dot(off, off);
+  }
+  return sum / double(end - begin);
+}
+
 }  // namespace helicarm

@@ -33,6 +33,7 @@ inline constexpr std::uint32_t uniformity_stream = 20100;
 inline constexpr std::uint32_t location_stream = 20200;  // and the next
 inline constexpr std::uint32_t biplane_stream = 20300;   // and the nine next
 inline constexpr std::uint32_t calibration_stream = 20400;
+inline constexpr std::uint32_t design_stream = 20500;  // and the three next
 
 inline constexpr double cone_height_mm = 87.5;  // 2.3.1
 inline constexpr double cone_base_mm = 60;      // radii
@@ -101,6 +102,8 @@ class LaneTargets {
   /// their pixels carry noise where it is given.
   Lanes mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2], double sigma_px,
                    const LanePixels* noise) const;
+  /// Mean squared distance likewise, of exact pixels.
+  Lanes mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const;
 
  private:
   std::vector<LanePoint> points_;
