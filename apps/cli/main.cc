@@ -118,16 +118,19 @@ void add_study(CLI::App& app, Action& action) {
   command->add_flag("--resume", a.resume, "Go on where a run was stopped that wrote to the same folder");
   command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->check(within(6, 64));
   command
       ->add_option(
           "--sigma", a.sigmas,
           "How N(0, 2.34) is read: std, var, mean_distance, rms_distance; number: several (default: all)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command
       ->add_option("--reading", a.readings,
                    "number: pixels projected back: calibration_pixels, fresh_noise, exact (default: all)")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command->add_option("--fle", a.fle, "Instead of 2.34")->check(within(0, 1000));
   command->add_option("--origin", a.origin, "World's origin on the cone's axis: base (as printed) or centre");
   command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
