@@ -34,13 +34,12 @@ double sharp(double r, double absorbance) {
 
 BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorbance_(absorbance) {
   constexpr int rings = 48;
-  constexpr double step = 1.0 / 64;
+  constexpr double step = 1.0 / 96;
   const double reach = 1 + 4 * blur;
   const int count = static_cast<int>(std::ceil(reach / step)) + 2;
   per_unit_ = static_cast<float>(1 / step);
   last_ = count - 1;
   values_.resize(static_cast<std::size_t>(count));
-  slopes_.resize(static_cast<std::size_t>(count));
   // The rings stand closer towards the rim, where the chord length falls like a square root, and towards the
   // centre.
   double radius[rings];
@@ -64,16 +63,7 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
     values_[static_cast<std::size_t>(i)] = static_cast<float>(sum / (blur * blur));
   }
   values_.back() = 0;
-  for (int i = 0; i < count; ++i) {
-    const auto before = static_cast<std::size_t>(std::max(0, i - 1));
-    const auto after = static_cast<std::size_t>(std::min(count - 1, i + 1));
-    slopes_[static_cast<std::size_t>(i)] =
-        (values_[after] - values_[before]) * per_unit_ / float(after - before);
-  }
-  slopes_.front() = 0;
-  slopes_.back() = 0;
   values_.push_back(0);  // one beyond, for the interpolation at the end
-  slopes_.push_back(0);
 }
 
 }  // namespace helicarm

@@ -22,17 +22,17 @@ class BallProfile {
   /// By value, so that a loop over pixels can look up several at once.
   struct Table {
     const float* values;
-    const float* slopes;
     float per_unit;
     float last;
     Sample at(float s) const {
       const float x = std::min(s * per_unit, last);
       const int i = static_cast<int>(x);
       const float t = x - static_cast<float>(i);
-      return {values[i] + t * (values[i + 1] - values[i]), slopes[i] + t * (slopes[i + 1] - slopes[i])};
+      const float rise = values[i + 1] - values[i];
+      return {values[i] + t * rise, rise * per_unit};
     }
   };
-  Table table() const { return {values_.data(), slopes_.data(), per_unit_, static_cast<float>(last_)}; }
+  Table table() const { return {values_.data(), per_unit_, static_cast<float>(last_)}; }
   Sample at(float s) const { return table().at(s); }
   /// Beyond this s the profile is nought.
   float reach() const { return static_cast<float>(last_) / per_unit_; }
@@ -45,7 +45,6 @@ class BallProfile {
   float per_unit_;
   int last_;
   std::vector<float> values_;
-  std::vector<float> slopes_;
 };
 
 }  // namespace helicarm
