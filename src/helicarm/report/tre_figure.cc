@@ -5,9 +5,10 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <vector>
 
 #include <fmt/format.h>
+
+#include "helicarm/report/isoline.h"
 
 namespace helicarm {
 namespace {
@@ -26,15 +27,6 @@ std::string colour_of(double share) {
   for (std::size_t c = 0; c < 3; ++c)
     mixed[c] = int(std::lround((1 - t) * colours[below][c] + t * colours[below + 1][c]));
   return fmt::format("#{:02x}{:02x}{:02x}", mixed[0], mixed[1], mixed[2]);
-}
-
-/// A round step that divides a range into about `count` parts.
-double round_step(double range, int count) {
-  const double rough = range / count;
-  const double decade = std::pow(10, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * decade >= rough) return factor * decade;
-  return 10 * decade;
 }
 
 struct Scale {
@@ -76,7 +68,7 @@ class Slice {
                          x_of(column - 0.5), y_of(row + 0.5), cell_ + 0.3, cell_ + 0.3,
                          colour_of(scale_.share(value)));
     for (double level = scale_.low + scale_.step; level < scale_.high - 1e-9; level += scale_.step)
-      if (const std::string path = isoline(level); !path.empty())
+      if (const std::string path = path_of(level); !path.empty())
         fmt::format_to(put,
                        R"(<path d="{}" stroke="#fff" stroke-opacity="0.7" fill="none"/>)"
                        "\n",
@@ -116,27 +108,12 @@ class Slice {
   double x_of(double column) const { return x0_ + (column + 0.5) * cell_; }
   double y_of(double row) const { return top_px + slice_px - (row + 0.5) * cell_; }
 
-  /// Marching squares over the lattice's points.
-  std::string isoline(double level) const {
+  std::string path_of(double level) const {
     std::string path;
-    for (int row = 0; row + 1 < volume_.side; ++row)
-      for (int column = 0; column + 1 < volume_.side; ++column) {
-        constexpr int corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-        std::vector<std::array<double, 2>> crossings;
-        for (int side = 0; side < 4; ++side) {
-          const auto& from = corners[side];
-          const auto& to = corners[(side + 1) % 4];
-          const double a = at(column + from[0], row + from[1]) - level;
-          const double b = at(column + to[0], row + to[1]) - level;
-          if (!(a * b < 0)) continue;
-          const double t = a / (a - b);
-          crossings.push_back(
-              {x_of(column + from[0] + t * (to[0] - from[0])), y_of(row + from[1] + t * (to[1] - from[1]))});
-        }
-        for (std::size_t i = 0; i + 1 < crossings.size(); i += 2)
-          fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}L{:.1f} {:.1f}", crossings[i][0],
-                         crossings[i][1], crossings[i + 1][0], crossings[i + 1][1]);
-      }
+    for (const auto& [from, to] : isoline(
+             volume_.side, volume_.side, [this](int column, int row) { return at(column, row); }, level))
+      fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}L{:.1f} {:.1f}", x_of(from[0]), y_of(from[1]),
+                     x_of(to[0]), y_of(to[1]));
     return path;
   }
 

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/chart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "helicarm/report/isoline.h"
+#include "helicarm/report/markup.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double chart_width = 460, chart_height = 360;  // of the frame
+constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
+constexpr double legend_line = 17, legend_mark = 26;
+constexpr int about_ticks = 7;
+constexpr std::size_t few_dots = 50;  // more are drawn smaller, and let others show through
+
+/// Okabe and Ito's colours, told apart by the colour-blind too.
+constexpr std::array series_colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                    "#e69f00", "#56b4e9", "#000000"};
+
+struct Axis {
+  double low, high, step;
+  static Axis over(double least, double most) {
+    if (!(most > least)) least -= 0.5, most += 0.5;
+    const double step = round_step(most - least, about_ticks);
+    return {std::floor(least / step + 1e-9) * step, std::ceil(most / step - 1e-9) * step, step};
+  }
+  double share(double value) const { return (value - low) / (high - low); }
+};
+
+class ChartDrawing {
+ public:
+  ChartDrawing(const Chart& chart, double x0) : chart_(chart), x0_(x0) {
+    double x_low = infinity, x_high = -infinity, y_low = infinity, y_high = -infinity;
+    const auto include = [&](double x, double y) {
+      if (!std::isfinite(x) || !std::isfinite(y)) return;
+      x_low = std::min(x_low, x), x_high = std::max(x_high, x);
+      y_low = std::min(y_low, y), y_high = std::max(y_high, y);
+    };
+    for (const ChartSeries& series : chart.series)
+      for (const auto& [x, y] : series.points) include(x, y);
+    if (chart.field) {
+      const ChartField& f = *chart.field;
+      include(f.x_first, f.y_first);
+      include(f.x_first + f.step * (f.columns - 1), f.y_first + f.step * (f.rows - 1));
+    }
+    if (chart.band) y_low = std::min(y_low, chart.band->low), y_high = std::max(y_high, chart.band->high);
+    if (!(x_low <= x_high)) x_low = y_low = 0, x_high = y_high = 1;
+    if (chart.y_from_zero) y_low = std::min(0.0, y_low);
+    if (chart.y_most) y_high = std::min(y_high, *chart.y_most);
+    x_ = Axis::over(x_low, x_high);
+    y_ = Axis::over(y_low, y_high);
+    if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
+    if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
+  }
+
+  std::string svg() {
+    frame();
+    put(R"(<clipPath id="frame{0:.0f}"><rect x="{0:.0f}" y="{1}" width="{2}" height="{3}"/></clipPath>)"
+        "\n<g clip-path=\"url(#frame{0:.0f})\">\n",
+        x0_, top_margin, chart_width, chart_height);
+    if (chart_.band) band(*chart_.band);
+    if (chart_.field) field(*chart_.field);
+    for (std::size_t i = 0; i < chart_.series.size(); ++i) series(chart_.series[i], colour(i));
+    text_ += "</g>\n";
+    legend();
+    return std::move(text_);
+  }
+
+ private:
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+
+  static const char* colour(std::size_t i) { return series_colours[i % series_colours.size()]; }
+  double px(double x) const { return x0_ + chart_width * x_.share(x); }
+  double py(double y) const { return top_margin + chart_height * (1 - y_.share(y)); }
+
+  template <class... Values>
+  void put(fmt::format_string<Values...> format, Values&&... values) {
+    fmt::format_to(std::back_inserter(text_), format, std::forward<Values>(values)...);
+  }
+
+  void frame() {
+    const double bottom = top_margin + chart_height;
+    const auto ticks = [](const Axis& axis) {
+      std::vector<double> places;
+      for (double at = std::ceil(axis.low / axis.step - 1e-9) * axis.step; at <= axis.high + 1e-9 * axis.step;
+           at += axis.step)
+        places.push_back(std::abs(at) < 1e-9 * axis.step ? 0 : at);
+      return places;
+    };
+    for (const double x : ticks(x_))
+      put(R"(<path d="M{0:.1f} {1}V{2}" class="grid"/><text x="{0:.1f}" y="{3}" class="middle">{4:.6g}</text>)"
+          "\n",
+          px(x), top_margin, bottom, bottom + 18, x);
+    for (const double y : ticks(y_))
+      put(R"(<path d="M{0} {1:.1f}H{2}" class="grid"/><text x="{3}" y="{4:.1f}" class="end">{5:.6g}</text>)"
+          "\n",
+          x0_, py(y), x0_ + chart_width, x0_ - 7, py(y) + 4, y);
+    put(R"(<rect x="{}" y="{}" width="{}" height="{}" class="frame"/>)"
+        "\n",
+        x0_, top_margin, chart_width, chart_height);
+    put(R"(<text x="{}" y="{}" class="middle">{}</text>)"
+        "\n",
+        x0_ + chart_width / 2, bottom + 40, escaped(chart_.x_label));
+    put(R"-(<text transform="translate({} {}) rotate(-90)" class="middle">{}</text>)-"
+        "\n",
+        x0_ - 44, top_margin + chart_height / 2, escaped(chart_.y_label));
+    put(R"(<text x="{}" y="{}" class="title">{}</text>)"
+        "\n",
+        x0_, top_margin - 28, escaped(chart_.title));
+    put(R"(<text x="{}" y="{}" class="note">{}</text>)"
+        "\n",
+        x0_, top_margin - 10, escaped(chart_.note));
+  }
+
+  void band(const ChartBand& band) {
+    put(R"(<rect x="{}" y="{:.1f}" width="{}" height="{:.1f}" class="band"/>)"
+        "\n",
+        x0_, py(band.high), chart_width, py(band.low) - py(band.high));
+  }
+
+  void series(const ChartSeries& series, const char* colour) {
+    if (series.scattered) {
+      const bool few = series.points.size() <= few_dots;
+      put("<g fill=\"{}\" fill-opacity=\"{}\">\n", colour, few ? 1 : 0.35);
+      for (const auto& [x, y] : series.points)
+        if (std::isfinite(x) && std::isfinite(y) && y_.share(y) <= 1.02)
+          put("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\"/>\n", px(x), py(y), few ? 3.5 : 1.6);
+      text_ += "</g>\n";
+      return;
+    }
+    std::string path, marks;
+    for (const auto& [x, y] : series.points) {
+      if (!std::isfinite(x) || !std::isfinite(y)) continue;
+      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', px(x), py(y));
+      if (series.points.size() > 2)
+        fmt::format_to(std::back_inserter(marks), R"(<circle cx="{:.1f}" cy="{:.1f}" r="3"/>)", px(x), py(y));
+    }
+    put("<path d=\"{}\" class=\"line\" stroke=\"{}\"{}/>\n<g fill=\"{}\">{}</g>\n", path, colour,
+        series.dashed ? " stroke-dasharray=\"6 4\"" : "", colour, marks);
+  }
+
+  void field(const ChartField& field) {
+    const auto at = [&](int column, int row) {
+      return field.values[std::size_t(row * field.columns + column)];
+    };
+    for (std::size_t i = 0; i < field.levels.size(); ++i) {
+      const double level = field.levels[i];
+      const auto pieces = isoline(field.columns, field.rows, at, level);
+      if (pieces.empty()) continue;
+      const auto x_of = [&](double column) { return px(field.x_first + field.step * column); };
+      const auto y_of = [&](double row) { return py(field.y_first + field.step * row); };
+      std::string path;
+      // The label stands where the line is nearest to a diagonal from the middle, a turn on for each line.
+      const double way = 0.6 + 0.9 * double(i);
+      constexpr double nowhere = 3;
+      double best = nowhere, label_x = 0, label_y = 0;
+      for (const auto& [from, to] : pieces) {
+        fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}L{:.1f} {:.1f}", x_of(from[0]), y_of(from[1]),
+                       x_of(to[0]), y_of(to[1]));
+        const double across = (from[0] - (field.columns - 1) / 2.0), up = (from[1] - (field.rows - 1) / 2.0);
+        const double length = std::hypot(across, up);
+        const bool inside = std::abs(across) < 0.45 * field.columns && std::abs(up) < 0.45 * field.rows;
+        const double off =
+            length > 0 && inside ? 1 - (across * std::cos(way) + up * std::sin(way)) / length : nowhere;
+        if (off < best) best = off, label_x = x_of(from[0]), label_y = y_of(from[1]);
+      }
+      put("<path d=\"{}\" class=\"line\" stroke=\"{}\"/>\n", path, colour(0));
+      if (best < nowhere)
+        put("<text x=\"{:.1f}\" y=\"{:.1f}\" class=\"level\">{:.3g}</text>\n", label_x, label_y + 4, level);
+    }
+  }
+
+  void legend() {
+    int line = 0;
+    const auto add = [&](const std::string& mark, const std::string& name) {
+      put(R"-(<g transform="translate({} {})">{}<text x="{}" y="4">{}</text></g>)-"
+          "\n",
+          x0_, top_margin + chart_height + bottom_margin + legend_line * (line++ + 0.3), mark,
+          legend_mark + 8, escaped(name));
+    };
+    if (chart_.band)
+      add(fmt::format(R"(<rect y="-5" width="{}" height="10" class="band"/>)", legend_mark),
+          chart_.band->name);
+    for (std::size_t i = 0; i < chart_.series.size(); ++i) {
+      const ChartSeries& series = chart_.series[i];
+      if (series.name.empty()) continue;
+      add(series.scattered ? fmt::format(R"(<circle cx="{}" r="3" fill="{}"/>)", legend_mark / 2, colour(i))
+                           : fmt::format(R"(<path d="M0 0H{}" class="line" stroke="{}"{}/>)", legend_mark,
+                                         colour(i), series.dashed ? " stroke-dasharray=\"6 4\"" : ""),
+          series.name);
+    }
+  }
+
+  const Chart& chart_;
+  double x0_;
+  Axis x_{}, y_{};
+  std::string text_;
+};
+
+double legend_height(const Chart& chart) {
+  const auto named = [](const ChartSeries& series) { return !series.name.empty(); };
+  const auto lines = std::ranges::count_if(chart.series, named) + (chart.band ? 1 : 0);
+  return legend_line * double(lines);
+}
+
+}  // namespace
+
+std::string chart_svg(std::span<const Chart> charts) {
+  std::string body;
+  double x = left_margin, legends = 0;
+  for (const Chart& chart : charts) {
+    legends = std::max(legends, legend_height(chart));
+    body += ChartDrawing(chart, x).svg();
+    x += chart_width + left_margin + right_margin;
+  }
+  std::string title;
+  for (const Chart& chart : charts) title += (title.empty() ? "" : "; ") + chart.title;
+  return fmt::format(
+      R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" )"
+      R"(font-family="system-ui, sans-serif" font-size="12" role="img" aria-label="{2}">)"
+      "\n<style>.grid{{stroke:#e4e4e0}} .frame{{fill:none;stroke:#333}} "
+      ".band{{fill:#b9b9b0;fill-opacity:0.45}} "
+      ".line{{fill:none;stroke-width:1.8}} .middle{{text-anchor:middle}} .end{{text-anchor:end}} "
+      ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
+      ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"
+      "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
+      x - left_margin, top_margin + chart_height + bottom_margin + legends, escaped(title), body);
+}
+
+}  // namespace helicarm

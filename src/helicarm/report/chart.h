@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace helicarm {
+
+/// Points joined by a line, with a mark at each, or (`scattered`) small dots alone.
+struct ChartSeries {
+  std::string name;  ///< for the legend; empty: not in it
+  std::vector<std::array<double, 2>> points = {};
+  bool scattered = false;
+  bool dashed = false;
+};
+
+/// A range of y that lies behind the curves: what was printed, say.
+struct ChartBand {
+  std::string name;
+  double low;
+  double high;
+};
+
+/// Values on a lattice, x fastest, drawn as isolines that carry their level.
+struct ChartField {
+  double x_first, y_first, step;
+  int columns, rows;
+  std::vector<double> values;
+  std::vector<double> levels;
+};
+
+struct Chart {
+  std::string title;
+  std::string x_label;  ///< with unit
+  std::string y_label;
+  std::vector<ChartSeries> series = {};
+  std::optional<ChartBand> band = {};
+  std::optional<ChartField> field = {};
+  bool y_from_zero = false;
+  std::optional<double> y_most = {};  ///< what lies higher is cut off
+  std::string note = {};              ///< a line below the title
+};
+
+/// Charts side by side as one SVG document with axes, ticks and legends. The same input gives the same bytes.
+std::string chart_svg(std::span<const Chart> charts);
+
+}  // namespace helicarm

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/chart.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/report/isoline.h"
+
+namespace helicarm {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Chart, HasAxesWithUnitsAndLegend) {
+  Chart chart{"(a) FRE", "Number of points", "FRE, mm", {{"fresh noise", {{6, 0.6}, {12, 0.55}, {20, 0.5}}}}};
+  chart.band = ChartBand{"printed", 0.68, 0.8};
+  const std::string svg = chart_svg(std::array{chart});
+  for (const char* word :
+       {"(a) FRE", "Number of points", "FRE, mm", "fresh noise", "printed", ">12<", ">0.6<"})
+    EXPECT_THAT(svg, HasSubstr(word));
+}
+
+TEST(Chart, EscapesWhatItIsGiven) {
+  const std::string svg = chart_svg(std::array{Chart{"a < b & c", "<x>", "y"}});
+  EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
+  EXPECT_THAT(svg, Not(HasSubstr("<x>")));
+}
+
+TEST(Chart, LeavesOutWhatIsNotFinite) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::string svg = chart_svg(
+      std::array{Chart{"t", "x", "y", {{"s", {{0, 1}, {1, nan}, {2, 3}}}, {"none", {{nan, nan}}}}}});
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+  EXPECT_THAT(chart_svg(std::array{Chart{"nothing", "x", "y"}}), Not(HasSubstr("inf")));
+}
+
+TEST(Isoline, OfAConeIsACircle) {
+  const auto height = [](int column, int row) { return std::hypot(column - 20.0, row - 20.0); };
+  const auto pieces = isoline(41, 41, height, 12.5);
+  EXPECT_GT(pieces.size(), 60u);
+  for (const auto& piece : pieces)
+    for (const auto& [column, row] : piece) EXPECT_NEAR(std::hypot(column - 20, row - 20), 12.5, 0.02);
+  EXPECT_TRUE(isoline(41, 41, height, 100).empty());
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace helicarm {
+
+/// A piece of an isoline within one cell of a lattice: column and row of its two ends.
+using IsolinePiece = std::array<std::array<double, 2>, 2>;
+
+/// Marching squares: where the values `at(column, row)` cross a level. Cells with a NaN corner have none.
+template <class At>
+std::vector<IsolinePiece> isoline(int columns, int rows, At at, double level) {
+  std::vector<IsolinePiece> pieces;
+  constexpr int corners[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  for (int row = 0; row + 1 < rows; ++row)
+    for (int column = 0; column + 1 < columns; ++column) {
+      std::array<std::array<double, 2>, 4> crossings;
+      std::size_t count = 0;
+      for (int side = 0; side < 4; ++side) {
+        const auto& from = corners[side];
+        const auto& to = corners[(side + 1) % 4];
+        const double a = at(column + from[0], row + from[1]) - level;
+        const double b = at(column + to[0], row + to[1]) - level;
+        if (!(a * b < 0)) continue;
+        const double t = a / (a - b);
+        crossings[count++] = {column + from[0] + t * (to[0] - from[0]),
+                              row + from[1] + t * (to[1] - from[1])};
+      }
+      for (std::size_t i = 0; i + 1 < count; i += 2) pieces.push_back({crossings[i], crossings[i + 1]});
+    }
+  return pieces;
+}
+
+/// A round step that divides a range into about `count` parts.
+inline double round_step(double range, int count) {
+  const double rough = range / count;
+  const double decade = std::pow(10, std::floor(std::log10(rough)));
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * decade >= rough) return factor * decade;
+  return 10 * decade;
+}
+
+}  // namespace helicarm
