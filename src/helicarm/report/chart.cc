@@ -36,15 +36,18 @@ struct Axis {
 
 class ChartDrawing {
  public:
-  ChartDrawing(const Chart& chart, double x0) : chart_(chart), x0_(x0) {
+  ChartDrawing(const Chart& chart, std::size_t number, double x0) : chart_(chart), number_(number), x0_(x0) {
     double x_low = infinity, x_high = -infinity, y_low = infinity, y_high = -infinity;
     const auto include = [&](double x, double y) {
       if (!std::isfinite(x) || !std::isfinite(y)) return;
       x_low = std::min(x_low, x), x_high = std::max(x_high, x);
       y_low = std::min(y_low, y), y_high = std::max(y_high, y);
     };
-    for (const ChartSeries& series : chart.series)
+    for (const ChartSeries& series : chart.series) {
       for (const auto& [x, y] : series.points) include(x, y);
+      for (std::size_t i = 0; i < series.ranges.size(); ++i)
+        for (const double y : series.ranges[i]) include(series.points[i][0], y);
+    }
     if (chart.field) {
       const ChartField& f = *chart.field;
       include(f.x_first, f.y_first);
@@ -54,7 +57,9 @@ class ChartDrawing {
     if (!(x_low <= x_high)) x_low = y_low = 0, x_high = y_high = 1;
     if (chart.y_from_zero) y_low = std::min(0.0, y_low);
     if (chart.y_most) y_high = std::min(y_high, *chart.y_most);
-    x_ = Axis::over(x_low, x_high);
+    if (chart.y_range) y_low = chart.y_range->front(), y_high = chart.y_range->back();
+    x_ =
+        chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
     y_ = Axis::over(y_low, y_high);
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
     if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
@@ -62,9 +67,9 @@ class ChartDrawing {
 
   std::string svg() {
     frame();
-    put(R"(<clipPath id="frame{0:.0f}"><rect x="{0:.0f}" y="{1}" width="{2}" height="{3}"/></clipPath>)"
-        "\n<g clip-path=\"url(#frame{0:.0f})\">\n",
-        x0_, top_margin, chart_width, chart_height);
+    put(R"(<clipPath id="frame{0}"><rect x="{1}" y="{2}" width="{3}" height="{4}"/></clipPath>)"
+        "\n<g clip-path=\"url(#frame{0})\">\n",
+        number_, x0_, top_margin, chart_width, chart_height);
     if (chart_.band) band(*chart_.band);
     if (chart_.field) field(*chart_.field);
     for (std::size_t i = 0; i < chart_.series.size(); ++i) series(chart_.series[i], colour(i));
@@ -94,7 +99,11 @@ class ChartDrawing {
         places.push_back(std::abs(at) < 1e-9 * axis.step ? 0 : at);
       return places;
     };
-    for (const double x : ticks(x_))
+    for (std::size_t i = 0; i < chart_.x_names.size(); ++i)
+      put(R"(<text x="{:.1f}" y="{}" class="middle">{}</text>)"
+          "\n",
+          px(double(i)), bottom + 18, escaped(chart_.x_names[i]));
+    for (const double x : chart_.x_names.empty() ? ticks(x_) : std::vector<double>{})
       put(R"(<path d="M{0:.1f} {1}V{2}" class="grid"/><text x="{0:.1f}" y="{3}" class="middle">{4:.6g}</text>)"
           "\n",
           px(x), top_margin, bottom, bottom + 18, x);
@@ -135,6 +144,12 @@ class ChartDrawing {
       text_ += "</g>\n";
       return;
     }
+    for (std::size_t i = 0; i < series.ranges.size(); ++i)
+      put(R"(<path d="M{0:.1f} {1:.1f}V{2:.1f}" class="line" stroke="{3}"{5}/><circle cx="{0:.1f}" cy="{4:.1f}" r="4" fill="{3}"/>)"
+          "\n",
+          px(series.points[i][0]), py(series.ranges[i][0]), py(series.ranges[i][1]), colour,
+          py(series.points[i][1]), series.dashed ? " stroke-dasharray=\"6 4\"" : "");
+    if (!series.ranges.empty()) return;
     std::string path, marks;
     for (const auto& [x, y] : series.points) {
       if (!std::isfinite(x) || !std::isfinite(y)) continue;
@@ -199,6 +214,7 @@ class ChartDrawing {
   }
 
   const Chart& chart_;
+  std::size_t number_;  ///< in the document
   double x0_;
   Axis x_{}, y_{};
   std::string text_;
@@ -212,16 +228,24 @@ double legend_height(const Chart& chart) {
 
 }  // namespace
 
-std::string chart_svg(std::span<const Chart> charts) {
-  std::string body;
-  double x = left_margin, legends = 0;
-  for (const Chart& chart : charts) {
-    legends = std::max(legends, legend_height(chart));
-    body += ChartDrawing(chart, x).svg();
-    x += chart_width + left_margin + right_margin;
+std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
+  if (columns == 0) columns = std::max<std::size_t>(1, charts.size());
+  std::string body, title;
+  double width = 0, height = 0;
+  for (std::size_t first = 0; first < charts.size(); first += columns) {
+    double x = left_margin, legends = 0;
+    body += fmt::format("<g transform=\"translate(0 {})\">\n", height);
+    for (std::size_t i = first; i < std::min(first + columns, charts.size()); ++i) {
+      const Chart& chart = charts[i];
+      title += (title.empty() ? "" : "; ") + chart.title;
+      legends = std::max(legends, legend_height(chart));
+      body += ChartDrawing(chart, i, x).svg();
+      x += chart_width + left_margin + right_margin;
+    }
+    body += "</g>\n";
+    width = std::max(width, x - left_margin);
+    height += top_margin + chart_height + bottom_margin + legends;
   }
-  std::string title;
-  for (const Chart& chart : charts) title += (title.empty() ? "" : "; ") + chart.title;
   return fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" )"
       R"(font-family="system-ui, sans-serif" font-size="12" role="img" aria-label="{2}">)"
@@ -231,7 +255,7 @@ std::string chart_svg(std::span<const Chart> charts) {
       ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
       ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
-      x - left_margin, top_margin + chart_height + bottom_margin + legends, escaped(title), body);
+      width, height, escaped(title), body);
 }
 
 }  // namespace helicarm
