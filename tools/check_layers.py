@@ -31,7 +31,7 @@ ROOMS = {
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification simulation navigation",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-             " verification simulation navigation",
+             " verification simulation navigation report",
 }
 FOR_TESTS = {"core", "simulation"}
 

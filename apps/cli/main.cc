@@ -103,10 +103,8 @@ void add_study(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, study_command);
   command->add_option("NAME", a.name, "limit: error over the Cramer-Rao bound, and coverage of error bars")
       ->required();
-  command->add_option("--groups", a.groups, "Trials of each setting")
-      ->check(within(1, 1e6))
-      ->capture_default_str();
-  command->add_option("--out", a.out, "Folder for limit.csv and limit.json")->capture_default_str();
+  command->add_option("--groups", a.groups, "Trials of each setting [1000]")->check(within(1, 1e6));
+  command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
 }
 
 void add_demo(CLI::App& app, Action& action) {

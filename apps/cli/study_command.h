@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "command.h"
@@ -9,13 +10,13 @@
 namespace helicarm::cli {
 
 struct StudyArguments {
-  std::string name;   ///< limit
-  int groups = 1000;  ///< trials of each setting
+  std::string name;           ///< limit
+  std::optional<int> groups;  ///< trials of each setting; empty: the study's default
   std::filesystem::path out = "helicarm-study";
 };
 
-/// Runs an experiment on simulated numbers and writes NAME.csv and NAME.json. The same seed gives the same
-/// bytes, whatever the number of threads.
+/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg. The same seed gives
+/// the same bytes, whatever the number of threads.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli
