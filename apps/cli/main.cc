@@ -101,9 +101,13 @@ void add_study(CLI::App& app, Action& action) {
       add_command(app, "study", "Simulated experiments: the estimators against the statistical limit",
                   "helicarm study limit --groups 10000 --seed 1 --out limit");
   auto& a = arguments_of(command, action, study_command);
-  command->add_option("NAME", a.name, "limit: error over the Cramer-Rao bound, and coverage of error bars")
+  command
+      ->add_option("NAME", a.name,
+                   "limit: error over the Cramer-Rao bound, and coverage of error bars; centres: what wrong "
+                   "assumptions about a ball's picture cost")
       ->required();
-  command->add_option("--groups", a.groups, "Trials of each setting [1000]")->check(within(1, 1e6));
+  command->add_option("--groups", a.groups, "Trials, or balls, of each setting [1000]")
+      ->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
 }
 

@@ -9,6 +9,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/study/centres.h"
 #include "helicarm/study/limit.h"
 #include "progress_line.h"
 
@@ -30,8 +31,17 @@ StudyFiles run_limit(const StudyRun& run) {
   return files_of(study_limit(options, run.progress), options);
 }
 
+StudyFiles run_centres(const StudyRun& run) {
+  CentreOptions options;
+  if (run.arguments.groups) options.balls = *run.arguments.groups;
+  options.seed = run.console.seed;
+  options.threads = run.console.threads;
+  return files_of(study_centres(options, run.progress), options);
+}
+
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 1> studies{{{"limit", run_limit}}};
+constexpr std::array<std::pair<std::string_view, Study>, 2> studies{
+    {{"limit", run_limit}, {"centres", run_centres}}};
 
 Study study_named(const std::string& name) {
   std::vector<std::string_view> names;
@@ -57,9 +67,12 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
       files = study({arguments, console, [&](double share) { line.tell(share); }});
     }
     const std::string json = to_text(files.json) + "\n";
-    value_or_throw(write_file(out / (arguments.name + ".csv"), files.csv));
-    value_or_throw(write_file(out / (arguments.name + ".json"), json));
-    value_or_throw(write_file(out / (arguments.name + ".svg"), files.svg));
+    const auto write = [&](const char* ending, const std::string& text) {
+      if (!text.empty()) value_or_throw(write_file(out / (arguments.name + ending), text));
+    };
+    write(".csv", files.csv);
+    write(".json", json);
+    write(".svg", files.svg);
     if (console.json)
       console.out << json;
     else if (!console.quiet)

@@ -10,13 +10,14 @@
 namespace helicarm::cli {
 
 struct StudyArguments {
-  std::string name;           ///< limit
-  std::optional<int> groups;  ///< trials of each setting; empty: the study's default
+  std::string name;  ///< limit or centres
+  std::optional<int>
+      groups;  ///< trials (limit) or balls (centres) of each setting; empty: the study's default
   std::filesystem::path out = "helicarm-study";
 };
 
-/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg. The same seed gives
-/// the same bytes, whatever the number of threads.
+/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (centres: no SVG). The
+/// same seed gives the same bytes, whatever the number of threads.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli
