@@ -50,16 +50,17 @@ void search_blobs(benchmark::State& state) {
 }
 BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
+/// As the balls are fitted at last: from where the search left them, with the picture's own look.
 void fit_one_ball(benchmark::State& state) {
   const auto found =
       value_or_throw(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
-  Dot start;
-  for (const Fiducial& ball : found.fiducials)
-    if (ball.status == FiducialStatus::used) start.centre_px = ball.uv_raw;
-  start.radius_px = 13;
-  const BallProfile profile(0.9 / start.radius_px, 3);
-  const DotFitOptions options = fit_options_for(exposure());
-  for (auto _ : state) benchmark::DoNotOptimize(fit_dot(exposure().pixels, start, profile, {}, options));
+  std::vector<Dot> balls;
+  for (const Dot& dot : rectification().other_dots)
+    for (const Fiducial& ball : found.fiducials)
+      if (ball.status == FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
+        balls.push_back(dot);
+  const DotLook look = estimate_look(exposure(), rectification().noise, balls);
+  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(exposure(), {balls.front()}, look, {}));
 }
 BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
 

@@ -3,11 +3,13 @@
 """The program from outside: exit codes, streams and files. Usage: cli_test.py PROGRAM"""
 
 import json
+import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 PROGRAM = sys.argv.pop(1)
@@ -56,6 +58,70 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.root / "limit1/limit.csv").read_bytes(), (self.root / "limit3/limit.csv").read_bytes())
         self.assertEqual(run("study", "fortune").returncode, 2)
+
+    def test_studies_of_the_paper_write_table_figure_and_summary(self):
+        for name, more in (("number", ("--balls", "6,12")), ("uniformity", ("--draws", 3)),
+                           ("location", ("--calibrator", "udcsc")), ("biplane", ()), ("design", ("--surface", "dome"))):
+            out = {}
+            for threads in (1, 2):
+                folder = self.root / f"{name}{threads}"
+                done = run("study", name, "--groups", 70, *more, "--seed", 4, "--threads", threads, "--out", folder)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn("by design" if name == "design" else "Printed (", done.stdout)
+                out[threads] = {path.name: path.read_bytes() for path in folder.iterdir()}
+            self.assertEqual(out[1], out[2])
+            self.assertEqual(sorted(out[1]), [f"{name}.csv", f"{name}.json", f"{name}.svg"])
+            written = json.loads(out[1][f"{name}.json"])
+            self.assertEqual((written["format"], written["study"], written["groups"], written["seed"]),
+                             ("helicarm-study/1", name, 70, 4))
+
+    def test_study_refuses_options_it_does_not_have(self):
+        for wrong in (("number", "--sigma", "variance"), ("number", "--draws", 3), ("number", "--balls", "5"),
+                      ("number", "--balls", "7,7"), ("number", "--reading", "exact,exact"), ("uniformity", "--balls", "6,7"),
+                      ("location", "--origin", "top"), ("location", "--calibrator", "none.json"), ("limit", "--fle", 1),
+                      ("number", "--groups", 0)):
+            done = run("study", *wrong, "--out", self.root / "refused")
+            self.assertEqual(done.returncode, 2, wrong)
+            self.assertTrue(done.stderr.strip(), wrong)
+
+    @unittest.skipUnless(os.environ.get("HELICARM_MPIRUN"), "built without MPI")
+    def test_study_writes_the_same_bytes_on_any_number_of_ranks(self):
+        surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+                        "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+        study = ("study", "number", "--groups", "3001", "--balls", "6,12", "--seed", "4", "--out")
+        self.assertEqual(run(*study, self.root / "alone", "--quiet").returncode, 0)
+        for ranks in ("1", "2", "3"):
+            folder = self.root / f"ranks{ranks}"
+            done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", ranks, PROGRAM, *study, str(folder)],
+                                  capture_output=True, text=True, env=surroundings)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(done.stdout.count("written to"), 1)
+            self.assertEqual(f"{ranks} ranks" in done.stderr, ranks != "1")
+            for ending in ("csv", "json", "svg"):
+                self.assertEqual((folder / f"number.{ending}").read_bytes(),
+                                 (self.root / f"alone/number.{ending}").read_bytes())
+        done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", "2", PROGRAM, "study", "number", "--fle", "no"],
+                              capture_output=True, text=True, env=surroundings)
+        self.assertEqual(done.returncode, 2, done.stderr)
+
+    def test_study_that_was_killed_goes_on_to_the_same_bytes(self):
+        study = ("study", "uniformity", "--groups", 1000, "--seed", 3, "--quiet")
+        folder = self.root / "killed"
+        journal = folder / "uniformity.partial"
+        killed = subprocess.Popen([PROGRAM, *map(str, study), "--threads", "1", "--out", str(folder)])
+        while killed.poll() is None and not journal.exists():
+            time.sleep(0.002)
+        killed.kill()
+        killed.wait()
+        if not (folder / "uniformity.csv").exists():  # else the machine was too fast to be interrupted
+            self.assertTrue(journal.exists())
+            self.assertEqual(run(*study, "--draws", 99, "--resume", "--out", folder).returncode, 2)
+        self.assertEqual(run(*study, "--resume", "--out", folder).returncode, 0)
+        self.assertFalse(journal.exists())
+        self.assertEqual(run(*study, "--out", self.root / "whole").returncode, 0)
+        for ending in ("csv", "json", "svg"):
+            self.assertEqual((folder / f"uniformity.{ending}").read_bytes(),
+                             (self.root / f"whole/uniformity.{ending}").read_bytes())
 
     def test_run_writes_result_report_and_overlays(self):
         done = run("run", self.root / "case", "--out", self.root / "out", "--json")

@@ -98,17 +98,47 @@ void add_predict(CLI::App& app, Action& action) {
 
 void add_study(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "study", "Simulated experiments: the estimators against the statistical limit",
-                  "helicarm study limit --groups 10000 --seed 1 --out limit");
+      add_command(app, "study", "The paper's simulations, and the estimators against the statistical limit",
+                  "helicarm study number --out number\n"
+                  "  helicarm study location --calibrator udcsc --out location\n"
+                  "  helicarm study limit --groups 10000 --seed 1 --out limit");
   auto& a = arguments_of(command, action, study_command);
   command
       ->add_option("NAME", a.name,
-                   "limit: error over the Cramer-Rao bound, and coverage of error bars; centres: what wrong "
-                   "assumptions about a ball's picture cost")
+                   "number: FRE and TRE by number of balls (Fig. 5)\n"
+                   "uniformity: E(A) against TRE (Fig. 6)\n"
+                   "location: TRE by place of the target (Fig. 7)\n"
+                   "biplane: the cone against plates on the receiver (Table 1)\n"
+                   "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
+                   "design: ball positions of least TRE under the rules\n"
+                   "limit: error over the Cramer-Rao bound, and coverage of error bars\n"
+                   "centres: what wrong assumptions about a ball's picture cost")
       ->required();
-  command->add_option("--groups", a.groups, "Trials, or balls, of each setting [1000]")
+  command->add_option("--groups", a.groups, "Trials of each setting; centres: balls of each situation")
       ->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
+  command->add_flag("--resume", a.resume, "Go on where a run was stopped that wrote to the same folder");
+  command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(6, 64));
+  command
+      ->add_option(
+          "--sigma", a.sigmas,
+          "How N(0, 2.34) is read: std, var, mean_distance, rms_distance; number: several (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--reading", a.readings,
+                   "number: pixels projected back: calibration_pixels, fresh_noise, exact (default: all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--fle", a.fle, "Instead of 2.34")->check(within(0, 1000));
+  command->add_option("--origin", a.origin, "World's origin on the cone's axis: base (as printed) or centre");
+  command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
+  command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome");
+  command->add_option("--calibrator", a.calibrator,
+                      "location: a built-in's name or a file; else random balls");
 }
 
 void add_demo(CLI::App& app, Action& action) {

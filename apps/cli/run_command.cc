@@ -96,8 +96,10 @@ std::string summary_of(const Result& result) {
   for (const Tunnel& tunnel : result.tunnels)
     if (tunnel.start_in_tool && tunnel.end_in_tool)
       text += fmt::format(
-          "\n  tunnel {:<8} in the tool's frame, {:.2f} mm long\n    start {}\n    end   {}\n", tunnel.name,
-          tunnel.length_mm.value_or(0), coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
+          "\n  tunnel {:<8} in the tool's frame, {:.2f} mm long, axis within {:.2f} degrees (one sigma)\n"
+          "    start {}\n    end   {}\n",
+          tunnel.name, tunnel.length_mm.value_or(0), tunnel.axis_sigma_deg().value_or(0),
+          coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
   for (const Verification& v : result.verifications)
     for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
       if (*error)

@@ -4,20 +4,30 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "command.h"
 
 namespace helicarm::cli {
 
+/// What is not given has the default of the study's own options.
 struct StudyArguments {
-  std::string name;  ///< limit or centres
-  std::optional<int>
-      groups;  ///< trials (limit) or balls (centres) of each setting; empty: the study's default
+  std::string name;  ///< number, uniformity, location, biplane, calibration, design, limit or centres
+  std::optional<std::size_t> groups;
   std::filesystem::path out = "helicarm-study";
+  bool resume = false;
+  std::vector<int> balls;
+  std::vector<std::string> sigmas;
+  std::vector<std::string> readings;
+  std::optional<double> fle;
+  std::string origin;
+  std::optional<int> draws;
+  std::string calibrator;
+  std::string surface;
 };
 
 /// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (centres: no SVG). The
-/// same seed gives the same bytes, whatever the number of threads.
+/// same seed gives the same bytes, whatever the number of threads and ranks.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

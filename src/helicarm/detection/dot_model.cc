@@ -128,28 +128,10 @@ void DotModel::evaluate(const DotPatch& patch, const Parameters& p) {
   drop_clipped(n, patch.clipped.data(), residuals);
 }
 
-namespace {
-
-DotSums sums_of(const DotModel& model, std::span<const float> weights, Index first) {
-  const Eigen::MatrixXd products = weighted_products(model.rows, weights, first);
+DotSums accumulate(const DotModel& model, const DotPatch& patch) {
+  const Eigen::MatrixXd products = weighted_products(model.rows, patch.weight);
   const Index n = model.parameters();
   return {products.topLeftCorner(n, n), products.col(n).head(n), products(n, n)};
-}
-
-}  // namespace
-
-DotSums accumulate(const DotModel& model, const DotPatch& patch) { return sums_of(model, patch.weight, 0); }
-
-std::array<DotSums, DotPatch::octants> accumulate_octants(const DotModel& model, const DotPatch& patch) {
-  std::array<DotSums, DotPatch::octants> sums;
-  const std::span<const float> weights(patch.weight);
-  for (std::size_t k = 0; k < sums.size(); ++k) {
-    const Index first = patch.octant_start[k];
-    const Index count = patch.octant_start[k + 1] - first;
-    sums[k] = sums_of(
-        model, weights.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count)), first);
-  }
-  return sums;
 }
 
 }  // namespace helicarm

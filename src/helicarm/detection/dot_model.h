@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
 
@@ -56,7 +55,5 @@ struct DotSums {
 };
 
 DotSums accumulate(const DotModel& model, const DotPatch& patch);
-/// The same of each octant alone.
-std::array<DotSums, DotPatch::octants> accumulate_octants(const DotModel& model, const DotPatch& patch);
 
 }  // namespace helicarm

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 
 namespace helicarm {
 
@@ -30,9 +31,11 @@ std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v
   struct Pixel {
     int x, y;
     float grey;
+    std::size_t octant;
   };
-  std::array<std::vector<Pixel>, DotPatch::octants> pixels;
-  for (auto& octant : pixels) octant.reserve(static_cast<std::size_t>(patch.side * patch.side) / 6);
+  std::vector<Pixel> pixels(static_cast<std::size_t>(patch.side * patch.side));
+  std::array<std::size_t, DotPatch::octants + 1> starts{};
+  std::size_t count = 0;
   int inside = 0;
   int open = 0;
   double sum = 0;
@@ -43,34 +46,33 @@ std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v
       if (!image.contains(u + x, v + y)) continue;
       const float grey = image(u + x, v + y);
       if (grey <= options.floor || within(near, x, y)) continue;
-      const int octant = 4 * (y >= 0) + 2 * (x >= 0) + (std::abs(x) > std::abs(y));
-      pixels[static_cast<std::size_t>(octant)].push_back({x, y, grey});
+      const auto octant = static_cast<std::size_t>(4 * (y >= 0) + 2 * (x >= 0) + (std::abs(x) > std::abs(y)));
+      pixels[count++] = {x, y, grey, octant};
+      ++starts[octant + 1];
       open += grey < options.ceiling;
       sum += double(grey);
     }
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < DotPatch::octants; ++k) {
-    count += pixels[k].size();
-    patch.octant_start[k + 1] = static_cast<Eigen::Index>(count);
-  }
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  for (std::size_t k = 0; k < starts.size(); ++k)
+    patch.octant_start[k] = static_cast<Eigen::Index>(starts[k]);
   if (open < 30 || double(count) < 0.4 * inside) return std::nullopt;
   patch.count = static_cast<Eigen::Index>(count);
   patch.scale = std::max(1e-3f, float(std::abs(sum)) / float(count));
   const std::size_t whole = (count + 7) / 8 * 8;
-  for (auto* column : {&patch.x, &patch.y, &patch.grey}) column->reserve(whole);
-  patch.clipped.reserve(whole);
-  patch.cell.reserve(count);
-  for (const auto& octant : pixels)
-    for (const Pixel& pixel : octant) {
-      patch.x.push_back(float(pixel.x));
-      patch.y.push_back(float(pixel.y));
-      patch.grey.push_back(pixel.grey / patch.scale);
-      patch.clipped.push_back(pixel.grey >= options.ceiling);
-      patch.cell.push_back((pixel.y + half) * patch.side + pixel.x + half);
-    }
+  for (auto* column : {&patch.x, &patch.y, &patch.grey}) column->resize(whole);
+  patch.clipped.resize(whole);
+  patch.cell.resize(count);
   patch.weight.assign(count, 1);
-  for (auto* column : {&patch.x, &patch.y, &patch.grey, &patch.weight}) column->resize(whole, 0);
-  patch.clipped.resize(whole, 0);
+  patch.weight.resize(whole, 0);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Pixel& pixel = pixels[k];
+    const std::size_t at = starts[pixel.octant]++;
+    patch.x[at] = float(pixel.x);
+    patch.y[at] = float(pixel.y);
+    patch.grey[at] = pixel.grey / patch.scale;
+    patch.clipped[at] = pixel.grey >= options.ceiling;
+    patch.cell[at] = (pixel.y + half) * patch.side + pixel.x + half;
+  }
   return patch;
 }
 

@@ -85,7 +85,7 @@ DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, s
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
   DotFitOptions options = fit_options_for(exposure);
-  options.rough = 0.1;
+  options.rough = 0.1;  // the dots have been fitted before
   double blur = 1;
   double absorbance = 2;
   const auto total = [&] {
@@ -121,7 +121,6 @@ DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, s
     try_values(blur, scaled, 0.3, 0.6 * radius + 0.3);
     try_values(absorbance, scaled_twice, 0.1, 60);
   }
-  options.rough = DotFitOptions{}.rough;
   options.noise = noise;
   return {BallProfile(blur / radius, absorbance), options};
 }

@@ -52,17 +52,43 @@ Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, con
   return pull;
 }
 
-/// Covariance of a fit with Tukey's weights (Huber 1981) to noise that neighbours share and that is another
-/// behind a dot: the normal matrix' inverse on both sides of what the noise does to the right side.
-Normal covariance_of(const DotModel& model, const DotPatch& patch, const DotSums& sums, const Vector& pull,
-                     float cut, const NoiseCorrelation& noise) {
+/// Variances of a centre, mean of both axes.
+struct CentreError {
+  double by_noise;
+  double one_sided;
+};
+
+/// The spread of a centre when each octant in turn is left out (delete-a-group jackknife; `pulls`: what each
+/// pixel adds to a coordinate of the centre, `shares`: of the information about it). What is wrong on one
+/// side only, such as a wire or a shutter across the dot, shows here.
+double jackknife_variance(const DotPatch& patch, const Eigen::ArrayXf& pulls, const Eigen::ArrayXf& shares) {
+  constexpr double groups = DotPatch::octants;
+  const double all = double(shares.sum());
+  double sum = 0;
+  double squares = 0;
+  for (std::size_t k = 0; k < DotPatch::octants; ++k) {
+    const Index first = patch.octant_start[k];
+    const Index count = patch.octant_start[k + 1] - first;
+    if (count == 0) continue;
+    const double share = std::min(0.9, double(shares.segment(first, count).sum()) / all);
+    const double step = double(pulls.segment(first, count).sum()) / (1 - share);
+    sum += step;
+    squares += step * step;
+  }
+  return (groups - 1) / groups * (squares - sum * sum / groups);
+}
+
+/// Errors of each dot's centre in a fit with Tukey's weights (Huber 1981) to noise that neighbours share and
+/// that is another behind a dot: what the noise does to the sums that the centre is made of.
+std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& patch, const DotSums& sums,
+                                       const Vector& pull, float cut, const NoiseCorrelation& noise) {
   using Array = Eigen::Map<const Eigen::ArrayXf>;
-  const auto n = patch.weight.size();  // those that fill up have no weight
-  const Array weight(patch.weight.data(), static_cast<Index>(n));
-  const Array residual(model.residual(), static_cast<Index>(n));
-  Eigen::ArrayXf behind = Eigen::ArrayXf::Zero(static_cast<Index>(n));
+  const auto n = static_cast<Index>(patch.weight.size());  // those that fill up have no weight
+  const Array weight(patch.weight.data(), n);
+  const Array residual(model.residual(), n);
+  Eigen::ArrayXf behind = Eigen::ArrayXf::Zero(n);
   for (std::size_t k = 0; k < model.dots(); ++k)
-    behind -= Array(model.rows.row(DotModel::contrast_of(k)).data(), static_cast<Index>(n));
+    behind -= Array(model.rows.row(DotModel::contrast_of(k)).data(), n);
   const Eigen::ArrayXf counts = (weight > 0).cast<float>();
   const Eigen::ArrayXf pulls = (weight * residual).square();
   const Eigen::ArrayXf t = (residual / cut).square();
@@ -72,35 +98,39 @@ Normal covariance_of(const DotModel& model, const DotPatch& patch, const DotSums
   const double mean = squares / used;
   // Straight line through the weighted residuals' squares.
   Eigen::Matrix2d sides;
-  sides << used, double((counts * behind).sum()), 0, double((counts * behind.square()).sum());
-  sides(1, 0) = sides(0, 1);
+  const double behind_sum = double((counts * behind).sum());
+  sides << used, behind_sum, behind_sum, double((counts * behind.square()).sum());
   const Eigen::Vector2d line = sides.ldlt().solve(Eigen::Vector2d(squares, double((pulls * behind).sum())));
   const Eigen::ArrayXf level =
       ((float(line[0]) + float(line[1]) * behind) / float(mean)).max(0.1f).sqrt() * weight;
-  PixelRows weighted = model.rows.topRows(model.parameters());
-  weighted.array().rowwise() *= level.transpose();
-  const Normal inverse = sums.normal.ldlt().solve(Normal::Identity(sums.normal.rows(), sums.normal.rows()));
-  Normal between = correlated_normal(noise, weighted, patch.cell, patch.side);
-  const double freedom = (inverse * between).trace() * used / double(weight.sum());
-  const double variance = squares / std::max(0.1 * used, used - freedom) * (used * used) / (slopes * slopes);
-  between.diagonal() += pull;
-  return variance * (inverse * between * inverse);
-}
 
-/// The spread of the parameters when each octant in turn is left out (delete-a-group jackknife, a
-/// Gauss-Newton step each): what is wrong on one side only, such as a wire or a shutter across the dot, shows
-/// here.
-Vector jackknife_variances(const DotModel& model, const DotPatch& patch, const DotSums& sums) {
-  constexpr double groups = DotPatch::octants;
-  Vector sum = Vector::Zero(sums.right.size());
-  Vector squares = sum;
-  for (const DotSums& octant : accumulate_octants(model, patch)) {
-    const Normal rest = sums.normal - octant.normal;
-    const Vector step = rest.ldlt().solve(sums.right - octant.right);
-    sum += step;
-    squares += step.cwiseAbs2();
+  const Index parameters = model.parameters();
+  const Normal inverse = sums.normal.llt().solve(Normal::Identity(parameters, parameters));
+  // The centres as sums over pixels, side by side.
+  PixelRows influence(2 * static_cast<Index>(model.dots()), n);
+  Eigen::VectorXd by_priors(influence.rows());
+  Eigen::VectorXd one_sided(influence.rows());
+  for (Index row = 0; row < influence.rows(); ++row) {
+    const Vector of_centre =
+        inverse.col(DotModel::contrast_of(static_cast<std::size_t>(row / 2)) + 1 + row % 2);
+    influence.row(row) = of_centre.cast<float>().transpose() * model.rows.topRows(parameters);
+    by_priors[row] = of_centre.cwiseAbs2().dot(pull);
+    const Eigen::ArrayXf weighted = influence.row(row).transpose().array() * weight;
+    one_sided[row] =
+        jackknife_variance(patch, weighted * residual, weighted * influence.row(row).transpose().array());
   }
-  return (groups - 1) / groups * (squares - sum.cwiseAbs2() / groups);
+  influence.array().rowwise() *= level.transpose();
+  const Eigen::MatrixXd spread = correlated_normal(noise, influence, patch.cell, patch.side);
+  const Eigen::MatrixXd white = correlated_normal({}, influence, patch.cell, patch.side);
+  // What the fit takes from the residuals, more where neighbours are alike.
+  const double freedom = double(parameters) * spread.trace() / white.trace();
+  const double variance = squares / std::max(0.1 * used, used - freedom) * (used * used) / (slopes * slopes);
+  std::vector<CentreError> errors;
+  for (Index row = 0; row < influence.rows(); row += 2)
+    errors.push_back(
+        {0.5 * variance * (spread(row, row) + spread(row + 1, row + 1) + by_priors.segment<2>(row).sum()),
+         0.5 * one_sided.segment<2>(row).sum()});
+  return errors;
 }
 
 }  // namespace
@@ -161,7 +191,7 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
   // Background and contrasts first, at the given places.
   model.evaluate(*patch, p);
   DotSums sums = equations(true);
-  p += sums.normal.ldlt().solve(sums.right).cast<float>();
+  p += sums.normal.llt().solve(sums.right).cast<float>();
   if (!p.allFinite()) return std::nullopt;
 
   float cut = 0;
@@ -176,7 +206,7 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     cut = reweight(*patch, model, float(tolerance * contrast));
     sums = equations(false);
     if ((roughness < options.tolerance && move < 4e-3) || i == options.iterations) break;
-    const Vector step = sums.normal.ldlt().solve(sums.right);
+    const Vector step = sums.normal.llt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     double share = 1;
     move = 0;
@@ -198,8 +228,7 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
   }
   if (move > 0.05) return std::nullopt;
 
-  const Normal covariance = covariance_of(model, *patch, sums, pull, cut, options.noise);
-  const Vector jackknife = jackknife_variances(model, *patch, sums);
+  const auto errors = centre_errors(model, *patch, sums, pull, cut, options.noise);
   double squares = 0;
   for (Index i = 0; i < patch->count; ++i) {
     const double residual = double(model.residual()[i]);
@@ -213,9 +242,8 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     Dot dot;
     dot.centre_px = Eigen::Vector2d(u, v) + p.segment<2>(contrast_index + 1).cast<double>();
     dot.radius_px = double(p[contrast_index + 3]);
-    dot.sigma_px = std::sqrt(0.5 * (covariance(contrast_index + 1, contrast_index + 1) +
-                                    covariance(contrast_index + 2, contrast_index + 2)));
-    dot.one_sided_px = std::sqrt(std::max(0.0, 0.5 * jackknife.segment<2>(contrast_index + 1).sum()));
+    dot.sigma_px = std::sqrt(errors[k].by_noise);
+    dot.one_sided_px = std::sqrt(errors[k].one_sided);
     dot.contrast = contrast * double(patch->scale);
     dot.misfit = std::sqrt(squares / double(patch->count)) / std::abs(contrast);
     if (!dot.centre_px.allFinite() || !std::isfinite(dot.sigma_px)) return std::nullopt;

@@ -47,12 +47,12 @@ void add_tile(const Rows<tall>& left, const Rows<wide>& right, const float* weig
 
 }  // namespace
 
-Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> weights, Index first) {
+Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> weights) {
   constexpr Index block = 1024;  // floats sum up well over so many
   const Index n = rows.rows();
-  const auto end = first + static_cast<Index>(weights.size());
+  const auto end = static_cast<Index>(weights.size());
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
-  for (Index start = first; start < end; start += block) {
+  for (Index start = 0; start < end; start += block) {
     const Index count = std::min(block, end - start);
     for (Index i = 0; i < n; i += tall)
       for (Index j = 0; j < std::min(n, i + tall); j += wide) {
@@ -64,7 +64,7 @@ Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> 
         for (Index b = 0; b < wide; ++b)
           right[static_cast<std::size_t>(b)] = &rows(std::min(j + b, n - 1), start);
         float sums[tall][wide];
-        add_tile(left, right, weights.data() + (start - first), count, sums);
+        add_tile(left, right, weights.data() + start, count, sums);
         for (Index a = 0; a < tall && i + a < n; ++a)
           for (Index b = 0; b < wide && j + b < n; ++b) products(i + a, j + b) += double(sums[a][b]);
       }

@@ -119,6 +119,7 @@ Expected<Intersection> intersect(std::span<const Sight> sights, const Eigen::Mat
     const Eigen::Vector3d step = qr.solve(residual);
     result.chi2 = residual.squaredNorm();
     result.covariance = (jacobian.transpose() * jacobian).inverse();
+    result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
     result.point += step;
     if (auto placed = check_place(sights, result.point); !placed)
       return tl::unexpected<Failure>(placed.error());

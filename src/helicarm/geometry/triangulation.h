@@ -17,10 +17,11 @@ struct Sight {
 };
 
 struct Intersection {
-  Eigen::Vector3d point;       ///< in the views' world, mm
-  Eigen::Matrix3d covariance;  ///< mm^2
-  double ray_gap_mm = 0;       ///< largest distance between two of the rays
-  double chi2 = 0;             ///< of the pixels, 2n - 3 degrees of freedom
+  Eigen::Vector3d point;            ///< in the views' world, mm
+  Eigen::Matrix3d covariance;       ///< mm^2
+  double ray_gap_mm = 0;            ///< largest distance between two of the rays
+  double chi2 = 0;                  ///< of the pixels, 2n - 3 degrees of freedom
+  Eigen::Matrix3Xd by_pixels = {};  ///< d point / d (u1, v1, u2, ...)
 };
 
 /// Eq. 8 (with its right side mended) over n >= 2 views by least squares, each equation weighted as the

@@ -39,12 +39,12 @@ TracedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readi
     information.push_back(information_of_ray(view, bone, point.point_in_anchor));
     sum += information.back();
   }
-  TracedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}};
+  TracedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
   const Eigen::Matrix3d scale = sum.inverse();
   for (std::size_t i = 0; i < point.views.size(); ++i) {
     const Poses& poses = point.views[i].poses;
     const int moment = static_cast<int>(i);
-    TracedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}};
+    TracedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}, {}};
     ray = enter_tracker(std::move(ray), *poses.tracker_from_calibrator,
                         readings.at(Marker::calibrator, moment));
     ray = leave_tracker(std::move(ray), *poses.tracker_from(bone), readings.at(marker_of(bone), moment));
@@ -82,7 +82,8 @@ GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& 
     if (const auto& tracker_from_bone = now.tracker_from(*point.anchor))
       in_tracker_now = enter_tracker(in_bone, *tracker_from_bone, readings.at(marker, present));
   } else {
-    const TracedPoint in_calibrator{point.point_in_anchor, point.covariance_in_anchor, {}};
+    const TracedPoint in_calibrator{
+        point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
     put(in_calibrator, guided.in_calibrator, guided.covariance_in_calibrator);
     if (then.tracker_from_calibrator)
       in_tracker_then =
@@ -96,9 +97,11 @@ GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& 
   if (in_tracker_then && then.tracker_from_tibia)
     put(leave_tracker(*in_tracker_then, *then.tracker_from_tibia, readings.at(Marker::tibia, 0)),
         guided.in_tibia, guided.covariance_in_tibia);
-  if (in_tracker_now && now.tracker_from_tool)
-    put(leave_tracker(*in_tracker_now, *now.tracker_from_tool, readings.at(Marker::tool, present)),
-        guided.in_tool, guided.covariance_in_tool);
+  if (in_tracker_now && now.tracker_from_tool) {
+    guided.traced_to_tool =
+        leave_tracker(*in_tracker_now, *now.tracker_from_tool, readings.at(Marker::tool, present));
+    put(*guided.traced_to_tool, guided.in_tool, guided.covariance_in_tool);
+  }
   return guided;
 }
 

@@ -8,6 +8,7 @@
 
 #include "helicarm/geometry/view.h"
 #include "helicarm/guidance/poses.h"
+#include "helicarm/guidance/traced_point.h"
 
 namespace helicarm {
 
@@ -25,6 +26,7 @@ struct XrayPoint {
   Eigen::Matrix3d covariance_in_anchor;  ///< mm^2, from pixels and calibration alone
   std::optional<Bone> anchor;            ///< nothing: the calibrator
   std::vector<DatedView> views;          ///< the first one's moment dates `in_calibrator`
+  Eigen::Matrix3Xd by_calibration = {};  ///< d point / d the views' parameters
 };
 
 /// A point carried calibrator -> tracker -> bone -> now -> tool (Eq. 16); absent where a reading is missing.
@@ -38,6 +40,7 @@ struct GuidedPoint {
   std::optional<Eigen::Matrix3d> covariance_in_femur;
   std::optional<Eigen::Matrix3d> covariance_in_tibia;
   std::optional<Eigen::Matrix3d> covariance_in_tool;
+  std::optional<TracedPoint> traced_to_tool;  ///< with all that it shares with other points
 };
 
 /// The same picture seen from a bone: world = bone. Intersecting in such views lets the bone move between

@@ -24,20 +24,45 @@ Effect& effect_at(TracedPoint& point, Reading reading) {
 TracedPoint turned(TracedPoint point, const Eigen::Matrix3d& rotation) {
   point.covariance = rotation * point.covariance * rotation.transpose();
   for (auto& [reading, effect] : point.by_reading) effect = rotation * effect;
+  point.by_calibration = rotation * point.by_calibration;
   return point;
+}
+
+/// Variances of (tau, omega).
+Eigen::Vector<double, 6> variances_of(const TrackerNoise& noise) {
+  const double sigma_rad = noise.sigma_deg * std::numbers::pi / 180;
+  Eigen::Vector<double, 6> variances;
+  variances << Eigen::Vector3d::Constant(noise.sigma_mm * noise.sigma_mm),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  return variances;
 }
 
 }  // namespace
 
 Eigen::Matrix3d TracedPoint::total_covariance(const TrackerNoise& noise) const {
-  const double sigma_rad = noise.sigma_deg * std::numbers::pi / 180;
-  Eigen::Vector<double, 6> variances;
-  variances << Eigen::Vector3d::Constant(noise.sigma_mm * noise.sigma_mm),
-      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
   Eigen::Matrix3d total = covariance;
   for (const auto& [reading, effect] : by_reading)
-    total += effect * variances.asDiagonal() * effect.transpose();
+    total += effect * variances_of(noise).asDiagonal() * effect.transpose();
   return total;
+}
+
+Eigen::Matrix3d covariance_between(const TracedPoint& from, const TracedPoint& to,
+                                   const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise) {
+  Eigen::Matrix3d covariance = from.covariance + to.covariance;
+  const Eigen::Index shared = calibration_covariance.cols();
+  if (shared > 0 && from.by_calibration.cols() == shared && to.by_calibration.cols() == shared) {
+    const Eigen::Matrix3d both = from.by_calibration * calibration_covariance * to.by_calibration.transpose();
+    covariance -= both + both.transpose();
+  }
+  auto readings = from.by_reading;
+  for (auto& [reading, effect] : readings) effect *= -1;
+  for (const auto& [reading, effect] : to.by_reading) {
+    const auto [at, is_new] = readings.try_emplace(reading, effect);
+    if (!is_new) at->second += effect;
+  }
+  for (const auto& [reading, effect] : readings)
+    covariance += effect * variances_of(noise).asDiagonal() * effect.transpose();
+  return covariance;
 }
 
 TracedPoint enter_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading) {

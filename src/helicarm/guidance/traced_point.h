@@ -21,9 +21,15 @@ struct TracedPoint {
   Eigen::Vector3d point;
   Eigen::Matrix3d covariance;                                 ///< from the X-rays
   std::map<Reading, Eigen::Matrix<double, 3, 6>> by_reading;  ///< d point / d (tau, omega)
+  Eigen::Matrix3Xd by_calibration = {};                       ///< d point / d the views' parameters
 
   Eigen::Matrix3d total_covariance(const TrackerNoise& noise) const;
 };
+
+/// Covariance of the way from one point to another in the same frame, mm^2: what both owe to the same
+/// calibration (its covariance given) and to the same readings falls out.
+Eigen::Matrix3d covariance_between(const TracedPoint& from, const TracedPoint& to,
+                                   const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 
 /// From a marker's frame to the tracker's.
 TracedPoint enter_tracker(TracedPoint point, const RigidTransform& tracker_from_marker, Reading reading);

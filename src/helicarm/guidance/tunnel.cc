@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/guidance/tunnel.h"
 
+#include <cmath>
+#include <numbers>
+
 #include <fmt/format.h>
 
 namespace helicarm {
 
-Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, const GuidedPoint& end) {
+std::optional<double> Tunnel::axis_sigma_deg() const {
+  if (!axis_covariance) return std::nullopt;
+  return std::sqrt(axis_covariance->trace()) * 180 / std::numbers::pi;
+}
+
+Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, const GuidedPoint& end,
+                             const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise) {
   const bool ordered = start.in_tool && end.in_tool;
   const Eigen::Vector3d along =
       ordered ? *end.in_tool - *start.in_tool : end.in_calibrator - start.in_calibrator;
@@ -20,6 +29,14 @@ Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, 
     tunnel.start_in_tool = start.in_tool;
     tunnel.end_in_tool = end.in_tool;
     tunnel.axis_in_tool = along / length;
+  }
+  if (start.traced_to_tool && end.traced_to_tool) {
+    const Eigen::Matrix3d covariance =
+        covariance_between(*start.traced_to_tool, *end.traced_to_tool, calibration_covariance, noise);
+    const Eigen::Vector3d axis = along / length;
+    const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - axis * axis.transpose()) / length;
+    tunnel.axis_covariance = across * covariance * across;
+    tunnel.length_sigma_mm = std::sqrt(axis.dot(covariance * axis));
   }
   return tunnel;
 }

@@ -11,12 +11,12 @@
 namespace helicarm {
 namespace {
 
-/// What the calibration's own errors do to the pictures of a point, px^2 (2n x 2n).
-Eigen::MatrixXd calibration_noise(const Eigen::Vector3d& point_in_anchor,
-                                  std::span<const PointPicture> pictures, const Calibration& calibration) {
+/// What the views' parameters do to the pictures of a point: d pixels (2n) / d parameters.
+Eigen::MatrixXd pictures_by_calibration(const Eigen::Vector3d& point_in_anchor,
+                                        std::span<const PointPicture> pictures,
+                                        const Calibration& calibration) {
   const auto n = 2 * Eigen::Index(pictures.size());
   const Eigen::Index columns = calibration.joint_covariance.cols();
-  if (columns == 0) return Eigen::MatrixXd::Zero(n, n);
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(n, columns);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
     const PointPicture& picture = pictures[std::size_t(i)];
@@ -24,7 +24,7 @@ Eigen::MatrixXd calibration_noise(const Eigen::Vector3d& point_in_anchor,
         pixel_by_parameters(calibration.views[picture.view].view,
                             picture.calibrator_from_anchor * point_in_anchor);
   }
-  return jacobian * calibration.joint_covariance * jacobian.transpose();
+  return jacobian;
 }
 
 void enlarge_if_rays_miss(LocatedPoint& located) {
@@ -32,6 +32,7 @@ void enlarge_if_rays_miss(LocatedPoint& located) {
   const double excess = located.chi2 / double(2 * located.views.size() - 3);
   if (!(excess > largest_excess)) return;
   located.covariance_in_anchor *= excess;
+  located.by_calibration *= std::sqrt(excess);
   located.doubt = Warning{
       Reason::residual_too_large,
       fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain",
@@ -47,7 +48,7 @@ double LocatedPoint::predicted_rms_mm() const { return std::sqrt(covariance_in_a
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
                               std::span<const PointPicture> pictures, const Calibration& calibration) {
   std::vector<Sight> sights;
-  LocatedPoint located{name, source, {}, {}};
+  LocatedPoint located{.name = name, .source = source, .point_in_anchor = {}, .covariance_in_anchor = {}};
   const auto n = 2 * Eigen::Index(pictures.size());
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
   for (const PointPicture& picture : pictures) {
@@ -59,8 +60,11 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
     located.views.push_back(seen.name);
   }
   auto found = intersect(sights, noise);
-  if (found && calibration.joint_covariance.size() > 0)
-    found = intersect(sights, noise + calibration_noise(found->point, pictures, calibration));
+  if (found && calibration.joint_covariance.size() > 0) {
+    const Eigen::MatrixXd slopes = pictures_by_calibration(found->point, pictures, calibration);
+    found = intersect(sights, noise + slopes * calibration.joint_covariance * slopes.transpose());
+    if (found) located.by_calibration = -found->by_pixels * slopes;
+  }
   if (!found) return tl::unexpected<Failure>(found.error());
   located.point_in_anchor = found->point;
   located.covariance_in_anchor = found->covariance;

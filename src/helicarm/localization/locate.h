@@ -31,6 +31,7 @@ struct LocatedPoint {
   PointSource source = PointSource::pick;
   Eigen::Vector3d point_in_anchor;       ///< mm
   Eigen::Matrix3d covariance_in_anchor;  ///< mm^2, of pixels and calibration
+  Eigen::Matrix3Xd by_calibration = {};  ///< d point / d the views' parameters, which all points share
   double ray_gap_mm = 0;
   double chi2 = 0;  ///< 2n - 3 degrees of freedom
   std::vector<std::string> views = {};

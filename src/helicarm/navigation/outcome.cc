@@ -48,13 +48,15 @@ std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
   return ends;
 }
 
-Expected<std::vector<Tunnel>> plan_tunnels(const std::vector<TunnelPlan>& plans, const Result& result) {
+Expected<std::vector<Tunnel>> plan_tunnels(const Case& given, const Result& result) {
+  const std::vector<TunnelPlan>& plans = given.tunnels;
   return guarded([&] {
     std::vector<Tunnel> tunnels;
     for (std::size_t i = 0; i < plans.size(); ++i) {
       const auto& start = result.points[result.tunnel_ends[i].start].place;
       const auto& end = result.points[result.tunnel_ends[i].end].place;
-      tunnels.push_back(start && end ? value_or_throw(plan_tunnel(plans[i].name, *start, *end))
+      tunnels.push_back(start && end ? value_or_throw(plan_tunnel(plans[i].name, *start, *end,
+                                                                  result.joint_covariance, given.tracker))
                                      : Tunnel{plans[i].name, {}, {}, {}, {}});
     }
     return tunnels;

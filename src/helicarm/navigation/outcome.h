@@ -19,7 +19,7 @@ std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
                                     const std::vector<PointResult>& points);
 
 /// Eq. 16; a tunnel with an end that is not located has only a name. Refuses as `plan_tunnel`.
-Expected<std::vector<Tunnel>> plan_tunnels(const std::vector<TunnelPlan>& plans, const Result& result);
+Expected<std::vector<Tunnel>> plan_tunnels(const Case& given, const Result& result);
 
 /// Eq. 17; an end that is not located is left out. Refuses as `distance_to_line`.
 Expected<std::vector<Verification>> verify_tool_lines(const Case& given,

@@ -153,7 +153,7 @@ std::vector<Warning> locate_points(const Case& given, const Calibration& calibra
     if (located->point.doubt) warnings.push_back(*located->point.doubt);
     point.ray_gap_mm = located->point.ray_gap_mm;
     point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
-                         located->views},
+                         located->views, located->point.by_calibration},
                         given.poses_now, given.tracker);
     if (point.moves_with && !located->anchor)
       warnings.push_back(

@@ -170,7 +170,10 @@ Json json_of(const Tunnel& tunnel) {
           {"start_in_tool", optional_vector(tunnel.start_in_tool)},
           {"end_in_tool", optional_vector(tunnel.end_in_tool)},
           {"axis_in_tool", optional_vector(tunnel.axis_in_tool)},
-          {"length_mm", optional_number(tunnel.length_mm)}};
+          {"length_mm", optional_number(tunnel.length_mm)},
+          {"length_sigma_mm", optional_number(tunnel.length_sigma_mm)},
+          {"axis_sigma_deg", optional_number(tunnel.axis_sigma_deg())},
+          {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
 }
 
 Json json_of(const Verification& verification, const std::vector<ViewResult>& views) {

@@ -57,7 +57,8 @@ TEST(ResultJson, HoldsEveryKeyOfTheContract) {
                                   "views", "reason", "in_femur", "in_tibia", "in_tool"});
   EXPECT_EQ(json["points"][0]["views"], Json({"AP"}));
   expect_keys(json["accuracy"], {"fle_px", "fre_mm", "tre_mm", "targets"});
-  expect_keys(json["tunnels"][0], {"name", "start_in_tool", "end_in_tool", "axis_in_tool", "length_mm"});
+  expect_keys(json["tunnels"][0], {"name", "start_in_tool", "end_in_tool", "axis_in_tool", "length_mm",
+                                   "length_sigma_mm", "axis_sigma_deg", "axis_covariance"});
   expect_keys(json["verification"][0],
               {"name", "start_px", "end_px", "err_start_px", "err_end_px", "err_start_mm", "err_end_mm",
                "distance_start_mm", "distance_end_mm"});

@@ -56,7 +56,7 @@ void run_stages(const Case& given, Result& result) {
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
   append(result.warnings, doubts_of(given.calibrator, result));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
-  result.tunnels = value_or_throw(plan_tunnels(given.tunnels, result));                        // Eq. 16
+  result.tunnels = value_or_throw(plan_tunnels(given, result));                                // Eq. 16
   result.verifications = value_or_throw(verify_tool_lines(given, calibration.views, result));  // Eq. 17
   append(result.warnings, value_or_throw(check_certain(result.points, options.max_error_mm)));
 }

@@ -141,13 +141,14 @@ std::string accuracy_section(const Result& result) {
 
 std::string guidance_section(const Result& result) {
   std::string html;
-  HtmlTable tunnels({"Tunnel", "Start in tool, mm", "End in tool, mm", "Axis in tool", "#Length, mm"});
+  HtmlTable tunnels(
+      {"Tunnel", "Start in tool, mm", "End in tool, mm", "Axis in tool", "#Axis ±, °", "#Length, mm"});
   for (const Tunnel& tunnel : result.tunnels)
     tunnels.row({escaped(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
                  tunnel.axis_in_tool ? fmt::format("{:.4f}, {:.4f}, {:.4f}", tunnel.axis_in_tool->x(),
                                                    tunnel.axis_in_tool->y(), tunnel.axis_in_tool->z())
                                      : std::string("–"),
-                 fixed(tunnel.length_mm, 2)});
+                 fixed(tunnel.axis_sigma_deg(), 3), fixed(tunnel.length_mm, 2)});
   if (!tunnels.empty()) html += headed("Tunnels", tunnels.html());
   HtmlTable lines({"Tool line", "End", "#Eq. 17, px", "#Eq. 17, mm", "#In space, mm"});
   for (const Verification& verification : result.verifications)

@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/biplane.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/report/chart.h"
+#include "helicarm/study/statistics.h"
+
+namespace helicarm {
+namespace {
+
+constexpr std::size_t experiments_of_block = 64;
+constexpr int tests_of_experiment = 10;  // 3.2
+constexpr double focal_length_mm = 900;
+
+/// The table's cells in order, each with what the paper prints for it. The plates of the two views are in
+/// different places, so that their own balls have no two rays: their error is that of one.
+struct Cell {
+  std::string_view calibrator, points, measure;
+  std::optional<ErrorFigures> printed;
+};
+constexpr std::array<Cell, 10> table_cells{
+    {{"udcsc", "fre", "intersection", ErrorFigures{0.70, 0.05, 0.36, 0.43}},
+     {"udcsc", "on_biplane", "intersection", ErrorFigures{7.53, 3.30, 4.50, 4.68}},
+     {"udcsc", "on_biplane", "ray", {}},
+     {"udcsc", "centre", "intersection", ErrorFigures{0.42, 0.18, 0.30, 0.42}},
+     {"udcsc", "on_udcsc", "intersection", ErrorFigures{1.15, 0.16, 0.54, 0.62}},
+     {"biplane", "fre", "ray", ErrorFigures{0.58, 0.03, 0.25, 0.32}},
+     {"biplane", "on_biplane", "ray", ErrorFigures{0.89, 0.20, 0.58, 0.65}},
+     {"biplane", "on_biplane", "intersection", {}},
+     {"biplane", "centre", "intersection", ErrorFigures{3.08, 1.75, 2.65, 2.77}},
+     {"biplane", "on_udcsc", "intersection", ErrorFigures{3.33, 1.43, 2.04, 2.16}}}};
+constexpr std::size_t figures_of_cell = sizeof(ErrorFigures) / sizeof(double);
+
+/// Errors of one cell over an experiment.
+struct Gathered {
+  Lanes most{}, least = lanes(1e300), sum{}, squares{};
+  double count = 0;
+
+  void add(Lanes error) {
+    most = larger(error, most);
+    least = error < least ? error : least;
+    sum += error;
+    squares += error * error;
+    ++count;
+  }
+  ErrorFigures figures(int lane) const {
+    return {most[lane], least[lane], sum[lane] / count, std::sqrt(squares[lane] / count)};
+  }
+};
+
+std::vector<Eigen::Vector3d> points_of_udcsc() {
+  std::vector<Eigen::Vector3d> points;
+  for (const CalibratorBall& ball : udcsc().balls) points.push_back(ball.centre_in_calibrator);
+  return points;
+}
+
+/// The four check points of 3.2 on the cone's surface: left, right, and two on its upper face.
+std::vector<Eigen::Vector3d> surface_targets() {
+  const double half = cone_height_mm / 2, side = (cone_base_mm + cone_top_mm) / 2;
+  return {{side, 0, half}, {-side, 0, half}, {15, 0, cone_height_mm}, {-15, 0, cone_height_mm}};
+}
+
+class BiplaneTrials {
+ public:
+  explicit BiplaneTrials(const BiplaneOptions& options) : options_(options) {
+    views_ = paper_views(WorldOrigin::centre);
+    for (View& view : views_)
+      view.camera_from_world.translation.z() +=
+          options.cone_mm - 800;  // paper_views has the middle at 800 mm
+    for (std::size_t i = 0; i < 2; ++i) plates_[i] = plates_in_world(views_[i]);
+    cone_ = points_of_udcsc();
+    on_cone_ = cone_;
+    for (const auto& target : surface_targets()) on_cone_.push_back(target);
+  }
+
+  /// Experiments first .. first + 3: table_cells.size() times four figures each.
+  void run(std::uint64_t first, double* out) const {
+    std::array<Gathered, table_cells.size()> cells;
+    for (int test = 0; test < tests_of_experiment; ++test)
+      run_test(LaneRandom(options_.seed, biplane_stream + std::uint32_t(test), first), cells);
+    for (int lane = 0; lane < lane_count; ++lane)
+      for (const Gathered& cell : cells) {
+        const ErrorFigures figures = cell.figures(lane);
+        for (const double figure : {figures.max, figures.min, figures.mean, figures.rms}) *out++ = figure;
+      }
+  }
+
+ private:
+  /// A list of places known to all lanes with noisy pixels.
+  struct Seen {
+    std::vector<LanePoint> points;
+    std::vector<LanePixel> pixels[2];
+  };
+
+  std::vector<Eigen::Vector3d> plates_in_world(const View& view) const {
+    std::vector<Eigen::Vector3d> balls;
+    const int n = options_.balls_a_side;
+    for (const double depth : {options_.near_plate_mm, options_.far_plate_mm})
+      for (int j = 0; j < n; ++j)
+        for (int i = 0; i < n; ++i) {
+          const Eigen::Vector2d share(2.0 * i / (n - 1) - 1, 2.0 * j / (n - 1) - 1);
+          Eigen::Vector3d in_camera;
+          in_camera << share * options_.half_plate_mm * depth / focal_length_mm, depth;
+          balls.push_back(view.camera_from_world.rotation.transpose() *
+                          (in_camera - view.camera_from_world.translation));
+        }
+    return balls;
+  }
+
+  /// `at` counts blocks of random words on.
+  Seen seen(const std::vector<Eigen::Vector3d>& points, const LaneRandom& random, std::uint32_t& at) const {
+    const double sigma = sigma_px(options_.sigma, options_.fle);
+    Seen result;
+    for (const Eigen::Vector3d& point : points) {
+      result.points.push_back({lanes(point.x()), lanes(point.y()), lanes(point.z())});
+      for (std::size_t view = 0; view < 2; ++view) {
+        const Eigen::Vector2d pixel = views_[view].project(point);
+        const auto [u, v] = random.normals(at++);
+        result.pixels[view].push_back({pixel.x() + sigma * u, pixel.y() + sigma * v});
+      }
+    }
+    return result;
+  }
+
+  /// Where the tracker says that a view's plates are.
+  std::vector<LanePoint> tracked(const Seen& plates, const LaneRandom& random, std::uint32_t& at) const {
+    const auto a = random.normals(at++), b = random.normals(at++), c = random.normals(at++);
+    const double angle = options_.tracker_sigma_deg * std::numbers::pi / 180;
+    const LanePoint turn{angle * a.first, angle * a.second, angle * b.first};
+    LanePoint middle{};
+    for (const LanePoint& ball : plates.points) {
+      middle.x += ball.x / double(plates.points.size());
+      middle.y += ball.y / double(plates.points.size());
+      middle.z += ball.z / double(plates.points.size());
+    }
+    std::vector<LanePoint> moved;
+    for (const LanePoint& ball : plates.points) {
+      const LanePoint out = ball - middle;  // turned by a small angle
+      moved.push_back({ball.x + turn.y * out.z - turn.z * out.y + options_.tracker_sigma_mm * b.second,
+                       ball.y + turn.z * out.x - turn.x * out.z + options_.tracker_sigma_mm * c.first,
+                       ball.z + turn.x * out.y - turn.y * out.x + options_.tracker_sigma_mm * c.second});
+    }
+    return moved;
+  }
+
+  void run_test(const LaneRandom& random, std::array<Gathered, table_cells.size()>& cells) const {
+    std::uint32_t at = 0;
+    const Seen cone = seen(cone_, random, at);
+    const Seen plates[2] = {seen(plates_[0], random, at), seen(plates_[1], random, at)};
+    const Seen anew[2] = {seen(plates_[0], random, at), seen(plates_[1], random, at)};
+    const Seen centre = seen({middle_of_cone()}, random, at);
+    const Seen on_cone = seen(on_cone_, random, at);
+    const std::vector<LanePoint> told[2] = {tracked(plates[0], random, at), tracked(plates[1], random, at)};
+
+    const LaneBalls cone_model(cone.points);
+    const LaneProjection by_cone[2] = {cone_model.calibrate(cone.pixels[0]),
+                                       cone_model.calibrate(cone.pixels[1])};
+    const LaneProjection by_plates[2] = {LaneBalls(told[0]).calibrate(plates[0].pixels[0]),
+                                         LaneBalls(told[1]).calibrate(plates[1].pixels[1])};
+    const auto intersections = [](const LaneProjection(&views)[2], const Seen& s, Gathered& cell) {
+      for (std::size_t i = 0; i < s.points.size(); ++i)
+        cell.add(norm(intersect(views[0], s.pixels[0][i], views[1], s.pixels[1][i]) - s.points[i]));
+    };
+    const auto rays = [](const LaneProjection& view, const std::vector<LanePixel>& pixels,
+                         const std::vector<LanePoint>& points, Gathered& cell) {
+      for (std::size_t i = 0; i < points.size(); ++i) cell.add(ray_distance(view, pixels[i], points[i]));
+    };
+    intersections(by_cone, cone, cells[0]);
+    intersections(by_cone, centre, cells[3]);
+    intersections(by_cone, on_cone, cells[4]);
+    intersections(by_plates, centre, cells[8]);
+    intersections(by_plates, on_cone, cells[9]);
+    for (std::size_t view = 0; view < 2; ++view) {
+      intersections(by_cone, anew[view], cells[1]);
+      rays(by_cone[view], anew[view].pixels[view], anew[view].points, cells[2]);
+      rays(by_plates[view], plates[view].pixels[view], told[view], cells[5]);
+      rays(by_plates[view], anew[view].pixels[view], told[view], cells[6]);
+      intersections(by_plates, anew[view], cells[7]);
+    }
+  }
+
+  BiplaneOptions options_;
+  std::array<View, 2> views_;
+  std::array<std::vector<Eigen::Vector3d>, 2> plates_;
+  std::vector<Eigen::Vector3d> cone_, on_cone_;
+};
+
+Expected<void> check(const BiplaneOptions& o) {
+  if (o.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (o.balls_a_side < 2 || o.balls_a_side > 5)
+    return fail(Reason::bad_value, fmt::format("balls_a_side: {}, limits 2 and 5", o.balls_a_side));
+  if (!(o.cone_mm > 0 && o.near_plate_mm > 0 && o.far_plate_mm > o.near_plate_mm))
+    return fail(Reason::bad_value,
+                "the plates and the cone must lie before the source, the far plate beyond the near one");
+  return {};
+}
+
+const Cell& cell_of(const BiplaneRow& row) {
+  return *std::ranges::find_if(table_cells, [&](const Cell& cell) {
+    return cell.calibrator == row.calibrator && cell.points == row.points && cell.measure == row.measure;
+  });
+}
+
+const ErrorFigures& printed_or_nothing(const Cell& cell) {
+  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  static constexpr ErrorFigures nothing{nan, nan, nan, nan};
+  return cell.printed ? *cell.printed : nothing;
+}
+
+std::array<double, figures_of_cell> listed(const ErrorFigures& f) { return {f.max, f.min, f.mean, f.rms}; }
+
+std::string biplane_summary(const std::vector<BiplaneRow>& rows) {
+  const auto mean = [&](std::string_view calibrator, std::string_view points, std::string_view measure) {
+    for (const BiplaneRow& row : rows)
+      if (row.calibrator == calibrator && row.points == points && row.measure == measure)
+        return row.figures.mean;
+    return 0.0;
+  };
+  const double cone_far = mean("udcsc", "on_biplane", "intersection"),
+               cone_centre = mean("udcsc", "centre", "intersection"),
+               cone_near = mean("udcsc", "on_udcsc", "intersection"),
+               plates_own = mean("biplane", "on_biplane", "ray"),
+               plates_centre = mean("biplane", "centre", "intersection"),
+               plates_cone = mean("biplane", "on_udcsc", "intersection");
+  const bool same_order = cone_centre < plates_centre && cone_near < plates_cone && plates_own < cone_far;
+  return fmt::format(
+      "Printed (Table 1), mean errors in mm by UDCSC and by biplane: points on the biplane 4.50 and 0.58, "
+      "centre of UDCSC "
+      "0.30 and 2.65, points on UDCSC 0.54 and 2.04. Here: {:.2f} and {:.2f}, {:.2f} and {:.2f}, {:.2f} and "
+      "{:.2f}{}. Each "
+      "calibrator is good where its balls are. The print gives neither the lengths nor the tracker's noise, "
+      "and the "
+      "plates turn with the C-arm: the balls of one view are elsewhere in the other, so the error on their "
+      "own points "
+      "is taken as the distance from one view's ray; as the intersection of two it is {:.2f} mm.",
+      cone_far, plates_own, cone_centre, plates_centre, cone_near, plates_cone,
+      same_order ? ": the same order" : ": not the same order",
+      mean("biplane", "on_biplane", "intersection"));
+}
+
+std::string biplane_svg(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options) {
+  Chart chart{"Table 1: UDCSC and biplane", "Points", "Error, mm: mean, largest and least of ten tests"};
+  chart.x_names = {"FRE", "TRE on biplane", "TRE at the centre", "TRE on UDCSC"};
+  chart.y_from_zero = true;
+  chart.note = fmt::format("medians of {} simulated experiments beside the print", options.groups);
+  const std::array places{"fre", "on_biplane", "centre", "on_udcsc"};
+  for (const char* calibrator : {"udcsc", "biplane"})
+    for (const bool print : {false, true}) {
+      ChartSeries series{fmt::format("{}, {}", calibrator == std::string_view("udcsc") ? "UDCSC" : "biplane",
+                                     print ? "printed" : "here")};
+      series.dashed = print;
+      for (const BiplaneRow& row : rows) {
+        const Cell& cell = cell_of(row);
+        if (row.calibrator != calibrator || !cell.printed) continue;
+        const ErrorFigures& figures = print ? *cell.printed : row.figures;
+        const auto place = double(std::ranges::find(places, row.points) - places.begin());
+        series.points.push_back({place + 0.14 * (double(chart.series.size()) - 1.5), figures.mean});
+        series.ranges.push_back({figures.min, figures.max});
+      }
+      chart.series.push_back(std::move(series));
+    }
+  return chart_svg(std::array{chart});
+}
+
+}  // namespace
+
+Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, const EngineOptions& engine,
+                                                const Ranks& ranks) {
+  if (const auto good = check(options); !good) return tl::unexpected<Failure>(good.error());
+  const BiplaneTrials trials(options);
+  constexpr std::size_t stride = table_cells.size() * figures_of_cell;
+  StudySetting setting;
+  setting.blocks = (options.groups + experiments_of_block - 1) / experiments_of_block;
+  setting.values_per_block = experiments_of_block * stride;
+  setting.work = [&](std::size_t block, std::span<double> values) {
+    for (std::size_t i = 0; i < experiments_of_block; i += lane_count)
+      if (const std::size_t first = block * experiments_of_block + i; first < options.groups)
+        trials.run(first, values.data() + i * stride);
+  };
+  setting.settle = [&](std::span<const double> values) {
+    std::vector<double> medians;
+    for (std::size_t figure = 0; figure < stride; ++figure) {
+      std::vector<double> column;
+      for (std::size_t i = 0; i < options.groups; ++i) column.push_back(values[i * stride + figure]);
+      medians.push_back(column_statistics(column).median);
+    }
+    return medians;
+  };
+  const std::string identity =
+      fmt::format("biplane {} groups {} seed {} sigma {} fle {} lengths {} {} {} {} balls {} tracker {} {}",
+                  HELICARM_VERSION, options.groups, options.seed, name_of(options.sigma), options.fle,
+                  options.cone_mm, options.near_plate_mm, options.far_plate_mm, options.half_plate_mm,
+                  options.balls_a_side, options.tracker_sigma_mm, options.tracker_sigma_deg);
+  const auto kept = run_study({setting}, identity, engine, ranks);
+  if (!kept) return tl::unexpected<Failure>(kept.error());
+  std::vector<BiplaneRow> rows;
+  if (kept->empty()) return rows;
+  for (std::size_t i = 0; i < table_cells.size(); ++i) {
+    const double* f = kept->front().data() + i * figures_of_cell;
+    const Cell& cell = table_cells[i];
+    rows.push_back({cell.calibrator, cell.points, cell.measure, {f[0], f[1], f[2], f[3]}});
+  }
+  return rows;
+}
+
+StudyFiles files_of(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options) {
+  StudyFiles files;
+  files.summary = biplane_summary(rows);
+  files.svg = biplane_svg(rows, options);
+  files.csv = "calibrator,points,measure,max,min,mean,rms,printed_max,printed_min,printed_mean,printed_rms\n";
+  Json table = Json::array();
+  for (const BiplaneRow& row : rows) {
+    const Cell& cell = cell_of(row);
+    files.csv += fmt::format("{},{},{}", row.calibrator, row.points, row.measure);
+    for (const double value : listed(row.figures)) files.csv += fmt::format(",{}", value);
+    for (const double value : listed(printed_or_nothing(cell)))
+      files.csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
+    files.csv += '\n';
+    const auto json_of = [](const ErrorFigures& f) {
+      return Json{{"max", f.max}, {"min", f.min}, {"mean", f.mean}, {"rms", f.rms}};
+    };
+    table.push_back({{"calibrator", row.calibrator},
+                     {"points", row.points},
+                     {"measure", row.measure},
+                     {"mm", json_of(row.figures)},
+                     {"printed_mm", cell.printed ? json_of(*cell.printed) : Json(nullptr)}});
+  }
+  files.json = {{"format", "helicarm-study/1"},
+                {"study", "biplane"},
+                {"groups", options.groups},
+                {"seed", options.seed},
+                {"version", HELICARM_VERSION},
+                {"sigma", name_of(options.sigma)},
+                {"sigma_px", sigma_px(options.sigma, options.fle)},
+                {"cone_mm", options.cone_mm},
+                {"plates_mm", {options.near_plate_mm, options.far_plate_mm}},
+                {"balls_of_biplane", 2 * options.balls_a_side * options.balls_a_side},
+                {"tracker_sigma_mm", options.tracker_sigma_mm},
+                {"tracker_sigma_deg", options.tracker_sigma_deg},
+                {"summary", files.summary},
+                {"rows", std::move(table)}};
+  return files;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/calibration_study.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/navigation/case.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/report/chart.h"
+#include "helicarm/simulation/simulate_case.h"
+#include "helicarm/simulation/write_case.h"
+#include "helicarm/study/paper_scene.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double unmeasured = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t figures_of_test = sizeof(CalibrationTest) / sizeof(double);
+using TestFigures = std::array<double, figures_of_test>;
+
+std::uint32_t seed_of_case(const CalibrationStudyOptions& options, std::size_t test) {
+  return RandomStream(options.seed, calibration_stream, test).bits();
+}
+
+CalibrationTest measured(const Case& given, Method method) {
+  CalibrationTest test{1, 0, unmeasured, unmeasured, unmeasured, unmeasured, {}};
+  test.targets.fill(unmeasured);
+  RunOptions options;
+  options.method = method;
+  options.threads = 1;
+  const Result result = value_or_throw(run_case(given, options));
+  if (result.failure) return test;
+  test.refused = 0;
+  const Statistics& fre = result.accuracy.fre_mm;
+  test.balls = fre.n;
+  if (fre.n > 0)
+    test.fre_mean = fre.mean, test.fre_max = fre.max, test.fre_min = fre.min, test.fre_rms = fre.rms;
+  for (const TargetError& target : result.accuracy.targets)
+    for (std::size_t i = 0; i < test.targets.size(); ++i)
+      if (target.name == fmt::format("T{}", i + 1)) test.targets[i] = target.error_mm;
+  return test;
+}
+
+void run_calibration_test(const CalibrationStudyOptions& options, std::size_t number, std::span<double> out) {
+  simulation::SimulationOptions simulated;
+  simulated.seed = seed_of_case(options, number);
+  simulated.size = options.size_px;
+  simulated.threads = 1;
+  const auto folder = options.folder / fmt::format("calibration-case-{}", number);
+  value_or_throw(simulation::write_case(folder, value_or_throw(simulation::simulate_case(simulated))));
+  const Case given = value_or_throw(read_case(folder));
+  for (const Method method : {Method::paper, Method::best}) {
+    std::ranges::copy(std::bit_cast<TestFigures>(measured(given, method)), out.begin());
+    out = out.subspan(figures_of_test);
+  }
+  std::error_code ignored;
+  std::filesystem::remove_all(folder, ignored);
+}
+
+/// Largest, least, mean and rms of errors over the tests.
+struct TestSummary {
+  double most = 0, least = std::numeric_limits<double>::infinity(), sum = 0, squares = 0, count = 0;
+
+  void add(double error) { add(error, error, error, error, 1); }
+  void add(double mean, double max, double min, double rms, double n) {
+    if (!std::isfinite(mean)) return;
+    most = std::max(most, max);
+    least = std::min(least, min);
+    sum += n * mean;
+    squares += n * rms * rms;
+    count += n;
+  }
+  std::array<double, 4> figures() const {
+    if (count == 0) return {unmeasured, unmeasured, unmeasured, unmeasured};
+    return {most, least, sum / count, std::sqrt(squares / count)};
+  }
+};
+
+struct TestRow {
+  const char* points;
+  std::array<double, 4> printed;  ///< Table 1
+  TestSummary paper, best;
+};
+
+/// Table 1's columns: balls, the target in the middle, and balls with the four targets on the surface.
+std::array<TestRow, 3> rows_of(const std::vector<CalibrationTests>& tests) {
+  std::array<TestRow, 3> rows{{{"fre", {0.70, 0.05, 0.36, 0.43}, {}, {}},
+                               {"centre", {0.42, 0.18, 0.30, 0.42}, {}, {}},
+                               {"on_udcsc", {1.15, 0.16, 0.54, 0.62}, {}, {}}}};
+  const auto add = [&](const CalibrationTest& t, TestSummary TestRow::*method) {
+    for (TestRow* row : {&rows[0], &rows[2]})
+      (row->*method).add(t.fre_mean, t.fre_max, t.fre_min, t.fre_rms, t.balls);
+    (rows[1].*method).add(t.targets[0]);
+    for (std::size_t i = 1; i < t.targets.size(); ++i) (rows[2].*method).add(t.targets[i]);
+  };
+  for (const CalibrationTests& test : tests) {
+    add(test.paper, &TestRow::paper);
+    add(test.best, &TestRow::best);
+  }
+  return rows;
+}
+
+Chart chart_of(const std::vector<CalibrationTests>& tests, CalibrationTest CalibrationTests::*method,
+               const char* title) {
+  Chart chart{title, "Test", "Target's error, mm"};
+  chart.y_from_zero = true;
+  chart.note = "T1 in the middle; printed means: 0.30 mm there, 0.41 mm over all";
+  for (std::size_t target = 0; target < 5; ++target) {
+    ChartSeries series{fmt::format("T{}", target + 1)};
+    for (std::size_t i = 0; i < tests.size(); ++i)
+      series.points.push_back({double(i + 1), (tests[i].*method).targets[target]});
+    chart.series.push_back(std::move(series));
+  }
+  return chart;
+}
+
+}  // namespace
+
+Expected<std::vector<CalibrationTests>> study_calibration(const CalibrationStudyOptions& options,
+                                                          const EngineOptions& engine, const Ranks& ranks) {
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  StudySetting setting;
+  setting.blocks = options.groups;
+  setting.values_per_block = 2 * figures_of_test;
+  setting.work = [&](std::size_t block, std::span<double> values) {
+    run_calibration_test(options, block, values);
+  };
+  setting.settle = [](std::span<const double> values) {
+    return std::vector<double>(values.begin(), values.end());
+  };
+  const std::string identity = fmt::format("calibration {} groups {} seed {} size {}", HELICARM_VERSION,
+                                           options.groups, options.seed, options.size_px);
+  const auto kept = run_study({setting}, identity, engine, ranks);
+  if (!kept) return tl::unexpected<Failure>(kept.error());
+  std::vector<CalibrationTests> tests;
+  if (kept->empty()) return tests;
+  for (std::size_t i = 0; i < options.groups; ++i) {
+    TestFigures paper, best;
+    const auto from = kept->front().begin() + std::ptrdiff_t(2 * i * figures_of_test);
+    std::copy_n(from, figures_of_test, paper.begin());
+    std::copy_n(from + figures_of_test, figures_of_test, best.begin());
+    tests.push_back({seed_of_case(options, i), std::bit_cast<CalibrationTest>(paper),
+                     std::bit_cast<CalibrationTest>(best)});
+  }
+  return tests;
+}
+
+StudyFiles files_of(const std::vector<CalibrationTests>& tests, const CalibrationStudyOptions& options) {
+  StudyFiles files;
+  files.csv = "test,case_seed,method,refused,balls,fre_mean,fre_max,fre_min,fre_rms,T1,T2,T3,T4,T5\n";
+  int refused_paper = 0, refused_best = 0;
+  for (std::size_t i = 0; i < tests.size(); ++i)
+    for (const auto* test : {&tests[i].paper, &tests[i].best}) {
+      const bool by_paper = test == &tests[i].paper;
+      (by_paper ? refused_paper : refused_best) += test->refused > 0;
+      files.csv += fmt::format("{},{},{}", i + 1, tests[i].case_seed, by_paper ? "paper" : "best");
+      for (const double value : std::bit_cast<TestFigures>(*test))
+        files.csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
+      files.csv += '\n';
+    }
+  const auto rows = rows_of(tests);
+  const auto json_of = [](const std::array<double, 4>& f) {
+    return Json{{"max", f[0]}, {"min", f[1]}, {"mean", f[2]}, {"rms", f[3]}};
+  };
+  Json table = Json::array();
+  std::string means;
+  for (const TestRow& row : rows) {
+    table.push_back({{"points", row.points},
+                     {"printed_mm", json_of(row.printed)},
+                     {"paper_mm", json_of(row.paper.figures())},
+                     {"best_mm", json_of(row.best.figures())}});
+    means += fmt::format("{}{} {:.2f} printed, {:.2f} by the printed recipe, {:.2f} by the best one",
+                         means.empty() ? "" : "; ", row.points, row.printed[2], row.paper.figures()[2],
+                         row.best.figures()[2]);
+  }
+  files.summary = fmt::format(
+      "Table 1's columns of UDCSC and Fig. 14, from {} simulated tests of an AP and a lateral picture, mean "
+      "errors in mm: "
+      "{}. Refused: {} by the printed recipe, {} by the best one. Printed figures are of a real C-arm, whose "
+      "distortion, "
+      "noise and calibrator's tolerance are not known.",
+      tests.size(), means, refused_paper, refused_best);
+  files.json = {{"format", "helicarm-study/1"},
+                {"study", "calibration"},
+                {"groups", options.groups},
+                {"seed", options.seed},
+                {"version", HELICARM_VERSION},
+                {"size_px", options.size_px},
+                {"refused", {{"paper", refused_paper}, {"best", refused_best}}},
+                {"summary", files.summary},
+                {"rows", std::move(table)}};
+  files.svg = chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) the printed recipe"),
+                                   chart_of(tests, &CalibrationTests::best, "(b) the best one")});
+  return files;
+}
+
+}  // namespace helicarm

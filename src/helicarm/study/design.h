@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/study/engine.h"
+#include "helicarm/study/paper_scene.h"
+#include "helicarm/study/study_files.h"
+
+namespace helicarm {
+
+/// Where a designed calibrator's balls may lie: on the spiral of Eq. 9, on its cone, or on a dome (half an
+/// ellipsoid) of the same base and height.
+enum class DesignSurface { helix, cone, dome };
+inline constexpr std::array design_surfaces{DesignSurface::helix, DesignSurface::cone, DesignSurface::dome};
+std::string_view name_of(DesignSurface surface);
+
+/// A search for the ball positions of least TRE in the cone under the rules of 2.3.4 that do not go by label
+/// (`check_rules`: no ball hides another over +-5 degrees, all imaged, the targets within the balls).
+struct DesignOptions {
+  std::size_t groups = 10000;  ///< random sets to compare with
+  std::uint64_t seed = 1;
+  int balls = 12;  ///< 6 to 20
+  DesignSurface surface = DesignSurface::helix;
+  SigmaReading sigma = SigmaReading::std;
+  double fle = printed_fle;
+  int restarts = 8;
+  int steps = 2000;  ///< of each restart: one ball moved, kept if better
+};
+
+struct DesignedSet {
+  Calibrator calibrator;
+  double tre_mm = 0;  ///< rms over noise and the cone's targets with exact pixels, from draws of its own
+  bool keeps_rules = false;
+};
+
+struct DesignAnswer {
+  DesignedSet design;
+  DesignedSet best_random;        ///< whatever the rules
+  DesignedSet best_random_ruled;  ///< the best that keeps them; no balls where none does
+  DesignedSet udcsc;
+  double median_random_mm = 0;
+};
+
+/// Nothing (no balls) at ranks that do not lead. `uncertain` where no restart finds a set that keeps the
+/// rules.
+Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOptions& engine,
+                                    const Ranks& ranks);
+
+/// design.csv, design.json (with the calibrator as a file for `phantom` and cases), design.svg and a summary.
+StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options);
+
+}  // namespace helicarm

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "helicarm/study/lanes.h"
+
+namespace helicarm {
+
+struct LanePoint {
+  Lanes x, y, z;  ///< mm
+};
+
+struct LanePixel {
+  Lanes u, v;
+};
+
+/// Projections in the world of the balls, with 1 as the last element (Eq. 6).
+struct LaneProjection {
+  Lanes u[4];
+  Lanes v[4];
+  Lanes w[3];
+};
+
+inline LanePoint operator-(const LanePoint& a, const LanePoint& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+inline Lanes dot(const LanePoint& a, const LanePoint& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+[[gnu::always_inline]] inline Lanes norm(const LanePoint& a) { return square_root(dot(a, a)); }
+
+/// A symmetric 3x3 matrix.
+struct LaneSymmetric {
+  Lanes xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
+
+  void add(const LanePoint& a, const LanePoint& weighted) {
+    xx += a.x * weighted.x;
+    xy += a.x * weighted.y;
+    xz += a.x * weighted.z;
+    yy += a.y * weighted.y;
+    yz += a.y * weighted.z;
+    zz += a.z * weighted.z;
+  }
+  LanePoint operator*(const LanePoint& a) const {
+    return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z, xz * a.x + yz * a.y + zz * a.z};
+  }
+  [[gnu::always_inline]] LaneSymmetric inverse() const {
+    LaneSymmetric adjugate{yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy,
+                           xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy};
+    const Lanes scale = 1.0 / (xx * adjugate.xx + xy * adjugate.xy + xz * adjugate.xz);
+    adjugate.xx *= scale;
+    adjugate.xy *= scale;
+    adjugate.xz *= scale;
+    adjugate.yy *= scale;
+    adjugate.yz *= scale;
+    adjugate.zz *= scale;
+    return adjugate;
+  }
+  /// The same of a positive definite matrix that may be near singular, by its triangular factors (L D L').
+  LaneSymmetric careful_inverse() const {
+    const Lanes a = 1.0 / xx;
+    const Lanes l1 = xy * a, l2 = xz * a;
+    const Lanes rest = yz - l2 * xy;
+    const Lanes b = 1.0 / (yy - l1 * xy);
+    const Lanes l3 = rest * b;
+    const Lanes c = 1.0 / (zz - l2 * xz - l3 * rest);
+    const Lanes m = l1 * l3 - l2;
+    return {a + l1 * l1 * b + m * m * c, -l1 * b - m * l3 * c, m * c, b + l3 * l3 * c, -l3 * c, c};
+  }
+};
+
+/// What Eq. 7 needs to know of the balls, the same for every view and every noise.
+class LaneBalls {
+ public:
+  static constexpr std::size_t most = 64;
+
+  explicit LaneBalls(std::span<const LanePoint> balls);
+
+  /// Eq. 7 by least squares, for each lane on its own: the same minimiser as `solve_dlt`, which is its
+  /// oracle. The balls' mean and the pixels' mean are moved to 0 and both are scaled first; then the eight
+  /// numbers of the first two rows are eliminated, for they appear in one view axis each and share one 4x4
+  /// matrix. What is left is 3x3. Lanes whose balls leave the view open give nonsense or NaN.
+  LaneProjection calibrate(std::span<const LanePixel> pixels) const;
+
+ private:
+  std::size_t count_;
+  LanePoint centre_;        // mm
+  LanePoint scaled_[most];  // about the centre
+  LaneSymmetric inverse_;   // of the balls' second moments
+};
+
+/// Eq. 8 (its right side mended) for two views by least squares, weighted as `intersect_linear` does.
+[[gnu::always_inline]] inline LanePoint intersect(const LaneProjection& a, const LanePixel& in_a,
+                                                  const LaneProjection& b, const LanePixel& in_b) {
+  LaneSymmetric normal;
+  LanePoint right{};
+  const auto add = [&](const LaneProjection& view, const Lanes(&row)[4], Lanes pixel) {
+    const LanePoint left{pixel * view.w[0] - row[0], pixel * view.w[1] - row[1], pixel * view.w[2] - row[2]};
+    const Lanes value = row[3] - pixel;
+    normal.add(left, left);
+    right.x += left.x * value;
+    right.y += left.y * value;
+    right.z += left.z * value;
+  };
+  add(a, a.u, in_a.u);
+  add(a, a.v, in_a.v);
+  add(b, b.u, in_b.u);
+  add(b, b.v, in_b.v);
+  return normal.inverse() * right;
+}
+
+/// Distance of a point from the ray through a pixel.
+inline Lanes ray_distance(const LaneProjection& view, const LanePixel& pixel, const LanePoint& point) {
+  const auto plane = [&](const Lanes(&row)[4], Lanes at) {
+    return LanePoint{at * view.w[0] - row[0], at * view.w[1] - row[1], at * view.w[2] - row[2]};
+  };
+  const LanePoint u = plane(view.u, pixel.u), v = plane(view.v, pixel.v);
+  const Lanes off_u = dot(u, point) - (view.u[3] - pixel.u), off_v = dot(v, point) - (view.v[3] - pixel.v);
+  const Lanes uu = dot(u, u), uv = dot(u, v), vv = dot(v, v);
+  return square_root((vv * off_u * off_u - 2.0 * uv * off_u * off_v + uu * off_v * off_v) /
+                     (uu * vv - uv * uv));
+}
+
+}  // namespace helicarm

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/study/engine.h"
+#include "helicarm/study/paper_scene.h"
+#include "helicarm/study/study_files.h"
+
+namespace helicarm {
+
+/// Fig. 7: TRE of targets on the planes through the balls' centre along XOY and XOZ.
+struct LocationOptions {
+  std::size_t groups = 10000;  ///< noise draws
+  std::uint64_t seed = 1;
+  /// mm, calibrator frame; 6 to 64. None: twelve random ones on the spiral, the seed's.
+  std::vector<Eigen::Vector3d> balls;
+  SigmaReading sigma = SigmaReading::std;
+  double fle = printed_fle;
+  WorldOrigin origin = WorldOrigin::base;
+  double half_mm = 150;  ///< of the planes
+  double step_mm = 7.5;
+  double interval_mm = 0.5;  ///< between isolines
+};
+
+enum class TargetPlane { xoy, xoz };
+
+struct LocationPoint {
+  TargetPlane plane;
+  Eigen::Vector3d place;  ///< mm, calibrator frame
+  double tre_fresh;       ///< mean distance (Eq. 12) over the draws, mm; the target's pixels carry noise
+  double se_fresh;        ///< its standard error
+  double tre_exact;       ///< likewise; only the calibration is noisy
+  double se_exact;
+};
+
+struct LocationMap {
+  std::vector<Eigen::Vector3d> balls;
+  Eigen::Vector3d centre;             ///< of the balls
+  int side = 0;                       ///< points along each edge of a plane
+  std::vector<LocationPoint> points;  ///< XOY, then XOZ; x runs fastest
+};
+
+/// No points at ranks that do not lead.
+Expected<LocationMap> study_location(const LocationOptions& options, const EngineOptions& engine,
+                                     const Ranks& ranks);
+
+/// location.csv, location.json, location.svg and how it compares with the print.
+StudyFiles files_of(const LocationMap& map, const LocationOptions& options);
+
+}  // namespace helicarm

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/paper_scene.h"
+
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/phantom/conical_helix.h"
+
+namespace helicarm {
+namespace {
+
+// 19 points within sqrt(2) steps: 6 at one step, 12 at sqrt(2). A ball's points have 3/5 of its radius
+// squared.
+const double ball_lattice_mm = space_radius_mm * std::sqrt(0.6 * 19 / 30);
+constexpr double cone_lattice_mm = 30;
+
+/// Lattice points about `middle` for which `inside` holds; none is farther out than four steps.
+template <class Inside>
+std::vector<Eigen::Vector3d> lattice_points(const Eigen::Vector3d& middle, double step_mm, Inside inside) {
+  std::vector<Eigen::Vector3d> points;
+  for (int k = -4; k <= 4; ++k)
+    for (int j = -4; j <= 4; ++j)
+      for (int i = -4; i <= 4; ++i)
+        if (const Eigen::Vector3d point = middle + step_mm * Eigen::Vector3d(i, j, k); inside(point))
+          points.push_back(point);
+  return points;
+}
+
+}  // namespace
+
+std::string_view name_of(WorldOrigin origin) { return origin == WorldOrigin::base ? "base" : "centre"; }
+
+std::string_view name_of(SigmaReading reading) {
+  constexpr std::array names{"std", "var", "mean_distance", "rms_distance"};
+  return names[std::size_t(reading)];
+}
+
+double sigma_px(SigmaReading reading, double fle) {
+  switch (reading) {
+    case SigmaReading::std:
+      return fle;
+    case SigmaReading::var:
+      return std::sqrt(fle);
+    case SigmaReading::mean_distance:
+      return fle / std::sqrt(std::numbers::pi / 2);  // a Rayleigh distribution's mean
+    case SigmaReading::rms_distance:
+      return fle / std::numbers::sqrt2;
+  }
+  throw std::invalid_argument("sigma_px: no such reading");
+}
+
+Eigen::Vector3d origin_in_calibrator(WorldOrigin origin) {
+  return origin == WorldOrigin::base ? Eigen::Vector3d::Zero() : middle_of_cone();
+}
+
+std::array<View, 2> paper_views(WorldOrigin origin) {
+  constexpr double f_px = 900 / 0.15;
+  const auto view = [&](double alpha) {
+    const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
+    return View{{f_px, f_px, 512, 512, 0},
+                {rotation, Eigen::Vector3d(0, 0, 800) - rotation * origin_in_calibrator(origin)}};
+  };
+  return {view(0), view(std::numbers::pi / 2)};
+}
+
+std::vector<Eigen::Vector3d> targets_in_ball(WorldOrigin origin) {
+  const Eigen::Vector3d middle = origin_in_calibrator(origin);
+  return lattice_points(middle, ball_lattice_mm, [&](const Eigen::Vector3d& point) {
+    return (point - middle).norm() <= space_radius_mm;
+  });
+}
+
+std::vector<Eigen::Vector3d> targets_in_cone() {
+  return lattice_points(middle_of_cone(), cone_lattice_mm, [](const Eigen::Vector3d& point) {
+    const double share = point.z() / cone_height_mm;
+    return share >= 0 && share <= 1 &&
+           point.head<2>().norm() <= cone_base_mm + share * (cone_top_mm - cone_base_mm);
+  });
+}
+
+Eigen::Vector3d middle_of_cone() { return {0, 0, cone_height_mm / 2}; }
+
+LaneViews::LaneViews(const std::array<View, 2>& views) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Projection projection = views[i].projection();
+    for (Eigen::Index row = 0; row < 3; ++row)
+      for (Eigen::Index column = 0; column < 4; ++column) p_[i][row][column] = projection(row, column);
+  }
+}
+
+LanePixel LaneViews::project(std::size_t view, const LanePoint& point) const {
+  const auto row = [&](int i) {
+    const double(&p)[4] = p_[view][i];
+    return p[0] * point.x + p[1] * point.y + p[2] * point.z + p[3];
+  };
+  const Lanes one_over_depth = 1.0 / row(2);
+  return {row(0) * one_over_depth, row(1) * one_over_depth};
+}
+
+LanePoint on_spiral(Lanes share) {
+  constexpr ConicalHelix spiral;
+  const SineCosine direction = sine_cosine_of_turns(share * (spiral.t_end / (2 * std::numbers::pi)));
+  const Lanes radius = spiral.rr * exponential(share * (-spiral.t_end / spiral.pp));
+  return {radius * direction.cosine, radius * direction.sine, share * (spiral.h * spiral.t_end)};
+}
+
+std::vector<LanePoint> balls_on_spiral(const LaneRandom& random, std::size_t count) {
+  std::vector<LanePoint> balls(count);
+  for (std::size_t i = 0; i < count; i += 2) {
+    const auto [first, second] = random.uniforms(draw::places + std::uint32_t(i / 2));
+    balls[i] = on_spiral(first);
+    if (i + 1 < count) balls[i + 1] = on_spiral(second);
+  }
+  return balls;
+}
+
+void draw_noise(const LaneRandom& random, std::uint32_t from, std::size_t count, LanePixels& noise) {
+  for (std::uint32_t view = 0; view < 2; ++view)
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto [u, v] = random.normals(from + view * std::uint32_t(LaneBalls::most) + i);
+      noise.of_view[view][i] = {u, v};
+    }
+}
+
+void add_noise(const LanePixels& exact, double sigma, const LanePixels& noise, std::size_t count,
+               LanePixels& pixels) {
+  for (std::size_t view = 0; view < 2; ++view)
+    for (std::size_t i = 0; i < count; ++i) {
+      const LanePixel& unit = noise.of_view[view][i];
+      const LanePixel& from = exact.of_view[view][i];
+      pixels.of_view[view][i] = {from.u + sigma * unit.u, from.v + sigma * unit.v};
+    }
+}
+
+LaneTargets::LaneTargets(std::span<const Eigen::Vector3d> points, const std::array<View, 2>& views) {
+  if (points.size() > LaneBalls::most) throw std::invalid_argument("LaneTargets: more than 64");
+  const LaneViews lane_views(views);
+  for (const Eigen::Vector3d& point : points) {
+    const LanePoint target{lanes(point.x()), lanes(point.y()), lanes(point.z())};
+    for (std::size_t i = 0; i < 2; ++i) exact_.of_view[i][points_.size()] = lane_views.project(i, target);
+    points_.push_back(target);
+  }
+}
+
+Lanes LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2],
+                              double sigma, const LanePixels* noise) const {
+  Lanes sum{};
+  for (std::size_t i = begin; i < end; ++i) {
+    LanePixel seen[2];
+    for (std::size_t view = 0; view < 2; ++view) {
+      seen[view] = exact_.of_view[view][i];
+      if (!noise) continue;
+      seen[view].u += sigma * noise->of_view[view][i].u;
+      seen[view].v += sigma * noise->of_view[view][i].v;
+    }
+    sum += norm(intersect(views[0], seen[0], views[1], seen[1]) - points_[i]);
+  }
+  return sum / double(end - begin);
+}
+
+Lanes LaneTargets::mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const {
+  Lanes sum{};
+  for (std::size_t i = begin; i < end; ++i) {
+    const LanePoint off =
+        intersect(views[0], exact_.of_view[0][i], views[1], exact_.of_view[1][i]) - points_[i];
+    sum += dot(off, off);
+  }
+  return sum / double(end - begin);
+}
+
+}  // namespace helicarm

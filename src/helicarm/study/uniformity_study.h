@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/study/engine.h"
+#include "helicarm/study/paper_scene.h"
+#include "helicarm/study/study_files.h"
+
+namespace helicarm {
+
+/// Fig. 6: how evenly random balls lie, E(A) of Eq. 13, against the TRE they give.
+struct UniformityOptions {
+  std::size_t groups = 1000;
+  std::uint64_t seed = 1;
+  int balls = 12;  ///< 6 to 64
+  int draws =
+      100;  ///< of noise for each group, over which its TRE is averaged; the first of them stands alone too
+  SigmaReading sigma = SigmaReading::std;
+  double fle = printed_fle;
+  WorldOrigin origin = WorldOrigin::base;
+};
+
+/// TRE (Eq. 12, mm) by where the targets are.
+struct PlacedTre {
+  double ball, cone, centre;
+};
+
+struct UniformityGroup {
+  double uniformity;           ///< E(A) in the ball of 100 mm about the origin
+  PlacedTre one, one_exact;    ///< of the first draw; exact: only the calibration is noisy
+  PlacedTre mean, mean_exact;  ///< over all draws
+};
+
+/// One entry for each group; none at ranks that do not lead.
+Expected<std::vector<UniformityGroup>> study_uniformity(const UniformityOptions& options,
+                                                        const EngineOptions& engine, const Ranks& ranks);
+
+/// uniformity.csv, uniformity.json, uniformity.svg and how it compares with the print.
+StudyFiles files_of(const std::vector<UniformityGroup>& groups, const UniformityOptions& options);
+
+}  // namespace helicarm

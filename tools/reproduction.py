@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Renews the tables of docs/reproduction.md: the paper's experiments, rerun.
+
+    tools/reproduction.py [--seed 1]
+"""
+
+import argparse
+import csv
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+
+from evaluate import renew
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def study(options, name, *more):
+    """What the command writes: its table and its JSON."""
+    with tempfile.TemporaryDirectory() as out:
+        subprocess.run([options.helicarm, "study", name, "--seed", str(options.seed), "--out", out, "--quiet", *more],
+                       check=True)
+        with open(Path(out) / f"{name}.csv", newline="") as file:
+            return list(csv.DictReader(file)), json.loads((Path(out) / f"{name}.json").read_text())
+
+
+def number(options):
+    rows, _ = study(options, "number")
+    columns = [("fre", "calibration_pixels"), ("fre", "fresh_noise"), ("fre", "exact"), ("tre_ball", "fresh_noise"),
+               ("tre_cone", "fresh_noise"), ("tre_centre", "fresh_noise")]
+    median = {(row["n"], row["sigma"], row["error"], row["reading"]): float(row["median"]) for row in rows}
+    heads = [f"{error}, {reading.replace('_', ' ')}" for error, reading in columns]
+    yield "| balls | " + " | ".join(heads) + " | fre_max, fresh noise, sigma as rms_distance |"
+    yield "| --- |" + " ---: |" * (len(columns) + 1)
+    for n in dict.fromkeys(row["n"] for row in rows):
+        values = [median[n, "std", *column] for column in columns] + [median[n, "rms_distance", "fre_max", "fresh_noise"]]
+        yield f"| {n} | " + " | ".join(f"{value:.3f}" for value in values) + " |"
+
+
+def uniformity(options):
+    _, result = study(options, "uniformity")
+    yield "| targets | pixels | one draw: Pearson | Spearman | mean of 100 draws: Pearson | Spearman |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: |"
+    found = {entry["tre"]: entry for entry in result["correlations"]}
+    for pixels in ("fresh_noise", "exact"):
+        for place in ("ball", "cone", "centre"):
+            name = f"tre_{place}_{pixels}"
+            values = [found[before + name][kind] for before in ("", "mean_") for kind in ("pearson", "spearman")]
+            yield f"| {place} | {pixels.replace('_', ' ')} | " + " | ".join(f"{value:.2f}" for value in values) + " |"
+
+
+def location(options):
+    results = [("random", study(options, "location")[1]), ("udcsc", study(options, "location", "--calibrator", "udcsc")[1])]
+    distances = [entry["distance_mm"] for entry in results[0][1]["by_distance"]]
+    yield "| balls | " + " | ".join(f"at {distance:g} mm" for distance in distances) + " | Spearman with distance |"
+    yield "| --- |" + " ---: |" * (len(distances) + 1)
+    for name, result in results:
+        values = [f"{entry['fresh_noise']:.2f} ({entry['exact']:.2f})" for entry in result["by_distance"]]
+        yield f"| {name} | " + " | ".join(values) + f" | {result['spearman_with_distance']:.2f} |"
+
+
+def biplane(options):
+    rows, _ = study(options, "biplane")
+    yield "| calibrator | points | measure | max | min | mean | RMS |"
+    yield "| --- | --- | --- | ---: | ---: | ---: | ---: |"
+    for row in rows:
+        values = [f"{float(row[kind]):.2f}" + (f" ({float(row['printed_' + kind]):.2f})" if row["printed_" + kind] else "")
+                  for kind in ("max", "min", "mean", "rms")]
+        yield f"| {row['calibrator']} | {row['points']} | {row['measure']} | " + " | ".join(values) + " |"
+
+
+def calibration(options):
+    _, result = study(options, "calibration")
+    yield "| points | by | max | min | mean | RMS |"
+    yield "| --- | --- | ---: | ---: | ---: | ---: |"
+    for row in result["rows"]:
+        for key, name in (("printed_mm", "the print"), ("paper_mm", "the printed recipe"), ("best_mm", "the best recipe")):
+            yield f"| {row['points']} | {name} | " + " | ".join(f"{row[key][kind]:.2f}" for kind in ("max", "min", "mean", "rms")) + " |"
+
+
+def design(options):
+    yield "| surface | design | udcsc | best of the random sets | the best that keeps the rules | their median |"
+    yield "| --- | ---: | ---: | ---: | ---: | ---: |"
+    for surface in ("helix", "cone", "dome"):
+        _, result = study(options, "design", "--surface", surface)
+        ruled = result["best_random_that_keeps_rules"]
+        yield (f"| {surface} | {result['design']['tre_mm']:.3f} | {result['udcsc']['tre_mm']:.3f} | "
+               f"{result['best_random']['tre_mm']:.3f} | {ruled['tre_mm'] if ruled else float('nan'):.3f} | "
+               f"{result['median_random_mm']:.3f} |")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
+    options = parser.parse_args()
+    page = ROOT / "docs/reproduction.md"
+    for table in (number, uniformity, location, biplane, calibration, design):
+        renew(page, table.__name__, list(table(options)))
+    print(f"renewed {page.relative_to(ROOT)}, seed {options.seed}")
+
+
+if __name__ == "__main__":
+    main()
