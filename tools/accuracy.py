@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Renews the tables of docs/accuracy.md: the estimators against the statistical limit.
+"""Renews the tables of docs/accuracy.md: the estimators against the statistical limit, and what wrong assumptions about
+a ball's picture cost.
 
-    tools/accuracy.py [--groups 10000] [--seed 1]
+    tools/accuracy.py [--groups 10000] [--balls 1000] [--seed 1] [--only limit|centres]
 """
 
 import argparse
@@ -17,12 +18,15 @@ ROOT = Path(__file__).resolve().parent.parent
 PLACES = ["centre", "50 mm lateral", "100 mm lateral", "150 mm axial"]
 
 
-def rows_of(helicarm, groups, seed):
+WORDS = ("model", "place", "point", "group", "situation")
+
+
+def rows_of(helicarm, study, groups, seed):
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([helicarm, "study", "limit", "--groups", str(groups), "--seed", str(seed), "--out", out],
+        subprocess.run([helicarm, "study", study, "--groups", str(groups), "--seed", str(seed), "--out", out],
                        check=True, stdout=subprocess.DEVNULL)
-        with open(Path(out) / "limit.csv", newline="") as file:
-            return [{key: value if key in ("model", "place", "point") else float(value) for key, value in row.items()}
+        with open(Path(out) / f"{study}.csv", newline="") as file:
+            return [{key: value if key in WORDS else float(value) if value else None for key, value in row.items()}
                     for row in csv.DictReader(file)]
 
 
@@ -62,17 +66,37 @@ def far(rows):
                    f"{row['dlt_mm'] / row['error_mm']:.1f} |")
 
 
+def centres(rows):
+    def number(value, digits, unit=""):
+        return "" if value is None else f"{value:.{digits}f}{unit}"
+
+    yield ("| | | rms error px | over bound | bias px | predicted sigma px | error over sigma | covered at 95 % | "
+           "fitted radius | refused |")
+    yield "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    for row in rows:
+        radius = "" if row["radius_bias"] is None else f"{100 * row['radius_bias']:+.1f} %"
+        yield (f"| {row['group']} | {row['situation']} | {number(row['rms_px'], 3)} | {number(row['ratio'], 2)} | "
+               f"{number(row['bias_px'], 3)} | {number(row['sigma_px'], 3)} | {number(row['z'], 2)} | "
+               f"{number(100 * row['coverage'], 1, ' %')} | {radius} | {row['refused']:.0f} of {row['balls']:.0f} |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", type=int, default=10000)
+    parser.add_argument("--groups", type=int, default=10000, help="trials of each setting of the limit")
+    parser.add_argument("--balls", type=int, default=1000, help="of each situation of the centres")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", choices=["limit", "centres"])
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
-    rows = rows_of(options.helicarm, options.groups, options.seed)
     page = ROOT / "docs/accuracy.md"
-    for marker, lines in (("efficiency", efficiency(rows)), ("coverage", coverage(rows)), ("far", far(rows))):
-        renew(page, marker, list(lines))
-    print(f"renewed {page.relative_to(ROOT)} from {options.groups} trials of each setting, seed {options.seed}")
+    if options.only != "centres":
+        rows = rows_of(options.helicarm, "limit", options.groups, options.seed)
+        for marker, lines in (("efficiency", efficiency(rows)), ("coverage", coverage(rows)), ("far", far(rows))):
+            renew(page, marker, list(lines))
+        print(f"renewed {page.relative_to(ROOT)} from {options.groups} trials of each setting, seed {options.seed}")
+    if options.only != "limit":
+        renew(page, "centres", list(centres(rows_of(options.helicarm, "centres", options.balls, options.seed))))
+        print(f"renewed {page.relative_to(ROOT)} from {options.balls} balls of each situation, seed {options.seed}")
 
 
 if __name__ == "__main__":

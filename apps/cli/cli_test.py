@@ -56,7 +56,12 @@ class CommandLine(unittest.TestCase):
             done = run("study", "limit", "--groups", 1, "--seed", 4, "--threads", threads, "--quiet",
                        "--out", self.root / f"limit{threads}")
             self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual((self.root / "limit1/limit.csv").read_bytes(), (self.root / "limit3/limit.csv").read_bytes())
+        for ending in ("csv", "json", "svg"):
+            self.assertEqual((self.root / f"limit1/limit.{ending}").read_bytes(),
+                             (self.root / f"limit3/limit.{ending}").read_bytes())
+        done = run("study", "limit", "--groups", 1, "--out", self.root / "limit1")
+        self.assertLess(done.stdout.count("\n"), 12)
+        self.assertNotIn("\r", done.stderr)
         self.assertEqual(run("study", "fortune").returncode, 2)
 
     def test_studies_of_the_paper_write_table_figure_and_summary(self):

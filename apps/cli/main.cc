@@ -111,9 +111,11 @@ void add_study(CLI::App& app, Action& action) {
                    "biplane: the cone against plates on the receiver (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
                    "design: ball positions of least TRE under the rules\n"
-                   "limit: error over the Cramer-Rao bound, and coverage of error bars")
+                   "limit: error over the Cramer-Rao bound, and coverage of error bars\n"
+                   "centres: what wrong assumptions about a ball's picture cost")
       ->required();
-  command->add_option("--groups", a.groups, "Trials of each setting")->check(within(1, 1e6));
+  command->add_option("--groups", a.groups, "Trials of each setting; centres: balls of each situation")
+      ->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
   command->add_flag("--resume", a.resume, "Go on where a run was stopped that wrote to the same folder");
   command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")

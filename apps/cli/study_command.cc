@@ -13,6 +13,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/study/biplane.h"
 #include "helicarm/study/calibration_study.h"
+#include "helicarm/study/centres.h"
 #include "helicarm/study/design.h"
 #include "helicarm/study/limit.h"
 #include "helicarm/study/location.h"
@@ -146,38 +147,6 @@ StudyFiles run_design(const StudyRun& run) {
   return run.ranks.leads() ? files_of(answer, options) : StudyFiles{};
 }
 
-Json json_of(const std::vector<LimitRow>& rows, std::size_t groups, std::uint64_t seed) {
-  Json json{{"format", "helicarm-study/1"}, {"study", "limit"},     {"groups", groups}, {"seed", seed},
-            {"version", HELICARM_VERSION},  {"rows", Json::array()}};
-  for (const LimitRow& row : rows)
-    json["rows"].push_back({{"balls", row.balls},
-                            {"sigma_px", row.sigma_px},
-                            {"model", row.model},
-                            {"place", row.place},
-                            {"point", row.point_exact ? "exact" : "noisy"},
-                            {"trials", row.trials},
-                            {"failures", row.failures},
-                            {"bound_mm", row.bound_mm},
-                            {"error_mm", row.error_mm},
-                            {"ratio", row.efficiency()},
-                            {"dlt_mm", row.dlt_mm},
-                            {"dlt_ratio", row.dlt_mm / row.bound_mm},
-                            {"coverage", row.coverage}});
-  return json;
-}
-
-std::string table_of(const std::vector<LimitRow>& rows) {
-  std::string text = fmt::format("{:>5} {:>9} {:<8} {:<15} {:<6} {:>9} {:>9} {:>6} {:>9} {:>9} {:>9}\n",
-                                 "balls", "sigma px", "model", "place", "point", "bound mm", "error mm",
-                                 "ratio", "DLT mm", "covered", "failures");
-  for (const LimitRow& row : rows)
-    text += fmt::format(
-        "{:>5} {:>9.2f} {:<8} {:<15} {:<6} {:>9.4f} {:>9.4f} {:>6.3f} {:>9.4f} {:>8.1f}% {:>9}\n", row.balls,
-        row.sigma_px, row.model, row.place, row.point_exact ? "exact" : "noisy", row.bound_mm, row.error_mm,
-        row.efficiency(), row.dlt_mm, 100 * row.coverage, row.failures);
-  return text;
-}
-
 StudyFiles run_limit(const StudyRun& run) {
   only(run.arguments, {});
   LimitOptions options;
@@ -186,17 +155,28 @@ StudyFiles run_limit(const StudyRun& run) {
   options.threads = run.console.threads;
   if (!run.ranks.leads()) return {};
   const auto rows = study_limit(options, run.engine.progress);
-  return {to_csv(rows), json_of(rows, std::size_t(options.trials), options.seed), {}, table_of(rows)};
+  return files_of(rows, options);
+}
+
+StudyFiles run_centres(const StudyRun& run) {
+  only(run.arguments, {});
+  CentreOptions options;
+  if (run.arguments.groups) options.balls = int(*run.arguments.groups);
+  options.seed = run.console.seed;
+  options.threads = run.console.threads;
+  if (!run.ranks.leads()) return {};
+  return files_of(study_centres(options, run.engine.progress), options);
 }
 
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 7> studies{{{"number", run_number},
+constexpr std::array<std::pair<std::string_view, Study>, 8> studies{{{"number", run_number},
                                                                      {"uniformity", run_uniformity},
                                                                      {"location", run_location},
                                                                      {"biplane", run_biplane},
                                                                      {"calibration", run_calibration},
                                                                      {"design", run_design},
-                                                                     {"limit", run_limit}}};
+                                                                     {"limit", run_limit},
+                                                                     {"centres", run_centres}}};
 
 Study study_named(const std::string& name) {
   std::vector<std::string_view> names;

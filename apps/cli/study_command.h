@@ -12,7 +12,7 @@ namespace helicarm::cli {
 
 /// What is not given has the default of the study's own options.
 struct StudyArguments {
-  std::string name;  ///< number, uniformity, location, biplane, calibration, design or limit
+  std::string name;  ///< number, uniformity, location, biplane, calibration, design, limit or centres
   std::optional<std::size_t> groups;
   std::filesystem::path out = "helicarm-study";
   bool resume = false;
@@ -26,7 +26,7 @@ struct StudyArguments {
   std::string surface;
 };
 
-/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (limit: no SVG). The
+/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (centres: no SVG). The
 /// same seed gives the same bytes, whatever the number of threads and ranks.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 

@@ -79,11 +79,7 @@ class BallFitter {
     start.centre_px = raw;
     start.radius_px = radius;
     const auto dot = fit(start);
-    if (!dot || (dot->centre_px - raw).norm() > rescue_reach_px || dot->sigma_px > 0.4) return std::nullopt;
-    if (std::abs(dot->radius_px / radius - 1) > 0.12 || dot->misfit > 0.35) return std::nullopt;
-    if (dot->contrast * typical_contrast_ < 0 || std::abs(dot->contrast) < 0.25 * std::abs(typical_contrast_))
-      return std::nullopt;
-    return dot;
+    return dot && is_believable(*dot, start, typical_contrast_) ? dot : std::nullopt;
   }
 
   bool is_black(const Vector2d& raw) const {
@@ -151,6 +147,13 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm) {
   const auto [least, most] =
       std::ranges::minmax(calibrator.balls | std::views::transform(&CalibratorBall::diameter_mm));
   return {1.03 * 0.5 * least / pixel_mm, 2.7 * 0.5 * most / pixel_mm};
+}
+
+bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contrast) {
+  return (fitted.centre_px - predicted.centre_px).norm() <= rescue_reach_px && fitted.sigma_px <= 0.4 &&
+         std::abs(fitted.radius_px / predicted.radius_px - 1) <= 0.12 && fitted.misfit <= 0.35 &&
+         fitted.contrast * typical_contrast >= 0 &&
+         std::abs(fitted.contrast) >= 0.25 * std::abs(typical_contrast);
 }
 
 Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,

@@ -30,6 +30,10 @@ struct FoundFiducials {
 /// receiver and half way to the source.
 Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
 
+/// Whether what was fitted where a pose puts a ball is believed to be it: near the place, of the size, the
+/// polarity and a quarter of the contrast at least that the other balls have.
+bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contrast);
+
 /// Finds and names the calibrator's balls among the dots that are not the plate's, rescues those that the
 /// search missed at their predicted places, and says of each of the others why it is not used. Along the
 /// cone's axis the labels hang on the balls' sizes: `radius_bias`, as another view of the same calibrator

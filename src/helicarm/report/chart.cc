@@ -36,7 +36,7 @@ struct Axis {
 
 class ChartDrawing {
  public:
-  ChartDrawing(const Chart& chart, double x0) : chart_(chart), x0_(x0) {
+  ChartDrawing(const Chart& chart, std::size_t number, double x0) : chart_(chart), number_(number), x0_(x0) {
     double x_low = infinity, x_high = -infinity, y_low = infinity, y_high = -infinity;
     const auto include = [&](double x, double y) {
       if (!std::isfinite(x) || !std::isfinite(y)) return;
@@ -57,6 +57,7 @@ class ChartDrawing {
     if (!(x_low <= x_high)) x_low = y_low = 0, x_high = y_high = 1;
     if (chart.y_from_zero) y_low = std::min(0.0, y_low);
     if (chart.y_most) y_high = std::min(y_high, *chart.y_most);
+    if (chart.y_range) y_low = chart.y_range->front(), y_high = chart.y_range->back();
     x_ =
         chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
     y_ = Axis::over(y_low, y_high);
@@ -66,9 +67,9 @@ class ChartDrawing {
 
   std::string svg() {
     frame();
-    put(R"(<clipPath id="frame{0:.0f}"><rect x="{0:.0f}" y="{1}" width="{2}" height="{3}"/></clipPath>)"
-        "\n<g clip-path=\"url(#frame{0:.0f})\">\n",
-        x0_, top_margin, chart_width, chart_height);
+    put(R"(<clipPath id="frame{0}"><rect x="{1}" y="{2}" width="{3}" height="{4}"/></clipPath>)"
+        "\n<g clip-path=\"url(#frame{0})\">\n",
+        number_, x0_, top_margin, chart_width, chart_height);
     if (chart_.band) band(*chart_.band);
     if (chart_.field) field(*chart_.field);
     for (std::size_t i = 0; i < chart_.series.size(); ++i) series(chart_.series[i], colour(i));
@@ -213,6 +214,7 @@ class ChartDrawing {
   }
 
   const Chart& chart_;
+  std::size_t number_;  ///< in the document
   double x0_;
   Axis x_{}, y_{};
   std::string text_;
@@ -226,16 +228,24 @@ double legend_height(const Chart& chart) {
 
 }  // namespace
 
-std::string chart_svg(std::span<const Chart> charts) {
-  std::string body;
-  double x = left_margin, legends = 0;
-  for (const Chart& chart : charts) {
-    legends = std::max(legends, legend_height(chart));
-    body += ChartDrawing(chart, x).svg();
-    x += chart_width + left_margin + right_margin;
+std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
+  if (columns == 0) columns = std::max<std::size_t>(1, charts.size());
+  std::string body, title;
+  double width = 0, height = 0;
+  for (std::size_t first = 0; first < charts.size(); first += columns) {
+    double x = left_margin, legends = 0;
+    body += fmt::format("<g transform=\"translate(0 {})\">\n", height);
+    for (std::size_t i = first; i < std::min(first + columns, charts.size()); ++i) {
+      const Chart& chart = charts[i];
+      title += (title.empty() ? "" : "; ") + chart.title;
+      legends = std::max(legends, legend_height(chart));
+      body += ChartDrawing(chart, i, x).svg();
+      x += chart_width + left_margin + right_margin;
+    }
+    body += "</g>\n";
+    width = std::max(width, x - left_margin);
+    height += top_margin + chart_height + bottom_margin + legends;
   }
-  std::string title;
-  for (const Chart& chart : charts) title += (title.empty() ? "" : "; ") + chart.title;
   return fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" )"
       R"(font-family="system-ui, sans-serif" font-size="12" role="img" aria-label="{2}">)"
@@ -245,7 +255,7 @@ std::string chart_svg(std::span<const Chart> charts) {
       ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
       ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
-      x - left_margin, top_margin + chart_height + bottom_margin + legends, escaped(title), body);
+      width, height, escaped(title), body);
 }
 
 }  // namespace helicarm

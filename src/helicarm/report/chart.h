@@ -42,11 +42,13 @@ struct Chart {
   std::optional<ChartField> field = {};
   std::vector<std::string> x_names = {};  ///< of x = 0, 1, ...: instead of numbers
   bool y_from_zero = false;
-  std::optional<double> y_most = {};  ///< what lies higher is cut off
-  std::string note = {};              ///< a line below the title
+  std::optional<double> y_most = {};                  ///< what lies higher is cut off
+  std::string note = {};                              ///< a line below the title
+  std::optional<std::array<double, 2>> y_range = {};  ///< instead of the curves' own
 };
 
-/// Charts side by side as one SVG document with axes, ticks and legends. The same input gives the same bytes.
-std::string chart_svg(std::span<const Chart> charts);
+/// Charts side by side, `columns` in a row (0: all), as one SVG document with axes, ticks and legends. The
+/// same input gives the same bytes.
+std::string chart_svg(std::span<const Chart> charts, std::size_t columns = 0);
 
 }  // namespace helicarm

@@ -73,12 +73,18 @@ double poisson(double mean, RandomStream& random) {
 
 }  // namespace
 
+Light illuminate(const Image<float>& signal, const Imaging& imaging) {
+  Light light{signal, 0};
+  blur(light.level, imaging.focus_sigma_px);
+  add_scatter(light.level, imaging.scatter_fraction, imaging.scatter_sigma_px);
+  light.quanta = imaging.quanta_per_pixel / mean_of_the_field(light.level);
+  return light;
+}
+
 Image<std::uint16_t> develop(const Image<float>& signal, const Imaging& imaging, std::uint64_t seed,
                              std::uint32_t stream, unsigned threads) {
-  Image<float> light = signal;
-  blur(light, imaging.focus_sigma_px);
-  add_scatter(light, imaging.scatter_fraction, imaging.scatter_sigma_px);
-  const double quanta = imaging.quanta_per_pixel / mean_of_the_field(light);
+  auto [light, quanta_of_open_beam] = illuminate(signal, imaging);
+  const double quanta = quanta_of_open_beam;  // a structured binding cannot be captured
   const auto rows = static_cast<std::size_t>(light.height());
   parallel_for(rows, threads, [&](std::size_t row) {
     RandomStream random(seed, stream, row);

@@ -22,6 +22,15 @@ struct Imaging {
   double open_level = 0.86;  ///< grey of the open beam as a part of the highest; above 1 it saturates
 };
 
+/// What falls on the screen, on average.
+struct Light {
+  Image<float> level;  ///< open beam, without scatter = 1
+  double quanta;       ///< per pixel at level 1
+};
+
+/// A noise-free picture (open beam = 1) with the focal spot's penumbra and scatter.
+Light illuminate(const Image<float>& signal, const Imaging& imaging);
+
 /// The grey values of a noise-free picture (open beam = 1). `stream` sets views of one seed apart. The same
 /// bytes whatever `threads` (0: all cores).
 Image<std::uint16_t> develop(const Image<float>& signal, const Imaging& imaging, std::uint64_t seed,

@@ -286,15 +286,4 @@ std::vector<LimitRow> study_limit(const LimitOptions& options,
   return rows;
 }
 
-std::string to_csv(const std::vector<LimitRow>& rows) {
-  std::string text =
-      "balls,sigma_px,model,place,point,trials,failures,bound_mm,error_mm,ratio,dlt_mm,dlt_ratio,coverage\n";
-  for (const LimitRow& row : rows)
-    text +=
-        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", row.balls, row.sigma_px, row.model, row.place,
-                    row.point_exact ? "exact" : "noisy", row.trials, row.failures, row.bound_mm, row.error_mm,
-                    row.efficiency(), row.dlt_mm, row.dlt_mm / row.bound_mm, row.coverage);
-  return text;
-}
-
 }  // namespace helicarm

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/study/study_files.h"
+
 namespace helicarm {
 
 struct LimitOptions {
@@ -35,7 +37,7 @@ struct LimitRow {
 std::vector<LimitRow> study_limit(const LimitOptions& options,
                                   const std::function<void(double share)>& progress);
 
-/// limit.csv: a head and one line for each row, full precision.
-std::string to_csv(const std::vector<LimitRow>& rows);
+/// limit.csv, limit.json, limit.svg (12 balls, exact pixels) and one line for each model.
+StudyFiles files_of(const std::vector<LimitRow>& rows, const LimitOptions& options);
 
 }  // namespace helicarm

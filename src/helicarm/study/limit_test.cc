@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/study/limit.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -49,14 +50,38 @@ TEST(LeastCovariance, KnowledgeNeverHurts) {
   EXPECT_LT(bound(0.5, 1e-3, known()), bound(0.5, 1e-3, wide));
 }
 
-TEST(StudyLimit, BytesDoNotDependOnThreads) {
-  const auto quiet = [](double) {};
-  EXPECT_EQ(to_csv(study_limit({2, 7, 1}, quiet)), to_csv(study_limit({2, 7, 3}, quiet)));
+StudyFiles few_trials(int trials, std::uint64_t seed, unsigned threads) {
+  const LimitOptions options{trials, seed, threads};
+  return files_of(study_limit(options, [](double) {}), options);
 }
 
-TEST(StudyLimit, SeedsDiffer) {
-  const auto quiet = [](double) {};
-  EXPECT_NE(to_csv(study_limit({1, 7, 1}, quiet)), to_csv(study_limit({1, 8, 1}, quiet)));
+TEST(StudyLimit, BytesDoNotDependOnThreads) {
+  const StudyFiles one = few_trials(2, 7, 1);
+  const StudyFiles three = few_trials(2, 7, 3);
+  EXPECT_EQ(one.csv, three.csv);
+  EXPECT_EQ(one.svg, three.svg);
+  EXPECT_EQ(one.summary, three.summary);
+}
+
+TEST(StudyLimit, SeedsDiffer) { EXPECT_NE(few_trials(1, 7, 1).csv, few_trials(1, 8, 1).csv); }
+
+TEST(StudyLimit, SummaryHasOneLineForEachModel) {
+  std::vector<LimitRow> rows;
+  for (const char* model : {"free", "known"})
+    for (const double sigma : {0.1, 1.0}) {
+      LimitRow row{12, sigma, model, "centre", true};
+      row.trials = 100;
+      row.failures = sigma > 0.5 ? 3 : 0;
+      row.bound_mm = 1;
+      row.error_mm = 1 + 0.1 * sigma;
+      row.coverage = 0.95;
+      rows.push_back(row);
+    }
+  const StudyFiles files = files_of(rows, {});
+  EXPECT_EQ(std::count(files.summary.begin(), files.summary.end(), '\n'), 3);
+  EXPECT_NE(files.summary.find("1.01 to 1.10"), std::string::npos) << files.summary;
+  EXPECT_EQ(files.json.at("rows").size(), rows.size());
+  EXPECT_EQ(files.svg.find("nan"), std::string::npos);
 }
 
 }  // namespace
