@@ -141,6 +141,70 @@ TEST(FitMap, RemainderFollowsALocalBump) {
   EXPECT_LT(most, 0.1);
 }
 
+/// Displacements (px, both axes) drawn from a Matern field of the given length at places of (-1 .. 1)^2.
+Eigen::MatrixX2d drawn_field(const std::vector<Vector2d>& places, double length, double sigma,
+                             RandomStream& random) {
+  const auto n = static_cast<Eigen::Index>(places.size());
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index i = 0; i < n; ++i)
+      covariance(i, j) =
+          sigma * sigma * kernel((places[std::size_t(i)] - places[std::size_t(j)]).squaredNorm(), length);
+  covariance.diagonal().array() += 1e-10;
+  const Eigen::MatrixX2d white = Eigen::MatrixX2d::NullaryExpr(n, 2, [&] { return random.normal(); });
+  return covariance.llt().matrixL() * white;
+}
+
+TEST(FitMap, ErrorBetweenDotsIsAsLargeAsTold) {
+  constexpr int draws = 40;
+  const auto dots = plate(7, pincushion);
+  const auto between = plate(6, pincushion);
+  std::vector<Vector2d> places;
+  for (const auto* of : {&dots, &between})
+    for (const Correspondence& dot : *of) places.push_back(dot.place_mm / 110);
+  RandomStream random(11, 1);
+  double chi2 = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    const Eigen::MatrixX2d field = drawn_field(places, 0.5, 0.4, random);
+    auto seen = dots;
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      seen[i].raw_px +=
+          field.row(Eigen::Index(i)).transpose() + 0.05 * Vector2d(random.normal(), random.normal());
+    const auto fit = fit_map(seen, side, side, {});
+    ASSERT_TRUE(fit);
+    for (std::size_t i = 0; i < between.size(); ++i) {
+      const Vector2d truth = between[i].raw_px + field.row(Eigen::Index(dots.size() + i)).transpose();
+      const Vector2d rectified = fit->rectified_from_plate * between[i].place_mm;
+      chi2 += (fit->map.raw_from_rectified(rectified) - truth).squaredNorm() /
+              std::pow(fit->map.sigma_px(rectified), 2);
+    }
+  }
+  const double z = std::sqrt(chi2 / double(2 * draws * between.size()));
+  EXPECT_GT(z, 0.85);
+  EXPECT_LT(z, 1.15);
+}
+
+TEST(FitMap, FarFromEveryDotTheRemainderIsAsUncertainAsBefore) {
+  const auto fit = fit_map(plate(7, bumpy, 0.05), side, side, {});
+  ASSERT_TRUE(fit);
+  const double at_a_dot = fit->map.sigma_px(fit->rectified_from_plate * Vector2d(0, 0));
+  const double between = fit->map.sigma_px(fit->rectified_from_plate * Vector2d(18, 18));
+  const double outside = fit->map.sigma_px(fit->rectified_from_plate * Vector2d(180, 0));
+  EXPECT_LT(at_a_dot, between);
+  EXPECT_GT(outside, 5 * between);
+}
+
+TEST(FitMap, NeighboursOfADotShareItsError) {
+  const auto fit = fit_map(plate(7, bumpy, 0.05), side, side, {});
+  ASSERT_TRUE(fit);
+  std::vector<Vector2d> places;
+  for (const double x : {17.0, 19.0, -90.0}) places.push_back(fit->rectified_from_plate * Vector2d(x, 18));
+  const Eigen::MatrixXd covariance = fit->map.covariance_px2(places);
+  EXPECT_NEAR(std::sqrt(covariance(0, 0)) / fit->map.sigma_px(places[0]), 1, 1e-9);
+  EXPECT_GT(covariance(0, 1), 0.8 * covariance(0, 0));
+  EXPECT_LT(std::abs(covariance(0, 2)), 0.3 * covariance(0, 0));
+}
+
 TEST(FitMap, OutliersAreRejectedAndNothingElse) {
   auto dots = plate(7, pincushion, 0.04);
   dots[10].raw_px += Vector2d(4, -3);
