@@ -193,5 +193,22 @@ TEST(FitDot, RefusesAStartWithoutRadius) {
   EXPECT_FALSE(fit_dot(subtracted(ball(middle, 5.5), even, 800), start, profile_for(5.5), {}, {}));
 }
 
+/// A dark band over a part of one side of the ball, as a shutter's soft edge or a faint wire makes it.
+Image<float> with_band(Image<float> picture, double from_u, double depth) {
+  for (int v = 0; v < side; ++v)
+    for (int u = 0; u < side; ++u) picture(u, v) -= float(depth / (1 + std::exp(from_u - u)));
+  return picture;
+}
+
+TEST(FitDot, WhatOnlyOneSideSaysShowsInTheError) {
+  const Image<float> clean = multiplied(ball(middle, 9), even, 0.5);
+  const auto undisturbed = fit(clean, middle, 9);
+  const auto pulled = fit(with_band(clean, 38, 120), middle, 9);
+  ASSERT_TRUE(undisturbed && pulled);
+  EXPECT_LT(undisturbed->error_px(), 0.02);
+  EXPECT_GT(error(pulled, middle), 5 * error(undisturbed, middle));
+  EXPECT_GT(pulled->error_px(), 0.4 * error(pulled, middle));
+}
+
 }  // namespace
 }  // namespace helicarm
