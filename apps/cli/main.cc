@@ -212,6 +212,13 @@ void add_simulate(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
   command->add_option("--kind", a.kind, "accuracy, tunnels or flat")->capture_default_str();
+  command->add_option(
+      "--preset", a.preset,
+      "The C-arm; pixels are those of 1024 a side\n"
+      "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
+      "no distortion, no plate\n"
+      "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
+      "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
   command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 12 or 16")->capture_default_str();
   command->add_flag("!--no-knee", a.knee, "Leave the knee out");

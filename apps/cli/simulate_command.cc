@@ -14,6 +14,7 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   simulation::SimulationOptions options;
   options.seed = console.seed;
   options.kind = value_or_throw(simulation::case_kind(arguments.kind));
+  if (!arguments.preset.empty()) options.preset = value_or_throw(simulation::preset(arguments.preset));
   options.size = arguments.size;
   options.bits = arguments.bits;
   options.knee = arguments.knee;
@@ -30,6 +31,7 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
 Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase& simulated) {
   Json json = {{"folder", arguments.folder.string()},
                {"kind", arguments.kind},
+               {"preset", simulation::word(simulated.options.machine())},
                {"seed", simulated.options.seed},
                {"views", Json::array()}};
   for (const simulation::SimulatedView& view : simulated.views) {
@@ -54,8 +56,8 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
       return;
     }
     if (console.quiet) return;
-    console.out << fmt::format("{}: case of kind {}, seed {}\n", arguments.folder.string(), arguments.kind,
-                               options.seed);
+    console.out << fmt::format("{}: case of kind {}, preset {}, seed {}\n", arguments.folder.string(),
+                               arguments.kind, simulation::word(options.machine()), options.seed);
     for (const Json& view : written["views"])
       console.out << fmt::format("  {}.dcm  {} of {} balls clear\n", view["name"].get<std::string>(),
                                  view["clear_balls"].get<int>(), view["balls"].get<int>());

@@ -13,6 +13,7 @@ namespace helicarm::cli {
 struct SimulateArguments {
   std::filesystem::path folder;
   std::string kind = "accuracy";  ///< accuracy, tunnels or flat
+  std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: as the kind needs it
   int size = 1024;                ///< 512 or 1024 pixels a side
   int bits = 12;                  ///< 8, 12 or 16
   bool knee = true;

@@ -22,6 +22,9 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
     return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));
   if (options.bits != 8 && options.bits != 12 && options.bits != 16)
     return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 12 and 16", options.bits));
+  if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
+    return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
+                                               word(options.machine())));
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
                      [&](const CalibratorBall& ball) { return ball.label == lost; }))
@@ -85,7 +88,7 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
     return tl::unexpected<Failure>(checked.error());
   const bool tunnels = options.kind == CaseKind::tunnels;
   if (!tunnels) room.calibrator.targets = check_targets(room.calibrator);
-  if (options.kind != CaseKind::flat) room.plate = plate48();
+  if (model_of(options.machine()).intensifier) room.plate = plate48();
 
   RandomStream random(options.seed, stream::patient);
   const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);

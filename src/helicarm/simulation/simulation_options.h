@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,13 @@ enum class CaseKind {
   flat       ///< as accuracy, with a flat panel: no plate, no distortion
 };
 
+/// A make of C-arm. Pixels are given for 1024 of them a side; with 512 they are twice as large.
+enum class Preset {
+  paper_sim,  ///< the paper's 2.3.3: f 900 mm, 0.15 mm pixels, AP and lateral view at 800 mm, nothing askew
+  ii_9in,     ///< 9 inch intensifier: 0.2295 mm pixels, 997 mm, with plate, distortion, sag and tilt
+  flat_panel  ///< 0.29 mm pixels, 1020 mm, with sag and tilt; no distortion
+};
+
 enum class Fault {
   decoys,     ///< two stray balls of the calibrator's size
   wires,      ///< a K-wire over a ball in each view
@@ -28,21 +36,25 @@ enum class Fault {
 
 /// The words for them on the command line and in truth.json; an unknown one is a `usage` failure.
 std::string_view word(CaseKind kind);
+std::string_view word(Preset preset);
 std::string_view word(Fault fault);
 Expected<CaseKind> case_kind(std::string_view word);
+Expected<Preset> preset(std::string_view word);
 Expected<Fault> fault(std::string_view word);
 
 struct SimulationOptions {
   std::uint64_t seed = 1;
   CaseKind kind = CaseKind::accuracy;
-  int size = 1024;  ///< 512 or 1024 pixels a side
-  int bits = 12;    ///< 8, 12 or 16
+  std::optional<Preset> preset = {};  ///< not given: flat_panel for kind flat, else ii_9in
+  int size = 1024;                    ///< 512 or 1024 pixels a side
+  int bits = 12;                      ///< 8, 12 or 16
   bool knee = true;
   std::vector<Fault> faults;
   std::vector<std::string> lost_balls;  ///< labels of balls that fell out of the calibrator
   unsigned threads = 0;
 
   bool has(Fault fault) const;
+  Preset machine() const;
 };
 
 }  // namespace helicarm::simulation

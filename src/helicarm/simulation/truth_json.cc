@@ -122,6 +122,7 @@ Json matrix_json(const Eigen::MatrixXd& matrix) {
 Json truth_json(const SimulatedCase& simulated) {
   Json json = {{"format", "helicarm-truth/1"},
                {"kind", word(simulated.options.kind)},
+               {"preset", word(simulated.options.machine())},
                {"seed", simulated.options.seed},
                {"knee", simulated.options.knee},
                {"faults", Json::array()},
