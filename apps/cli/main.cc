@@ -211,7 +211,21 @@ void add_simulate(CLI::App& app, Action& action) {
                   "helicarm simulate my-case --kind tunnels --seed 7");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
-  command->add_option("--kind", a.kind, "accuracy, tunnels or flat")->capture_default_str();
+  command
+      ->add_option("--kind", a.kind,
+                   "accuracy: AP and lateral picture, five check targets\n"
+                   "tunnels: balls at the tunnels' ends, tracker and tool\n"
+                   "flat: as accuracy, on a flat panel\n"
+                   "grid: the test grid of wires (3.1), for rectify --test-grid")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--distance", a.distances_mm,
+          "grid: of the wires from the receiver, mm; one gives GRID.dcm (default: 45), 30,60,90 give "
+          "GRID-30.dcm and so on")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(20, 500));
   command->add_option(
       "--preset", a.preset,
       "The C-arm; pixels are those of 1024 a side\n"

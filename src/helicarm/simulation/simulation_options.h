@@ -14,7 +14,8 @@ namespace helicarm::simulation {
 enum class CaseKind {
   accuracy,  ///< the paper's 3.2: intensifier, plate, five check targets
   tunnels,   ///< an ACL navigation: intensifier, plate, balls at the tunnels' ends, tracker and tool
-  flat       ///< as accuracy, with a flat panel: no plate, no distortion
+  flat,      ///< as accuracy, with a flat panel: no plate, no distortion
+  grid       ///< the paper's 3.1: pictures of the plate alone and with the test grid of wires before it
 };
 
 /// A make of C-arm. Pixels are given for 1024 of them a side; with 512 they are twice as large.
@@ -50,6 +51,8 @@ struct SimulationOptions {
   int bits = 12;                      ///< 8, 12 or 16
   bool knee = true;
   std::vector<Fault> faults;
+  std::vector<double> grid_distances_mm = {
+      45};                              ///< kind grid: from the receiver to the wires' axes; up to 20
   std::vector<std::string> lost_balls;  ///< labels of balls that fell out of the calibrator
   unsigned threads = 0;
 
