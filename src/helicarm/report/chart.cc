@@ -16,6 +16,7 @@ namespace {
 
 constexpr double chart_width = 460, chart_height = 360;  // of the frame
 constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
+constexpr double column_width = left_margin + chart_width + right_margin;
 constexpr double legend_line = 17, legend_mark = 26;
 constexpr int about_ticks = 7;
 constexpr std::size_t few_dots = 50;  // more are drawn smaller, and let others show through
@@ -36,7 +37,7 @@ struct Axis {
 
 class ChartDrawing {
  public:
-  ChartDrawing(const Chart& chart, double x0) : chart_(chart), x0_(x0) {
+  ChartDrawing(const Chart& chart, std::size_t number, double x0) : chart_(chart), number_(number), x0_(x0) {
     double x_low = infinity, x_high = -infinity, y_low = infinity, y_high = -infinity;
     const auto include = [&](double x, double y) {
       if (!std::isfinite(x) || !std::isfinite(y)) return;
@@ -60,15 +61,16 @@ class ChartDrawing {
     x_ =
         chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
     y_ = Axis::over(y_low, y_high);
+    if (chart.picture) share_scale();
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
     if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
   }
 
   std::string svg() {
     frame();
-    put(R"(<clipPath id="frame{0:.0f}"><rect x="{0:.0f}" y="{1}" width="{2}" height="{3}"/></clipPath>)"
-        "\n<g clip-path=\"url(#frame{0:.0f})\">\n",
-        x0_, top_margin, chart_width, chart_height);
+    put(R"(<clipPath id="frame{4}"><rect x="{0:.0f}" y="{1}" width="{2}" height="{3}"/></clipPath>)"
+        "\n<g clip-path=\"url(#frame{4})\">\n",
+        x0_, top_margin, chart_width, chart_height, number_);
     if (chart_.band) band(*chart_.band);
     if (chart_.field) field(*chart_.field);
     for (std::size_t i = 0; i < chart_.series.size(); ++i) series(chart_.series[i], colour(i));
@@ -82,7 +84,19 @@ class ChartDrawing {
 
   static const char* colour(std::size_t i) { return series_colours[i % series_colours.size()]; }
   double px(double x) const { return x0_ + chart_width * x_.share(x); }
-  double py(double y) const { return top_margin + chart_height * (1 - y_.share(y)); }
+  double py(double y) const {
+    return top_margin + chart_height * (chart_.picture ? y_.share(y) : 1 - y_.share(y));
+  }
+
+  /// Widens the axis that has more room.
+  void share_scale() {
+    const double scale = std::max((x_.high - x_.low) / chart_width, (y_.high - y_.low) / chart_height);
+    for (const auto& [axis, length] : {std::pair{&x_, chart_width}, std::pair{&y_, chart_height}}) {
+      const double middle = 0.5 * (axis->low + axis->high);
+      axis->low = middle - 0.5 * scale * length;
+      axis->high = middle + 0.5 * scale * length;
+    }
+  }
 
   template <class... Values>
   void put(fmt::format_string<Values...> format, Values&&... values) {
@@ -148,11 +162,16 @@ class ChartDrawing {
           "\n",
           px(series.points[i][0]), py(series.ranges[i][0]), py(series.ranges[i][1]), colour,
           py(series.points[i][1]), series.dashed ? " stroke-dasharray=\"6 4\"" : "");
-    if (!series.ranges.empty()) return;
+    if (!series.ranges.empty() && !series.joined) return;
     std::string path, marks;
+    bool broken = true;
     for (const auto& [x, y] : series.points) {
-      if (!std::isfinite(x) || !std::isfinite(y)) continue;
-      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', px(x), py(y));
+      if (!std::isfinite(x) || !std::isfinite(y)) {
+        broken = true;
+        continue;
+      }
+      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", broken ? 'M' : 'L', px(x), py(y));
+      broken = false;
       if (series.points.size() > 2)
         fmt::format_to(std::back_inserter(marks), R"(<circle cx="{:.1f}" cy="{:.1f}" r="3"/>)", px(x), py(y));
     }
@@ -213,6 +232,7 @@ class ChartDrawing {
   }
 
   const Chart& chart_;
+  std::size_t number_;
   double x0_;
   Axis x_{}, y_{};
   std::string text_;
@@ -227,12 +247,18 @@ double legend_height(const Chart& chart) {
 }  // namespace
 
 std::string chart_svg(std::span<const Chart> charts) {
+  const std::size_t columns = charts.size() > 3 ? 2 : std::max<std::size_t>(charts.size(), 1);
   std::string body;
-  double x = left_margin, legends = 0;
-  for (const Chart& chart : charts) {
-    legends = std::max(legends, legend_height(chart));
-    body += ChartDrawing(chart, x).svg();
-    x += chart_width + left_margin + right_margin;
+  double height = 0;
+  for (std::size_t first = 0; first < charts.size(); first += columns) {
+    double legends = 0;
+    body += first == 0 ? "<g>\n" : fmt::format("<g transform=\"translate(0 {})\">\n", height);
+    for (std::size_t i = first; i < std::min(first + columns, charts.size()); ++i) {
+      legends = std::max(legends, legend_height(charts[i]));
+      body += ChartDrawing(charts[i], i, left_margin + double(i - first) * column_width).svg();
+    }
+    body += "</g>\n";
+    height += top_margin + chart_height + bottom_margin + legends;
   }
   std::string title;
   for (const Chart& chart : charts) title += (title.empty() ? "" : "; ") + chart.title;
@@ -245,7 +271,7 @@ std::string chart_svg(std::span<const Chart> charts) {
       ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
       ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
-      x - left_margin, top_margin + chart_height + bottom_margin + legends, escaped(title), body);
+      double(columns) * column_width, height, escaped(title), body);
 }
 
 }  // namespace helicarm
