@@ -178,4 +178,16 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   return room;
 }
 
+Exposure exposure_of(const SimulatedView& view) {
+  Exposure exposure;
+  exposure.name = view.shot.name;
+  exposure.pixels = Image<float>(view.pixels.width(), view.pixels.height());
+  std::ranges::copy(view.pixels.pixels(), exposure.pixels.pixels().begin());
+  exposure.highest = static_cast<float>((1 << view.shot.imaging.bits) - 1);
+  exposure.acquisition.pixel_mm = Eigen::Vector2d::Constant(view.shot.pixel_mm());
+  exposure.acquisition.source_detector_mm = view.shot.nominal_f_mm;
+  exposure.acquisition.logarithmic = view.shot.imaging.logarithmic;
+  return exposure;
+}
+
 }  // namespace helicarm::simulation

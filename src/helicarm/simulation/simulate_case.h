@@ -13,6 +13,7 @@
 #include "helicarm/simulation/navigation_truth.h"
 #include "helicarm/simulation/simulation_options.h"
 #include "helicarm/simulation/truth.h"
+#include "helicarm/xray/exposure.h"
 
 namespace helicarm::simulation {
 
@@ -45,5 +46,8 @@ struct SimulatedCase {
 /// A whole case from its options: the same bytes for the same seed. Refuses (bad_value) an unknown size,
 /// depth or ball, a preset that does not suit the kind, and a grid that is not before the plate.
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
+
+/// The picture as the reader would hand it over, without the detour through a file.
+Exposure exposure_of(const SimulatedView& view);
 
 }  // namespace helicarm::simulation
