@@ -80,10 +80,42 @@ std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Ve
   return std::nullopt;
 }
 
+/// All wires of a grid are of one width. What only seems a crossing (a wire at the edge of the field, a wire
+/// behind a plate's dot) is wider or far less sharp; the factors part the two kinds on simulated pictures.
+struct Likeness {
+  double radius_px = 0;
+  double sigma_px = 0;
+
+  explicit Likeness(const std::vector<Dot>& crosses) {
+    std::vector<double> radii;
+    std::vector<double> sigmas;
+    for (const Dot& cross : crosses) {
+      radii.push_back(cross.radius_px);
+      sigmas.push_back(cross.sigma_px);
+    }
+    if (crosses.empty()) return;
+    radius_px = middle_of(radii);
+    sigma_px = middle_of(sigmas);
+  }
+  bool width_fits(const Dot& cross) const {
+    return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px;
+  }
+  bool holds(const Dot& cross) const { return width_fits(cross) && cross.sigma_px < 4 * sigma_px; }
+
+ private:
+  static double middle_of(std::vector<double> values) {
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+};
+
 }  // namespace
 
 std::vector<Dot> find_grid(const Exposure& exposure) {
   std::vector<Dot> crosses = find_crosses(exposure, {});
+  const Likeness alike(crosses);
+  std::erase_if(crosses, [&](const Dot& cross) { return !alike.holds(cross); });
   const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
   if (lattice.dots.empty()) return crosses;
   Grid grid;
@@ -135,7 +167,7 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
       const auto cross =
           fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
-          cross->sigma_px < 0.5)
+          cross->sigma_px < 0.5 && alike.width_fits(*cross))
         complete.push_back(*cross);
     }
   return complete;
