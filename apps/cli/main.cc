@@ -110,6 +110,7 @@ void add_study(CLI::App& app, Action& action) {
                    "location: TRE by place of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
+                   "rectification: the test grid at ten distances, by ten intensifiers (Figs. 9 to 11)\n"
                    "design: ball positions of least TRE under the rules\n"
                    "limit: error over the Cramer-Rao bound, and coverage of error bars")
       ->required();
