@@ -7,6 +7,7 @@
 
 import argparse
 import csv
+import functools
 import json
 import subprocess
 import tempfile
@@ -19,8 +20,13 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def study(options, name, *more):
     """What the command writes: its table and its JSON."""
+    return written(options.helicarm, options.seed, name, *more)
+
+
+@functools.lru_cache
+def written(helicarm, seed, name, *more):
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([options.helicarm, "study", name, "--seed", str(options.seed), "--out", out, "--quiet", *more],
+        subprocess.run([helicarm, "study", name, "--seed", str(seed), "--out", out, "--quiet", *more],
                        check=True)
         with open(Path(out) / f"{name}.csv", newline="") as file:
             return list(csv.DictReader(file)), json.loads((Path(out) / f"{name}.json").read_text())
@@ -80,6 +86,27 @@ def calibration(options):
             yield f"| {row['points']} | {name} | " + " | ".join(f"{row[key][kind]:.2f}" for kind in ("max", "min", "mean", "rms")) + " |"
 
 
+def rectification(options):
+    _, result = study(options, "rectification")
+    yield "| mm from the receiver | raw: mean | largest | printed recipe: mean | largest | best recipe: mean | largest |"
+    yield "| --- |" + " ---: |" * 6
+    for row in result["rows"]:
+        if row["similarity"] == "nine":
+            values = [row[picture][figure] for picture in ("raw", "paper", "best") for figure in ("mean_px", "max_px")]
+            yield f"| {row['distance_mm']:g} | " + " | ".join(f"{v['mean']:.2f} ± {v['sd']:.2f}" for v in values) + " |"
+
+
+def rectification_ratios(options):
+    _, result = study(options, "rectification")
+    yield "| ideal grid, raw | ideal grid, rectified | rectified by | mean error | largest error |"
+    yield "| --- | --- | --- | ---: | ---: |"
+    words = {"nine": "nine crosses", "all": "all crosses", "paper": "the printed recipe", "best": "the best recipe"}
+    for row in result["ratios"]:
+        names = [words[row[key]] for key in ("raw_similarity", "rectified_similarity", "picture")]
+        values = [f"{row[kind]['mean']:.2f} ({row[kind]['least']:.2f} to {row[kind]['most']:.2f})" for kind in ("mean", "max")]
+        yield "| " + " | ".join(names + values) + " |"
+
+
 def design(options):
     yield "| surface | design | udcsc | best of the random sets | the best that keeps the rules | their median |"
     yield "| --- | ---: | ---: | ---: | ---: | ---: |"
@@ -97,7 +124,7 @@ def main():
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))
     options = parser.parse_args()
     page = ROOT / "docs/reproduction.md"
-    for table in (number, uniformity, location, biplane, calibration, design):
+    for table in (number, uniformity, location, biplane, calibration, rectification, rectification_ratios, design):
         renew(page, table.__name__, list(table(options)))
     print(f"renewed {page.relative_to(ROOT)}, seed {options.seed}")
 

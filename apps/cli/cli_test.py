@@ -42,6 +42,31 @@ class CommandLine(unittest.TestCase):
         self.assertIn("<svg", (self.root / "tre/tre.svg").read_text())
         self.assertEqual(run("predict", self.root / "case", "--at", "1,2").returncode, 2)
 
+    def test_test_grid_is_rehearsed_from_simulation_to_errors(self):
+        folder = self.root / "grid"
+        done = run("simulate", folder, "--kind", "grid", "--size", 512, "--seed", 2)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(sorted(path.name for path in folder.iterdir()),
+                         ["GRID.dcm", "PLATE.dcm", "plate.json", "truth.json"])
+        errors = {}
+        for method in ("paper", "best"):
+            out = self.root / f"grid-{method}"
+            done = run("rectify", folder / "PLATE.dcm", "--plate", folder / "plate.json", "--method", method, "--out", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            done = run("rectify", folder / "GRID.dcm", "--map", out / "map.json", "--test-grid", 20, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            errors[method] = json.loads(done.stdout)
+        self.assertGreater(errors["best"]["n"], 70)
+        self.assertEqual(errors["best"]["raw"], errors["paper"]["raw"])
+        self.assertLess(errors["best"]["rectified"]["max_px"], 0.1 * errors["best"]["raw"]["max_px"])
+        self.assertGreater(errors["paper"]["rectified"]["max_px"], 0.5 * errors["paper"]["raw"]["max_px"])
+        self.assertEqual(run("simulate", folder, "--kind", "grid", "--size", 512, "--distance", "30,60").returncode, 0)
+        self.assertEqual(sorted(path.name for path in folder.iterdir()),
+                         ["GRID-30.dcm", "GRID-60.dcm", "PLATE.dcm", "plate.json", "truth.json"])
+        for wrong in (("--kind", "grid", "--distance", 10), ("--distance", 45), ("--kind", "grid", "--preset", "paper-sim"),
+                      ("--preset", "c-arm"), ("--kind", "grid", "--fault", "screws")):
+            self.assertEqual(run("simulate", folder, *wrong).returncode, 2, wrong)
+
     def test_machine_remembers_each_picture_once(self):
         machine = self.root / "machine.json"
         for _ in range(2):

@@ -110,6 +110,7 @@ void add_study(CLI::App& app, Action& action) {
                    "location: TRE by place of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
+                   "rectification: the test grid at ten distances, by ten intensifiers (Figs. 9 to 11)\n"
                    "design: ball positions of least TRE under the rules\n"
                    "limit: error over the Cramer-Rao bound, and coverage of error bars\n"
                    "centres: what wrong assumptions about a ball's picture cost")
@@ -213,7 +214,28 @@ void add_simulate(CLI::App& app, Action& action) {
                   "helicarm simulate my-case --kind tunnels --seed 7");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
-  command->add_option("--kind", a.kind, "accuracy, tunnels or flat")->capture_default_str();
+  command
+      ->add_option("--kind", a.kind,
+                   "accuracy: AP and lateral picture, five check targets\n"
+                   "tunnels: balls at the tunnels' ends, tracker and tool\n"
+                   "flat: as accuracy, on a flat panel\n"
+                   "grid: the test grid of wires (3.1), for rectify --test-grid")
+      ->capture_default_str();
+  command
+      ->add_option(
+          "--distance", a.distances_mm,
+          "grid: of the wires from the receiver, mm; one gives GRID.dcm (default: 45), 30,60,90 give "
+          "GRID-30.dcm and so on")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(20, 500));
+  command->add_option(
+      "--preset", a.preset,
+      "The C-arm; pixels are those of 1024 a side\n"
+      "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
+      "no distortion, no plate\n"
+      "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
+      "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
   command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 12 or 16")->capture_default_str();
   command->add_flag("!--no-knee", a.knee, "Leave the knee out");

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulate_command.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "helicarm/simulation/write_case.h"
@@ -14,10 +16,16 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   simulation::SimulationOptions options;
   options.seed = console.seed;
   options.kind = value_or_throw(simulation::case_kind(arguments.kind));
+  if (!arguments.preset.empty()) options.preset = value_or_throw(simulation::preset(arguments.preset));
   options.size = arguments.size;
   options.bits = arguments.bits;
   options.knee = arguments.knee;
   options.threads = console.threads;
+  if (!arguments.distances_mm.empty()) {
+    if (options.kind != simulation::CaseKind::grid)
+      throw BadInput(Reason::usage, "simulate: --distance is for --kind grid");
+    options.grid_distances_mm = arguments.distances_mm;
+  }
   constexpr std::string_view lost = "lost:";
   for (const std::string& fault : arguments.faults)
     if (fault.starts_with(lost))
@@ -30,12 +38,19 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
 Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase& simulated) {
   Json json = {{"folder", arguments.folder.string()},
                {"kind", arguments.kind},
+               {"preset", simulation::word(simulated.options.machine())},
                {"seed", simulated.options.seed},
                {"views", Json::array()}};
   for (const simulation::SimulatedView& view : simulated.views) {
-    int clear = 0;
-    for (const simulation::TruePoint& ball : view.balls) clear += ball.visibility == Visibility::clear;
-    json["views"].push_back({{"name", view.shot.name}, {"clear_balls", clear}, {"balls", view.balls.size()}});
+    const auto clear = [](const std::vector<simulation::TruePoint>& points) {
+      return std::ranges::count(points, Visibility::clear, &simulation::TruePoint::visibility);
+    };
+    Json entry = {{"name", view.shot.name}};
+    if (simulated.options.kind == simulation::CaseKind::grid)
+      entry.update({{"clear_crosses", clear(view.crosses)}, {"crosses", view.crosses.size()}});
+    else
+      entry.update({{"clear_balls", clear(view.balls)}, {"balls", view.balls.size()}});
+    json["views"].push_back(std::move(entry));
   }
   return json;
 }
@@ -54,13 +69,19 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
       return;
     }
     if (console.quiet) return;
-    console.out << fmt::format("{}: case of kind {}, seed {}\n", arguments.folder.string(), arguments.kind,
-                               options.seed);
-    for (const Json& view : written["views"])
-      console.out << fmt::format("  {}.dcm  {} of {} balls clear\n", view["name"].get<std::string>(),
-                                 view["clear_balls"].get<int>(), view["balls"].get<int>());
-    console.out << fmt::format("  case.json, calibrator.json{}, truth.json\n",
-                               simulated.plate ? ", plate.json" : "");
+    console.out << fmt::format("{}: case of kind {}, preset {}, seed {}\n", arguments.folder.string(),
+                               arguments.kind, simulation::word(options.machine()), options.seed);
+    const bool grid = options.kind == simulation::CaseKind::grid;
+    const std::string things = grid ? "crosses" : "balls";
+    for (const Json& view : written["views"]) {
+      console.out << fmt::format("  {}.dcm", view["name"].get<std::string>());
+      if (view[things].get<int>() > 0)
+        console.out << fmt::format("  {} of {} {} clear", view["clear_" + things].get<int>(),
+                                   view[things].get<int>(), things);
+      console.out << '\n';
+    }
+    console.out << fmt::format("  {}{}truth.json\n", grid ? "" : "case.json, calibrator.json, ",
+                               simulated.plate ? "plate.json, " : "");
   });
 }
 

@@ -12,12 +12,14 @@ namespace helicarm::cli {
 /// `helicarm simulate DIR`: a case with known truth, drawn from `console.seed`.
 struct SimulateArguments {
   std::filesystem::path folder;
-  std::string kind = "accuracy";  ///< accuracy, tunnels or flat
+  std::string kind = "accuracy";  ///< accuracy, tunnels, flat or grid
+  std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: as the kind needs it
   int size = 1024;                ///< 512 or 1024 pixels a side
   int bits = 12;                  ///< 8, 12 or 16
   bool knee = true;
   /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
   std::vector<std::string> faults;
+  std::vector<double> distances_mm;  ///< kind grid: of the wires from the receiver; none: 45 mm
 };
 
 CommandResult simulate_command(const SimulateArguments& arguments, Console& console);

@@ -18,6 +18,7 @@
 #include "helicarm/study/limit.h"
 #include "helicarm/study/location.h"
 #include "helicarm/study/number.h"
+#include "helicarm/study/rectification_study.h"
 #include "helicarm/study/uniformity_study.h"
 #include "progress_line.h"
 
@@ -136,6 +137,15 @@ StudyFiles run_calibration(const StudyRun& run) {
   return run.ranks.leads() ? files_of(tests, options) : StudyFiles{};
 }
 
+StudyFiles run_rectification(const StudyRun& run) {
+  only(run.arguments, {});
+  RectificationStudyOptions options;
+  if (run.arguments.groups) options.groups = *run.arguments.groups;
+  options.seed = run.console.seed;
+  const auto intensifiers = value_or_throw(study_rectification(options, run.engine, run.ranks));
+  return run.ranks.leads() ? files_of(intensifiers, options) : StudyFiles{};
+}
+
 StudyFiles run_design(const StudyRun& run) {
   only(run.arguments, {"--balls", "--surface", "--sigma", "--fle"});
   auto options = common_options<DesignOptions>(run);
@@ -169,11 +179,12 @@ StudyFiles run_centres(const StudyRun& run) {
 }
 
 using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 8> studies{{{"number", run_number},
+constexpr std::array<std::pair<std::string_view, Study>, 9> studies{{{"number", run_number},
                                                                      {"uniformity", run_uniformity},
                                                                      {"location", run_location},
                                                                      {"biplane", run_biplane},
                                                                      {"calibration", run_calibration},
+                                                                     {"rectification", run_rectification},
                                                                      {"design", run_design},
                                                                      {"limit", run_limit},
                                                                      {"centres", run_centres}}};

@@ -12,7 +12,8 @@ namespace helicarm::cli {
 
 /// What is not given has the default of the study's own options.
 struct StudyArguments {
-  std::string name;  ///< number, uniformity, location, biplane, calibration, design, limit or centres
+  /// number, uniformity, location, biplane, calibration, rectification, design, limit or centres
+  std::string name;
   std::optional<std::size_t> groups;
   std::filesystem::path out = "helicarm-study";
   bool resume = false;

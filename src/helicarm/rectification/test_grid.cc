@@ -6,6 +6,7 @@
 #include <complex>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -24,7 +25,7 @@ using Points = std::vector<Complex>;
 
 /// In the plane a similarity is w = scale z + shift with complex numbers, and its least-squares fit is one
 /// division.
-GridError error_of(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
+Points ideal_places(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
   Complex ideal_middle;
   Complex seen_middle;
   for (const std::size_t k : central) {
@@ -38,11 +39,22 @@ GridError error_of(const Points& ideal, const Points& seen, const std::vector<st
     squares += std::norm(ideal[k] - ideal_middle);
   }
   const Complex scale = mixed / squares;
+  Points places;
+  for (const Complex& place : ideal) places.push_back(seen_middle + scale * (place - ideal_middle));
+  return places;
+}
+
+std::vector<double> distances(const Points& p, const Points& q) {
+  std::vector<double> between;
+  for (std::size_t k = 0; k < p.size(); ++k) between.push_back(std::abs(p[k] - q[k]));
+  return between;
+}
+
+GridError summed(const std::vector<double>& errors) {
   GridError error;
-  for (std::size_t k = 0; k < ideal.size(); ++k) {
-    const double distance = std::abs(seen[k] - seen_middle - scale * (ideal[k] - ideal_middle));
-    error.mean_px += distance / double(ideal.size());
-    error.max_px = std::max(error.max_px, distance);
+  for (const double e : errors) {
+    error.mean_px += e / double(errors.size());
+    error.max_px = std::max(error.max_px, e);
   }
   return error;
 }
@@ -68,10 +80,42 @@ std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Ve
   return std::nullopt;
 }
 
+/// All wires of a grid are of one width. What only seems a crossing (a wire at the edge of the field, a wire
+/// behind a plate's dot) is wider or far less sharp; the factors part the two kinds on simulated pictures.
+struct Likeness {
+  double radius_px = 0;
+  double sigma_px = 0;
+
+  explicit Likeness(const std::vector<Dot>& crosses) {
+    std::vector<double> radii;
+    std::vector<double> sigmas;
+    for (const Dot& cross : crosses) {
+      radii.push_back(cross.radius_px);
+      sigmas.push_back(cross.sigma_px);
+    }
+    if (crosses.empty()) return;
+    radius_px = middle_of(radii);
+    sigma_px = middle_of(sigmas);
+  }
+  bool width_fits(const Dot& cross) const {
+    return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px;
+  }
+  bool holds(const Dot& cross) const { return width_fits(cross) && cross.sigma_px < 4 * sigma_px; }
+
+ private:
+  static double middle_of(std::vector<double> values) {
+    const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+};
+
 }  // namespace
 
 std::vector<Dot> find_grid(const Exposure& exposure) {
   std::vector<Dot> crosses = find_crosses(exposure, {});
+  const Likeness alike(crosses);
+  std::erase_if(crosses, [&](const Dot& cross) { return !alike.holds(cross); });
   const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
   if (lattice.dots.empty()) return crosses;
   Grid grid;
@@ -123,13 +167,13 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
       const auto cross =
           fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
-          cross->sigma_px < 0.5)
+          cross->sigma_px < 0.5 && alike.width_fits(*cross))
         complete.push_back(*cross);
     }
   return complete;
 }
 
-Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map) {
+Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map, GridFit fit) {
   const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
   TestGrid grid;
   std::vector<Vector2i> indices;
@@ -160,6 +204,10 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
         Reason::too_few_fiducials,
         fmt::format("{} crossings on a grid were found, but no nine that form its middle", grid.crosses),
         {{"crosses", double(grid.crosses)}});
+  if (fit == GridFit::all) {
+    central.resize(indices.size());
+    std::iota(central.begin(), central.end(), std::size_t{0});
+  }
   Points ideal;
   Points raw;
   Points rectified;
@@ -168,8 +216,12 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
     raw.push_back(complex_of(grid.raw_px[k]));
     rectified.push_back(complex_of(grid.rectified_px[k]));
   }
-  grid.raw = error_of(ideal, raw, central);
-  grid.rectified = error_of(ideal, rectified, central);
+  const Points raw_ideal = ideal_places(ideal, raw, central);
+  for (const Complex& place : raw_ideal) grid.raw_ideal_px.emplace_back(place.real(), place.imag());
+  grid.raw_error_px = distances(raw, raw_ideal);
+  grid.rectified_error_px = distances(rectified, ideal_places(ideal, rectified, central));
+  grid.raw = summed(grid.raw_error_px);
+  grid.rectified = summed(grid.rectified_error_px);
   return grid;
 }
 

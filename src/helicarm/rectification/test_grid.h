@@ -25,15 +25,22 @@ struct TestGrid {
   int crosses = 0;
   std::vector<Eigen::Vector2d> raw_px;  ///< the crossings on the grid
   std::vector<Eigen::Vector2d> rectified_px;
+  std::vector<Eigen::Vector2d> raw_ideal_px;  ///< Eq. 14 in the raw picture
+  std::vector<double> raw_error_px;           ///< Eq. 15, each by its own picture's similarity
+  std::vector<double> rectified_error_px;
 };
 
 /// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their
 /// neighbours put them.
 std::vector<Dot> find_grid(const Exposure& exposure);
 
+/// The crossings that define the ideal grid: the paper's nine, or all of them.
+enum class GridFit { nine, all };
+
 /// Similarity of the nine central crossings by least squares (Eq. 14, Umeyama 1991), then the distance of
 /// every crossing from its ideal place (Eq. 15), before and after rectification. too_few_fiducials unless the
 /// nine are there.
-Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map);
+Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map,
+                                     GridFit fit = GridFit::nine);
 
 }  // namespace helicarm

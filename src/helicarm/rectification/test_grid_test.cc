@@ -60,6 +60,10 @@ TEST(MeasureTestGrid, OneMovedCornerIsTheGreatestErrorAndItsShareTheMean) {
   ASSERT_TRUE(measured);
   EXPECT_NEAR(measured->raw.max_px, 2, 1e-9);
   EXPECT_NEAR(measured->raw.mean_px, 2.0 / 49, 1e-9);
+  for (std::size_t k = 0; k < measured->raw_px.size(); ++k) {
+    EXPECT_NEAR((measured->raw_px[k] - measured->raw_ideal_px[k]).norm(), measured->raw_error_px[k], 1e-12);
+    EXPECT_NEAR(measured->rectified_error_px[k], measured->raw_error_px[k], 1e-9);  // the map is the identity
+  }
 }
 
 TEST(MeasureTestGrid, TheRightMapTakesTheDistortionAway) {
@@ -69,6 +73,16 @@ TEST(MeasureTestGrid, TheRightMapTakesTheDistortionAway) {
   ASSERT_TRUE(measured);
   EXPECT_GT(measured->raw.max_px, 4);
   EXPECT_LT(measured->rectified.max_px, 1e-8);
+}
+
+TEST(MeasureTestGrid, GridThroughAllCrossingsLiesNearerToThemThanTheOneThroughNine) {
+  auto crosses = grid();
+  for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
+  const auto nine = measure_test_grid(crosses, pincushion_map());
+  const auto all = measure_test_grid(crosses, pincushion_map(), GridFit::all);
+  ASSERT_TRUE(nine && all);
+  EXPECT_LT(all->raw.mean_px, 0.6 * nine->raw.mean_px);
+  EXPECT_LT(all->rectified.max_px, 1e-8);
 }
 
 TEST(MeasureTestGrid, WithoutItsMiddleIsRefused) {

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double chart_width = 460, chart_height = 360;  // of the frame
 constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
+constexpr double column_width = left_margin + chart_width + right_margin;
 constexpr double legend_line = 17, legend_mark = 26;
 constexpr int about_ticks = 7;
 constexpr std::size_t few_dots = 50;  // more are drawn smaller, and let others show through
@@ -61,6 +62,7 @@ class ChartDrawing {
     x_ =
         chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
     y_ = Axis::over(y_low, y_high);
+    if (chart.picture) share_scale();
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
     if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
   }
@@ -83,7 +85,19 @@ class ChartDrawing {
 
   static const char* colour(std::size_t i) { return series_colours[i % series_colours.size()]; }
   double px(double x) const { return x0_ + chart_width * x_.share(x); }
-  double py(double y) const { return top_margin + chart_height * (1 - y_.share(y)); }
+  double py(double y) const {
+    return top_margin + chart_height * (chart_.picture ? y_.share(y) : 1 - y_.share(y));
+  }
+
+  /// Widens the axis that has more room.
+  void share_scale() {
+    const double scale = std::max((x_.high - x_.low) / chart_width, (y_.high - y_.low) / chart_height);
+    for (const auto& [axis, length] : {std::pair{&x_, chart_width}, std::pair{&y_, chart_height}}) {
+      const double middle = 0.5 * (axis->low + axis->high);
+      axis->low = middle - 0.5 * scale * length;
+      axis->high = middle + 0.5 * scale * length;
+    }
+  }
 
   template <class... Values>
   void put(fmt::format_string<Values...> format, Values&&... values) {
@@ -149,11 +163,16 @@ class ChartDrawing {
           "\n",
           px(series.points[i][0]), py(series.ranges[i][0]), py(series.ranges[i][1]), colour,
           py(series.points[i][1]), series.dashed ? " stroke-dasharray=\"6 4\"" : "");
-    if (!series.ranges.empty()) return;
+    if (!series.ranges.empty() && !series.joined) return;
     std::string path, marks;
+    bool broken = true;
     for (const auto& [x, y] : series.points) {
-      if (!std::isfinite(x) || !std::isfinite(y)) continue;
-      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', px(x), py(y));
+      if (!std::isfinite(x) || !std::isfinite(y)) {
+        broken = true;
+        continue;
+      }
+      fmt::format_to(std::back_inserter(path), "{}{:.1f} {:.1f}", broken ? 'M' : 'L', px(x), py(y));
+      broken = false;
       if (series.points.size() > 2)
         fmt::format_to(std::back_inserter(marks), R"(<circle cx="{:.1f}" cy="{:.1f}" r="3"/>)", px(x), py(y));
     }
@@ -229,7 +248,7 @@ double legend_height(const Chart& chart) {
 }  // namespace
 
 std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
-  if (columns == 0) columns = std::max<std::size_t>(1, charts.size());
+  if (columns == 0) columns = charts.size() > 3 ? 2 : std::max<std::size_t>(1, charts.size());
   std::string body, title;
   double width = 0, height = 0;
   for (std::size_t first = 0; first < charts.size(); first += columns) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/report/chart.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -36,6 +37,26 @@ TEST(Chart, LeavesOutWhatIsNotFinite) {
       std::array{Chart{"t", "x", "y", {{"s", {{0, 1}, {1, nan}, {2, 3}}}, {"none", {{nan, nan}}}}}});
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
   EXPECT_THAT(chart_svg(std::array{Chart{"nothing", "x", "y"}}), Not(HasSubstr("inf")));
+}
+
+TEST(Chart, PictureHasYDownAndOneScaleBothWays) {
+  Chart chart{"t", "u, px", "v, px", {{"", {{0, 0}, {100, 0}, {100, 200}}}}};
+  chart.picture = true;
+  // 460 x 360 px of frame hold 200 units of v in 360 px, so 100 units of u take 180 px.
+  EXPECT_THAT(chart_svg(std::array{chart}), HasSubstr("M204.0 56.0L384.0 56.0L384.0 416.0"));
+}
+
+TEST(Chart, LineBreaksWhereAPointIsMissing) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::string svg =
+      chart_svg(std::array{Chart{"t", "x", "y", {{"", {{0, 0}, {1, 1}, {nan, nan}, {2, 0}, {3, 1}}}}}});
+  const auto path = svg.substr(svg.find("<path d=\"M64.0 416.0L"));
+  EXPECT_EQ(std::ranges::count(path.substr(0, path.find("class")), 'M'), 2);
+}
+
+TEST(Chart, FourStandInTwoRows) {
+  const std::vector<Chart> four(4, Chart{"t", "x", "y"});
+  EXPECT_THAT(chart_svg(four), HasSubstr("viewBox=\"0 0 1104 944\""));
 }
 
 TEST(Isoline, OfAConeIsACircle) {

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/phantom/conical_helix.h"
 #include "helicarm/simulation/streams.h"
 
 namespace helicarm::simulation {
@@ -44,12 +46,13 @@ IntensifierDistortion draw_distortion(RandomStream& random, int size) {
 }
 
 Imaging draw_imaging(const SimulationOptions& options, double field_radius_px, double pixel_mm) {
+  const bool intensifier = model_of(options.machine()).intensifier;
   Imaging imaging;
   imaging.quanta_per_pixel = 20000 * pixel_mm * pixel_mm * (options.has(Fault::low_dose) ? 0.05 : 1);
   imaging.scatter_sigma_px = 26 / pixel_mm;
   imaging.focus_sigma_px = 0.09 / pixel_mm;  // a 0.6 mm spot at magnification 1.5
-  imaging.screen_sigma_px = (options.kind == CaseKind::flat ? 0.10 : 0.15) / pixel_mm;
-  imaging.vignette = options.kind == CaseKind::flat ? 0.05 : 0.2;
+  imaging.screen_sigma_px = (intensifier ? 0.15 : 0.10) / pixel_mm;
+  imaging.vignette = intensifier ? 0.2 : 0.05;
   imaging.field_radius_px = field_radius_px;
   imaging.logarithmic = options.knee;
   imaging.bits = options.bits;
@@ -59,10 +62,45 @@ Imaging draw_imaging(const SimulationOptions& options, double field_radius_px, d
 
 double rounded(double value, double step) { return step * std::round(value / step); }
 
+/// 2.3.3: Eq. 5 at (0, 0, 0) and (90, 0, 0) degrees, T = (0, 0, 800) mm. The world's origin is put to the
+/// middle of the cone, since from its base the top of the spiral falls outside the lateral picture.
+std::vector<Shot> paper_stand(const SimulationOptions& options) {
+  const CArmModel model = model_of(Preset::paper_sim);
+  const ConicalHelix helix;
+  const Vector3d middle(0, 0, 0.5 * helix.h * helix.t_end);
+  const double pixel_mm = model.receiver_mm / options.size;
+  const double f = model.source_detector_mm / pixel_mm;
+  std::vector<Shot> shots;
+  for (const double alpha_deg : {0.0, 90.0}) {
+    Shot shot;
+    shot.name = shots.empty() ? "AP" : "LAT";
+    shot.mirrored = !shots.empty() && options.has(Fault::mirrored);
+    shot.f_mm = shot.nominal_f_mm = model.source_detector_mm;
+    shot.primary_angle_deg = alpha_deg;
+    shot.view.intrinsics = {f, f, 0.5 * options.size, 0.5 * options.size};
+    const Matrix3d rotation = rotation_from_euler(alpha_deg * radian, 0, 0);
+    shot.view.camera_from_world = {rotation, Vector3d(0, 0, model.source_isocentre_mm) - rotation * middle};
+    shot.detector = {options.size, options.size, pixel_mm, {}, {}};
+    shot.detector.distortion.centre_px = Vector2d::Constant(0.5 * (options.size - 1));
+    shot.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
+    shots.push_back(shot);
+  }
+  return shots;
+}
+
 }  // namespace
 
-CArmModel ii_9in() { return {true, 235, 997, 650}; }
-CArmModel flat_panel() { return {false, 297, 1020, 640}; }
+CArmModel model_of(Preset preset) {
+  switch (preset) {
+    case Preset::paper_sim:
+      return {false, 153.6, 900, 800};
+    case Preset::ii_9in:
+      return {true, 235, 997, 650};
+    case Preset::flat_panel:
+      return {false, 297, 1020, 640};
+  }
+  return {};
+}
 
 View Shot::stored_view() const {
   View stored = view;
@@ -85,7 +123,8 @@ Vector2d Shot::raw_image(const Vector3d& point_in_calibrator) const {
 
 std::vector<Shot> take_stand(const SimulationOptions& options, double plate_height_mm,
                              const RigidTransform& calibrator_from_patient) {
-  const CArmModel model = options.kind == CaseKind::flat ? flat_panel() : ii_9in();
+  if (options.machine() == Preset::paper_sim) return paper_stand(options);
+  const CArmModel model = model_of(options.machine());
   RandomStream random(options.seed, stream::c_arm);
   const double pixel_mm = model.receiver_mm / options.size;
   const double unit = options.size / 1024.0;

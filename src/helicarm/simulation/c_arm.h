@@ -19,8 +19,7 @@ struct CArmModel {
   double source_isocentre_mm;
 };
 
-CArmModel ii_9in();      ///< 235 mm picture (0.2295 mm at 1024 pixels), 997 mm
-CArmModel flat_panel();  ///< 297 mm picture (0.29 mm at 1024 pixels), 1020 mm
+CArmModel model_of(Preset preset);
 
 /// The C-arm as it truly stands when one view is taken.
 struct Shot {
@@ -43,7 +42,8 @@ struct Shot {
   Eigen::Vector2d raw_image(const Eigen::Vector3d& point_in_calibrator) const;
 };
 
-/// An AP and a lateral view of the calibrator, with the seed's own sag, tilt, distortion and dose.
+/// An AP and a lateral view of the calibrator, with the seed's own sag, tilt and distortion; of paper_sim
+/// exactly those of 2.3.3, about the middle of the cone.
 std::vector<Shot> take_stand(const SimulationOptions& options, double plate_height_mm,
                              const RigidTransform& calibrator_from_patient);
 

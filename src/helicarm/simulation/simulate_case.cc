@@ -11,17 +11,50 @@
 #include "helicarm/simulation/knee.h"
 #include "helicarm/simulation/random_pose.h"
 #include "helicarm/simulation/streams.h"
+#include "helicarm/simulation/wire_grid.h"
 
 namespace helicarm::simulation {
 namespace {
 
 using Eigen::Vector2d;
 
+constexpr std::size_t most_distances = 20;
+constexpr double least_distance_mm = 20;  // clear of plate48, whose balls end 16.25 mm from the receiver
+constexpr double most_distance_mm = 500;
+
+Expected<void> check_grid(const SimulationOptions& options) {
+  if (options.machine() == Preset::paper_sim)
+    return fail(Reason::bad_value,
+                "preset: paper-sim has no distortion, and its picture does not hold the plate; "
+                "kind grid is for ii-9in and flat-panel");
+  for (const Fault fault : options.faults)
+    if (fault != Fault::low_dose && fault != Fault::saturated)
+      return fail(
+          Reason::bad_value,
+          fmt::format("fault: {} does not occur in kind grid; low_dose and saturated do", word(fault)));
+  if (!options.lost_balls.empty()) return fail(Reason::bad_value, "lost ball: kind grid has no calibrator");
+  const std::vector<double>& distances = options.grid_distances_mm;
+  if (distances.empty() || distances.size() > most_distances)
+    return fail(Reason::bad_value, fmt::format("grid distances: {} of them, 1 to {} are possible",
+                                               distances.size(), most_distances));
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    if (!(distances[i] >= least_distance_mm && distances[i] <= most_distance_mm))
+      return fail(Reason::bad_value, fmt::format("grid distance: {} mm is outside {} to {} mm", distances[i],
+                                                 least_distance_mm, most_distance_mm));
+    if (std::count(distances.begin(), distances.end(), distances[i]) > 1)
+      return fail(Reason::bad_value, fmt::format("grid distance: {} mm is given twice", distances[i]));
+  }
+  return {};
+}
+
 Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
   if (options.size != 512 && options.size != 1024)
     return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));
   if (options.bits != 8 && options.bits != 12 && options.bits != 16)
     return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 12 and 16", options.bits));
+  if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
+    return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
+                                               word(options.machine())));
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
                      [&](const CalibratorBall& ball) { return ball.label == lost; }))
@@ -37,6 +70,24 @@ Click click(const TruePoint& point, RandomStream& random) {
   return {point.name, (raw * 10).array().round().matrix() / 10};
 }
 
+void expose(SimulatedView& view, const Scene& scene, const SimulationOptions& options, std::uint32_t number) {
+  const Shot& shot = view.shot;
+  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads);
+  view.pixels = develop(signal, shot.imaging, options.seed, stream::noise + 2 * number, options.threads);
+  if (shot.mirrored) view.pixels = mirrored(view.pixels);
+}
+
+void add_plate_dots(SimulatedView& view, const Plate& plate, const Scene& scene) {
+  const Shot& shot = view.shot;
+  const RigidTransform world_from_plate = shot.view.camera_from_world.inverse() * shot.camera_from_plate;
+  for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
+    const Vector2d& dot = plate.dots_mm[i];
+    view.plate_dots.push_back(true_point(plate_dot_name(i),
+                                         world_from_plate * Eigen::Vector3d(dot.x(), dot.y(), 0),
+                                         plate.diameter_mm, scene, shot));
+  }
+}
+
 SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const Shot& shot,
                         std::uint32_t number) {
   const SimulationOptions& options = room.options;
@@ -45,26 +96,15 @@ SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const S
     for (const Body& dot : plate_body(*room.plate, shot.camera_from_plate, shot.view)) scene.push_back(dot);
   for (const Body& leaf : shutter_leaves(options, shot)) scene.push_back(leaf);
 
-  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads);
   SimulatedView view;
   view.shot = shot;
-  view.pixels = develop(signal, shot.imaging, options.seed, stream::noise + 2 * number, options.threads);
-  if (shot.mirrored) view.pixels = mirrored(view.pixels);
-
+  expose(view, scene, options, number);
   for (const CalibratorBall& ball : room.calibrator.balls)
     view.balls.push_back(true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, shot));
   for (const CalibratorTarget& target : room.calibrator.targets)
     view.targets.push_back(
         true_point(target.name, target.point_in_calibrator, target.diameter_mm, scene, shot));
-  if (room.plate) {
-    const RigidTransform world_from_plate = shot.view.camera_from_world.inverse() * shot.camera_from_plate;
-    for (std::size_t i = 0; i < room.plate->dots_mm.size(); ++i) {
-      const Vector2d& dot = room.plate->dots_mm[i];
-      view.plate_dots.push_back(true_point(plate_dot_name(i),
-                                           world_from_plate * Eigen::Vector3d(dot.x(), dot.y(), 0),
-                                           room.plate->diameter_mm, scene, shot));
-    }
-  }
+  if (room.plate) add_plate_dots(view, *room.plate, scene);
   if (room.navigation) {
     RandomStream random(options.seed, stream::clicks, number);
     for (const TunnelPoint& point : room.navigation->points) {
@@ -75,6 +115,26 @@ SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const S
   return view;
 }
 
+SimulatedCase simulate_grid(SimulationOptions options) {
+  options.knee = false;
+  SimulatedCase room;
+  room.options = options;
+  room.plate = plate48();
+  const WireGrid grid;
+  for (const Shot& shot : take_grid_stand(options, *room.plate->height_above_receiver_mm)) {
+    SimulatedView view;
+    view.shot = shot;
+    Scene scene = plate_body(*room.plate, shot.camera_from_plate, shot.view);
+    if (!room.views.empty())
+      for (const Body& wire : wire_grid_body(grid)) scene.push_back(wire);
+    expose(view, scene, options, static_cast<std::uint32_t>(room.views.size()));
+    add_plate_dots(view, *room.plate, scene);
+    if (!room.views.empty()) view.crosses = grid_crosses(grid, scene, shot);
+    room.views.push_back(std::move(view));
+  }
+  return room;
+}
+
 }  // namespace
 
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
@@ -83,9 +143,13 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   room.calibrator = udcsc();
   if (const auto checked = check(options, room.calibrator); !checked)
     return tl::unexpected<Failure>(checked.error());
+  if (options.kind == CaseKind::grid) {
+    if (const auto checked = check_grid(options); !checked) return tl::unexpected<Failure>(checked.error());
+    return simulate_grid(options);
+  }
   const bool tunnels = options.kind == CaseKind::tunnels;
   if (!tunnels) room.calibrator.targets = check_targets(room.calibrator);
-  if (options.kind != CaseKind::flat) room.plate = plate48();
+  if (model_of(options.machine()).intensifier) room.plate = plate48();
 
   RandomStream random(options.seed, stream::patient);
   const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
@@ -112,6 +176,18 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   for (std::size_t i = 0; i < shots.size(); ++i)
     room.views.push_back(take_view(room, patient, shots[i], static_cast<std::uint32_t>(i)));
   return room;
+}
+
+Exposure exposure_of(const SimulatedView& view) {
+  Exposure exposure;
+  exposure.name = view.shot.name;
+  exposure.pixels = Image<float>(view.pixels.width(), view.pixels.height());
+  std::ranges::copy(view.pixels.pixels(), exposure.pixels.pixels().begin());
+  exposure.highest = static_cast<float>((1 << view.shot.imaging.bits) - 1);
+  exposure.acquisition.pixel_mm = Eigen::Vector2d::Constant(view.shot.pixel_mm());
+  exposure.acquisition.source_detector_mm = view.shot.nominal_f_mm;
+  exposure.acquisition.logarithmic = view.shot.imaging.logarithmic;
+  return exposure;
 }
 
 }  // namespace helicarm::simulation

@@ -13,6 +13,7 @@
 #include "helicarm/simulation/navigation_truth.h"
 #include "helicarm/simulation/simulation_options.h"
 #include "helicarm/simulation/truth.h"
+#include "helicarm/xray/exposure.h"
 
 namespace helicarm::simulation {
 
@@ -30,19 +31,23 @@ struct SimulatedView {
   std::vector<TruePoint> targets;
   std::vector<TruePoint> tunnel_points;
   std::vector<TruePoint> plate_dots;
+  std::vector<TruePoint> crosses;  ///< of the test grid
   std::vector<Click> clicks;
 };
 
 struct SimulatedCase {
   SimulationOptions options;
-  Calibrator calibrator;
+  Calibrator calibrator;  ///< without balls in kind grid
   std::optional<Plate> plate;
   std::vector<SimulatedView> views;
   std::optional<NavigationTruth> navigation;
 };
 
 /// A whole case from its options: the same bytes for the same seed. Refuses (bad_value) an unknown size,
-/// depth or ball.
+/// depth or ball, a preset that does not suit the kind, and a grid that is not before the plate.
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
+
+/// The picture as the reader would hand it over, without the detour through a file.
+Exposure exposure_of(const SimulatedView& view);
 
 }  // namespace helicarm::simulation

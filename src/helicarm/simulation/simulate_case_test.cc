@@ -76,6 +76,41 @@ TEST(SimulateCase, ClearBallsAreDarkWhereTheTruthPutsThem) {
   }
 }
 
+TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  options.preset = Preset::paper_sim;
+  const SimulatedCase simulated = *simulate_case(options);
+  EXPECT_FALSE(simulated.plate);
+  const View& ap = simulated.views[0].shot.view;
+  const View& lateral = simulated.views[1].shot.view;
+  for (const View& view : {ap, lateral}) {
+    EXPECT_NEAR(view.intrinsics.fx, 3000, 1e-9);  // 900 mm over twice 0.15 mm
+    EXPECT_EQ(view.intrinsics.u0, 256);
+  }
+  const Eigen::Vector3d middle(0, 0, 0.5 * 3.979 * 7 * EIGEN_PI);
+  EXPECT_NEAR((ap.source_in_world() - middle - Eigen::Vector3d(0, 0, -800)).norm(), 0, 1e-9);
+  EXPECT_NEAR((lateral.source_in_world() - middle - Eigen::Vector3d(0, 800, 0)).norm(), 0, 1e-9);
+  for (const SimulatedView& view : simulated.views)
+    for (const TruePoint& ball : view.balls) {
+      EXPECT_LT((ball.raw - ball.ideal).norm(), 1e-9);
+      EXPECT_NE(ball.visibility, Visibility::outside) << view.shot.name << ball.name;
+    }
+}
+
+TEST(SimulateCase, PresetTakesThePlaceOfTheKindsOwnMachine) {
+  SimulationOptions options = small(CaseKind::flat);
+  EXPECT_EQ(options.machine(), Preset::flat_panel);
+  const SimulatedCase flat = *simulate_case(options);
+  options.kind = CaseKind::accuracy;
+  EXPECT_EQ(options.machine(), Preset::ii_9in);
+  options.preset = Preset::flat_panel;
+  EXPECT_TRUE(same(flat.views[0].pixels, simulate_case(options)->views[0].pixels));
+  options = small(CaseKind::flat);
+  options.preset = Preset::ii_9in;
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+  EXPECT_EQ(preset("ii_9in").error().reason, Reason::usage);
+}
+
 TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreSeen) {
   const SimulatedCase simulated = *simulate_case(small(CaseKind::accuracy));
   for (const SimulatedView& view : simulated.views) {

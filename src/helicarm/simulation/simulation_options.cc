@@ -11,7 +11,8 @@ namespace helicarm::simulation {
 namespace {
 
 /// In the order of the enumerations.
-constexpr std::array<std::string_view, 3> kinds = {"accuracy", "tunnels", "flat"};
+constexpr std::array<std::string_view, 4> kinds = {"accuracy", "tunnels", "flat", "grid"};
+constexpr std::array<std::string_view, 3> presets = {"paper-sim", "ii-9in", "flat-panel"};
 constexpr std::array<std::string_view, 7> faults = {"decoys",   "wires",    "screws",   "low_dose",
                                                     "shutters", "mirrored", "saturated"};
 
@@ -27,9 +28,15 @@ Expected<Value> value_of(const std::array<std::string_view, n>& words, std::stri
 }  // namespace
 
 std::string_view word(CaseKind kind) { return kinds.at(static_cast<std::size_t>(kind)); }
+std::string_view word(Preset preset) { return presets.at(static_cast<std::size_t>(preset)); }
 std::string_view word(Fault fault) { return faults.at(static_cast<std::size_t>(fault)); }
 Expected<CaseKind> case_kind(std::string_view word) { return value_of<CaseKind>(kinds, word, "kind"); }
+Expected<Preset> preset(std::string_view word) { return value_of<Preset>(presets, word, "preset"); }
 Expected<Fault> fault(std::string_view word) { return value_of<Fault>(faults, word, "fault"); }
+
+Preset SimulationOptions::machine() const {
+  return preset.value_or(kind == CaseKind::flat ? Preset::flat_panel : Preset::ii_9in);
+}
 
 bool SimulationOptions::has(Fault fault) const {
   return std::find(faults.begin(), faults.end(), fault) != faults.end();

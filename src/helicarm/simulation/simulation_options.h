@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,7 +14,15 @@ namespace helicarm::simulation {
 enum class CaseKind {
   accuracy,  ///< the paper's 3.2: intensifier, plate, five check targets
   tunnels,   ///< an ACL navigation: intensifier, plate, balls at the tunnels' ends, tracker and tool
-  flat       ///< as accuracy, with a flat panel: no plate, no distortion
+  flat,      ///< as accuracy, with a flat panel: no plate, no distortion
+  grid       ///< the paper's 3.1: pictures of the plate alone and with the test grid of wires before it
+};
+
+/// A make of C-arm. Pixels are given for 1024 of them a side; with 512 they are twice as large.
+enum class Preset {
+  paper_sim,  ///< the paper's 2.3.3: f 900 mm, 0.15 mm pixels, AP and lateral view at 800 mm, nothing askew
+  ii_9in,     ///< 9 inch intensifier: 0.2295 mm pixels, 997 mm, with plate, distortion, sag and tilt
+  flat_panel  ///< 0.29 mm pixels, 1020 mm, with sag and tilt; no distortion
 };
 
 enum class Fault {
@@ -28,21 +37,27 @@ enum class Fault {
 
 /// The words for them on the command line and in truth.json; an unknown one is a `usage` failure.
 std::string_view word(CaseKind kind);
+std::string_view word(Preset preset);
 std::string_view word(Fault fault);
 Expected<CaseKind> case_kind(std::string_view word);
+Expected<Preset> preset(std::string_view word);
 Expected<Fault> fault(std::string_view word);
 
 struct SimulationOptions {
   std::uint64_t seed = 1;
   CaseKind kind = CaseKind::accuracy;
-  int size = 1024;  ///< 512 or 1024 pixels a side
-  int bits = 12;    ///< 8, 12 or 16
+  std::optional<Preset> preset = {};  ///< not given: flat_panel for kind flat, else ii_9in
+  int size = 1024;                    ///< 512 or 1024 pixels a side
+  int bits = 12;                      ///< 8, 12 or 16
   bool knee = true;
   std::vector<Fault> faults;
+  std::vector<double> grid_distances_mm = {
+      45};                              ///< kind grid: from the receiver to the wires' axes; up to 20
   std::vector<std::string> lost_balls;  ///< labels of balls that fell out of the calibrator
   unsigned threads = 0;
 
   bool has(Fault fault) const;
+  Preset machine() const;
 };
 
 }  // namespace helicarm::simulation

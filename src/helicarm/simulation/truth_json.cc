@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "helicarm/simulation/wire_grid.h"
+
 namespace helicarm::simulation {
 namespace {
 
@@ -47,7 +49,7 @@ Json distortion_json(const VirtualDetector& detector) {
           {"bumps", bumps}};
 }
 
-Json view_json(const SimulatedView& view) {
+Json view_json(const SimulatedView& view, const char* world) {
   const Shot& shot = view.shot;
   const View stored = shot.stored_view();
   Json json = {{"name", shot.name},
@@ -57,7 +59,7 @@ Json view_json(const SimulatedView& view) {
                 {{"f_mm", shot.f_mm},
                  {"pixel_mm", shot.detector.pixel_mm},
                  {"K", matrix_json(stored.intrinsics.matrix())},
-                 {"camera_from_calibrator", matrix_json(stored.camera_from_world.matrix())},
+                 {std::string("camera_from_") + world, matrix_json(stored.camera_from_world.matrix())},
                  {"projection", matrix_json(stored.projection())}}},
                {"field_radius_px", nullptr},
                {"distortion", distortion_json(shot.detector)},
@@ -65,6 +67,7 @@ Json view_json(const SimulatedView& view) {
                {"targets", points_json(view.targets)},
                {"tunnel_points", points_json(view.tunnel_points)},
                {"plate", points_json(view.plate_dots)}};
+  if (!view.crosses.empty()) json["crosses"] = points_json(view.crosses);
   if (shot.detector.field_radius_px) json["field_radius_px"] = *shot.detector.field_radius_px;
   return json;
 }
@@ -122,6 +125,7 @@ Json matrix_json(const Eigen::MatrixXd& matrix) {
 Json truth_json(const SimulatedCase& simulated) {
   Json json = {{"format", "helicarm-truth/1"},
                {"kind", word(simulated.options.kind)},
+               {"preset", word(simulated.options.machine())},
                {"seed", simulated.options.seed},
                {"knee", simulated.options.knee},
                {"faults", Json::array()},
@@ -131,8 +135,17 @@ Json truth_json(const SimulatedCase& simulated) {
                 "any mirroring "
                 "(u -> width - 1 - u)"},
                {"views", Json::array()}};
+  const bool grid = simulated.options.kind == CaseKind::grid;
+  if (grid) {
+    const WireGrid wires;
+    json["grid"] = {{"wires", wires.wires},
+                    {"pitch_mm", wires.pitch_mm},
+                    {"thickness_mm", wires.thickness_mm},
+                    {"distances_mm", simulated.options.grid_distances_mm}};
+  }
   for (Fault fault : simulated.options.faults) json["faults"].push_back(word(fault));
-  for (const SimulatedView& view : simulated.views) json["views"].push_back(view_json(view));
+  for (const SimulatedView& view : simulated.views)
+    json["views"].push_back(view_json(view, grid ? "grid" : "calibrator"));
   for (const CalibratorTarget& target : simulated.calibrator.targets)
     json["targets_in_calibrator"][target.name] = vector_json(target.point_in_calibrator);
   if (simulated.navigation) json["navigation"] = navigation_json(simulated);

@@ -14,6 +14,8 @@ namespace {
 
 constexpr const char* truth_file = "truth.json";
 constexpr const char* plate_file = "plate.json";
+constexpr const char* calibrator_file = "calibrator.json";
+constexpr const char* case_file = "case.json";
 
 /// The seed alone decides, so that a case is written alike each time.
 std::string uid(std::uint64_t seed, std::uint64_t item) {
@@ -77,11 +79,27 @@ Expected<void> write_json(const std::filesystem::path& path, const Json& json) {
   return write_file(path, to_text(json) + "\n");
 }
 
+/// What an earlier simulation of another kind wrote: its views by the names in its truth.
+void remove_leftovers(const std::filesystem::path& folder) {
+  const auto truth = read_json(folder / truth_file);
+  if (!truth) return;
+  std::error_code ignored;
+  for (const char* file : {plate_file, calibrator_file, case_file})
+    std::filesystem::remove(folder / file, ignored);
+  for (const char* view : {"AP", "LAT", "PLATE", "GRID"})
+    std::filesystem::remove(folder / fmt::format("{}.dcm", view), ignored);
+  const Json grid = truth->value("grid", Json::object());
+  if (!grid.is_object() || !grid.contains("distances_mm")) return;
+  for (const Json& distance : grid["distances_mm"])
+    if (distance.is_number())
+      std::filesystem::remove(folder / fmt::format("GRID-{:g}.dcm", distance.get<double>()), ignored);
+}
+
 }  // namespace
 
 Json case_json(const SimulatedCase& simulated) {
   Json json = {{"format", "helicarm-case/1"},
-               {"calibrator", "calibrator.json"},
+               {"calibrator", calibrator_file},
                {"plate", simulated.plate ? Json(plate_file) : Json(nullptr)},
                {"views", Json::array()}};
   for (const SimulatedView& view : simulated.views)
@@ -110,16 +128,15 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
   std::filesystem::create_directories(folder, error);
   if (error) return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), error.message()));
   return guarded([&] {
+    remove_leftovers(folder);
     // The truth goes first: it marks the folder as a simulation should the rest be cut short.
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)
       value_or_throw(write_dicom(folder / (simulated.views[i].shot.name + ".dcm"), dicom(simulated, i)));
-    value_or_throw(write_json(folder / "calibrator.json", to_json(simulated.calibrator)));
-    if (simulated.plate)
-      value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
-    else
-      std::filesystem::remove(folder / plate_file, error);
-    value_or_throw(write_json(folder / "case.json", case_json(simulated)));
+    if (simulated.plate) value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
+    if (simulated.options.kind == CaseKind::grid) return;
+    value_or_throw(write_json(folder / calibrator_file, to_json(simulated.calibrator)));
+    value_or_throw(write_json(folder / case_file, case_json(simulated)));
   });
 }
 

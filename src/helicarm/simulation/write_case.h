@@ -8,14 +8,15 @@
 
 namespace helicarm::simulation {
 
-/// case.json as docs/formats.md describes it.
+/// case.json as docs/formats.md describes it; not of kind grid, which has no calibrator.
 Json case_json(const SimulatedCase& simulated);
 
 /// Refuses (cannot_write) a folder that holds anything but an earlier simulation.
 Expected<void> check_case_folder(const std::filesystem::path& folder);
 
-/// Writes AP.dcm, LAT.dcm, calibrator.json, plate.json, case.json and truth.json; each file whole or not at
-/// all.
+/// Writes AP.dcm, LAT.dcm, calibrator.json, plate.json, case.json and truth.json; of kind grid PLATE.dcm,
+/// GRID.dcm (with several distances GRID-30.dcm and so on), plate.json and truth.json. Each file whole or not
+/// at all; what an earlier simulation left goes.
 Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCase& simulated);
 
 }  // namespace helicarm::simulation

@@ -34,6 +34,7 @@ inline constexpr std::uint32_t location_stream = 20200;  // and the next
 inline constexpr std::uint32_t biplane_stream = 20300;   // and the nine next
 inline constexpr std::uint32_t calibration_stream = 20400;
 inline constexpr std::uint32_t design_stream = 20500;  // and the three next
+inline constexpr std::uint32_t rectification_stream = 20600;
 
 inline constexpr double cone_height_mm = 87.5;  // 2.3.1
 inline constexpr double cone_base_mm = 60;      // radii

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/study/rectification_study.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/rectification/test_grid.h"
+#include "helicarm/simulation/simulate_case.h"
+#include "helicarm/study/paper_scene.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double no_figure = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t figures_of_picture = sizeof(GridPicture) / sizeof(double);
+constexpr std::size_t figures_of_cross = sizeof(GridCross) / sizeof(double);
+
+template <class Figures>
+std::array<double, sizeof(Figures) / sizeof(double)> flat(const Figures& figures) {
+  return std::bit_cast<std::array<double, sizeof(Figures) / sizeof(double)>>(figures);
+}
+
+template <class Figures>
+Figures all_missing() {
+  std::array<double, sizeof(Figures) / sizeof(double)> missing;
+  missing.fill(no_figure);
+  return std::bit_cast<Figures>(missing);
+}
+
+std::uint32_t seed_of_intensifier(const RectificationStudyOptions& options, std::size_t number) {
+  return RandomStream(options.seed, rectification_stream, number).bits();
+}
+
+struct Maps {
+  DistortionMap paper, best;
+};
+
+/// Crosses that both maps carry, so that all errors are of the same ones.
+std::vector<Dot> within_both(std::vector<Dot> crosses, const Maps& maps) {
+  std::erase_if(crosses, [&](const Dot& cross) {
+    return !maps.paper.rectified_from_raw(cross.centre_px) || !maps.best.rectified_from_raw(cross.centre_px);
+  });
+  return crosses;
+}
+
+struct Measured {
+  TestGrid paper, best;
+  GridErrors errors() const {
+    return {paper.raw.mean_px,      paper.raw.max_px,       paper.rectified.mean_px,
+            paper.rectified.max_px, best.rectified.mean_px, best.rectified.max_px};
+  }
+};
+
+std::optional<Measured> measured_by(const std::vector<Dot>& crosses, const Maps& maps, GridFit fit) {
+  auto paper = measure_test_grid(crosses, maps.paper, fit);
+  auto best = measure_test_grid(crosses, maps.best, fit);
+  if (!paper || !best) return {};
+  return Measured{*std::move(paper), *std::move(best)};
+}
+
+/// Number of the true cross that is seen there; a mesh is 80 px wide, and 40 px with 512 pixels a side.
+std::optional<std::size_t> true_cross(const simulation::SimulatedView& view, const Eigen::Vector2d& raw) {
+  constexpr double same_px = 5;
+  for (std::size_t i = 0; i < view.crosses.size(); ++i)
+    if ((view.crosses[i].raw - raw).norm() < same_px) return i;
+  return {};
+}
+
+/// Where a map or the grid is refused, what hangs on it stays NaN.
+GridPicture measure_picture(const simulation::SimulatedView& view, const std::optional<Maps>& maps,
+                            std::span<GridCross> kept) {
+  GridPicture picture = all_missing<GridPicture>();
+  picture.crosses = 0;
+  if (!maps) return picture;
+  const auto crosses = within_both(find_grid(exposure_of(view)), *maps);
+  double squares = 0;
+  for (const Dot& cross : crosses)
+    if (const auto at = true_cross(view, cross.centre_px))
+      squares += (view.crosses[*at].raw - cross.centre_px).squaredNorm(), ++picture.crosses;
+  if (picture.crosses > 0) picture.finder_rms = std::sqrt(squares / picture.crosses);
+  if (const auto all = measured_by(crosses, *maps, GridFit::all)) picture.all = all->errors();
+  const auto nine = measured_by(crosses, *maps, GridFit::nine);
+  if (!nine) return picture;
+  picture.nine = nine->errors();
+  const TestGrid& paper = nine->paper;
+  for (std::size_t k = 0; k < paper.raw_px.size() && !kept.empty(); ++k)
+    if (const auto at = true_cross(view, paper.raw_px[k]))
+      kept[*at] = {paper.raw_px[k].x(),
+                   paper.raw_px[k].y(),
+                   paper.raw_ideal_px[k].x(),
+                   paper.raw_ideal_px[k].y(),
+                   paper.raw_error_px[k],
+                   paper.rectified_error_px[k],
+                   nine->best.rectified_error_px[k]};
+  return picture;
+}
+
+std::optional<Maps> maps_of(const simulation::SimulatedCase& given) {
+  const Exposure plate = exposure_of(given.views.front());
+  auto paper = rectify(plate, *given.plate, {Method::paper, {}});
+  auto best = rectify(plate, *given.plate, {Method::best, {}});
+  if (!paper || !best) return {};
+  return Maps{std::move(paper->map), std::move(best->map)};
+}
+
+void run_intensifier(const RectificationStudyOptions& options, std::size_t number, std::span<double> out) {
+  simulation::SimulationOptions simulated;
+  simulated.seed = seed_of_intensifier(options, number);
+  simulated.kind = simulation::CaseKind::grid;
+  simulated.size = options.size_px;
+  simulated.grid_distances_mm = options.distances_mm;
+  simulated.threads = 1;
+  const auto given = value_or_throw(simulation::simulate_case(simulated));
+  const auto maps = maps_of(given);
+  std::array<GridCross, crosses_of_grid> crosses;
+  crosses.fill(all_missing<GridCross>());
+  for (std::size_t i = 0; i < options.distances_mm.size(); ++i) {
+    const bool keep = options.distances_mm[i] == options.figure_distance_mm;
+    const auto picture =
+        measure_picture(given.views[i + 1], maps, keep ? std::span(crosses) : std::span<GridCross>());
+    std::ranges::copy(flat(picture), out.begin());
+    out = out.subspan(figures_of_picture);
+  }
+  for (const GridCross& cross : crosses) {
+    std::ranges::copy(flat(cross), out.begin());
+    out = out.subspan(figures_of_cross);
+  }
+}
+
+template <class Figures>
+Figures taken(std::span<const double>& from) {
+  std::array<double, sizeof(Figures) / sizeof(double)> figures;
+  std::copy_n(from.begin(), figures.size(), figures.begin());
+  from = from.subspan(figures.size());
+  return std::bit_cast<Figures>(figures);
+}
+
+}  // namespace
+
+Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyOptions& options,
+                                                       const EngineOptions& engine, const Ranks& ranks) {
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (std::ranges::count(options.distances_mm, options.figure_distance_mm) != 1)
+    return fail(Reason::bad_value,
+                fmt::format("distances: {} mm is not once among them, its crosses are drawn",
+                            options.figure_distance_mm));
+  StudySetting setting;
+  setting.blocks = options.groups;
+  setting.values_per_block =
+      options.distances_mm.size() * figures_of_picture + crosses_of_grid * figures_of_cross;
+  setting.work = [&](std::size_t block, std::span<double> values) {
+    run_intensifier(options, block, values);
+  };
+  setting.settle = [](std::span<const double> values) {
+    return std::vector<double>(values.begin(), values.end());
+  };
+  const std::string identity = fmt::format(
+      "rectification {} groups {} seed {} size {} distances {} figure {}", HELICARM_VERSION, options.groups,
+      options.seed, options.size_px, fmt::join(options.distances_mm, ","), options.figure_distance_mm);
+  const auto kept = run_study({setting}, identity, engine, ranks);
+  if (!kept) return tl::unexpected<Failure>(kept.error());
+  std::vector<Intensifier> intensifiers;
+  if (kept->empty()) return intensifiers;
+  std::span<const double> values = kept->front();
+  for (std::size_t i = 0; i < options.groups; ++i) {
+    Intensifier intensifier{seed_of_intensifier(options, i), {}, {}};
+    for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
+      intensifier.pictures.push_back(taken<GridPicture>(values));
+    for (GridCross& cross : intensifier.crosses) cross = taken<GridCross>(values);
+    intensifiers.push_back(std::move(intensifier));
+  }
+  return intensifiers;
+}
+
+}  // namespace helicarm

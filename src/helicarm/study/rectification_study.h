@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/study/engine.h"
+#include "helicarm/study/study_files.h"
+
+namespace helicarm {
+
+/// The paper's 3.1 (Figs. 9 to 11) from pictures: each intensifier takes the plate alone, which gives the
+/// maps, and then the test grid of wires at several distances from the receiver.
+struct RectificationStudyOptions {
+  std::size_t groups = 10;  ///< intensifiers
+  std::uint64_t seed = 1;
+  int size_px = 1024;  ///< 512 or 1024
+  /// Of the wires from the receiver. The print has ten, of which it names one, 45 mm.
+  std::vector<double> distances_mm = {30, 45, 60, 75, 90, 105, 120, 135, 150, 165};
+  double figure_distance_mm = 45;  ///< whose crosses are kept (Figs. 9 and 10); one of the above
+};
+
+/// Mean and largest error over the crosses of one picture (Eq. 15), raw pixels' scale; NaN: no answer.
+struct GridErrors {
+  double raw_mean, raw_max;
+  double paper_mean, paper_max;  ///< rectified by the printed recipe: Hough centres, quadratic
+  double best_mean, best_max;    ///< rectified by the best one
+};
+
+struct GridPicture {
+  double crosses;     ///< found, and within both maps
+  double finder_rms;  ///< of the crosses found from their true places, px
+  GridErrors nine;    ///< the ideal grid is that of the nine central crosses (Eq. 14)
+  GridErrors all;     ///< it is that of all crosses
+};
+
+/// One cross; NaN: not found. Ideal place by the nine of the raw picture.
+struct GridCross {
+  double u, v, ideal_u, ideal_v, raw_error, paper_error, best_error;
+};
+
+constexpr std::size_t crosses_of_grid = 81;
+
+struct Intensifier {
+  std::uint32_t case_seed;  ///< `helicarm simulate --kind grid --seed` draws the same one
+  std::vector<GridPicture> pictures;
+  std::array<GridCross, crosses_of_grid> crosses;  ///< at figure_distance_mm, row by row
+};
+
+/// Empty at ranks that do not lead.
+Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyOptions& options,
+                                                       const EngineOptions& engine, const Ranks& ranks);
+
+/// rectification.csv, rectification.json, rectification.svg and how it compares with the print.
+StudyFiles files_of(const std::vector<Intensifier>& intensifiers, const RectificationStudyOptions& options);
+
+}  // namespace helicarm
