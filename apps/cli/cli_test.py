@@ -117,7 +117,8 @@ class CommandLine(unittest.TestCase):
     @unittest.skipUnless(os.environ.get("HELICARM_MPIRUN"), "built without MPI")
     def test_study_writes_the_same_bytes_on_any_number_of_ranks(self):
         surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-                        "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+                        "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
+                        "OMPI_MCA_plm_rsh_agent": "false"}  # all on this machine: no remote shell is needed
         study = ("study", "number", "--groups", "3001", "--balls", "6,12", "--seed", "4", "--out")
         self.assertEqual(run(*study, self.root / "alone", "--quiet").returncode, 0)
         for ranks in ("1", "2", "3"):
