@@ -21,8 +21,9 @@ TEST(Lanes, LogarithmAgreesWithTheLibrary) {
 }
 
 TEST(Lanes, ExponentialAgreesWithTheLibrary) {
+  // Twice as many: the fourth power at the end multiplies rounding errors by four.
   for (double x = -1; x <= 1; x += 0.00317)
-    ASSERT_NEAR(exponential(lanes(x))[0], std::exp(x), few_units * std::exp(x)) << x;
+    ASSERT_NEAR(exponential(lanes(x))[0], std::exp(x), 2 * few_units * std::exp(x)) << x;
 }
 
 TEST(Lanes, SineAndCosineAgreeWithTheLibraryInAllQuadrants) {
