@@ -26,6 +26,7 @@ ROOMS = {
     "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
     "simulation": "core geometry image phantom xray",
+    "devices": "core geometry image xray",
     "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                   " verification simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
