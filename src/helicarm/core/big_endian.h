@@ -66,10 +66,10 @@ class BigEndianWriter {
     bytes_ += text;
     return *this;
   }
-  /// Cut off or filled with NUL to the width.
-  BigEndianWriter& put_name(std::string_view name, std::size_t width) {
+  /// Cut off or filled up to the width.
+  BigEndianWriter& put_name(std::string_view name, std::size_t width, char filling = '\0') {
     bytes_ += name.substr(0, width);
-    bytes_.append(width - std::min(width, name.size()), '\0');
+    bytes_.append(width - std::min(width, name.size()), filling);
     return *this;
   }
   const std::string& bytes() const& { return bytes_; }

@@ -31,6 +31,8 @@ std::string_view code(Reason reason) {
       return "name_clash";
     case Reason::cannot_write:
       return "cannot_write";
+    case Reason::port_taken:
+      return "port_taken";
     case Reason::blank_image:
       return "blank_image";
     case Reason::saturated:
@@ -87,6 +89,6 @@ std::string_view code(Reason reason) {
   return "internal";
 }
 
-int exit_code(Reason reason) { return reason <= Reason::cannot_write ? 2 : 3; }
+int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }
 
 }  // namespace helicarm

@@ -28,6 +28,7 @@ enum class Reason {
   path_outside,
   name_clash,
   cannot_write,
+  port_taken,
   // Refused, the data does not allow a trustworthy answer: exit code 3.
   blank_image,
   saturated,

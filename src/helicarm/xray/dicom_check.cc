@@ -29,7 +29,7 @@ void check_kind(const DicomElements& elements) {
   const std::string_view sop_class = elements.text(tags::sop_class);
   if (sop_class.empty() && !elements.find(tags::pixel_data))
     elements.refuse(Reason::not_an_image, tags::pixel_data, "is missing: the file holds no picture");
-  if (std::ranges::find(xray_classes, sop_class) == xray_classes.end())
+  if (!is_xray_class(sop_class))
     elements.refuse(
         Reason::unsupported, tags::sop_class,
         fmt::format("is {}: not an XA, RF, CR, DX or secondary capture picture", quote(sop_class)));
@@ -96,6 +96,10 @@ void check_size(DicomOutline& outline) {
 }
 
 }  // namespace
+
+bool is_xray_class(std::string_view sop_class) {
+  return std::ranges::find(xray_classes, sop_class) != xray_classes.end();
+}
 
 Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin) {
   return guarded([&] {

@@ -24,6 +24,9 @@ struct DicomOutline {
   bool encapsulated() const { return !elements.fragments.empty(); }
 };
 
+/// Whether objects of this SOP class may be an X-ray that is read here: XA, RF, CR, DX or secondary capture.
+bool is_xray_class(std::string_view sop_class);
+
 /// Checks a whole file in memory before anything is decoded: `walk_dicom`, then what it is a picture of and
 /// how the pixels are stored. Refuses: not_an_image, truncated, bad_size (Rows, Columns, more than 64 MiB a
 /// frame), bad_value, unsupported (not a grey X-ray or secondary capture).

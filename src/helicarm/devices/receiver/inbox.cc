@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/inbox.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/devices/receiver/pdu.h"
+#include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/digest.h"
+#include "helicarm/xray/read_dicom.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int most_versions = 100;
+constexpr std::uintmax_t most_file_bytes = std::uintmax_t{1} << 30;
+
+void remove_parts(const fs::path& folder) {
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(folder, ec)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.') && name.ends_with(".part")) fs::remove(entry.path(), ec);
+  }
+}
+
+/// Proves that every frame's structure is sound and the first one can be decoded.
+void check_picture(std::string_view file, const std::string& origin) {
+  value_or_throw(read_dicom(file, origin, 1));
+}
+
+std::string meta_element(std::uint16_t number, std::string_view vr, std::string value) {
+  if (value.size() % 2 != 0) value += '\0';
+  const auto word = [](std::size_t v) { return std::string{char(v & 0xFF), char(v >> 8 & 0xFF)}; };
+  const std::string length = vr == "OB" ? word(0) + word(value.size()) + word(0) : word(value.size());
+  return word(2) + word(number) + std::string(vr) + length + value;
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
+  std::error_code ec;
+  const bool made = fs::create_directories(folder, ec);
+  if (ec || !fs::is_directory(folder))
+    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be made", folder.string()));
+  if (made) fs::permissions(folder, fs::perms::owner_all, ec);
+  const int lock = ::open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  if (lock < 0)
+    return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), std::strerror(errno)));
+  if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    ::close(lock);
+    return fail(Reason::cannot_write, fmt::format("{}: another program receives into it", folder.string()));
+  }
+  remove_parts(folder);
+  return std::unique_ptr<Inbox>(new Inbox(folder, lock));
+}
+
+Inbox::~Inbox() { ::close(lock_); }
+
+Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin) {
+  return guarded([&] {
+    check_picture(file, origin);
+    const std::string uid(value_or_throw(walk_dicom(file, origin)).text(tags::sop_instance));
+    if (!dicom::is_uid(uid))
+      throw BadInput(Reason::bad_value, fmt::format("{}: SOP Instance UID is not valid", origin));
+    Arrival arrival{{}, digest(file), false, {}};
+    const std::lock_guard naming(naming_);
+    for (int version = 1; version <= most_versions; ++version) {
+      arrival.path = folder_ / (version == 1 ? uid + ".dcm" : fmt::format("{}~{}.dcm", uid, version));
+      std::error_code ec;
+      if (!fs::exists(arrival.path, ec)) break;
+      if (read_file(arrival.path, most_file_bytes) == file) {
+        arrival.repeated = true;
+        return arrival;
+      }
+      if (version == most_versions)
+        throw BadInput(Reason::cannot_write,
+                       fmt::format("{}: {} pictures with this UID are here already", origin, most_versions));
+      if (version == 1)
+        arrival.warnings.push_back(
+            {Reason::uid_reused,
+             fmt::format("{}: another picture with the same SOP Instance UID is here already; both are kept",
+                         origin)});
+    }
+    value_or_throw(write_file(arrival.path, file));
+    return arrival;
+  });
+}
+
+std::string dicom_file(std::string_view sop_class, std::string_view sop_instance,
+                       std::string_view transfer_syntax, std::string_view data_set) {
+  const std::string meta = meta_element(0x0001, "OB", std::string("\0\1", 2)) +
+                           meta_element(0x0002, "UI", std::string(sop_class)) +
+                           meta_element(0x0003, "UI", std::string(sop_instance)) +
+                           meta_element(0x0010, "UI", std::string(transfer_syntax)) +
+                           meta_element(0x0012, "UI", std::string(dicom::implementation_uid));
+  std::string size;
+  for (int i = 0; i < 4; ++i) size += static_cast<char>(meta.size() >> (8 * i));
+  std::string file = std::string(128, '\0') + "DICM" + meta_element(0x0000, "UL", size) + meta;
+  file += data_set;
+  return file;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/inbox.h"
+
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/xray/dicom_builder.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+class InboxOnDisk : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "helicarm_inbox_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    folder_ = name;
+    inbox_ = Inbox::open(folder_).value();
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  fs::path folder_;
+  std::unique_ptr<Inbox> inbox_;
+};
+
+TEST_F(InboxOnDisk, PictureIsKeptAsItCame) {
+  const std::string file = DicomBuilder().bytes();
+  const Arrival arrival = inbox_->store(file, "test").value();
+  EXPECT_EQ(arrival.path, folder_ / "2.25.17.dcm");
+  EXPECT_EQ(read_file(arrival.path, 1 << 20).value(), file);
+  EXPECT_FALSE(arrival.repeated);
+}
+
+TEST_F(InboxOnDisk, SamePictureAgainIsTheSameArrival) {
+  inbox_->store(DicomBuilder().bytes(), "test").value();
+  const Arrival again = inbox_->store(DicomBuilder().bytes(), "test").value();
+  EXPECT_TRUE(again.repeated);
+  EXPECT_TRUE(again.warnings.empty());
+  EXPECT_FALSE(fs::exists(folder_ / "2.25.17~2.dcm"));
+}
+
+TEST_F(InboxOnDisk, OtherBytesUnderOneUidAreBothKeptWithAWarning) {
+  inbox_->store(DicomBuilder().bytes(), "test").value();
+  const std::string other = DicomBuilder().text(0x00181110, "DS", "990").bytes();
+  const Arrival arrival = inbox_->store(other, "test").value();
+  EXPECT_EQ(arrival.path, folder_ / "2.25.17~2.dcm");
+  ASSERT_EQ(arrival.warnings.size(), 1u);
+  EXPECT_EQ(arrival.warnings[0].reason, Reason::uid_reused);
+  EXPECT_TRUE(inbox_->store(other, "test").value().repeated);
+  EXPECT_EQ(read_file(folder_ / "2.25.17.dcm", 1 << 20).value(), DicomBuilder().bytes());
+}
+
+TEST_F(InboxOnDisk, UnreadablePictureIsRefusedAndLeavesNothing) {
+  EXPECT_EQ(inbox_->store("hello", "test").error().reason, Reason::not_an_image);
+  EXPECT_FALSE(inbox_->store(DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
+  EXPECT_FALSE(inbox_->store(DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // the lock
+}
+
+TEST_F(InboxOnDisk, UidThatIsNoNumberIsRefused) {
+  EXPECT_EQ(inbox_->store(DicomBuilder().text(0x00080018, "UI", "..").bytes(), "test").error().reason,
+            Reason::bad_value);
+}
+
+TEST_F(InboxOnDisk, NoMessageHoldsThePatientsName) {
+  const auto refused =
+      inbox_->store(DicomBuilder().text(0x00100010, "PN", "CANARY^NAME").word(0x00280010, 0).bytes(), "test");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message.find("CANARY"), std::string::npos);
+}
+
+TEST_F(InboxOnDisk, IsOneProgramsAtATime) {
+  const auto second = Inbox::open(folder_);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().reason, Reason::cannot_write);
+  inbox_.reset();
+  EXPECT_TRUE(Inbox::open(folder_));
+}
+
+TEST_F(InboxOnDisk, HalfWrittenPicturesOfAKilledProgramAreClearedAway) {
+  inbox_.reset();
+  std::ofstream(folder_ / ".2.25.17.dcm.123.0.part") << "half";
+  inbox_ = Inbox::open(folder_).value();
+  EXPECT_FALSE(fs::exists(folder_ / ".2.25.17.dcm.123.0.part"));
+}
+
+TEST(Inbox, ThatCannotBeMadeIsRefused) {
+  EXPECT_EQ(Inbox::open("/dev/null/inbox").error().reason, Reason::cannot_write);
+}
+
+}  // namespace
+}  // namespace helicarm

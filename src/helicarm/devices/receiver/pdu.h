@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+
+/// The protocol data units of DICOM's upper layer (PS3.8, 9.3), read without trusting any length in them.
+namespace helicarm::dicom {
+
+enum class PduType : std::uint8_t {
+  associate_request = 1,
+  associate_accept = 2,
+  associate_reject = 3,
+  data = 4,
+  release_request = 5,
+  release_answer = 6,
+  abort = 7
+};
+
+inline constexpr std::size_t pdu_header_bytes = 6;
+
+/// Names this program, as PS3.7, D.3.3.2 wants it.
+inline constexpr std::string_view implementation_uid = "2.25.91283404923874650913245760233914825573";
+
+struct PduHeader {
+  std::uint8_t type;  ///< may be none of PduType
+  std::uint32_t length;
+};
+
+/// `bytes` are the first six.
+PduHeader read_pdu_header(std::string_view bytes);
+
+/// What the peer wants to send, and in which of its encodings.
+struct PresentationContext {
+  std::uint8_t id;  ///< odd
+  std::string abstract_syntax;
+  std::vector<std::string> transfer_syntaxes;
+};
+
+struct AssociationRequest {
+  std::uint16_t version = 0;
+  std::string called;  ///< titles, without padding
+  std::string calling;
+  std::string application_context;
+  std::vector<PresentationContext> contexts;
+  std::uint32_t most_pdu_bytes = 0;  ///< that the peer takes; 0: any
+};
+
+/// The body of A-ASSOCIATE-RQ. Refuses (truncated, bad_value) items that end beyond it, titles and UIDs of
+/// other characters, contexts that are even, given twice or more than 128.
+Expected<AssociationRequest> read_association_request(std::string_view body);
+
+enum class ContextResult : std::uint8_t {
+  accepted = 0,
+  abstract_syntax_unknown = 3,
+  transfer_syntaxes_unknown = 4
+};
+
+struct ContextAnswer {
+  std::uint8_t id;
+  ContextResult result;
+  std::string abstract_syntax;
+  std::string transfer_syntax;
+};
+
+struct Rejection {
+  std::uint8_t result;  ///< 1 for good, 2 for now
+  std::uint8_t source;  ///< 1 user, 2 association control, 3 presentation
+  std::uint8_t reason;
+};
+
+enum class AbortReason : std::uint8_t { unspecified = 0, unknown_pdu = 1, unexpected_pdu = 2, bad_value = 6 };
+
+/// Whole PDUs with their headers.
+std::string associate_accept(const AssociationRequest& request, const std::vector<ContextAnswer>& contexts,
+                             std::uint32_t most_pdu_bytes);
+std::string associate_reject(const Rejection& rejection);
+std::string release_answer();
+std::string abort(AbortReason reason);
+/// One command as one fragment.
+std::string command_data(std::uint8_t context, std::string_view command);
+
+/// A fragment of a command or of a data set; a view of the PDU.
+struct Fragment {
+  std::uint8_t context;
+  bool command;
+  bool last;
+  std::string_view bytes;
+};
+
+/// The body of P-DATA-TF.
+Expected<std::vector<Fragment>> read_fragments(std::string_view body);
+
+/// 1 to 64 characters: numbers without signs, joined by points.
+bool is_uid(std::string_view text);
+
+/// 1 to 16 printable characters without a backslash, not all blank.
+bool is_title(std::string_view text);
+
+}  // namespace helicarm::dicom

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/receiver.h"
+
+#include <asio/co_spawn.hpp>
+#include <asio/detached.hpp>
+#include <asio/strand.hpp>
+#include <asio/thread_pool.hpp>
+#include <asio/use_awaitable.hpp>
+#include <fmt/format.h>
+
+#include "helicarm/devices/receiver/association.h"
+
+namespace helicarm {
+namespace {
+
+using asio::ip::tcp;
+
+// Checking and writing a picture takes one of them for some milliseconds.
+constexpr std::size_t crew = 4;
+// Connections beyond the association limit are told so, but not without end.
+constexpr unsigned most_unheard = 4;
+
+asio::ssl::context tls_context(const TlsFiles& files) {
+  asio::ssl::context context(asio::ssl::context::tls_server);
+  const auto use = [](const char* what, const std::filesystem::path& file, auto&& load) {
+    asio::error_code error;
+    load(error);
+    if (error)
+      throw BadInput(Reason::bad_value, fmt::format("{} {}: {}", what, file.string(), error.message()));
+  };
+  context.set_options(asio::ssl::context::default_workarounds | asio::ssl::context::no_tlsv1 |
+                      asio::ssl::context::no_tlsv1_1);
+  context.set_verify_mode(asio::ssl::verify_peer | asio::ssl::verify_fail_if_no_peer_cert);
+  use("certificate", files.certificate,
+      [&](auto& e) { context.use_certificate_chain_file(files.certificate.string(), e); });
+  use("key", files.key,
+      [&](auto& e) { context.use_private_key_file(files.key.string(), asio::ssl::context::pem, e); });
+  use("authorities", files.authorities,
+      [&](auto& e) { context.load_verify_file(files.authorities.string(), e); });
+  return context;
+}
+
+}  // namespace
+
+struct DicomReceiver::Engine {
+  ReceiverShared shared;
+  std::optional<asio::ssl::context> tls;
+  asio::thread_pool pool{crew};
+  tcp::acceptor acceptor{pool};
+
+  Engine(const ReceiverOptions& options, Inbox& inbox, ReceiverHooks hooks)
+      : shared{options, inbox, std::move(hooks), {}, {}, {}} {}
+  ~Engine() {
+    pool.stop();
+    pool.join();
+  }
+
+  void listen() {
+    asio::error_code error;
+    const ReceiverOptions& options = shared.options;
+    const auto address = asio::ip::make_address(options.address, error);
+    if (error)
+      throw BadInput(Reason::bad_value, fmt::format("address {}: is no IP address", options.address));
+    if (options.tls) tls = tls_context(*options.tls);
+    const tcp::endpoint endpoint(address, options.port);
+    acceptor.open(endpoint.protocol());
+    acceptor.set_option(tcp::acceptor::reuse_address(true));
+    acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+    if (error)
+      throw BadInput(Reason::port_taken,
+                     fmt::format("{} port {}: {}", options.address, options.port, error.message()));
+    asio::co_spawn(pool, accept(), asio::detached);
+  }
+
+  asio::awaitable<void> accept() {
+    while (true) {
+      auto strand = asio::make_strand(pool);
+      tcp::socket socket(strand);
+      try {
+        co_await acceptor.async_accept(socket, asio::use_awaitable);
+      } catch (const asio::system_error& error) {
+        if (error.code() == asio::error::operation_aborted) co_return;
+        continue;
+      }
+      ++shared.counters.connections;
+      if (shared.open >= most_unheard * shared.options.most_associations) continue;
+      asio::co_spawn(strand, serve(std::move(socket), tls ? &*tls : nullptr, shared), asio::detached);
+    }
+  }
+};
+
+DicomReceiver::DicomReceiver(std::unique_ptr<Engine> engine) : engine_(std::move(engine)) {}
+DicomReceiver::~DicomReceiver() = default;
+
+Expected<std::unique_ptr<DicomReceiver>> DicomReceiver::open(const ReceiverOptions& options, Inbox& inbox,
+                                                             ReceiverHooks hooks) {
+  return guarded([&] {
+    auto engine = std::make_unique<Engine>(options, inbox, std::move(hooks));
+    engine->listen();
+    return std::unique_ptr<DicomReceiver>(new DicomReceiver(std::move(engine)));
+  });
+}
+
+std::uint16_t DicomReceiver::port() const { return engine_->acceptor.local_endpoint().port(); }
+const ReceiverCounters& DicomReceiver::counters() const { return engine_->shared.counters; }
+
+}  // namespace helicarm

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "helicarm/devices/receiver/inbox.h"
+#include "helicarm/devices/receiver/negotiation.h"
+
+namespace helicarm {
+
+/// PEM files. Peers must show a certificate that one of `authorities` has signed.
+struct TlsFiles {
+  std::filesystem::path certificate;
+  std::filesystem::path key;
+  std::filesystem::path authorities;
+};
+
+struct ReceiverOptions {
+  std::string address = "127.0.0.1";  ///< another one opens the receiver to the network
+  std::uint16_t port = 11112;         ///< 0: any that is free
+  dicom::NegotiationOptions negotiation;
+  std::optional<TlsFiles> tls;
+  unsigned most_associations = 32;                         ///< at once; more are rejected for now
+  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< of one picture
+  std::size_t most_bytes = std::size_t{512} << 20;         ///< of all that are on the way
+  double request_limit_s = 10;                             ///< from connection to association
+  double idle_limit_s = 30;                                ///< for each PDU
+  double object_limit_s = 120;                             ///< from a message's first byte to its last
+};
+
+/// What happened since the start.
+struct ReceiverCounters {
+  std::atomic<std::uint64_t> connections{0};
+  std::atomic<std::uint64_t> associations{0};
+  std::atomic<std::uint64_t> rejected{0};   ///< associations
+  std::atomic<std::uint64_t> aborted{0};    ///< by the peer, or by us over a breach of the protocol
+  std::atomic<std::uint64_t> timed_out{0};  ///< stalled peers that were dropped
+  std::atomic<std::uint64_t> echoed{0};
+  std::atomic<std::uint64_t> stored{0};
+  std::atomic<std::uint64_t> repeated{0};
+  std::atomic<std::uint64_t> refused{0};  ///< pictures
+};
+
+/// Called from the receiver's threads.
+struct ReceiverHooks {
+  std::function<void(const Arrival&)> arrived = [](const Arrival&) {};
+  std::function<void(const Failure&)> refused = [](const Failure&) {};
+};
+
+/// Service class provider for C-STORE and C-ECHO. A picture is acknowledged once it is safely in the inbox,
+/// else its status says why not. No peer can hold up another.
+class DicomReceiver {
+ public:
+  /// Listens when it returns. Refuses port_taken, and bad_value for an address or TLS files that are none.
+  static Expected<std::unique_ptr<DicomReceiver>> open(const ReceiverOptions& options, Inbox& inbox,
+                                                       ReceiverHooks hooks = {});
+  /// Closes all connections; a picture that is being written is finished first.
+  ~DicomReceiver();
+
+  std::uint16_t port() const;
+  const ReceiverCounters& counters() const;
+
+ private:
+  struct Engine;
+  explicit DicomReceiver(std::unique_ptr<Engine> engine);
+  std::unique_ptr<Engine> engine_;
+};
+
+}  // namespace helicarm

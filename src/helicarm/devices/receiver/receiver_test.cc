@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/receiver.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/devices/receiver/peer.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int accepted = 2, rejected = 3, data = 4, released = 6, aborted = 7, closed = 0;
+
+class Receiver : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "helicarm_receiver_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    folder_ = name;
+    inbox_ = Inbox::open(folder_).value();
+    options_.port = 0;
+    open();
+  }
+  void TearDown() override {
+    receiver_.reset();
+    fs::remove_all(folder_);
+  }
+  void open() {
+    receiver_.reset();
+    receiver_ = DicomReceiver::open(options_, *inbox_).value();
+  }
+
+  RawClient client() const { return RawClient(receiver_->port()); }
+  RawClient associated() const {
+    RawClient client(receiver_->port());
+    client.send(peer::Request().bytes());
+    EXPECT_EQ(client.receive_type(), accepted);
+    return client;
+  }
+  /// What the receiver answers to these bytes: the type of its PDU.
+  int answer_to(const std::string& bytes) const {
+    RawClient client(receiver_->port());
+    client.send(bytes);
+    return client.receive_type();
+  }
+  int answer_in_association(const std::string& bytes) const {
+    RawClient client = associated();
+    client.send(bytes);
+    return client.receive_type();
+  }
+  void expect_alive() const {
+    RawClient client = associated();
+    client.send(peer::echo());
+    EXPECT_EQ(client.receive_status(), 0);
+  }
+
+  fs::path folder_;
+  std::unique_ptr<Inbox> inbox_;
+  ReceiverOptions options_;
+  std::unique_ptr<DicomReceiver> receiver_;
+};
+
+TEST_F(Receiver, AnswersEchoAndReleases) {
+  RawClient client = associated();
+  client.send(peer::echo());
+  EXPECT_EQ(client.receive_status(), 0);
+  client.send(peer::release());
+  EXPECT_EQ(client.receive_type(), released);
+  EXPECT_EQ(client.receive_type(), closed);
+  EXPECT_EQ(receiver_->counters().echoed, 1u);
+}
+
+TEST_F(Receiver, PictureIsOnDiskWhenItIsAcknowledged) {
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder()));
+  EXPECT_EQ(client.receive_status(), 0);
+  const std::string file = read_file(folder_ / "2.25.17.dcm", 1 << 20).value();
+  EXPECT_TRUE(file.ends_with(peer::data_set(DicomBuilder())));
+  EXPECT_EQ(receiver_->counters().stored, 1u);
+}
+
+TEST_F(Receiver, PictureInManySmallFragmentsIsTheSame) {
+  RawClient client = associated();
+  const std::string command = peer::command(1, xa_class, "2.25.17"), set = peer::data_set(DicomBuilder());
+  for (const char c : command.substr(0, command.size() - 1))
+    client.send(peer::pdu(data, peer::fragment(3, 1, {c})));
+  client.send(peer::pdu(data, peer::fragment(3, 3, {command.back()})));
+  for (const char c : set) client.send(peer::pdu(data, peer::fragment(3, 0, {c})));
+  client.send(peer::pdu(data, peer::fragment(3, 2, "")));
+  EXPECT_EQ(client.receive_status(), 0);
+  EXPECT_TRUE(fs::exists(folder_ / "2.25.17.dcm"));
+}
+
+TEST_F(Receiver, RetransmissionIsAcknowledgedAndKeptOnce) {
+  RawClient client = associated();
+  for (int i = 0; i < 2; ++i) {
+    client.send(peer::store(DicomBuilder()));
+    EXPECT_EQ(client.receive_status(), 0);
+  }
+  EXPECT_EQ(receiver_->counters().repeated, 1u);
+}
+
+TEST_F(Receiver, TellsTheHookOfEachPicture) {
+  std::vector<Arrival> arrivals;
+  std::vector<Failure> failures;
+  receiver_ = DicomReceiver::open(options_, *inbox_,
+                                  {[&](const Arrival& a) { arrivals.push_back(a); },
+                                   [&](const Failure& f) { failures.push_back(f); }})
+                  .value();
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder()));
+  client.receive_status();
+  client.send(peer::store(DicomBuilder().word(0x00280010, 0)));
+  client.receive_status();
+  ASSERT_EQ(arrivals.size(), 1u);
+  ASSERT_EQ(failures.size(), 1u);
+  EXPECT_EQ(arrivals[0].path.filename(), "2.25.17.dcm");
+}
+
+TEST_F(Receiver, BadPictureIsRefusedWithAStatusAndTheAssociationGoesOn) {
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder().word(0x00280010, 65535)));
+  EXPECT_EQ(client.receive_status(), 0xC000);
+  client.send(peer::store(DicomBuilder()));
+  EXPECT_EQ(client.receive_status(), 0);
+}
+
+TEST_F(Receiver, UidsOfCommandAndDataThatDifferAreRefused) {
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder(), "2.25.18"));
+  EXPECT_EQ(client.receive_status(), 0xA900);
+}
+
+TEST_F(Receiver, ClassThatWasNotAgreedOnIsRefused) {
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder(), "2.25.17", "1.2.840.10008.5.1.4.1.1.2"));
+  EXPECT_EQ(client.receive_status(), 0x0122);
+}
+
+TEST_F(Receiver, UnknownOperationIsRefused) {
+  RawClient client = associated();
+  client.send(peer::pdu(data, peer::fragment(1, 3, peer::command(0x20, verification_class))));
+  EXPECT_EQ(client.receive_status(), 0x0211);
+}
+
+TEST_F(Receiver, FullDiskIsOutOfResources) {
+  fs::permissions(folder_, fs::perms::owner_read | fs::perms::owner_exec);
+  if (!write_file(folder_ / "probe", "")) {
+    RawClient client = associated();
+    client.send(peer::store(DicomBuilder()));
+    EXPECT_EQ(client.receive_status(), 0xA700);
+  } else {
+    // Root writes everywhere: a folder that is gone does as well.
+    fs::remove_all(folder_);
+    std::error_code ec;
+    fs::create_symlink("/dev/null", folder_, ec);
+    RawClient client = associated();
+    client.send(peer::store(DicomBuilder()));
+    EXPECT_EQ(client.receive_status(), 0xA700);
+  }
+  fs::remove(folder_);
+}
+
+TEST_F(Receiver, WrongTitlesAreRejected) {
+  peer::Request request;
+  request.called = peer::padded("ANOTHER");
+  EXPECT_EQ(answer_to(request.bytes()), rejected);
+  options_.negotiation.peers = {"SOMEBODY"};
+  open();
+  EXPECT_EQ(answer_to(peer::Request().bytes()), rejected);
+}
+
+TEST_F(Receiver, StrangersToTheProtocolAreSentAway) {
+  EXPECT_EQ(answer_to("GET / HTTP/1.1\r\nHost: here\r\n\r\n"), aborted);
+  EXPECT_EQ(answer_to(std::string("\x16\3\1\2\0\1\0\1\xfc\3\3", 11)), aborted);  // TLS
+  EXPECT_EQ(answer_to(peer::pdu(0x99, "abcd")), aborted);
+  EXPECT_EQ(answer_to(peer::echo()), aborted);                            // before associating
+  EXPECT_EQ(answer_to(std::string("\1\0\xFF\xFF\xFF\xFF", 6)), aborted);  // 4 GB
+  EXPECT_EQ(answer_to(peer::pdu(1, "")), aborted);
+  EXPECT_EQ(answer_to(peer::pdu(1, peer::Request().body().substr(0, 90))), aborted);
+  expect_alive();
+}
+
+TEST_F(Receiver, BreachesWithinAnAssociationAbortIt) {
+  EXPECT_EQ(answer_in_association(peer::Request().bytes()), aborted);
+  EXPECT_EQ(answer_in_association(std::string("\4\0\x7F\xFF\xFF\xFF", 6)), aborted);
+  EXPECT_EQ(answer_in_association(peer::pdu(data, std::string("\0\0\0\x40\1\3", 6))), aborted);
+  EXPECT_EQ(answer_in_association(peer::pdu(data, peer::fragment(99, 3, "abc"))), aborted);
+  EXPECT_EQ(answer_in_association(peer::pdu(data, peer::fragment(3, 2, "data first"))), aborted);
+  EXPECT_EQ(answer_in_association(peer::pdu(data, peer::fragment(3, 3, "no command"))), aborted);
+  expect_alive();
+}
+
+TEST_F(Receiver, AbortInMidPictureLeavesNothing) {
+  RawClient client = associated();
+  client.send(peer::pdu(data, peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17"))));
+  client.send(peer::pdu(data, peer::fragment(3, 0, peer::data_set(DicomBuilder()).substr(0, 100))));
+  client.send(peer::pdu(aborted, std::string(4, '\0')));
+  EXPECT_EQ(client.receive_type(), closed);
+  EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
+}
+
+TEST_F(Receiver, PictureBeyondTheLimitAbortsTheAssociation) {
+  options_.most_object_bytes = 100;
+  open();
+  RawClient client = associated();
+  client.send(peer::store(DicomBuilder()));
+  EXPECT_EQ(client.receive_type(), aborted);
+  EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
+}
+
+TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
+  options_.request_limit_s = options_.idle_limit_s = 0.3;
+  open();
+  RawClient silent = client(), half = client(), idle = associated();
+  half.send(peer::Request().bytes().substr(0, 20));
+  expect_alive();
+  EXPECT_EQ(silent.receive_type(), closed);
+  EXPECT_EQ(half.receive_type(), closed);
+  EXPECT_EQ(idle.receive_type(), closed);
+  expect_alive();
+}
+
+TEST_F(Receiver, TooManyAssociationsAreRejectedForNow) {
+  options_.most_associations = 2;
+  open();
+  RawClient first = associated(), second = associated(), third = client();
+  third.send(peer::Request().bytes());
+  const auto [type, body] = third.receive();
+  EXPECT_EQ(type, rejected);
+  EXPECT_EQ(body, std::string("\0\2\3\2", 4));
+  first.send(peer::release());
+  first.receive_type();
+  EXPECT_EQ(first.receive_type(), closed);
+  RawClient fourth = client();
+  fourth.send(peer::Request().bytes());
+  EXPECT_EQ(fourth.receive_type(), accepted);
+}
+
+TEST_F(Receiver, PortThatIsTakenIsToldClearly) {
+  ReceiverOptions same = options_;
+  same.port = receiver_->port();
+  const auto second = DicomReceiver::open(same, *inbox_);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().reason, Reason::port_taken);
+  EXPECT_NE(second.error().message.find(std::to_string(same.port)), std::string::npos);
+}
+
+TEST_F(Receiver, AddressAndTlsFilesThatAreNoneAreToldClearly) {
+  ReceiverOptions bad = options_;
+  bad.address = "knee";
+  EXPECT_EQ(DicomReceiver::open(bad, *inbox_).error().reason, Reason::bad_value);
+  bad = options_;
+  bad.tls = TlsFiles{"/nowhere/cert.pem", "/nowhere/key.pem", "/nowhere/ca.pem"};
+  EXPECT_EQ(DicomReceiver::open(bad, *inbox_).error().reason, Reason::bad_value);
+}
+
+TEST_F(Receiver, ClosesAtOnceWithPeersConnected) {
+  RawClient idle = associated(), silent = client();
+  receiver_.reset();
+  EXPECT_EQ(idle.receive_type(), closed);
+}
+
+}  // namespace
+}  // namespace helicarm
