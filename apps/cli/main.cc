@@ -5,10 +5,9 @@
 #include <string>
 #include <string_view>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "command.h"
+#include "command_line.h"
 #include "demo_command.h"
 #include "detect_command.h"
 #include "helicarm/core/json.h"
@@ -28,36 +27,6 @@ namespace helicarm::cli {
 namespace {
 
 constexpr int internal_error = 1;
-
-/// The chosen command with its arguments; set while the command line is parsed.
-using Action = std::function<CommandResult(Console&)>;
-
-CLI::App* add_command(CLI::App& app, const char* name, const char* what, const char* example) {
-  CLI::App* command = app.add_subcommand(name, what);
-  command->footer(std::string("Example:\n  ") + example);
-  return command;
-}
-
-/// A number within bounds that the message names. CLI11's own checks let NaN pass.
-CLI::Validator within(double low, double high) {
-  const std::string bounds = fmt::format("{:g} to {:g}", low, high);
-  const auto check = [=](const std::string& word) -> std::string {
-    double value = 0;
-    const bool good = CLI::detail::lexical_cast(word, value) && value >= low && value <= high;
-    return good ? std::string{} : fmt::format("{} is not a number of {}", word, bounds);
-  };
-  return {check, bounds};
-}
-
-/// A command whose arguments live as long as its callback.
-template <class Arguments>
-Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(const Arguments&, Console&)) {
-  auto arguments = std::make_shared<Arguments>();
-  command->callback([arguments, run, &action] {
-    action = [arguments, run](Console& console) { return run(*arguments, console); };
-  });
-  return *arguments;
-}
 
 void add_run(CLI::App& app, Action& action) {
   auto* command =
@@ -294,6 +263,7 @@ int run(int argc, char** argv) {
   for (const auto add : {add_demo, add_run, add_predict, add_study, add_solve, add_locate, add_rectify,
                          add_detect, add_import, add_simulate, add_phantom})
     add(app, action);
+  add_device_commands(app, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& wish) {

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "receive_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
+#include "helicarm/devices/receiver/watched_folder.h"
+#include "helicarm/navigation/result.h"
+#include "stop_signal.h"
+
+namespace helicarm::cli {
+namespace {
+
+/// Tells the console of pictures as they come, from whatever thread.
+class Tale {
+ public:
+  Tale(Console& console, std::optional<std::uint64_t> count, StopSignal& stop)
+      : console_(console), left_(count), stop_(stop) {}
+
+  ReceiverHooks hooks() {
+    return {[this](const Arrival& arrival) { tell(arrival); }, [this](const Failure& f) { tell(f); }};
+  }
+
+ private:
+  void tell(const Arrival& arrival) {
+    const std::lock_guard lock(mutex_);
+    if (console_.json) {
+      Json warnings = Json::array();
+      for (const Warning& warning : arrival.warnings) warnings.push_back(to_json(warning));
+      console_.out << Json{{"file", arrival.path.string()},
+                           {"digest", arrival.digest},
+                           {"repeated", arrival.repeated},
+                           {"warnings", std::move(warnings)}}
+                          .dump()
+                   << std::endl;
+    } else {
+      console_.out << arrival.path.string() << (arrival.repeated ? " (again)" : "") << std::endl;
+      for (const Warning& warning : arrival.warnings)
+        console_.progress << code(warning.reason) << ": " << warning.message << std::endl;
+    }
+    if (left_ && --*left_ == 0) stop_.raise();
+  }
+  void tell(const Failure& failure) {
+    const std::lock_guard lock(mutex_);
+    console_.progress << fmt::format("refused: {}: {}\n", code(failure.reason),
+                                     without_control_characters(failure.message))
+                      << std::flush;
+  }
+
+  Console& console_;
+  std::optional<std::uint64_t> left_;
+  StopSignal& stop_;
+  std::mutex mutex_;
+};
+
+void check_titles(const dicom::NegotiationOptions& options) {
+  const auto check = [](const char* option, const std::string& title) {
+    if (!dicom::is_title(title))
+      throw BadInput(Reason::usage,
+                     fmt::format("{}: \"{}\" is no title: 1 to 16 printable characters, no backslash", option,
+                                 without_control_characters(title)));
+  };
+  check("--title", options.title);
+  for (const std::string& peer : options.peers) check("--peer", peer);
+}
+
+}  // namespace
+
+CommandResult receive_command(const ReceiveArguments& arguments, Console& console) {
+  return guarded([&] {
+    ReceiverOptions options = arguments.receiver;
+    check_titles(options.negotiation);
+    if (!arguments.certificate.empty())
+      options.tls = TlsFiles{arguments.certificate, arguments.key, arguments.authorities};
+    StopSignal stop;
+    Tale tale(console, arguments.count, stop);
+    const auto inbox = value_or_throw(Inbox::open(arguments.out));
+    std::unique_ptr<DicomReceiver> receiver;
+    std::optional<WatchedFolder> watched;
+    if (arguments.watch.empty()) {
+      receiver = value_or_throw(DicomReceiver::open(options, *inbox, tale.hooks()));
+      if (!console.quiet)
+        console.progress << fmt::format("{} listens on {} port {}{}; Ctrl-C ends\n",
+                                        options.negotiation.title, options.address, receiver->port(),
+                                        options.tls ? ", TLS" : "")
+                         << std::flush;
+    } else {
+      if (!std::filesystem::is_directory(arguments.watch))
+        throw BadInput(Reason::missing_file,
+                       fmt::format("--watch: {}: no such folder", arguments.watch.string()));
+      watched.emplace(arguments.watch, *inbox, tale.hooks());
+    }
+    stop.wait(arguments.seconds);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "command.h"
+#include "helicarm/devices/receiver/receiver.h"
+
+namespace helicarm::cli {
+
+struct ReceiveArguments {
+  std::filesystem::path out = "inbox";
+  ReceiverOptions receiver;
+  std::filesystem::path certificate, key, authorities;  ///< all or none
+  std::filesystem::path watch;                          ///< empty: listen
+  std::optional<std::uint64_t> count;
+  std::optional<double> seconds;
+};
+
+/// Prints one line (or one line of JSON) for each picture until it is told to end.
+CommandResult receive_command(const ReceiveArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

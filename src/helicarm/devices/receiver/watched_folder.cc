@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/watched_folder.h"
+
+#include "helicarm/core/files.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
+
+}  // namespace
+
+std::vector<fs::path> FolderLook::at_rest() {
+  std::vector<fs::path> resting;
+  std::map<fs::path, Trace> now;
+  std::error_code ec;
+  for (fs::directory_iterator entry(folder_, ec), end; !ec && entry != end; entry.increment(ec)) {
+    std::error_code gone;
+    if (entry->path().filename().string().starts_with('.') || entry->is_symlink(gone) ||
+        !entry->is_regular_file(gone))
+      continue;
+    Trace trace{entry->file_size(gone), entry->last_write_time(gone)};
+    if (gone) continue;
+    const auto before = traces_.find(entry->path());
+    if (before != traces_.end() && before->second.size == trace.size &&
+        before->second.written == trace.written) {
+      if (!before->second.taken) resting.push_back(entry->path());
+      trace.taken = true;
+    }
+    now[entry->path()] = trace;
+  }
+  if (!ec) traces_ = std::move(now);
+  return resting;
+}
+
+WatchedFolder::WatchedFolder(fs::path folder, Inbox& inbox, ReceiverHooks hooks,
+                             std::chrono::milliseconds pause)
+    : look_(std::move(folder)),
+      inbox_(inbox),
+      hooks_(std::move(hooks)),
+      pause_(pause),
+      thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+void WatchedFolder::watch(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    for (const fs::path& path : look_.at_rest()) {
+      const std::string origin = path.filename().string();
+      const auto arrival = read_file(path, most_file_bytes).and_then([&](const std::string& file) {
+        return inbox_.store(file, origin);
+      });
+      if (arrival)
+        hooks_.arrived(*arrival);
+      else
+        hooks_.refused(arrival.error());
+    }
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, stop, pause_, [] { return false; });
+  }
+}
+
+}  // namespace helicarm

@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Sends X-rays to `helicarm receive` with programs that are not ours: DCMTK's echoscu and storescu (package dcmtk).
+
+    tools/drill_receiver.py [--build build] [--kills 200]
+
+Plain and TLS, wrong titles, strangers' certificates, twenty senders at once, an abort, SIGTERM, and SIGKILL at random
+instants: after each restart every acknowledged picture must be there, whole. Exits 1 when anything differs.
+"""
+
+import argparse
+import contextlib
+import pathlib
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+failures = []
+
+
+def check(name, good):
+    print(f"{'ok  ' if good else 'FAIL'} {name}", flush=True)
+    if not good:
+        failures.append(name)
+
+
+class Receiver:
+    def __init__(self, program, inbox, *options):
+        self.process = subprocess.Popen([program, "receive", "--out", inbox, "--port", "0", *options],
+                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.port = self.process.stderr.readline().split("port ")[1].split()[0].rstrip(",;")
+
+    def stop(self):
+        begin = time.monotonic()
+        self.process.send_signal(signal.SIGTERM)
+        code = self.process.wait(10)
+        self.process.stderr.close()
+        return code, time.monotonic() - begin
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stderr.close()
+
+
+@contextlib.contextmanager
+def receiving(program, inbox, *options):
+    receiver = Receiver(program, inbox, *options)
+    try:
+        yield receiver
+    finally:
+        receiver.stop()
+
+
+def dcmtk(tool, port, *words, called="HELICARM"):
+    return subprocess.run([tool, "-aec", called, "-to", "10", *words[:-1], "127.0.0.1", port,
+                           *([words[-1]] if tool == "storescu" else [])],
+                          stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
+
+
+def echo(port, *words, called="HELICARM"):
+    return dcmtk("echoscu", port, *words, "", called=called)
+
+
+def store(port, picture, *words, called="HELICARM"):
+    return dcmtk("storescu", port, *words, str(picture), called=called)
+
+
+def make_pictures(program, folder, count):
+    pictures = []
+    for seed in range(1, count // 2 + 1):
+        case = folder / f"case{seed}"
+        subprocess.run([program, "simulate", case, "--seed", str(seed), "--size", "512", "--quiet"], check=True)
+        pictures += [case / "AP.dcm", case / "LAT.dcm"]
+    return pictures
+
+
+def certificates(folder):
+    def openssl(*words):
+        subprocess.run(["openssl", *words], check=True, cwd=folder, stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
+
+    for authority in ("ca", "other"):
+        openssl("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{authority}.key", "-out",
+                f"{authority}.pem", "-days", "2", "-subj", f"/CN={authority}")
+    for name, authority in (("server", "ca"), ("client", "ca"), ("stranger", "other")):
+        openssl("req", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj",
+                f"/CN={name}")
+        openssl("x509", "-req", "-in", f"{name}.csr", "-CA", f"{authority}.pem", "-CAkey", f"{authority}.key",
+                "-CAcreateserial", "-out", f"{name}.pem", "-days", "2")
+
+
+def drill_plain(program, folder, pictures):
+    with receiving(program, folder / "plain", "--peer", "STORESCU", "--peer", "ECHOSCU") as receiver:
+        check("echo", echo(receiver.port))
+        check("store", store(receiver.port, pictures[0]))
+        check("store again", store(receiver.port, pictures[0]))
+        check("one file of it", len(list((folder / "plain").glob("*.dcm"))) == 1)
+        check("wrong called title is rejected", not echo(receiver.port, called="OTHER"))
+        check("unknown calling title is rejected", not echo(receiver.port, "-aet", "STRANGER"))
+        store(receiver.port, pictures[1], "--abort")
+        check("alive after an abort", echo(receiver.port))
+        senders = [subprocess.Popen(["storescu", "-aec", "HELICARM", "127.0.0.1", receiver.port, picture],
+                                    stderr=subprocess.DEVNULL) for picture in pictures[:20]]
+        check("twenty senders at once", all(sender.wait(60) == 0 for sender in senders))
+        check("all their pictures", len(list((folder / "plain").glob("*.dcm"))) == len(pictures[:20]))
+
+
+def drill_tls(program, folder, picture):
+    certificates(folder)
+
+    def tls(name, authority="ca"):
+        return ["+tls", str(folder / f"{name}.key"), str(folder / f"{name}.pem"), "+cf", str(folder / f"{authority}.pem")]
+
+    options = ["--tls-certificate", folder / "server.pem", "--tls-key", folder / "server.key", "--tls-authorities",
+               folder / "ca.pem"]
+    with receiving(program, folder / "tls", *options) as receiver:
+        check("TLS echo", echo(receiver.port, *tls("client")))
+        check("TLS store", store(receiver.port, picture, *tls("client")))
+        check("certificate of another authority is refused", not echo(receiver.port, *tls("stranger")))
+        check("no certificate is refused", not echo(receiver.port, "+tla", "+cf", str(folder / "ca.pem")))
+        check("plain talk is refused", not echo(receiver.port))
+        check("TLS still answers", echo(receiver.port, *tls("client")))
+
+
+def drill_stop(program, folder):
+    receiver = Receiver(program, folder / "stop")
+    code, seconds = receiver.stop()
+    check(f"SIGTERM ends it in {seconds * 1000:.0f} ms with code {code}", code == 0 and seconds < 1)
+    with receiving(program, folder / "stop") as receiver:
+        second = subprocess.run([program, "receive", "--out", folder / "stop2", "--port", receiver.port],
+                                capture_output=True, text=True)
+        check("a port that is taken: " + second.stderr.strip(), second.returncode == 2 and "port_taken" in second.stderr)
+
+
+def drill_kills(program, folder, pictures, kills):
+    inbox = folder / "kills"
+    acknowledged, lost, torn = {}, 0, 0
+    draw = random.Random(1)
+    for _ in range(kills):
+        for file in inbox.glob("*.dcm") if inbox.exists() else []:
+            file.unlink()
+        receiver = Receiver(program, inbox)
+        sender = subprocess.Popen(["storescu", "-v", "-aec", "HELICARM", "127.0.0.1", receiver.port, *pictures],
+                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        time.sleep(draw.uniform(0.01, 0.25))
+        receiver.kill()
+        heard, _ = sender.communicate(timeout=60)
+        count = heard.count("Received Store Response (Success)")
+        acknowledged[count] = acknowledged.get(count, 0) + 1
+        whole = 0
+        for file in inbox.glob("*.dcm"):
+            detected = subprocess.run(["dcmdump", "-q", "+P", "SOPInstanceUID", file], capture_output=True)
+            whole += detected.returncode == 0 and file.stat().st_size > 512 * 512 * 2
+            torn += file.stat().st_size <= 512 * 512 * 2
+        lost += whole < count
+    print(f"     acknowledged before the kill: {dict(sorted(acknowledged.items()))}")
+    check(f"{kills} kills: nothing acknowledged is lost ({lost}), nothing is half ({torn})", lost == 0 and torn == 0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
+    parser.add_argument("--kills", default=200, type=int)
+    arguments = parser.parse_args()
+    program = arguments.build / "bin" / "helicarm"
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        pictures = make_pictures(program, folder, 20)
+        drill_plain(program, folder, pictures)
+        drill_tls(program, folder, pictures[0])
+        drill_stop(program, folder)
+        drill_kills(program, folder, pictures, arguments.kills)
+    print(f"{len(failures)} failures")
+    sys.exit(1 if failures else 0)
+
+
+if __name__ == "__main__":
+    main()
