@@ -27,6 +27,7 @@ ROOMS = {
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
     "simulation": "core geometry image phantom xray",
     "devices": "core geometry image xray",
+    "session": "core",
     "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                   " verification simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"

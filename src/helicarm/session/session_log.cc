@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/session/session_log.h"
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <openssl/evp.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::string_view format_name = "helicarm-session/1";
+constexpr std::size_t chain_digits = 64;  // SHA-256
+constexpr std::uintmax_t most_log_bytes = std::uintmax_t{1} << 30;
+
+std::string link(std::string_view chain, std::string_view text) {
+  const std::string both = std::string(chain) + std::string(text);
+  std::array<unsigned char, chain_digits / 2> hash{};
+  if (EVP_Digest(both.data(), both.size(), hash.data(), nullptr, EVP_sha256(), nullptr) != 1)
+    throw std::runtime_error("SHA-256 is not to be had");
+  return fmt::format("{:02x}", fmt::join(hash, ""));
+}
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+SessionRecord record_of(const Json& json) {
+  return {json.at("n").get<std::uint64_t>(), json.at("time_s").get<double>(),
+          json.at("kind").get<std::string>(), json.at("content")};
+}
+
+struct Progress {
+  SessionHistory history;
+  std::string chain;
+};
+
+Progress read(const fs::path& log, std::string_view bytes) {
+  Progress progress;
+  std::size_t& at = progress.history.whole_bytes;
+  while (at < bytes.size()) {
+    const std::size_t end = bytes.find('\n', at);
+    if (end == std::string_view::npos) {
+      progress.history.torn = true;
+      break;
+    }
+    const std::string_view line = bytes.substr(at, end - at);
+    const std::uint64_t number = progress.history.records.size();
+    const auto refuse = [&](Reason reason, std::string_view problem) {
+      throw BadInput(reason, fmt::format("{}: line {}: {}", log.string(), number + 1, problem));
+    };
+    if (line.size() < chain_digits + 1 || line[chain_digits] != ' ')
+      refuse(Reason::bad_value, "is no record");
+    const std::string_view text = line.substr(chain_digits + 1);
+    progress.chain = link(progress.chain, text);
+    if (line.substr(0, chain_digits) != progress.chain)
+      refuse(Reason::bad_value, "its checksum does not fit: it or an earlier line was changed");
+    try {
+      progress.history.records.push_back(record_of(Json::parse(text)));
+    } catch (const nlohmann::json::exception&) {
+      refuse(Reason::bad_value, "is no record");
+    }
+    const SessionRecord& record = progress.history.records.back();
+    if (record.number != number) refuse(Reason::bad_value, "its number is wrong");
+    if (number == 0 && (record.kind != "session" || record.content.value("format", "") != format_name))
+      refuse(Reason::unsupported, fmt::format("is not the beginning of a {} log", format_name));
+    at = end + 1;
+  }
+  return progress;
+}
+
+}  // namespace
+
+Expected<SessionHistory> read_session(const fs::path& log) {
+  return guarded([&] { return read(log, value_or_throw(read_file(log, most_log_bytes))).history; });
+}
+
+Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
+  return guarded([&] {
+    std::error_code ec;
+    if (log.has_parent_path()) fs::create_directories(log.parent_path(), ec);
+    const int file = ::open(log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    if (file < 0)
+      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), std::strerror(errno)));
+    std::unique_ptr<SessionLog> session(new SessionLog(log, file));
+    if (::flock(file, LOCK_EX | LOCK_NB) != 0)
+      throw BadInput(Reason::cannot_write, fmt::format("{}: another program writes it", log.string()));
+    Progress progress = read(log, value_or_throw(read_file(log, most_log_bytes)));
+    session->history_ = std::move(progress.history);
+    session->chain_ = std::move(progress.chain);
+    session->next_ = session->history_.records.size();
+    session->size_ = session->history_.whole_bytes;
+    if (session->history_.torn && ::ftruncate(file, static_cast<off_t>(session->size_)) != 0)
+      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), std::strerror(errno)));
+    if (session->next_ == 0)
+      value_or_throw(session->append("session", {{"format", format_name}, {"version", HELICARM_VERSION}}));
+    return session;
+  });
+}
+
+SessionLog::~SessionLog() { ::close(file_); }
+
+Expected<void> SessionLog::append(const std::string& kind, Json content) {
+  const std::lock_guard lock(mutex_);
+  const std::string text =
+      Json{{"n", next_}, {"time_s", now_s()}, {"kind", kind}, {"content", std::move(content)}}.dump(
+          -1, ' ', false, Json::error_handler_t::replace);
+  std::string chain = link(chain_, text);
+  const std::string line = chain + ' ' + text + '\n';
+  const ssize_t written = ::write(file_, line.data(), line.size());
+  if (written != static_cast<ssize_t>(line.size()) || ::fdatasync(file_) != 0) {
+    const int error = written < 0 ? errno : ENOSPC;
+    [[maybe_unused]] const int cut = ::ftruncate(file_, static_cast<off_t>(size_));
+    return fail(Reason::cannot_write, fmt::format("{}: {}", log_.string(), std::strerror(error)));
+  }
+  chain_ = std::move(chain);
+  size_ += line.size();
+  ++next_;
+  return {};
+}
+
+}  // namespace helicarm

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/session/session_log.h"
+
+#include <csignal>
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "helicarm/core/files.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Session : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "helicarm_session_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    log_ = fs::path(name) / "session.log";
+  }
+  void TearDown() override { fs::remove_all(log_.parent_path()); }
+  std::string bytes() const { return read_file(log_, 1 << 20).value(); }
+  void overwrite(const std::string& content) const { std::ofstream(log_, std::ios::binary) << content; }
+  void write_three() const {
+    const auto session = SessionLog::open(log_).value();
+    EXPECT_TRUE(session->append("pose", {{"of", "femur"}, {"x_mm", 1.25}}));
+    EXPECT_TRUE(session->append("order", {{"text", "two\nlines"}}));
+  }
+
+  fs::path log_;
+};
+
+TEST_F(Session, WhatIsAppendedIsRead) {
+  write_three();
+  const SessionHistory history = read_session(log_).value();
+  ASSERT_EQ(history.records.size(), 3u);
+  EXPECT_EQ(history.records[0].kind, "session");
+  EXPECT_EQ(history.records[1].content.at("x_mm"), 1.25);
+  EXPECT_EQ(history.records[2].content.at("text"), "two\nlines");
+  EXPECT_EQ(history.records[2].number, 2u);
+  EXPECT_FALSE(history.torn);
+}
+
+TEST_F(Session, GoesOnWhereItEnded) {
+  write_three();
+  const auto session = SessionLog::open(log_).value();
+  EXPECT_EQ(session->history().records.size(), 3u);
+  EXPECT_TRUE(session->append("result", {}));
+  EXPECT_EQ(read_session(log_).value().records.back().number, 3u);
+}
+
+TEST_F(Session, CutAtAnyByteKeepsEveryWholeRecord) {
+  write_three();
+  const std::string whole = bytes();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    overwrite(whole.substr(0, size));
+    const auto lines = std::size_t(std::count(whole.begin(), whole.begin() + std::ptrdiff_t(size), '\n'));
+    const SessionHistory history = read_session(log_).value();
+    EXPECT_EQ(history.records.size(), lines) << size;
+    EXPECT_EQ(history.torn, size > 0 && whole[size - 1] != '\n') << size;
+    if (size % 16 != 0) continue;  // syncing takes its time
+    const auto session = SessionLog::open(log_).value();
+    EXPECT_TRUE(session->append("more", {}));
+    EXPECT_EQ(read_session(log_).value().records.size(), std::max<std::size_t>(lines, 1) + 1) << size;
+  }
+}
+
+TEST_F(Session, EveryChangedByteIsSeen) {
+  write_three();
+  const std::string whole = bytes();
+  for (std::size_t at = 0; at + 1 < whole.size(); ++at) {
+    std::string changed = whole;
+    changed[at] = static_cast<char>(changed[at] ^ 1);
+    overwrite(changed);
+    const auto history = read_session(log_);
+    EXPECT_FALSE(history && history->records.size() == 3 && !history->torn) << at;
+  }
+}
+
+TEST_F(Session, LineThatWasTakenOutIsSeen) {
+  write_three();
+  const std::string whole = bytes();
+  const std::size_t first = whole.find('\n') + 1, second = whole.find('\n', first) + 1;
+  overwrite(whole.substr(0, first) + whole.substr(second));
+  const auto history = read_session(log_);
+  ASSERT_FALSE(history);
+  EXPECT_EQ(history.error().reason, Reason::bad_value);
+  EXPECT_NE(history.error().message.find("line 2"), std::string::npos);
+}
+
+TEST_F(Session, AnotherFormatIsRefused) {
+  overwrite("hello\n");
+  EXPECT_EQ(read_session(log_).error().reason, Reason::bad_value);
+  EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::bad_value);
+  EXPECT_EQ(bytes(), "hello\n");
+}
+
+TEST_F(Session, IsOneProgramsAtATime) {
+  const auto first = SessionLog::open(log_).value();
+  EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::cannot_write);
+}
+
+TEST_F(Session, FullDiskIsToldAndLeavesTheLogWhole) {
+  const auto session = SessionLog::open(log_).value();
+  const auto before = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old{};
+  getrlimit(RLIMIT_FSIZE, &old);
+  const rlimit tight{fs::file_size(log_) + 20, old.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &tight);
+  const auto appended = session->append("pose", {{"x_mm", 1}});
+  setrlimit(RLIMIT_FSIZE, &old);
+  std::signal(SIGXFSZ, before);
+  ASSERT_FALSE(appended);
+  EXPECT_EQ(appended.error().reason, Reason::cannot_write);
+  EXPECT_TRUE(session->append("pose", {{"x_mm", 2}}));
+  const SessionHistory history = read_session(log_).value();
+  ASSERT_EQ(history.records.size(), 2u);
+  EXPECT_EQ(history.records[1].content.at("x_mm"), 2);
+}
+
+TEST_F(Session, FolderThatCannotBeMadeIsTold) {
+  EXPECT_EQ(SessionLog::open("/dev/null/session.log").error().reason, Reason::cannot_write);
+}
+
+}  // namespace
+}  // namespace helicarm
