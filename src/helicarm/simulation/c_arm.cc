@@ -7,6 +7,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom/conical_helix.h"
+#include "helicarm/simulation/random_pose.h"
 #include "helicarm/simulation/streams.h"
 
 namespace helicarm::simulation {
@@ -15,8 +16,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double radian = EIGEN_PI / 180;
 
 Matrix3d turn(double degrees, const Vector3d& axis) {
   return Eigen::AngleAxisd(degrees * radian, axis).toRotationMatrix();

@@ -6,6 +6,8 @@
 
 namespace helicarm::simulation {
 
+inline constexpr double radian = EIGEN_PI / 180;
+
 /// A rotation of normal spread (deg) and a shift of normal spread (mm) per axis.
 RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm);
 

@@ -93,6 +93,13 @@ Json navigation_json(const SimulatedCase& simulated) {
   Json json;
   for (const auto& [frame, pose] : truth.tracker_from)
     json["poses"]["tracker_from_" + frame] = matrix_json(pose.matrix());
+  const TrackerModel tracker = room_tracker();
+  json["tracker"] = {{"marker_sigma_mm", vector_json(tracker.marker_sigma_mm)},
+                     {"drift_sigma_mm", vector_json(tracker.drift_sigma_mm)},
+                     {"samples_per_reading", samples_per_reading},
+                     {"rate_hz", tracker_rate_hz}};
+  for (const auto& [frame, covariance] : truth.covariance)
+    json["tracker"]["covariance"]["tracker_from_" + frame] = matrix_json(covariance);
   for (const TunnelPoint& point : truth.points)
     json["points"].push_back({{"name", point.name},
                               {"bone", point.bone},
