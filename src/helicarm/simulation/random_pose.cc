@@ -23,4 +23,10 @@ Eigen::Matrix3d random_rotation(RandomStream& random) {
   return Eigen::Quaterniond(q.normalized()).toRotationMatrix();
 }
 
+Eigen::Vector2d in_disc(RandomStream& random, double radius) {
+  const double r = radius * std::sqrt(random.uniform());
+  const double angle = random.uniform(0, 2 * EIGEN_PI);
+  return {r * std::cos(angle), r * std::sin(angle)};
+}
+
 }  // namespace helicarm::simulation

@@ -14,4 +14,7 @@ RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigm
 /// A rotation drawn evenly from all.
 Eigen::Matrix3d random_rotation(RandomStream& random);
 
+/// Even over a disc.
+Eigen::Vector2d in_disc(RandomStream& random, double radius);
+
 }  // namespace helicarm::simulation
