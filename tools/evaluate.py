@@ -7,7 +7,8 @@
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
 points (T1, T2, ...) from their true places; of the tunnels' balls FS, FE, TS, TE where there are no such points or the
-case's name begins with n."""
+case's name begins with n. Folders of kind grid have a table of their own: the crossings' distance from the ideal grid,
+raw and rectified by the plate's own picture."""
 import argparse
 import json
 import math
@@ -119,6 +120,28 @@ def evaluate(helicarm, cases, method):
     return lines, groups
 
 
+def evaluate_grids(helicarm, grids):
+    """Rows of the grid pictures: distance of the crossings from the ideal grid, raw and rectified (Eq. 15)."""
+    yield "| grid | picture | crossings | raw px mean | raw px max | rectified px mean | rectified px max |"
+    yield "| --- | --- | --- | --- | --- | --- | --- |"
+    call = lambda *arguments: subprocess.run([helicarm, "rectify", *map(str, arguments)],  # noqa: E731
+                                             capture_output=True, text=True)
+    for grid in grids:
+        with tempfile.TemporaryDirectory() as out:
+            done = call(grid / "PLATE.dcm", "--plate", grid / "plate.json", "--out", out, "--quiet")
+            for view in json.loads((grid / "truth.json").read_text())["views"][1:]:
+                name = view["name"]
+                if done.returncode == 0:
+                    told = call(grid / f"{name}.dcm", "--map", Path(out) / "map.json", "--test-grid", "20", "--json")
+                if done.returncode or told.returncode:
+                    yield f"| {grid.name} | {name} | refused: {(done if done.returncode else told).stderr.strip()} | | | | |"
+                    continue
+                answer = json.loads(told.stdout)
+                raw, rectified = answer["raw"], answer["rectified"]
+                yield (f"| {grid.name} | {name} | {answer['n']} | {raw['mean_px']:.3f} | {raw['max_px']:.3f} | "
+                       f"{rectified['mean_px']:.3f} | {rectified['max_px']:.3f} |")
+
+
 GROUP_HEAD = ["| method | group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | in 95 % ellipsoid |",
               "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
 
@@ -153,8 +176,14 @@ def main():
         if options.simulate:
             simulate(options.helicarm, folder, options.simulate)
         cases = sorted(p.parent for p in folder.glob("*/case.json") if (p.parent / "truth.json").exists())
+        grids = sorted(p.parent for p in folder.glob("*/GRID*.dcm") if (p.parent / "truth.json").exists())
+        grids = list(dict.fromkeys(grids))
+        if grids:
+            print("", *evaluate_grids(options.helicarm, grids), sep="\n")
+        if not cases and grids:
+            return
         if not cases:
-            sys.exit(f"{folder}: no sub-folder with case.json and truth.json")
+            sys.exit(f"{folder}: no sub-folder with truth.json and either case.json or GRID.dcm")
         summary, speed = list(GROUP_HEAD), ["| method | cases | median ms | slowest ms |", "| --- | --- | --- | --- |"]
         for method in options.method or ["best", "paper"]:
             lines, groups = evaluate(options.helicarm, cases, method)

@@ -206,8 +206,17 @@ void add_simulate(CLI::App& app, Action& action) {
       "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
       "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
   command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
-  command->add_option("--bits", a.bits, "Stored bits: 8, 12 or 16")->capture_default_str();
+  command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
   command->add_flag("!--no-knee", a.knee, "Leave the knee out");
+  command->add_option("--response", a.response,
+                      "Of the grey values: linear or log (default: log with the knee, else linear)");
+  command
+      ->add_option(
+          "--view", a.views,
+          "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 looks up from below, "
+          "LAT:90,0 from the side (default: these two, roughly)")
+      ->allow_extra_args(false);
+  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm itself (default: the seed)");
   command->add_option(
       "--fault", a.faults,
       "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable");

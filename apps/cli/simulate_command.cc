@@ -21,6 +21,11 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   options.bits = arguments.bits;
   options.knee = arguments.knee;
   options.threads = console.threads;
+  if (!arguments.response.empty())
+    options.response = value_or_throw(simulation::response(arguments.response));
+  for (const std::string& view : arguments.views)
+    options.views.push_back(value_or_throw(simulation::view_angles(view)));
+  options.arm_seed = arguments.arm_seed;
   if (!arguments.distances_mm.empty()) {
     if (options.kind != simulation::CaseKind::grid)
       throw BadInput(Reason::usage, "simulate: --distance is for --kind grid");

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,8 +17,11 @@ struct SimulateArguments {
   std::string kind = "accuracy";  ///< accuracy, tunnels, flat or grid
   std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: as the kind needs it
   int size = 1024;                ///< 512 or 1024 pixels a side
-  int bits = 12;                  ///< 8, 12 or 16
+  int bits = 12;                  ///< 8, 10, 12, 14 or 16
   bool knee = true;
+  std::string response;                   ///< linear or log; empty: log with the knee
+  std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
+  std::optional<std::uint64_t> arm_seed;  ///< none: the seed
   /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
   std::vector<std::string> faults;
   std::vector<double> distances_mm;  ///< kind grid: of the wires from the receiver; none: 45 mm

@@ -18,14 +18,14 @@ using simulation::SimulatedView;
 using simulation::Visibility;
 
 const SimulatedCase& sound_case() {
-  static const SimulatedCase room = small_case(5, CaseKind::accuracy);
+  static const SimulatedCase room = small_case(6, CaseKind::accuracy);
   return room;
 }
 
 /// The lateral view mirrored, two stray balls, two of the calibrator's lost.
 const SimulatedCase& faulty_case() {
   static const SimulatedCase room =
-      small_case(7, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
+      small_case(8, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
   return room;
 }
 

@@ -22,7 +22,7 @@ using simulation::Visibility;
 /// A flat panel, so that rectified, ideal and raw pixels are the same; the lateral view is mirrored.
 const SimulatedCase& room() {
   static const SimulatedCase simulated =
-      small_case(5, simulation::CaseKind::flat, {simulation::Fault::mirrored});
+      small_case(9, simulation::CaseKind::flat, {simulation::Fault::mirrored});
   return simulated;
 }
 

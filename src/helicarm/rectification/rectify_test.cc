@@ -21,7 +21,7 @@ using simulation::SimulatedCase;
 using simulation::SimulatedView;
 
 const SimulatedCase& room() {
-  static const SimulatedCase simulated = small_case(5, simulation::CaseKind::accuracy);
+  static const SimulatedCase simulated = small_case(7, simulation::CaseKind::accuracy);
   return simulated;
 }
 

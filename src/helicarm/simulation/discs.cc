@@ -18,18 +18,11 @@ using Eigen::Vector3d;
 const NominalDiscCamera nominal;
 constexpr double lattice_px = 110;  // 25 mm at the receiver
 
-/// Even over a disc.
-Vector2d within(double radius, RandomStream& random) {
-  const double rho = radius * std::sqrt(random.uniform());
-  const double phi = random.uniform(0, 2 * std::numbers::pi);
-  return rho * Vector2d(std::cos(phi), std::sin(phi));
-}
-
 View random_view(const Calibrator& calibrator, std::optional<bool> mirrored, RandomStream& random) {
   View view;
   const bool flip = mirrored.value_or(random.uniform() < 0.5);
   const double f = nominal.focal_px * random.uniform(0.99, 1.01);
-  const Vector2d principal = nominal.principal_px + within(55, random);
+  const Vector2d principal = nominal.principal_px + in_disc(random, 55);
   view.intrinsics = {flip ? -f : f, f, principal.x(), principal.y()};
   view.camera_from_world.rotation = random_rotation(random);
   Vector3d centre = Vector3d::Zero();
@@ -90,7 +83,7 @@ DiscView random_discs(const Calibrator& calibrator, const DiscOptions& options, 
       const Vector2d steps(static_cast<int>(random.index(9)) - 4, static_cast<int>(random.index(9)) - 4);
       return nominal.principal_px + Eigen::Rotation2Dd(turn) * (lattice_px * steps + origin);
     }
-    return nominal.principal_px + within(i % 2 == 0 ? nominal.field_radius_px : 300, random);
+    return nominal.principal_px + in_disc(random, i % 2 == 0 ? nominal.field_radius_px : 300);
   };
   for (int i = 0; i < options.false_discs; ++i) {
     const Vector2d uv = false_place(i);

@@ -53,7 +53,7 @@ Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator
 
 Scene shutter_leaves(const SimulationOptions& options, const Shot& shot) {
   if (!options.has(Fault::shutters)) return {};
-  RandomStream random(options.seed, stream::faults, shot.name == "AP" ? 1 : 2);
+  RandomStream random(options.seed, stream::faults, shot.number + 1);
   const double field_mm = 0.5 * shot.pixel_mm() * shot.detector.width;
   constexpr double depth_mm = 100;
   const double scale = depth_mm / shot.f_mm;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/simulation/navigation_truth.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "helicarm/simulation/knee.h"
 #include "helicarm/simulation/random_pose.h"
 #include "helicarm/simulation/streams.h"
@@ -10,10 +13,36 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Somewhere around a place, turned any way.
-RigidTransform somewhere(const Vector3d& place, double spread_mm, RandomStream& random) {
-  RigidTransform pose = random_motion(random, 0, spread_mm);
-  return {random_rotation(random), place + pose.translation};
+/// Somewhere around a place in the tracker's frame, turned any way that the tracker sees.
+RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
+                         RandomStream& random) {
+  const Vector3d moved_place = place + random_motion(random, 0, spread_mm).translation;
+  for (;;) {
+    const RigidTransform pose{random_rotation(random), moved_place};
+    if (pose_covariance(room_tracker(), body, pose)) return pose;
+  }
+}
+
+/// Takes the readings and tells how far they truly scatter.
+void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>& bodies,
+                std::uint64_t seed) {
+  const TrackerModel model = room_tracker();
+  double turn2 = 0;
+  double shift2 = 0;
+  std::uint32_t number = 0;
+  for (const auto& [frame, pose] : truth.tracker_from) {
+    const TrackedBody& body = bodies.at(frame);
+    std::vector<double> times = steady_times(tracker_rate_hz, samples_per_reading);
+    const auto at_rest = [&](double) { return pose; };
+    const auto samples = track(model, body, at_rest, times, seed, stream::readings + 2 * number++);
+    const auto seen = std::ranges::count_if(samples, &TrackerSample::valid);
+    truth.read[frame] = mean_pose(samples).value();
+    truth.covariance[frame] = *pose_covariance(model, body, pose, static_cast<int>(seen));
+    turn2 += truth.covariance[frame].diagonal().head<3>().mean() / static_cast<double>(bodies.size());
+    shift2 += truth.covariance[frame].diagonal().tail<3>().mean() / static_cast<double>(bodies.size());
+  }
+  truth.sigma_deg = std::sqrt(turn2) / radian;
+  truth.sigma_mm = std::sqrt(shift2);
 }
 
 /// A drilled line: the tunnel's, missed by a normal 0.5 mm per axis 40 mm before its start and half way
@@ -41,17 +70,30 @@ double distance_to_line(const Vector3d& point, const Vector3d& a, const Vector3d
   return (point - a).cross(b - a).norm() / (b - a).norm();
 }
 
+TrackerModel room_tracker() {
+  TrackerModel model;
+  model.drift_sigma_mm = {0.07, 0.07, 0.17};
+  model.lost_sample = 0.02;
+  return model;
+}
+
 NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& calibrator_from_knee) {
   RandomStream random(seed, stream::tracker);
   NavigationTruth truth;
-  const RigidTransform tracker_from_calibrator = somewhere({-80, -60, 900}, 40, random);
+  std::map<std::string, TrackedBody> bodies;
+  for (const char* frame : {"femur", "tibia", "tool"}) bodies[frame] = marker_array();
+  bodies["calibrator"] = calibrator_markers();
+  const RigidTransform tracker_from_calibrator = somewhere(bodies["calibrator"], {-80, -60, 900}, 40, random);
   // Markers on both bones some way from the joint, the tool beside the knee.
   truth.tracker_from["calibrator"] = tracker_from_calibrator;
-  truth.tracker_from["femur"] = tracker_from_calibrator * somewhere({-130, 20, 60}, 10, random);
-  truth.tracker_from["tibia"] = tracker_from_calibrator * somewhere({120, -20, 50}, 10, random);
-  truth.tracker_from["tool"] = tracker_from_calibrator * somewhere({80, -220, 160}, 30, random);
-  for (const auto& [frame, pose] : truth.tracker_from)
-    truth.read[frame] = pose * random_motion(random, truth.sigma_deg, truth.sigma_mm);
+  const auto beside = [&](const char* frame, const Vector3d& in_calibrator, double spread_mm) {
+    truth.tracker_from[frame] =
+        somewhere(bodies[frame], tracker_from_calibrator * in_calibrator, spread_mm, random);
+  };
+  beside("femur", {-130, 20, 60}, 10);
+  beside("tibia", {120, -20, 50}, 10);
+  beside("tool", {80, -220, 160}, 30);
+  read_poses(truth, bodies, seed);
 
   const RigidTransform tool_from_calibrator = truth.tracker_from["tool"].inverse() * tracker_from_calibrator;
   const auto add = [&](const char* name, const char* bone, const Vector3d& in_knee) {

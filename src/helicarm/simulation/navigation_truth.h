@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-#include "helicarm/geometry/rigid_transform.h"
+#include "helicarm/simulation/tracker_model.h"
 
 namespace helicarm::simulation {
 
@@ -34,13 +34,22 @@ struct ToolLine {
   double end_error_mm;
 };
 
+/// The tracker of the operating room. Besides the markers' noise each body keeps an error of its place in the
+/// volume, which no short mean takes away.
+TrackerModel room_tracker();
+
+/// A reading is the mean of this many samples of bodies at rest, less those that were lost.
+inline constexpr int samples_per_reading = 6;
+inline constexpr double tracker_rate_hz = 60;
+
 /// An ACL navigation: the tracker's true and read poses ("calibrator", "femur", "tibia", "tool") and the
 /// tunnels.
 struct NavigationTruth {
-  double sigma_mm = 0.12;  ///< of a reading, per axis
-  double sigma_deg = 0.05;
+  double sigma_mm = 0;  ///< of a reading, per axis: rms over the axes and bodies
+  double sigma_deg = 0;
   std::map<std::string, RigidTransform> tracker_from;  ///< true
-  std::map<std::string, RigidTransform> read;          ///< one reading serves both views and now
+  std::map<std::string, RigidTransform> read;          ///< one reading serves every view and now
+  std::map<std::string, Matrix6d> covariance;          ///< of `read`, as of pose_covariance
   std::vector<TunnelPoint> points;
   std::vector<ToolLine> lines;
 };

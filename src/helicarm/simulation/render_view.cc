@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/simulation/ray_row.h"
 
 namespace helicarm::simulation {
 namespace {
@@ -21,19 +22,49 @@ constexpr double edge_mm = 0.05;
 struct Bounds {
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
+
+  bool holds(const Vector2d& pixel) const {
+    return (pixel.array() >= low.array()).all() && (pixel.array() <= high.array()).all();
+  }
 };
 
-/// A rectangle of ideal pixels that holds the body's shadow.
-Bounds shadow(const Body& body, const View& view) {
+const Bounds everywhere{Bounds{}.high, Bounds{}.low};
+
+/// A rectangle of ideal pixels that holds the solid's shadow.
+Bounds shadow(const Solid& solid, const View& view) {
   Bounds bounds;
-  for (const Solid& solid : body.solids)
-    for (const Vector3d& corner : solid.corners()) {
-      if (view.depth(corner) <= 1) return {bounds.high, bounds.low};
-      const Vector2d pixel = view.project(corner);
-      bounds.low = bounds.low.cwiseMin(pixel);
-      bounds.high = bounds.high.cwiseMax(pixel);
-    }
+  for (const Vector3d& corner : solid.corners()) {
+    if (view.depth(corner) <= 1) return everywhere;
+    const Vector2d pixel = view.project(corner);
+    bounds.low = bounds.low.cwiseMin(pixel);
+    bounds.high = bounds.high.cwiseMax(pixel);
+  }
   return bounds;
+}
+
+/// Where the pixels of a row look, without distortion.
+struct IdealRow {
+  std::vector<Vector2d> pixels;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+};
+
+/// From the first to the last of the pixels that the box holds.
+RayRange rays_within(const Bounds& box, const IdealRow& ideal, RayRange range) {
+  if (box.high.y() < ideal.low || box.low.y() > ideal.high) return {};
+  while (range.first < range.last && !box.holds(ideal.pixels[range.first])) ++range.first;
+  while (range.first < range.last && !box.holds(ideal.pixels[range.last - 1])) --range.last;
+  return range;
+}
+
+/// The pixels inside the field, and one more each side, whose metal tells whether there is an edge.
+RayRange lit_range(const std::vector<double>& weight) {
+  RayRange lit{0, weight.size()};
+  while (lit.first < lit.last && weight[lit.first] == 0) ++lit.first;
+  while (lit.first < lit.last && weight[lit.last - 1] == 0) --lit.last;
+  if (lit.first > 0) --lit.first;
+  if (lit.last < weight.size()) ++lit.last;
+  return lit;
 }
 
 class Tracer {
@@ -41,37 +72,54 @@ class Tracer {
   Tracer(const Scene& scene, const VirtualDetector& detector, const View& view)
       : scene_(scene), detector_(detector), source_(view.source_in_world()) {
     direction_from_pixel_ = view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
-    for (const Body& body : scene) bounds_.push_back(shadow(body, view));
+    for (const Body& body : scene) {
+      std::vector<Bounds>& bounds = bounds_.emplace_back();
+      for (const Solid& solid : body.solids) bounds.push_back(shadow(solid, view));
+    }
   }
 
   /// Traces the row's central rays; `metal` takes their paths in metal (mm).
   void trace_row(int v, float* signal, float* metal) const {
-    const auto width = static_cast<std::size_t>(detector_.width);
-    std::vector<Vector2d> ideal(width);
-    std::vector<Vector3d> direction(width);
-    std::vector<Array3d> depth(width, Array3d::Zero());
-    double low = std::numeric_limits<double>::infinity();
-    double high = -low;
-    for (std::size_t u = 0; u < width; ++u) {
-      ideal[u] = detector_.distortion.ideal_from_raw({static_cast<double>(u), v});
-      direction[u] = ray(ideal[u]);
-      low = std::min(low, ideal[u].y());
-      high = std::max(high, ideal[u].y());
-      metal[u] = 0;
+    const std::vector<double> weight = row_of_weights(v);
+    const RayRange lit = lit_range(weight);
+    IdealRow ideal{std::vector<Vector2d>(weight.size())};
+    RayRow rays(source_, weight.size());
+    for (std::size_t u = lit.first; u < lit.last; ++u) {
+      const Vector2d pixel = detector_.distortion.ideal_from_raw({static_cast<double>(u), v});
+      ideal.pixels[u] = pixel;
+      ideal.low = std::min(ideal.low, pixel.y());
+      ideal.high = std::max(ideal.high, pixel.y());
+      const Vector3d direction = ray(pixel);
+      rays.x[u] = direction.x();
+      rays.y[u] = direction.y();
+      rays.z[u] = direction.z();
     }
+    Eigen::ArrayX3d depth = Eigen::ArrayX3d::Zero(static_cast<Eigen::Index>(weight.size()), 3);
+    Eigen::ArrayXd path(depth.rows());
+    Eigen::ArrayXd in_metal = Eigen::ArrayXd::Zero(depth.rows());
     for (std::size_t i = 0; i < scene_.size(); ++i) {
-      const Bounds& box = bounds_[i];
-      if (box.high.y() < low || box.low.y() > high) continue;
-      for (std::size_t u = 0; u < width; ++u) {
-        if (ideal[u].x() < box.low.x() || ideal[u].x() > box.high.x()) continue;
-        const double path = union_length(scene_[i].solids, source_, direction[u]);
-        depth[u] += path * scene_[i].attenuation;
-        if (scene_[i].metal) metal[u] += static_cast<float>(path);
+      std::vector<RayRange> of_solid;
+      RayRange range{lit.last, lit.first};
+      for (const Bounds& box : bounds_[i]) {
+        of_solid.push_back(rays_within(box, ideal, lit));
+        if (of_solid.back().empty()) continue;
+        range.first = std::min(range.first, of_solid.back().first);
+        range.last = std::max(range.last, of_solid.back().last);
       }
+      if (range.empty()) continue;
+      union_lengths(scene_[i].solids, rays, range, of_solid, path.data());
+      const auto first = static_cast<Eigen::Index>(range.first);
+      const auto count = static_cast<Eigen::Index>(range.last - range.first);
+      for (Eigen::Index line = 0; line < 3; ++line)
+        depth.col(line).segment(first, count) += scene_[i].attenuation[line] * path.segment(first, count);
+      if (scene_[i].metal) in_metal.segment(first, count) += path.segment(first, count);
     }
-    for (std::size_t u = 0; u < width; ++u)
-      signal[u] = static_cast<float>(field_weight(detector_, {static_cast<double>(u), v}) *
-                                     (beam * (-depth[u]).exp()).sum());
+    using RowOfFloats = Eigen::Map<Eigen::ArrayXf>;
+    RowOfFloats(signal, depth.rows()) = (Eigen::Map<const Eigen::ArrayXd>(weight.data(), depth.rows()) *
+                                         ((-depth.col(0)).exp() * beam[0] + (-depth.col(1)).exp() * beam[1] +
+                                          (-depth.col(2)).exp() * beam[2]))
+                                            .cast<float>();
+    RowOfFloats(metal, depth.rows()) = in_metal.cast<float>();
   }
 
   float supersampled(int u, int v) const {
@@ -87,21 +135,30 @@ class Tracer {
     return (direction_from_pixel_ * Vector3d(ideal.x(), ideal.y(), 1)).normalized();
   }
 
+  std::vector<double> row_of_weights(int v) const {
+    std::vector<double> weight(static_cast<std::size_t>(detector_.width));
+    for (std::size_t u = 0; u < weight.size(); ++u)
+      weight[u] = field_weight(detector_, {static_cast<double>(u), v});
+    return weight;
+  }
+
   double through(const Vector2d& raw) const {
+    const double weight = field_weight(detector_, raw);
+    if (weight == 0) return 0;
     const Vector2d ideal = detector_.distortion.ideal_from_raw(raw);
     const Vector3d direction = ray(ideal);
     Array3d depth = Array3d::Zero();
     for (std::size_t i = 0; i < scene_.size(); ++i)
-      if ((ideal.array() >= bounds_[i].low.array()).all() && (ideal.array() <= bounds_[i].high.array()).all())
+      if (std::ranges::any_of(bounds_[i], [&](const Bounds& box) { return box.holds(ideal); }))
         depth += union_length(scene_[i].solids, source_, direction) * scene_[i].attenuation;
-    return field_weight(detector_, raw) * (beam * (-depth).exp()).sum();
+    return weight * (beam * (-depth).exp()).sum();
   }
 
   const Scene& scene_;
   const VirtualDetector& detector_;
   Vector3d source_;
   Eigen::Matrix3d direction_from_pixel_;
-  std::vector<Bounds> bounds_;
+  std::vector<std::vector<Bounds>> bounds_;  ///< of each body's solids
 };
 
 bool at_edge(const Image<float>& metal, int u, int v) {

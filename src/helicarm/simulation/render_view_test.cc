@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/simulation/render_view.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "helicarm/phantom/plate.h"
+#include "helicarm/simulation/c_arm.h"
+#include "helicarm/simulation/calibrator_body.h"
+#include "helicarm/simulation/knee.h"
 
 namespace helicarm::simulation {
 namespace {
@@ -131,6 +137,61 @@ TEST(RenderView, RoundFieldIsBlackOutsideAndWholeInside) {
   double area = 0;
   for (float pixel : picture.pixels()) area += pixel;
   EXPECT_NEAR(area, EIGEN_PI * 40 * 40, 10);
+}
+
+/// Every ray through every body, nothing left out.
+Image<float> picture_the_long_way(const Scene& scene, const VirtualDetector& detector, const View& view) {
+  const Vector3d source = view.source_in_world();
+  const auto ray = [&](double u, double v) -> Vector3d {
+    const Vector2d ideal = detector.distortion.ideal_from_raw({u, v});
+    const Vector3d in_camera = view.intrinsics.matrix().inverse() * Vector3d(ideal.x(), ideal.y(), 1);
+    return view.camera_from_world.rotation.transpose() * in_camera.normalized();
+  };
+  const auto signal = [&](double u, double v) {
+    return field_weight(detector, {u, v}) * transmission(scene, source, ray(u, v));
+  };
+  const auto metal = [&](int u, int v) {
+    double path = 0;
+    for (const Body& body : scene)
+      if (body.metal) path += union_length(body.solids, source, ray(u, v));
+    return path;
+  };
+  Image<float> paths(detector.width, detector.height);
+  for (int v = 0; v < detector.height; ++v)
+    for (int u = 0; u < detector.width; ++u) paths(u, v) = static_cast<float>(metal(u, v));
+  Image<float> picture(detector.width, detector.height);
+  for (int v = 0; v < detector.height; ++v)
+    for (int u = 0; u < detector.width; ++u) {
+      bool edge = false;
+      for (int row = std::max(v - 1, 0); row <= std::min(v + 1, detector.height - 1); ++row)
+        for (int column = std::max(u - 1, 0); column <= std::min(u + 1, detector.width - 1); ++column)
+          edge = edge || std::abs(paths(column, row) - paths(u, v)) > 0.05f;
+      double sum = edge ? 0 : 9 * signal(u, v);
+      for (int part = 0; edge && part < 9; ++part)
+        sum += signal(u + (part % 3 - 1) / 3.0, v + (part / 3 - 1) / 3.0);
+      picture(u, v) = static_cast<float>(sum / 9);
+    }
+  return picture;
+}
+
+TEST(RenderView, WholeSceneIsWhatEveryRayThroughEveryBodyGives) {
+  SimulationOptions options;
+  options.size = 256;
+  for (const Preset preset : {Preset::ii_9in, Preset::flat_panel}) {
+    options.preset = preset;
+    const Shot shot = take_stand(options, 15, {}).back();
+    Calibrator calibrator = udcsc();
+    calibrator.targets = check_targets(calibrator);
+    Scene scene = calibrator_body(calibrator);
+    const RigidTransform aside{Eigen::Matrix3d::Identity(), {12, 5, 20}};
+    for (const Body& body : knee_body()) scene.push_back(moved(body, aside));
+    for (const Body& dot : plate_body(plate48(), shot.camera_from_plate, shot.view)) scene.push_back(dot);
+    const Image<float> picture = render_view(scene, shot.detector, shot.view, 2);
+    const Image<float> truth = picture_the_long_way(scene, shot.detector, shot.view);
+    for (int v = 0; v < picture.height(); ++v)
+      for (int u = 0; u < picture.width(); ++u)
+        ASSERT_NEAR(picture(u, v), truth(u, v), 1e-6) << u << ' ' << v;
+  }
 }
 
 TEST(RenderView, ThreadsDoNotChangeABit) {

@@ -18,6 +18,7 @@ namespace {
 
 using Eigen::Vector2d;
 
+constexpr std::size_t most_views = 20;
 constexpr std::size_t most_distances = 20;
 constexpr double least_distance_mm = 20;  // clear of plate48, whose balls end 16.25 mm from the receiver
 constexpr double most_distance_mm = 500;
@@ -47,11 +48,39 @@ Expected<void> check_grid(const SimulationOptions& options) {
   return {};
 }
 
+/// The name becomes a file's.
+bool is_plain(const std::string& name) {
+  return !name.empty() && name.size() <= 32 && std::ranges::all_of(name, [](unsigned char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+  });
+}
+
+Expected<void> check_views(const SimulationOptions& options) {
+  const std::vector<ViewAngles>& views = options.views;
+  const bool grid = options.kind == CaseKind::grid;
+  if (grid ? views.size() > 1 : views.size() == 1 || views.size() > most_views)
+    return fail(Reason::bad_value, fmt::format("views: {} given, {} possible", views.size(),
+                                               grid ? "1 is" : fmt::format("2 to {} are", most_views)));
+  for (const ViewAngles& view : views) {
+    if (!is_plain(view.name))
+      return fail(Reason::bad_value,
+                  fmt::format("view: a name has 1 to 32 letters, digits, - or _; \"{}\" has not", view.name));
+    if (std::ranges::count(views, view.name, &ViewAngles::name) > 1)
+      return fail(Reason::bad_value, fmt::format("view: {} is given twice", view.name));
+    if (!(std::abs(view.angles.primary_deg) <= 180 && std::abs(view.angles.secondary_deg) <= 60))
+      return fail(Reason::bad_value,
+                  fmt::format("view {}: angles {}, {} are outside +-180, +-60 degrees", view.name,
+                              view.angles.primary_deg, view.angles.secondary_deg));
+  }
+  return {};
+}
+
 Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
   if (options.size != 512 && options.size != 1024)
     return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));
-  if (options.bits != 8 && options.bits != 12 && options.bits != 16)
-    return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 12 and 16", options.bits));
+  if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
+    return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 10, 12, 14 and 16", options.bits));
+  if (const auto checked = check_views(options); !checked) return checked;
   if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
                                                word(options.machine())));

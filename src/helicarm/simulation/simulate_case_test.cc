@@ -214,12 +214,51 @@ TEST(SimulateCase, TunnelsRunInsideTheirBones) {
   }
 }
 
+TEST(SimulateCase, EveryDepthAndResponseFillsItsGreyValues) {
+  for (const int bits : {8, 10, 12, 14, 16})
+    for (const Response response : {Response::linear, Response::logarithmic}) {
+      SimulationOptions options = small(CaseKind::flat);
+      options.knee = true;
+      options.bits = bits;
+      options.response = response;
+      const SimulatedCase simulated = *simulate_case(options);
+      const auto pixels = simulated.views[0].pixels.pixels();
+      const double highest = (1 << bits) - 1;
+      EXPECT_NEAR(*std::ranges::max_element(pixels) / highest, 0.9, 0.06);
+      EXPECT_EQ(*exposure_of(simulated.views[0]).acquisition.logarithmic, response == Response::logarithmic);
+    }
+}
+
+TEST(SimulateCase, ViewsAreTakenWhereAskedFor) {
+  SimulationOptions options = small(CaseKind::accuracy);
+  options.views = {{"AP", {0, 0}}, {"OBL", {45, 10}}, {"LAT", {90, 0}}};
+  const SimulatedCase simulated = *simulate_case(options);
+  ASSERT_EQ(simulated.views.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const SimulatedView& view = simulated.views[i];
+    EXPECT_EQ(view.shot.name, options.views[i].name);
+    EXPECT_EQ(view.shot.primary_angle_deg, options.views[i].angles.primary_deg);
+    EXPECT_GE(std::ranges::count(view.balls, Visibility::clear, &TruePoint::visibility), 8);
+  }
+  options.kind = CaseKind::grid;
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+  options.kind = CaseKind::accuracy;
+  for (const std::vector<ViewAngles>& wrong : {std::vector<ViewAngles>{{"AP", {}}},
+                                               {{"AP", {}}, {"AP", {90, 0}}},
+                                               {{"AP", {}}, {"../LAT", {90, 0}}},
+                                               {{"AP", {}}, {"LAT", {190, 0}}},
+                                               {{"AP", {}}, {"LAT", {90, 61}}}}) {
+    options.views = wrong;
+    EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+  }
+}
+
 TEST(SimulateCase, UnknownSizeDepthAndBallAreRefusedByName) {
   SimulationOptions options = small(CaseKind::accuracy);
   options.size = 640;
   EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
   options = small(CaseKind::accuracy);
-  options.bits = 10;
+  options.bits = 11;
   EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
   options = small(CaseKind::accuracy);
   options.lost_balls = {"P99"};

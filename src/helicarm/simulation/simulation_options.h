@@ -25,13 +25,16 @@ enum class Preset {
   flat_panel  ///< 0.29 mm pixels, 1020 mm, with sag and tilt; no distortion
 };
 
+/// Of the grey values to the signal.
+enum class Response { linear, logarithmic };
+
 enum class Fault {
   decoys,     ///< two stray balls of the calibrator's size
   wires,      ///< a K-wire over a ball in each view
   screws,     ///< two screws in the tibia
   low_dose,   ///< a twentieth of the quanta
   shutters,   ///< collimator leaves inside the field
-  mirrored,   ///< the lateral view is stored mirrored, and tagged so
+  mirrored,   ///< the second view (the lateral) is stored mirrored, and tagged so
   saturated,  ///< the open beam is beyond white
 };
 
@@ -39,17 +42,37 @@ enum class Fault {
 std::string_view word(CaseKind kind);
 std::string_view word(Preset preset);
 std::string_view word(Fault fault);
+std::string_view word(Response response);
 Expected<CaseKind> case_kind(std::string_view word);
 Expected<Preset> preset(std::string_view word);
 Expected<Fault> fault(std::string_view word);
+Expected<Response> response(std::string_view word);  ///< linear or log
+
+/// Where the C-arm stands, degrees: 0, 0 looks up from below (AP), 90, 0 from the lateral side. The secondary
+/// angle tilts the receiver towards the hip.
+struct ArmAngles {
+  double primary_deg = 0;
+  double secondary_deg = 0;
+};
+
+struct ViewAngles {
+  std::string name;  ///< letters, digits, - and _, at most 32; also the picture's file
+  ArmAngles angles;
+};
+
+/// NAME:PRIMARY,SECONDARY; anything else is a `usage` failure.
+Expected<ViewAngles> view_angles(std::string_view text);
 
 struct SimulationOptions {
   std::uint64_t seed = 1;
   CaseKind kind = CaseKind::accuracy;
   std::optional<Preset> preset = {};  ///< not given: flat_panel for kind flat, else ii_9in
   int size = 1024;                    ///< 512 or 1024 pixels a side
-  int bits = 12;                      ///< 8, 12 or 16
+  int bits = 12;                      ///< 8, 10, 12, 14 or 16
   bool knee = true;
+  std::optional<Response> response = {};       ///< not given: logarithmic with the knee, else linear
+  std::vector<ViewAngles> views;               ///< 2 to 20; none: AP and LAT, as the hand finds them
+  std::optional<std::uint64_t> arm_seed = {};  ///< of the C-arm itself; not given: the seed
   std::vector<Fault> faults;
   std::vector<double> grid_distances_mm = {
       45};                              ///< kind grid: from the receiver to the wires' axes; up to 20
@@ -58,6 +81,7 @@ struct SimulationOptions {
 
   bool has(Fault fault) const;
   Preset machine() const;
+  bool logarithmic() const;
 };
 
 }  // namespace helicarm::simulation

@@ -13,6 +13,9 @@ inline constexpr std::uint32_t tracker = 1003;
 inline constexpr std::uint32_t clicks = 1004;
 inline constexpr std::uint32_t uids = 1005;
 inline constexpr std::uint32_t grid = 1006;
+inline constexpr std::uint32_t readings = 1100;  ///< and the next: two per tracked body
+inline constexpr std::uint32_t arm = 1007;
+inline constexpr std::uint32_t shots = 1008;
 inline constexpr std::uint32_t noise = 1010;  ///< and the next: two per view
 
 }  // namespace helicarm::simulation::stream

@@ -49,6 +49,17 @@ Json distortion_json(const VirtualDetector& detector) {
           {"bumps", bumps}};
 }
 
+Json imaging_json(const Imaging& imaging) {
+  return {{"quanta_per_pixel", imaging.quanta_per_pixel},
+          {"electronic_noise", imaging.electronic_noise},
+          {"scatter_fraction", imaging.scatter_fraction},
+          {"scatter_sigma_px", imaging.scatter_sigma_px},
+          {"focus_sigma_px", imaging.focus_sigma_px},
+          {"screen_sigma_px", imaging.screen_sigma_px},
+          {"vignette", imaging.vignette},
+          {"open_level", imaging.open_level}};
+}
+
 Json view_json(const SimulatedView& view, const char* world) {
   const Shot& shot = view.shot;
   const View stored = shot.stored_view();
@@ -61,6 +72,8 @@ Json view_json(const SimulatedView& view, const char* world) {
                  {"K", matrix_json(stored.intrinsics.matrix())},
                  {std::string("camera_from_") + world, matrix_json(stored.camera_from_world.matrix())},
                  {"projection", matrix_json(stored.projection())}}},
+               {"angles_deg", {shot.true_angles.primary_deg, shot.true_angles.secondary_deg}},
+               {"imaging", imaging_json(shot.imaging)},
                {"field_radius_px", nullptr},
                {"distortion", distortion_json(shot.detector)},
                {"balls", points_json(view.balls)},
@@ -93,6 +106,13 @@ Json navigation_json(const SimulatedCase& simulated) {
   Json json;
   for (const auto& [frame, pose] : truth.tracker_from)
     json["poses"]["tracker_from_" + frame] = matrix_json(pose.matrix());
+  const TrackerModel tracker = room_tracker();
+  json["tracker"] = {{"marker_sigma_mm", vector_json(tracker.marker_sigma_mm)},
+                     {"drift_sigma_mm", vector_json(tracker.drift_sigma_mm)},
+                     {"samples_per_reading", samples_per_reading},
+                     {"rate_hz", tracker_rate_hz}};
+  for (const auto& [frame, covariance] : truth.covariance)
+    json["tracker"]["covariance"]["tracker_from_" + frame] = matrix_json(covariance);
   for (const TunnelPoint& point : truth.points)
     json["points"].push_back({{"name", point.name},
                               {"bone", point.bone},
@@ -127,7 +147,10 @@ Json truth_json(const SimulatedCase& simulated) {
                {"kind", word(simulated.options.kind)},
                {"preset", word(simulated.options.machine())},
                {"seed", simulated.options.seed},
+               {"arm_seed", simulated.options.arm_seed.value_or(simulated.options.seed)},
                {"knee", simulated.options.knee},
+               {"response", word(simulated.options.logarithmic() ? Response::logarithmic : Response::linear)},
+               {"bits", simulated.options.bits},
                {"faults", Json::array()},
                {"lost_balls", simulated.options.lost_balls},
                {"note",

@@ -49,10 +49,11 @@ TEST(WireGrid, CrossesAreDarkestWhereTheTruthPutsThem) {
     ++clear;
     const int u = static_cast<int>(std::lround(cross.raw.x()));
     const int v = static_cast<int>(std::lround(cross.raw.y()));
-    for (const int side : {-1, 1}) {  // 10 px beside it lies the mesh's inside
-      EXPECT_LT(view.pixels(u, v), 0.8 * view.pixels(u + 10 * side, v + 10 * side)) << cross.name;
-      EXPECT_LT(view.pixels(u, v), 0.8 * view.pixels(u + 10 * side, v - 10 * side)) << cross.name;
-    }
+    int brighter = 0;  // 10 px beside it lies the mesh's inside, in one of its corners perhaps a dot
+    for (const int side : {-10, 10})
+      for (const int upright : {-10, 10})
+        brighter += view.pixels(u, v) < 0.8 * view.pixels(u + side, v + upright);
+    EXPECT_GE(brighter, 3) << cross.name;
   }
   EXPECT_GE(clear, 40);
 }

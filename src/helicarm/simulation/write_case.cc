@@ -86,13 +86,12 @@ void remove_leftovers(const std::filesystem::path& folder) {
   std::error_code ignored;
   for (const char* file : {plate_file, calibrator_file, case_file})
     std::filesystem::remove(folder / file, ignored);
-  for (const char* view : {"AP", "LAT", "PLATE", "GRID"})
-    std::filesystem::remove(folder / fmt::format("{}.dcm", view), ignored);
-  const Json grid = truth->value("grid", Json::object());
-  if (!grid.is_object() || !grid.contains("distances_mm")) return;
-  for (const Json& distance : grid["distances_mm"])
-    if (distance.is_number())
-      std::filesystem::remove(folder / fmt::format("GRID-{:g}.dcm", distance.get<double>()), ignored);
+  const Json views = truth->value("views", Json::array());
+  for (const Json& view : views) {
+    if (!view.is_object() || !view.contains("name") || !view["name"].is_string()) continue;
+    const std::filesystem::path file = view["name"].get<std::string>() + ".dcm";
+    if (file == file.filename()) std::filesystem::remove(folder / file, ignored);
+  }
 }
 
 }  // namespace

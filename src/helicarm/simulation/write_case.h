@@ -14,9 +14,9 @@ Json case_json(const SimulatedCase& simulated);
 /// Refuses (cannot_write) a folder that holds anything but an earlier simulation.
 Expected<void> check_case_folder(const std::filesystem::path& folder);
 
-/// Writes AP.dcm, LAT.dcm, calibrator.json, plate.json, case.json and truth.json; of kind grid PLATE.dcm,
-/// GRID.dcm (with several distances GRID-30.dcm and so on), plate.json and truth.json. Each file whole or not
-/// at all; what an earlier simulation left goes.
+/// Writes a picture NAME.dcm for each view, calibrator.json, plate.json, case.json and truth.json; of kind
+/// grid PLATE.dcm, GRID.dcm (with several distances GRID-30.dcm and so on), plate.json and truth.json. Each
+/// file whole or not at all; what an earlier simulation left goes.
 Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCase& simulated);
 
 }  // namespace helicarm::simulation

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Times a simulated 1024 x 1024 view with knee, calibrator and plate on one and two threads.
+#include <benchmark/benchmark.h>
+
+#include "helicarm/simulation/c_arm.h"
+#include "helicarm/simulation/calibrator_body.h"
+#include "helicarm/simulation/develop.h"
+#include "helicarm/simulation/knee.h"
+#include "helicarm/simulation/render_view.h"
+#include "helicarm/simulation/streams.h"
+
+namespace helicarm::simulation {
+namespace {
+
+Shot shot() { return take_stand({}, *plate48().height_above_receiver_mm, {}).front(); }
+
+Scene scene_before(const Shot& shot) {
+  Calibrator calibrator = udcsc();
+  calibrator.targets = check_targets(calibrator);
+  Scene scene = calibrator_body(calibrator);
+  for (const Body& body : knee_body())
+    scene.push_back(moved(body, {Eigen::Matrix3d::Identity(), {10, 0, 14}}));
+  for (const Body& body : plate_body(plate48(), shot.camera_from_plate, shot.view)) scene.push_back(body);
+  return scene;
+}
+
+void render_knee(benchmark::State& state) {
+  const Shot taken = shot();
+  const Scene scene = scene_before(taken);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        render_view(scene, taken.detector, taken.view, static_cast<unsigned>(state.range(0))));
+}
+BENCHMARK(render_knee)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void develop_knee(benchmark::State& state) {
+  const Shot taken = shot();
+  const Image<float> signal = render_view(scene_before(taken), taken.detector, taken.view);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(
+        develop(signal, taken.imaging, 1, stream::noise, static_cast<unsigned>(state.range(0))));
+}
+BENCHMARK(develop_knee)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace helicarm::simulation
