@@ -31,6 +31,8 @@ std::string_view code(Reason reason) {
       return "name_clash";
     case Reason::cannot_write:
       return "cannot_write";
+    case Reason::port_taken:
+      return "port_taken";
     case Reason::blank_image:
       return "blank_image";
     case Reason::saturated:
@@ -67,6 +69,14 @@ std::string_view code(Reason reason) {
       return "target_not_found";
     case Reason::bad_tunnel:
       return "bad_tunnel";
+    case Reason::no_pose:
+      return "no_pose";
+    case Reason::stale_pose:
+      return "stale_pose";
+    case Reason::pose_spread:
+      return "pose_spread";
+    case Reason::poses_too_alike:
+      return "poses_too_alike";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:
@@ -87,6 +97,6 @@ std::string_view code(Reason reason) {
   return "internal";
 }
 
-int exit_code(Reason reason) { return reason <= Reason::cannot_write ? 2 : 3; }
+int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }
 
 }  // namespace helicarm

@@ -28,6 +28,7 @@ enum class Reason {
   path_outside,
   name_clash,
   cannot_write,
+  port_taken,
   // Refused, the data does not allow a trustworthy answer: exit code 3.
   blank_image,
   saturated,
@@ -47,6 +48,10 @@ enum class Reason {
   not_seen,
   target_not_found,
   bad_tunnel,
+  no_pose,
+  stale_pose,
+  pose_spread,
+  poses_too_alike,
   // Only ever warnings.
   name_differs,
   bone_taken_as_fixed,

@@ -3,17 +3,14 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "helicarm/devices/tracker/igtl_message.h"
+#include "helicarm/devices/tracker/pose_sample.h"
 
 namespace helicarm {
-
-/// How often something happened, by its name.
-using Counters = std::map<std::string, std::uint64_t, std::less<>>;
 
 /// Cuts a connection's bytes, however they are segmented, into messages. A message that is unsound within
 /// its announced length is dropped and counted: "messages", "wrong_crc", "unsupported_version", "malformed";
