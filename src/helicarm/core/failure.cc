@@ -69,6 +69,14 @@ std::string_view code(Reason reason) {
       return "target_not_found";
     case Reason::bad_tunnel:
       return "bad_tunnel";
+    case Reason::no_pose:
+      return "no_pose";
+    case Reason::stale_pose:
+      return "stale_pose";
+    case Reason::pose_spread:
+      return "pose_spread";
+    case Reason::poses_too_alike:
+      return "poses_too_alike";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:

@@ -48,6 +48,10 @@ enum class Reason {
   not_seen,
   target_not_found,
   bad_tunnel,
+  no_pose,
+  stale_pose,
+  pose_spread,
+  poses_too_alike,
   // Only ever warnings.
   name_differs,
   bone_taken_as_fixed,

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/devices/tracker/igtl_message.h"
+#include "helicarm/devices/tracker/pose_sample.h"
+
+namespace helicarm {
+
+struct IgtlClientOptions {
+  std::string address = "127.0.0.1";  ///< numeric
+  std::uint16_t port = 18944;
+  bool ask_for_tracking = false;  ///< send STT_TDATA on each new connection; many servers send unasked
+  int interval_ms = 0;            ///< to ask for; 0: as fast as the device is
+  double first_pause_s = 0.1;     ///< before the second attempt to connect; doubled with each one
+  double last_pause_s = 5;
+  double connect_s = 2;  ///< after so long an attempt is given up
+  double silence_s = 5;  ///< a connection on which nothing comes is made anew; 0: never
+};
+
+enum class LinkState { connecting, connected, waiting };
+std::string_view code(LinkState state);
+
+struct LinkStatus {
+  LinkState state = LinkState::connecting;
+  std::string trouble;  ///< why the last connection ended or failed; empty where none did
+  /// "attempts", "connections", "silences" and, over all connections, those of IgtlConnection
+  Counters counters;
+};
+
+/// The pause before the next attempt to connect.
+inline double next_pause(double pause_s, const IgtlClientOptions& options) {
+  return std::min(2 * pause_s, options.last_pause_s);
+}
+
+/// Keeps a connection to an OpenIGTLink server on a thread of its own, and makes it anew whenever it ends or
+/// goes silent. The pause between attempts starts anew only when a message has come: a server that accepts
+/// and hangs up is not stormed.
+class IgtlClient {
+ public:
+  using OnMessage = std::function<void(const IgtlMessage&, double arrival_s)>;
+
+  /// The functions are called on the client's thread; they must not call stop(). `arrival_s` is of
+  /// monotonic_seconds(). Fails only with `bad_value` for an address that is not numeric.
+  static Expected<std::unique_ptr<IgtlClient>> start(const IgtlClientOptions& options, OnMessage on_message,
+                                                     std::function<void()> on_connect = {});
+  ~IgtlClient();
+
+  LinkStatus status() const;  ///< from any thread
+  /// From any thread; lost while there is no connection.
+  void send(const IgtlMessage& message);
+  /// Returns at once, with the thread ended.
+  void stop();
+
+ private:
+  struct Impl;
+  explicit IgtlClient(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace helicarm

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include <asio.hpp>
+
+#include "helicarm/devices/tracker/igtl_stream.h"
+
+namespace helicarm {
+
+/// What one direction of a connection may hold back for a peer that does not read.
+struct SendLimits {
+  std::size_t messages = 256;  ///< the oldest are dropped beyond
+  std::size_t bytes = std::size_t{64} << 20;
+  double stall_s = 5;  ///< a peer that takes nothing for so long is cut off
+};
+
+/// A numeric address; names are not looked up, as that may hang for seconds. "localhost" is 127.0.0.1.
+Expected<asio::ip::tcp::endpoint> endpoint_of(const std::string& address, std::uint16_t port);
+
+void add_counters(Counters& to, const Counters& more);
+
+/// One connected socket with its stream and its queue. Everything is called and calls back on the thread of
+/// the socket's io_context, but for counters().
+class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
+ public:
+  struct Handlers {
+    IgtlStream::Sink on_message;
+    std::function<void(const std::string& why)> on_closed;
+  };
+
+  IgtlConnection(asio::ip::tcp::socket socket, const SendLimits& limits)
+      : socket_(std::move(socket)), limits_(limits) {}
+
+  void start(Handlers handlers);
+  void send(std::shared_ptr<const std::string> bytes);
+  void close(const std::string& why);
+
+  /// When the newest bytes came, or the connection began; monotonic_seconds().
+  double heard_s() const { return heard_s_; }
+  /// Those of the stream, "bytes", "sent" and "dropped" messages. From any thread.
+  Counters counters() const;
+
+ private:
+  void read();
+  void take(std::size_t size);
+  void write();
+  void publish();
+
+  asio::ip::tcp::socket socket_;
+  SendLimits limits_;
+  Handlers handlers_;
+  IgtlStream stream_;
+  std::array<char, 65536> segment_;
+  std::deque<std::shared_ptr<const std::string>> queue_;
+  std::vector<std::shared_ptr<const std::string>> in_flight_;
+  std::size_t queued_bytes_ = 0;
+  double writing_since_ = 0;
+  double heard_s_ = 0;
+  std::uint64_t bytes_ = 0, sent_ = 0, dropped_ = 0;
+  bool open_ = false;
+
+  mutable std::mutex mutex_;
+  Counters published_;
+};
+
+}  // namespace helicarm
