@@ -31,6 +31,8 @@ std::string_view code(Reason reason) {
       return "name_clash";
     case Reason::cannot_write:
       return "cannot_write";
+    case Reason::port_taken:
+      return "port_taken";
     case Reason::blank_image:
       return "blank_image";
     case Reason::saturated:
@@ -67,6 +69,26 @@ std::string_view code(Reason reason) {
       return "target_not_found";
     case Reason::bad_tunnel:
       return "bad_tunnel";
+    case Reason::out_of_reach:
+      return "out_of_reach";
+    case Reason::singular_pose:
+      return "singular_pose";
+    case Reason::keep_out:
+      return "keep_out";
+    case Reason::robot_moved:
+      return "robot_moved";
+    case Reason::robot_locked:
+      return "robot_locked";
+    case Reason::robot_stopped:
+      return "robot_stopped";
+    case Reason::order_not_confirmed:
+      return "order_not_confirmed";
+    case Reason::stale_state:
+      return "stale_state";
+    case Reason::off_target:
+      return "off_target";
+    case Reason::not_connected:
+      return "not_connected";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:
@@ -87,6 +109,6 @@ std::string_view code(Reason reason) {
   return "internal";
 }
 
-int exit_code(Reason reason) { return reason <= Reason::cannot_write ? 2 : 3; }
+int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }
 
 }  // namespace helicarm
