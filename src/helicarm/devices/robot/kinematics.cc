@@ -5,7 +5,7 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 namespace helicarm {
@@ -119,7 +119,9 @@ Eigen::Matrix<double, 6, 6> jacobian(const RobotModel& model, const Joints& join
 double least_singular_value(const RobotModel& model, const Joints& joints) {
   Eigen::Matrix<double, 6, 6> scaled = jacobian(model, joints);
   scaled.topRows<3>() /= 1000;
-  return scaled.jacobiSvd().singularValues().minCoeff();
+  const Eigen::Matrix<double, 6, 6> square = scaled * scaled.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(square, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues().minCoeff()));
 }
 
 std::vector<Joints> inverse(const RobotModel& model, const RigidTransform& base_from_flange) {

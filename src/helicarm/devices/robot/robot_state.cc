@@ -11,7 +11,6 @@
 namespace helicarm {
 namespace {
 
-constexpr double mm_per_m = 1000;
 constexpr double degrees = 180 / 3.14159265358979323846;
 
 /// Bits of the safety status that stand for a stop of some kind: 2 to 11 but 3, recovery, which the mode

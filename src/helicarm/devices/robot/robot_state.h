@@ -68,7 +68,8 @@ std::string_view name(SafetyMode mode);
 
 Json to_json(const RobotState& state);
 
-/// The robot's own writing of a pose: metres and a rotation vector. Nowhere else are there metres.
+/// The robot's own writing of a pose: metres and a rotation vector. Nothing else here is in metres.
+inline constexpr double mm_per_m = 1000;
 using UrPose = Eigen::Matrix<double, 6, 1>;
 UrPose ur_pose(const RigidTransform& transform);
 RigidTransform transform_from(const UrPose& pose);
