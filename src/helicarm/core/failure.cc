@@ -77,6 +77,26 @@ std::string_view code(Reason reason) {
       return "pose_spread";
     case Reason::poses_too_alike:
       return "poses_too_alike";
+    case Reason::out_of_reach:
+      return "out_of_reach";
+    case Reason::singular_pose:
+      return "singular_pose";
+    case Reason::keep_out:
+      return "keep_out";
+    case Reason::robot_moved:
+      return "robot_moved";
+    case Reason::robot_locked:
+      return "robot_locked";
+    case Reason::robot_stopped:
+      return "robot_stopped";
+    case Reason::order_not_confirmed:
+      return "order_not_confirmed";
+    case Reason::stale_state:
+      return "stale_state";
+    case Reason::off_target:
+      return "off_target";
+    case Reason::not_connected:
+      return "not_connected";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:

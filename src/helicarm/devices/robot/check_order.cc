@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/check_order.h"
+
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "helicarm/devices/robot/straight_path.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr double step_mm = 2;
+constexpr double step_rad = 0.5 * degree;
+/// A joint that turns further within one step jumps to another way of holding the tool.
+constexpr double jump_rad = 10 * degree;
+
+void require_within(double value, double low, double high, const std::string& what) {
+  if (!std::isfinite(value)) throw BadInput(Reason::not_finite, what + " is not finite");
+  if (!(value >= low && value <= high))
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{} is {:g}, must be {:g} to {:g}", what, value, low, high));
+}
+
+void require_rigid(const RigidTransform& transform, const std::string& what) {
+  value_or_throw(rigid_transform_from(transform.matrix(), what));
+}
+
+void check_numbers(const RobotOrder& order, const RobotLimits& limits) {
+  require_rigid(order.tool.flange_from_tcp, "order: flange_from_tcp");
+  require_within(order.tool.payload_kg, 0, limits.heaviest_kg, "order: payload_kg");
+  if (!order.start.allFinite()) throw BadInput(Reason::not_finite, "order: start is not finite");
+  if (order.waypoints.empty()) throw BadInput(Reason::bad_value, "order: there are no waypoints");
+  for (std::size_t i = 0; i < order.waypoints.size(); ++i) {
+    const std::string where = fmt::format("order: waypoints[{}]: ", i);
+    require_rigid(order.waypoints[i].base_from_tcp, where + "base_from_tcp");
+    require_within(order.waypoints[i].speed_mm_s, limits.slowest_mm_s, limits.fastest_mm_s,
+                   where + "speed_mm_s");
+    require_within(order.waypoints[i].acceleration_mm_s2, limits.softest_mm_s2, limits.hardest_mm_s2,
+                   where + "acceleration_mm_s2");
+  }
+  for (const KeepOut& keep_out : order.keep_outs) {
+    if (!keep_out.point_in_base.allFinite())
+      throw BadInput(Reason::not_finite, "order: keep_outs: not finite");
+    require_within(keep_out.normal.norm(), 1 - 1e-6, 1 + 1e-6, "order: keep_outs: length of the normal");
+  }
+  require_within(order.corrections.most, 0, 20, "order: corrections: most");
+  require_within(order.corrections.longest_mm, 0, 10, "order: corrections: longest_mm");
+  require_within(order.corrections.widest_deg, 0, 10, "order: corrections: widest_deg");
+  require_within(order.corrections.tolerance_mm, 0.01, 10, "order: corrections: tolerance_mm");
+  require_within(order.corrections.tolerance_deg, 0.01, 10, "order: corrections: tolerance_deg");
+}
+
+void check_keep_outs(const RobotOrder& order, const RobotModel& model, const Joints& joints,
+                     const RobotLimits& limits) {
+  const auto frames = joint_frames(model, joints);
+  const Eigen::Vector3d tip = frames.back() * order.tool.flange_from_tcp.translation;
+  for (std::size_t i = 0; i < order.keep_outs.size(); ++i) {
+    const auto depth = [&](const Eigen::Vector3d& point, double radius_mm) {
+      return radius_mm - (point - order.keep_outs[i].point_in_base).dot(order.keep_outs[i].normal);
+    };
+    double deepest = std::max(depth(tip, 0), depth(frames.back().translation, 0));
+    for (int joint = 1; joint < 5; ++joint)
+      deepest = std::max(deepest, depth(frames[joint].translation, limits.arm_radius_mm));
+    if (deepest > 0)
+      throw BadInput(
+          {Reason::keep_out,
+           fmt::format("the path enters the region beyond keep-out plane {} by {:.1f} mm", i, deepest),
+           {},
+           {{"plane", static_cast<double>(i)}, {"depth_mm", deepest}}});
+  }
+}
+
+void check_pose(const RobotOrder& order, const RobotModel& model, const Joints& joints,
+                const RobotLimits& limits) {
+  if (((joints.cwiseAbs() - model.farthest).array() > 0).any())
+    throw BadInput(Reason::out_of_reach, "a joint would be turned beyond its end");
+  const double least = least_singular_value(model, joints);
+  if (least < limits.least_singular_value)
+    throw BadInput({Reason::singular_pose,
+                    fmt::format("the arm would come near a singular pose: least singular value {:.3g}, "
+                                "must be {:g}",
+                                least, limits.least_singular_value),
+                    {},
+                    {{"least_singular_value", least}}});
+  check_keep_outs(order, model, joints, limits);
+}
+
+/// Walks one straight piece and gives the joints at its end.
+Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, const Waypoint& to,
+            const RobotLimits& limits) {
+  const StraightPath path(base_from_flange(model, joints) * order.tool.flange_from_tcp, to.base_from_tcp);
+  const RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
+  const int steps =
+      1 + static_cast<int>(std::min(1e5, std::max(path.shift_mm() / step_mm, path.turn() / step_rad)));
+  // The speed within a step is at most what the whole piece is run at.
+  const double step_s = path.length_mm() / steps / to.speed_mm_s;
+  for (int i = 1; i <= steps; ++i) {
+    const Joints next =
+        value_or_throw(nearest_inverse(model, path.at(double(i) / steps) * tcp_from_flange, joints));
+    const double turned = (next - joints).cwiseAbs().maxCoeff();
+    if (turned > jump_rad)
+      throw BadInput({Reason::singular_pose,
+                      fmt::format("a joint would jump by {:.0f} degrees on the path", turned / degree),
+                      {},
+                      {{"jump_deg", turned / degree}}});
+    check_pose(order, model, next, limits);
+    if (turned > limits.fastest_joint_rad_s * step_s && turned > 1e-9)
+      throw BadInput({Reason::bad_value,
+                      fmt::format("at this speed a joint would turn by {:.2f} rad/s, must be at most {:g}",
+                                  turned / step_s, limits.fastest_joint_rad_s),
+                      {},
+                      {{"joint_speed_rad_s", turned / step_s}, {"limit_rad_s", limits.fastest_joint_rad_s}}});
+    joints = next;
+  }
+  return joints;
+}
+
+Joints walk_all(const RobotOrder& order, Joints joints, const RobotLimits& limits) {
+  check_numbers(order, limits);
+  const RobotModel model = value_or_throw(robot_model(order.model));
+  const RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
+  for (const Waypoint& waypoint : order.waypoints)
+    value_or_throw(nearest_inverse(model, waypoint.base_from_tcp * tcp_from_flange, joints));
+  check_pose(order, model, joints, limits);
+  for (const Waypoint& waypoint : order.waypoints) joints = walk(order, model, joints, waypoint, limits);
+  return joints;
+}
+
+void require_near(double value, double limit, const std::string& what) {
+  if (!(value <= limit))
+    throw BadInput({Reason::robot_moved,
+                    fmt::format("{} by {:.2f}, must be within {:g}: plan again", what, value, limit),
+                    {},
+                    {{"difference", value}, {"limit", limit}}});
+}
+
+double angle_deg(const RigidTransform& a, const RigidTransform& b) {
+  return vector_from_rotation(a.rotation.transpose() * b.rotation).norm() / degree;
+}
+
+}  // namespace
+
+Expected<Joints> check_path(const RobotOrder& order, const RobotLimits& limits) {
+  return guarded([&] { return walk_all(order, order.start, limits); });
+}
+
+Expected<void> check_order(const RobotOrder& order, const RobotState& present, const RobotLimits& limits) {
+  return guarded([&] {
+    if (const auto stopped = why_stopped(present)) throw BadInput(*stopped);
+    const RobotModel model = value_or_throw(robot_model(order.model));
+    const RigidTransform& offset = order.tool.flange_from_tcp;
+    require_near((present.flange_from_tcp.translation - offset.translation).norm(), limits.tool_mm,
+                 "the robot's TCP differs from the order's in mm");
+    require_near(angle_deg(present.flange_from_tcp, offset), limits.tool_deg,
+                 "the robot's TCP differs from the order's in degrees");
+    require_near(std::abs(present.payload_kg - order.tool.payload_kg), limits.payload_kg,
+                 "the robot's payload differs from the order's in kg");
+    const Eigen::Vector3d planned = base_from_flange(model, order.start) * offset.translation;
+    const Eigen::Vector3d found = base_from_flange(model, present.joints) * offset.translation;
+    require_near((found - planned).norm(), limits.start_mm, "the tip has left its place at planning in mm");
+    require_near((present.joints - order.start).cwiseAbs().maxCoeff() / degree, limits.start_joint_deg,
+                 "a joint has left its place at planning in degrees");
+    walk_all(order, present.joints, limits);
+  });
+}
+
+double duration_s(const RobotOrder& order) {
+  const auto model = robot_model(order.model);
+  if (!model) return 0;
+  RigidTransform from = base_from_flange(*model, order.start) * order.tool.flange_from_tcp;
+  double total = 0;
+  for (const Waypoint& waypoint : order.waypoints) {
+    total += duration_s(StraightPath(from, waypoint.base_from_tcp).length_mm(), waypoint.speed_mm_s,
+                        waypoint.acceleration_mm_s2);
+    from = waypoint.base_from_tcp;
+  }
+  return total;
+}
+
+double kinematic_mismatch_mm(const RobotModel& model, const RobotState& state) {
+  const RigidTransform expected = base_from_flange(model, state.joints) * state.flange_from_tcp;
+  return (state.base_from_tcp.translation - expected.translation).norm();
+}
+
+}  // namespace helicarm

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "helicarm/devices/robot/robot_order.h"
+
+namespace helicarm {
+
+/// Tokens by which a person allows one order, once, for a while. A token belongs to every digit of its order.
+class Confirmations {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  explicit Confirmations(Clock::duration valid_for = std::chrono::minutes(2)) : valid_for_(valid_for) {}
+
+  /// To be called when a person has seen the order and agreed. 32 hexadecimal digits nobody can guess.
+  std::string confirm(const RobotOrder& order, Clock::time_point now = Clock::now());
+
+  /// Uses the token up, whatever comes of it. Refuses `order_not_confirmed`.
+  Expected<void> redeem(const std::string& token, const RobotOrder& order,
+                        Clock::time_point now = Clock::now());
+
+  /// After a stop nothing confirmed before holds.
+  void forget_all();
+
+ private:
+  struct Entry {
+    std::string order;
+    Clock::time_point until;
+  };
+  Clock::duration valid_for_;
+  std::mutex guard_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace helicarm

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
+#include "helicarm/devices/robot/kinematics.h"
+
+namespace helicarm {
+
+enum class RobotMode : std::int32_t {
+  no_controller = -1,
+  disconnected,
+  confirm_safety,
+  booting,
+  power_off,
+  power_on,
+  idle,
+  backdrive,
+  running,
+  updating,
+};
+
+enum class SafetyMode : std::int32_t {
+  normal = 1,
+  reduced,
+  protective_stop,
+  recovery,
+  safeguard_stop,
+  system_emergency_stop,
+  robot_emergency_stop,
+  violation,
+  fault,
+  validate_joint_id,
+  undefined,
+  automatic_safeguard_stop,
+  system_enabling_stop,
+  three_position_stop,
+};
+
+enum class RuntimeState : std::uint32_t { stopping, stopped, playing, pausing, paused, resuming };
+
+/// What the robot says of itself at one moment of its own clock.
+struct RobotState {
+  double time_s = 0;  ///< since the controller started
+  Joints joints = Joints::Zero();
+  Joints joint_speeds = Joints::Zero();
+  RigidTransform base_from_tcp;
+  RigidTransform flange_from_tcp;
+  double payload_kg = 0;
+  RobotMode robot_mode = RobotMode::running;
+  SafetyMode safety_mode = SafetyMode::normal;
+  std::uint32_t safety_bits = 1;
+  RuntimeState runtime = RuntimeState::stopped;
+  double speed_scaling = 1;
+  std::int32_t progress = 0;  ///< output register 0, which our scripts write
+};
+
+/// Why this robot must not move (`robot_stopped`): its mode, a stop, an emergency stop, an open brake, a
+/// speed slider at zero. Nothing where it may.
+std::optional<Failure> why_stopped(const RobotState& state);
+
+std::string_view name(RobotMode mode);
+std::string_view name(SafetyMode mode);
+
+Json to_json(const RobotState& state);
+
+/// The robot's own writing of a pose: metres and a rotation vector. Nothing else here is in metres.
+inline constexpr double mm_per_m = 1000;
+using UrPose = Eigen::Matrix<double, 6, 1>;
+UrPose ur_pose(const RigidTransform& transform);
+RigidTransform transform_from(const UrPose& pose);
+
+}  // namespace helicarm

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/devices/robot/robot_state.h"
+
+namespace helicarm {
+
+/// Kinds of message of the Real-Time Data Exchange, version 2 (Universal Robots, RTDE guide).
+enum class RtdeKind : std::uint8_t {
+  text = 'M',
+  version = 'V',
+  controller_version = 'v',
+  outputs = 'O',
+  inputs = 'I',
+  start = 'S',
+  pause = 'P',
+  data = 'U',
+};
+
+struct RtdeMessage {
+  RtdeKind kind;
+  std::string content;
+};
+
+/// The message as sent: size (two bytes, of the whole), kind, content.
+std::string to_bytes(const RtdeMessage& message);
+
+/// Cuts a stream into messages.
+class RtdeStream {
+ public:
+  void append(std::string_view bytes) { bytes_ += bytes; }
+  /// Nothing while it is not yet there as a whole. A size under 3 or over 4096 (ours have 500) is bad_size:
+  /// the stream is then of no more use.
+  Expected<std::optional<RtdeMessage>> next();
+
+ private:
+  std::string bytes_;
+};
+
+/// Names and types of what the robot is asked to send, and of the one register it is given: the heartbeat.
+extern const std::vector<std::string> state_names;
+extern const std::vector<std::string> state_types;
+inline constexpr const char* heartbeat_name = "input_int_register_24";  // 24 to 47 are for RTDE's clients
+inline constexpr const char* heartbeat_type = "INT32";
+
+std::string request_version();
+std::string request_controller_version();
+std::string request_outputs(double rate_hz);
+std::string request_inputs();
+std::string request_start();
+std::string heartbeat_message(std::uint8_t recipe, std::int32_t beat);
+
+/// The recipe's number. A type other than the one wanted is refused: NOT_FOUND as `unsupported`, IN_USE as
+/// `robot_locked` (another program commands), both with the name of what is missing.
+Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<std::string>& names,
+                                   const std::vector<std::string>& types);
+
+/// Whether version, start or pause was granted; another kind or length is bad_value.
+Expected<bool> read_granted(const RtdeMessage& reply, RtdeKind kind);
+
+struct ControllerVersion {
+  std::uint32_t major = 0, minor = 0, bugfix = 0, build = 0;
+};
+Expected<ControllerVersion> read_controller_version(const RtdeMessage& reply);
+
+/// A text message of the robot, for the log: without control characters.
+Expected<std::string> read_text(const RtdeMessage& message);
+
+/// Refuses another recipe, another length, or numbers that are not finite.
+Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe);
+
+/// As a robot sends it.
+RtdeMessage state_message(std::uint8_t recipe, const RobotState& state);
+
+}  // namespace helicarm

@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/urscript.h"
+
+#include <cctype>
+#include <charconv>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/text.h"
+
+namespace helicarm {
+namespace {
+
+constexpr std::size_t longest_script = 65536;
+constexpr int deepest_expression = 50;
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front()))) text.remove_prefix(1);
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.remove_suffix(1);
+  return text;
+}
+
+bool starts_word(char c) { return std::isalpha(static_cast<unsigned char>(c)) || c == '_'; }
+bool continues_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
+
+/// The word at the front, taken off.
+std::string take_word(std::string_view& text) {
+  std::size_t size = 0;
+  if (!text.empty() && starts_word(text[0]))
+    while (size < text.size() && continues_word(text[size])) ++size;
+  const std::string word(text.substr(0, size));
+  text = trimmed(text.substr(size));
+  return word;
+}
+
+/// A call as the script writes it.
+struct Call {
+  std::string name;
+  std::vector<UrValue> arguments;
+  std::map<std::string, double> named;
+};
+
+/// Recursive descent over one expression: comparison, sum, product, sign, primary.
+class Expression {
+ public:
+  Expression(std::string_view text, const std::map<std::string, UrValue>& variables, UrScriptHost& host)
+      : rest_(trimmed(text)), variables_(variables), host_(host) {}
+
+  UrValue whole() {
+    UrValue value = comparison();
+    if (!rest_.empty()) refuse();
+    return value;
+  }
+  Call whole_call() {
+    Call call = arguments_of(take_word(rest_));
+    if (!rest_.empty()) refuse();
+    return call;
+  }
+
+ private:
+  [[noreturn]] void refuse() const {
+    throw BadInput(
+        Reason::bad_value,
+        "syntax error before \"" + without_control_characters(std::string(rest_.substr(0, 30))) + "\"");
+  }
+  bool taken(std::string_view mark) {
+    if (!rest_.starts_with(mark)) return false;
+    rest_ = trimmed(rest_.substr(mark.size()));
+    return true;
+  }
+  void expect(std::string_view mark) {
+    if (!taken(mark)) refuse();
+  }
+  static double number(const UrValue& value) {
+    if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due, not a list");
+    return value[0];
+  }
+  UrValue comparison() {
+    const UrValue left = sum();
+    for (const std::string_view mark : {"==", "!=", "<=", ">=", "<", ">"}) {
+      if (!taken(mark)) continue;
+      const double a = number(left), b = number(sum());
+      const bool holds = mark == "=="   ? a == b
+                         : mark == "!=" ? a != b
+                         : mark == "<=" ? a <= b
+                         : mark == ">=" ? a >= b
+                         : mark == "<"  ? a < b
+                                        : a > b;
+      return {holds ? 1.0 : 0.0};
+    }
+    return left;
+  }
+  UrValue sum() {
+    UrValue value = product();
+    for (;;) {
+      if (taken("+"))
+        value = {number(value) + number(product())};
+      else if (taken("-"))
+        value = {number(value) - number(product())};
+      else
+        return value;
+    }
+  }
+  UrValue product() {
+    UrValue value = primary();
+    while (taken("*")) value = {number(value) * number(primary())};
+    return value;
+  }
+  UrValue primary() {
+    if (++depth_ > deepest_expression) throw BadInput(Reason::bad_value, "expression nests too deeply");
+    if (taken("-")) return {-number(primary())};
+    if (taken("(")) {
+      UrValue value = comparison();
+      expect(")");
+      return value;
+    }
+    if (taken("p[") || taken("[")) return list("]");
+    if (rest_.empty()) refuse();
+    if (!starts_word(rest_[0])) return {literal()};
+    const std::string word = take_word(rest_);
+    if (word == "True") return {1};
+    if (word == "False") return {0};
+    if (rest_.starts_with("(")) {
+      const Call call = arguments_of(word);
+      return host_.call(call.name, call.arguments);
+    }
+    const auto found = variables_.find(word);
+    if (found == variables_.end()) throw BadInput(Reason::bad_value, "variable " + word + " is not defined");
+    return found->second;
+  }
+  double literal() {
+    double value = 0;
+    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    if (error != std::errc() || !std::isfinite(value)) refuse();
+    rest_ = trimmed(rest_.substr(static_cast<std::size_t>(end - rest_.data())));
+    return value;
+  }
+  UrValue list(std::string_view close) {
+    UrValue values;
+    if (taken(close)) return values;
+    do values.push_back(number(comparison()));
+    while (taken(","));
+    expect(close);
+    return values;
+  }
+  Call arguments_of(const std::string& name) {
+    Call call{name, {}, {}};
+    expect("(");
+    if (taken(")")) return call;
+    do {
+      std::string_view ahead = rest_;
+      const std::string word = take_word(ahead);
+      if (!word.empty() && ahead.starts_with("=") && !ahead.starts_with("==")) {
+        rest_ = trimmed(ahead.substr(1));
+        call.named[word] = number(comparison());
+      } else {
+        call.arguments.push_back(comparison());
+      }
+    } while (taken(","));
+    expect(")");
+    return call;
+  }
+
+  std::string_view rest_;
+  const std::map<std::string, UrValue>& variables_;
+  UrScriptHost& host_;
+  int depth_ = 0;
+};
+
+bool is_motion(std::string_view name) { return name == "movel" || name == "movej" || name == "stopj"; }
+
+/// "while EXPRESSION:" and its like: what stands between word and colon.
+std::string head_of(std::string_view line, std::string_view word) {
+  line = trimmed(line.substr(word.size()));
+  if (line.empty() || line.back() != ':') throw BadInput(Reason::bad_value, "a colon is missing");
+  return std::string(trimmed(line.substr(0, line.size() - 1)));
+}
+
+/// "name()" of def, thread and run.
+std::string name_of(std::string_view text) {
+  const std::string name = take_word(text);
+  if (name.empty() || text != "()") throw BadInput(Reason::bad_value, "a name with () is due");
+  return name;
+}
+
+}  // namespace
+
+Expected<UrScript> UrScript::parse(std::string_view text) {
+  if (text.size() > longest_script) return fail(Reason::bad_size, "script is too long");
+  int number = 0;
+  auto parsed = guarded([&] {
+    struct Block {
+      std::string word, code;
+      std::size_t start;
+    };
+    UrScript script;
+    std::vector<Block> open;
+    bool ended = false;
+    const auto add = [&](Kind kind, std::string name, std::string expression) -> Command& {
+      return script.codes_[open.back().code].emplace_back(
+          Command{kind, std::move(name), std::move(expression), 0, number});
+    };
+    const auto close = [&] {
+      const Block block = open.back();
+      Code& code = script.codes_[block.code];
+      if (block.word == "while") {
+        code.push_back({Kind::jump, {}, {}, block.start, number});
+        code[block.start].target = code.size();
+      } else if (block.word == "if" || block.word == "else") {
+        code[block.start].target = code.size();
+      }
+      open.pop_back();
+      ended = open.empty();
+    };
+    while (!text.empty()) {
+      const std::size_t size = std::min(text.find('\n'), text.size());
+      std::string_view line = trimmed(text.substr(0, size));
+      text.remove_prefix(std::min(size + 1, text.size()));
+      ++number;
+      if (line.empty()) continue;
+      if (ended) throw BadInput(Reason::bad_value, "text after the program's end");
+      std::string_view after = line;
+      const std::string word = take_word(after);
+      if (open.empty()) {
+        if (word != "def") throw BadInput(Reason::bad_value, "a program starts with def");
+        name_of(head_of(line, word));
+        open.push_back({word, "", 0});
+        script.codes_[""];
+      } else if (word == "end" && after.empty()) {
+        close();
+      } else if (word == "thread") {
+        if (open.size() != 1) throw BadInput(Reason::unsupported, "a thread within a block");
+        const std::string name = name_of(head_of(line, word));
+        open.push_back({word, name, 0});
+        script.codes_[name];
+      } else if (word == "while" || word == "if") {
+        add(Kind::branch_unless, {}, head_of(line, word));
+        open.push_back({word, open.back().code, script.codes_[open.back().code].size() - 1});
+      } else if (word == "else") {
+        if (open.back().word != "if" || after != ":") throw BadInput(Reason::bad_value, "else without if");
+        Code& code = script.codes_[open.back().code];
+        add(Kind::jump, {}, {});
+        code[open.back().start].target = code.size();
+        open.back() = {word, open.back().code, code.size() - 1};
+      } else if (word == "halt" && after.empty()) {
+        add(Kind::halt, {}, {});
+      } else if (word == "kill") {
+        add(Kind::kill, take_word(after), {});
+      } else {
+        const bool global = word == "global";
+        std::string_view value = global ? after : line;
+        const std::string name = take_word(value);
+        if (value.starts_with("=") && !value.starts_with("==")) {
+          value = trimmed(value.substr(1));
+          std::string_view running = value;
+          if (take_word(running) == "run" && !running.starts_with("("))
+            add(Kind::run, name, name_of(running));
+          else
+            add(Kind::assign, name, std::string(value));
+        } else if (!global && value.starts_with("(")) {
+          add(Kind::call, name, std::string(line));
+        } else {
+          throw BadInput(Reason::unsupported, "statement is not understood");
+        }
+      }
+    }
+    if (!ended) throw BadInput(Reason::truncated, "the program's end is missing");
+    script.threads_.push_back(std::make_unique<Thread>());
+    return script;
+  });
+  if (parsed) return parsed;
+  return fail(parsed.error().reason, fmt::format("script: line {}: {}", number, parsed.error().message));
+}
+
+void UrScript::kill(const std::string& handle) {
+  for (const auto& thread : threads_)
+    if (thread->handle == handle) thread->ended = true;
+}
+
+bool UrScript::run(Thread& thread, UrScriptHost& host) {
+  if (thread.in_motion && host.moving()) return true;
+  thread.in_motion = false;
+  const Code& code = codes_.at(thread.code);
+  for (int commands = 0; thread.at < code.size(); ++commands) {
+    const Command& command = code[thread.at++];
+    try {
+      if (commands == 1000) throw BadInput(Reason::bad_value, "runs on without a pause");
+      Expression expression(command.expression, variables_, host);
+      switch (command.kind) {
+        case Kind::assign:
+          variables_[command.name] = expression.whole();
+          break;
+        case Kind::run:
+          if (!codes_.contains(command.expression)) throw BadInput(Reason::bad_value, "no such thread");
+          if (threads_.size() >= 10) throw BadInput(Reason::bad_value, "too many threads");
+          threads_.push_back(std::make_unique<Thread>(Thread{command.expression, command.name}));
+          break;
+        case Kind::kill:
+          kill(command.name);
+          break;
+        case Kind::halt:
+          return false;
+        case Kind::branch_unless:
+          if (expression.whole() == UrValue{0}) thread.at = command.target;
+          break;
+        case Kind::jump:
+          thread.at = command.target;
+          break;
+        case Kind::call: {
+          const Call call = expression.whole_call();
+          if (call.name == "sync") return true;
+          if (is_motion(call.name)) {
+            host.start_motion(call.name, call.arguments, call.named);
+            thread.in_motion = true;
+            return true;
+          }
+          host.call(call.name, call.arguments);
+        }
+      }
+    } catch (const BadInput& bad) {
+      throw BadInput(bad.failure().reason,
+                     fmt::format("script: line {}: {}", command.line, bad.failure().message));
+    }
+  }
+  thread.ended = true;
+  return !thread.code.empty();
+}
+
+Expected<bool> UrScript::step(UrScriptHost& host) {
+  return guarded([&] {
+    for (std::size_t i = 0; i < threads_.size(); ++i)
+      if (!threads_[i]->ended && !run(*threads_[i], host)) return false;
+    std::erase_if(threads_, [](const auto& thread) { return thread->ended; });
+    return !threads_.empty();
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// A value of the little URScript: a number (one element; True is 1), a list or a pose.
+using UrValue = std::vector<double>;
+
+/// What a script's commands act upon.
+class UrScriptHost {
+ public:
+  virtual ~UrScriptHost() = default;
+  virtual bool moving() const = 0;
+  /// A command that starts a motion and lasts until it ends: movel, movej, stopj. Throws BadInput.
+  virtual void start_motion(const std::string& command, const std::vector<UrValue>& arguments,
+                            const std::map<std::string, double>& named) = 0;
+  /// Any other command or function, which takes no time. Throws BadInput for one it does not know.
+  virtual UrValue call(const std::string& name, const std::vector<UrValue>& arguments) = 0;
+};
+
+/// Runs the part of URScript that our own scripts use: one program with threads, while, if and else,
+/// assignments, run, kill, halt, sync, numbers, comparisons, lists and calls. For the virtual robot.
+class UrScript {
+ public:
+  /// Refuses `unsupported` and `bad_value` with the line.
+  static Expected<UrScript> parse(std::string_view text);
+
+  /// One period of the controller. False when the program has ended; a failure is a runtime error, as is a
+  /// thread that does not pause within 1000 commands.
+  Expected<bool> step(UrScriptHost& host);
+
+ private:
+  enum class Kind { assign, run, kill, halt, call, branch_unless, jump };
+  struct Command {
+    Kind kind;
+    std::string name;        ///< variable, or thread's handle
+    std::string expression;  ///< or the thread's name
+    std::size_t target = 0;
+    int line = 0;
+  };
+  using Code = std::vector<Command>;
+  struct Thread {
+    std::string code;
+    std::string handle;
+    std::size_t at = 0;
+    bool in_motion = false;
+    bool ended = false;
+  };
+
+  /// False when the program halts.
+  bool run(Thread& thread, UrScriptHost& host);
+  void kill(const std::string& handle);
+
+  std::map<std::string, Code> codes_;  ///< the main program is ""
+  std::vector<std::unique_ptr<Thread>> threads_;
+  std::map<std::string, UrValue> variables_;
+};
+
+}  // namespace helicarm

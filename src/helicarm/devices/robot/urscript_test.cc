@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/urscript.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm {
+namespace {
+
+/// Writes down what it is told; a motion lasts until `moving_` is taken back.
+struct Notebook : UrScriptHost {
+  bool moving() const override { return moving_; }
+  void start_motion(const std::string& command, const std::vector<UrValue>&,
+                    const std::map<std::string, double>& named) override {
+    log += command + " ";
+    speed = named.contains("v") ? named.at("v") : 0;
+    moving_ = true;
+  }
+  UrValue call(const std::string& name, const std::vector<UrValue>& arguments) override {
+    if (name == "note") return note = arguments.at(0), UrValue{};
+    if (name == "input") return {input};
+    throw BadInput(Reason::unsupported, "function " + name + " is not defined");
+  }
+  bool moving_ = false;
+  double speed = 0, input = 0;
+  UrValue note;
+  std::string log;
+};
+
+Reason refused(const std::string& text) {
+  auto script = UrScript::parse(text);
+  if (!script) return script.error().reason;
+  Notebook notebook;
+  const auto step = script->step(notebook);
+  return step ? Reason::usage : step.error().reason;
+}
+
+TEST(UrScript, ArithmeticAndBranches) {
+  auto script = UrScript::parse(
+      "def f():\n  x = 2 * (1 + 3) - -1\n  if x == 9:\n    note([x, x - 1, 0.5])\n  else:\n    note(0)\n  "
+      "end\nend\n");
+  ASSERT_TRUE(script) << script.error().message;
+  Notebook notebook;
+  EXPECT_FALSE(*script->step(notebook));
+  EXPECT_EQ(notebook.note, (UrValue{9, 8, 0.5}));
+}
+
+TEST(UrScript, ThreadMovesWhileTheProgramWatches) {
+  auto script = UrScript::parse(
+      "def f():\n  thread move():\n    movel(p[0,0,0,0,0,0], a=1, v=0.25)\n    note(7)\n  end\n"
+      "  mover = run move()\n  while input() == 0:\n    sync()\n  end\n  kill mover\n  stopj(4)\nend\n");
+  ASSERT_TRUE(script) << script.error().message;
+  Notebook notebook;
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(*script->step(notebook));
+  EXPECT_EQ(notebook.log, "movel ");
+  EXPECT_EQ(notebook.speed, 0.25);
+  notebook.input = 1;
+  EXPECT_TRUE(*script->step(notebook));
+  EXPECT_EQ(notebook.log, "movel stopj ");
+  notebook.moving_ = false;
+  EXPECT_FALSE(*script->step(notebook));
+  EXPECT_TRUE(notebook.note.empty());
+}
+
+TEST(UrScript, WhatItDoesNotKnowIsRefused) {
+  EXPECT_EQ(refused("movej([0])\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  note(1)\n"), Reason::truncated);
+  EXPECT_EQ(refused("def f():\nend\nnote(1)\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  launch()\nend\n"), Reason::unsupported);
+  EXPECT_EQ(refused("def f():\n  note(y)\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  note(1;2)\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  import os\nend\n"), Reason::unsupported);
+  EXPECT_EQ(refused("def f():\n  else:\n  end\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  while True:\n  end\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  x = run nothing()\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  note(" + std::string(200, '(') + ")\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused(std::string(70000, ' ')), Reason::bad_size);
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "helicarm/devices/robot/kinematics.h"
+#include "helicarm/devices/robot/straight_path.h"
+
+namespace helicarm {
+
+/// The joints of a virtual arm: they follow a path with a trapezoidal speed, or brake.
+class VirtualArm {
+ public:
+  VirtualArm(const RobotModel& model, const Joints& joints) : model_(model), joints_(joints) {}
+
+  /// The tip in a straight line; refuses as `nearest_inverse` where it ends out of reach.
+  Expected<void> move_linear(const RigidTransform& base_from_tcp, const RigidTransform& flange_from_tcp,
+                             double speed_mm_s, double acceleration_mm_s2);
+  /// All joints in proportion; speeds are those of the joint that turns furthest.
+  void move_joints(const Joints& target, double speed_rad_s, double acceleration_rad_s2);
+  /// All joints come to rest in the same time.
+  void brake(double deceleration_rad_s2);
+  /// One period. `scaling` is the speed slider's place, 0 to 1. A failure is what a protective stop would
+  /// follow: a joint faster than its limit, or a path that leaves the reach; the arm then stays where it is.
+  Expected<void> step(double period_s, double scaling);
+  /// As if somebody had pushed it.
+  void push(const Joints& by) { joints_ += by; }
+
+  bool moving() const { return path_ != nullptr || braking_rad_s2_.has_value(); }
+  const Joints& joints() const { return joints_; }
+  const Joints& joint_speeds() const { return speeds_; }
+
+ private:
+  using Path = std::function<Expected<Joints>(double part, const Joints& near)>;
+  void follow(Path path, double length, double speed, double acceleration);
+
+  RobotModel model_;
+  Joints joints_;
+  Joints speeds_ = Joints::Zero();
+  Path path_;
+  double length_ = 0, speed_ = 0, acceleration_ = 0;  ///< of the path, in its own unit
+  double covered_ = 0, present_speed_ = 0;
+  std::optional<double> braking_rad_s2_;
+};
+
+}  // namespace helicarm

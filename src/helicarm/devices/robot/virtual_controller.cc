@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/virtual_controller.h"
+
+#include <array>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+namespace {
+
+constexpr std::array<std::string_view, 18> fault_names = {
+    "emergency_stop",     "protective_stop", "safeguard_stop", "violation",   "local_mode",
+    "brake_not_released", "zero_speed",      "moved_by_hand",  "other_tool",  "clock_jump",
+    "frozen_states",      "cut_cable",       "half_packet",    "huge_packet", "wrong_version",
+    "unknown_output",     "input_in_use",    "not_finite"};
+
+// UR5 user manual 5.3: braking begins within 24 ms and ends within 500 ms from full speed.
+constexpr double brake_delay_s = 0.024;
+constexpr double safety_stop_rad_s2 = 3.1416 / (0.5 - brake_delay_s);
+// A protective stop cannot be unlocked sooner.
+constexpr double unlock_after_s = 5;
+// At a program's end the controller halts the arm with its default.
+constexpr double end_rad_s2 = 10;
+
+UrPose six(const UrValue& value) {
+  if (value.size() != 6) throw BadInput(Reason::bad_value, "six numbers are due");
+  return Eigen::Map<const UrPose>(value.data());
+}
+
+double one(const UrValue& value) {
+  if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due");
+  return value[0];
+}
+
+double named_or(const std::map<std::string, double>& named, const char* name, double fallback) {
+  const auto found = named.find(name);
+  const double value = found == named.end() ? fallback : found->second;
+  if (!(value > 0 && value < 100)) throw BadInput(Reason::bad_value, std::string(name) + " is out of range");
+  return value;
+}
+
+std::uint32_t bits_of(SafetyMode mode) {
+  switch (mode) {
+    case SafetyMode::normal:
+      return 1;
+    case SafetyMode::protective_stop:
+      return 1u << 2 | 1u << 10;
+    case SafetyMode::safeguard_stop:
+      return 1u << 4 | 1u << 10;
+    case SafetyMode::robot_emergency_stop:
+      return 1u << 6 | 1u << 7 | 1u << 10;
+    case SafetyMode::violation:
+      return 1u << 8 | 1u << 10;
+    default:
+      return 1u << 9;
+  }
+}
+
+}  // namespace
+
+Expected<RobotFault> robot_fault(const std::string& name) {
+  for (std::size_t i = 0; i < fault_names.size(); ++i)
+    if (fault_names[i] == name) return static_cast<RobotFault>(i);
+  return fail(Reason::bad_value, fmt::format("a robot's fault is one of {}", fmt::join(fault_names, ", ")));
+}
+
+VirtualController::VirtualController(const RobotModel& model, const RobotTool& tool, const Joints& joints)
+    : model_(model), tool_(tool), arm_(model, joints) {}
+
+void VirtualController::end_program() {
+  script_.reset();
+  if (arm_.moving() && !brake_at_s_) arm_.brake(end_rad_s2);
+}
+
+void VirtualController::stop(SafetyMode mode) {
+  script_.reset();
+  safety_ = mode;
+  stopped_at_s_ = time_s_;
+  brake_at_s_ = time_s_ + brake_delay_s;
+}
+
+void VirtualController::step() {
+  const double period_s = 1 / model_.rate_hz;
+  time_s_ += period_s;
+  if (script_) {
+    const auto runs = script_->step(*this);
+    if (!runs) script_error_ = runs.error().message;
+    if (!runs || !*runs) end_program();
+  }
+  if (brake_at_s_ && time_s_ >= *brake_at_s_) {
+    brake_at_s_.reset();
+    if (arm_.moving()) arm_.brake(safety_stop_rad_s2);
+  }
+  const bool moved = arm_.moving();
+  if (!arm_.step(period_s, has(RobotFault::zero_speed) ? 0 : 1)) {
+    stop(SafetyMode::protective_stop);
+    arm_.brake(safety_stop_rad_s2);
+  }
+  if (moved && !arm_.moving())
+    rest_since_s_ = time_s_;
+  else if (arm_.moving())
+    rest_since_s_.reset();
+}
+
+void VirtualController::set(RobotFault fault, bool on) {
+  if (!on) {
+    faults_.erase(fault);
+    if (fault == RobotFault::emergency_stop && safety_ == SafetyMode::robot_emergency_stop) {
+      safety_ = SafetyMode::normal;  // the button is out again, but the arm has no power
+      mode_ = RobotMode::power_off;
+    }
+    if (fault == RobotFault::safeguard_stop && safety_ == SafetyMode::safeguard_stop)
+      safety_ = SafetyMode::normal;
+    return;
+  }
+  faults_.insert(fault);
+  switch (fault) {
+    case RobotFault::emergency_stop:
+      return stop(SafetyMode::robot_emergency_stop);
+    case RobotFault::protective_stop:
+      return stop(SafetyMode::protective_stop);
+    case RobotFault::safeguard_stop:
+      return stop(SafetyMode::safeguard_stop);
+    case RobotFault::violation:
+      return stop(SafetyMode::violation);
+    case RobotFault::brake_not_released:
+      mode_ = RobotMode::idle;
+      return end_program();
+    case RobotFault::moved_by_hand:
+      return arm_.push(Joints::Unit(0) * 0.02);
+    case RobotFault::clock_jump:
+      time_s_ = 0;
+      return;
+    default:
+      return;
+  }
+}
+
+void VirtualController::run_script(const std::string& text) {
+  if (has(RobotFault::local_mode)) return;
+  end_program();
+  auto script = UrScript::parse(text);
+  if (!script)
+    script_error_ = script.error().message;
+  else if (mode_ == RobotMode::running && safety_ == SafetyMode::normal)
+    script_ = *std::move(script);
+}
+
+std::string VirtualController::dashboard(std::string_view command) {
+  if (command == "robotmode") return fmt::format("Robotmode: {}", name(mode_));
+  if (command == "safetymode" || command == "safetystatus")
+    return fmt::format("{}: {}", command == "safetymode" ? "Safetymode" : "Safetystatus", name(safety_));
+  if (command == "programState") return script_ ? "PLAYING helicarm" : "STOPPED helicarm";
+  if (command == "running") return fmt::format("Program running: {}", script_.has_value());
+  if (command == "is in remote control") return has(RobotFault::local_mode) ? "false" : "true";
+  if (command == "PolyscopeVersion") return "URSoftware 5.25.1.0 (virtual)";
+  if (command == "close safety popup") return "closing safety popup";
+  if (command == "stop") {
+    end_program();
+    return "Stopped";
+  }
+  if (has(RobotFault::local_mode)) return "Command is not allowed: not in remote control";
+  if (command == "unlock protective stop") {
+    if (safety_ == SafetyMode::protective_stop) {
+      if (time_s_ - stopped_at_s_ < unlock_after_s)
+        return "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective "
+               "stop before unlocking";
+      safety_ = SafetyMode::normal;
+    }
+    return "Protective stop releasing";
+  }
+  if (command == "restart safety") {
+    if (safety_ == SafetyMode::violation) {
+      safety_ = SafetyMode::normal;
+      mode_ = RobotMode::power_off;
+    }
+    return "Restarting safety";
+  }
+  if (command == "power on") {
+    if (mode_ == RobotMode::power_off) mode_ = RobotMode::idle;
+    return "Powering on";
+  }
+  if (command == "brake release") {
+    if (!has(RobotFault::brake_not_released)) mode_ = RobotMode::running;
+    return "Brake releasing";
+  }
+  return fmt::format("could not understand: '{}'", command.substr(0, 100));
+}
+
+void VirtualController::start_motion(const std::string& command, const std::vector<UrValue>& arguments,
+                                     const std::map<std::string, double>& named) {
+  if (arguments.size() != 1) throw BadInput(Reason::bad_value, command + ": one place is due");
+  if (command == "stopj") return arm_.brake(std::clamp(one(arguments[0]), 0.1, 40.0));
+  if (command == "movej")
+    return arm_.move_joints(six(arguments[0]), named_or(named, "v", 1.05), named_or(named, "a", 1.4));
+  const auto going =
+      arm_.move_linear(transform_from(six(arguments[0])), tool_.flange_from_tcp,
+                       named_or(named, "v", 0.25) * mm_per_m, named_or(named, "a", 1.2) * mm_per_m);
+  if (!going) {
+    stop(SafetyMode::protective_stop);
+    throw BadInput(going.error());
+  }
+}
+
+UrValue VirtualController::call(const std::string& name, const std::vector<UrValue>& arguments) {
+  const auto expect = [&](std::size_t count) {
+    if (arguments.size() != count) throw BadInput(Reason::bad_value, name + ": wrong number of arguments");
+  };
+  if (name == "set_tcp") {
+    expect(1);
+    tool_.flange_from_tcp = transform_from(six(arguments[0]));
+  } else if (name == "set_payload") {
+    expect(1);
+    tool_.payload_kg = one(arguments[0]);
+  } else if (name == "read_input_integer_register") {
+    expect(1);
+    return {one(arguments[0]) == 24 ? double(heartbeat_) : 0.0};
+  } else if (name == "read_output_integer_register") {
+    expect(1);
+    return {double(progress_)};
+  } else if (name == "write_output_integer_register") {
+    expect(2);
+    if (one(arguments[0]) == 0) progress_ = static_cast<std::int32_t>(one(arguments[1]));
+  } else {
+    throw BadInput(Reason::unsupported, "function " + name + " is not defined");
+  }
+  return {};
+}
+
+RobotState VirtualController::state() const {
+  RobotState state;
+  state.time_s = has(RobotFault::not_finite) ? std::nan("") : time_s_;
+  state.joints = arm_.joints();
+  state.joint_speeds = arm_.joint_speeds();
+  state.flange_from_tcp = tool_.flange_from_tcp;
+  if (has(RobotFault::other_tool)) state.flange_from_tcp.translation.z() += 5;
+  state.base_from_tcp = base_from_flange(model_, state.joints) * state.flange_from_tcp;
+  state.payload_kg = tool_.payload_kg;
+  state.robot_mode = mode_;
+  state.safety_mode = safety_;
+  state.safety_bits = bits_of(safety_);
+  state.runtime = script_ ? RuntimeState::playing : RuntimeState::stopped;
+  state.speed_scaling = has(RobotFault::zero_speed) ? 0 : 1;
+  state.progress = progress_;
+  return state;
+}
+
+}  // namespace helicarm

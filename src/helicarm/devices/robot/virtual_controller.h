@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+
+#include "helicarm/devices/robot/robot_order.h"
+#include "helicarm/devices/robot/robot_state.h"
+#include "helicarm/devices/robot/urscript.h"
+#include "helicarm/devices/robot/virtual_arm.h"
+
+namespace helicarm {
+
+/// What can go wrong with a virtual robot, by name: the last eight with its network.
+enum class RobotFault {
+  emergency_stop,
+  protective_stop,
+  safeguard_stop,
+  violation,
+  local_mode,
+  brake_not_released,
+  zero_speed,
+  moved_by_hand,
+  other_tool,
+  clock_jump,
+  frozen_states,
+  cut_cable,
+  half_packet,
+  huge_packet,
+  wrong_version,
+  unknown_output,
+  input_in_use,
+  not_finite,
+};
+
+/// Its name as in the list above, e.g. "cut_cable"; bad_value lists them all.
+Expected<RobotFault> robot_fault(const std::string& name);
+
+/// A virtual robot without its network: modes, stops, the script that runs, the arm. Moves only by `step`.
+class VirtualController : public UrScriptHost {
+ public:
+  /// `model` is what the controller believes of the arm.
+  VirtualController(const RobotModel& model, const RobotTool& tool, const Joints& joints);
+
+  void step();
+  void set(RobotFault fault, bool on);
+  bool has(RobotFault fault) const { return faults_.contains(fault); }
+  /// Starts a program, ending the one that runs; not heard in local mode.
+  void run_script(const std::string& text);
+  /// The answer to one command of the dashboard, without its end of line.
+  std::string dashboard(std::string_view command);
+  void set_heartbeat(std::int32_t beat) { heartbeat_ = beat; }
+
+  RobotState state() const;
+  double time_s() const { return time_s_; }
+  bool moving() const override { return arm_.moving(); }
+  /// When the arm last came to rest, s; nothing while it moves or before it ever did.
+  std::optional<double> rest_since_s() const { return rest_since_s_; }
+  const std::string& script_error() const { return script_error_; }
+
+ private:
+  void start_motion(const std::string& command, const std::vector<UrValue>& arguments,
+                    const std::map<std::string, double>& named) override;
+  UrValue call(const std::string& name, const std::vector<UrValue>& arguments) override;
+  void stop(SafetyMode mode);
+  void end_program();
+
+  RobotModel model_;
+  RobotTool tool_;
+  VirtualArm arm_;
+  std::set<RobotFault> faults_;
+  std::optional<UrScript> script_;
+  std::string script_error_;
+  RobotMode mode_ = RobotMode::running;
+  SafetyMode safety_ = SafetyMode::normal;
+  double time_s_ = 0;
+  double stopped_at_s_ = 0;
+  std::optional<double> brake_at_s_;
+  std::optional<double> rest_since_s_;
+  std::int32_t heartbeat_ = 0;
+  std::int32_t progress_ = 0;
+};
+
+}  // namespace helicarm

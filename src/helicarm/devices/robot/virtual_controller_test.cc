@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/virtual_controller.h"
+
+#include <functional>
+
+#include <gmock/gmock.h>
+
+#include "helicarm/devices/robot/robot_scene_test.h"
+#include "helicarm/devices/robot/script.h"
+
+namespace helicarm {
+namespace {
+
+VirtualController robot(const RobotModel& model = ur5()) { return {model, drill(), resting_joints()}; }
+
+/// Runs the script with a heartbeat until it ends or `until` says so; gives the time passed.
+double run_until(
+    VirtualController& controller, const std::function<bool()>& until = [] { return false; }) {
+  const double start_s = controller.time_s();
+  for (int beat = 1; beat < 20000; ++beat) {
+    controller.set_heartbeat(beat);
+    controller.step();
+    if (until() || controller.state().runtime == RuntimeState::stopped) break;
+  }
+  return controller.time_s() - start_s;
+}
+
+void rest(VirtualController& controller) {
+  for (int i = 0; i < 1000 && controller.moving(); ++i) controller.step();
+}
+
+TEST(Script, HoldsNumbersOnly) {
+  RobotOrder order = planned();
+  order.name = "knee\")\nmovej([0, 0, 0, 0, 0, 0])\n";
+  EXPECT_EQ(script_of(order, ur5(), 7), script_of(planned(), ur5(), 7));
+  EXPECT_THAT(script_of(order, ur5(), 7), testing::HasSubstr("if silent >= 10:"));
+  EXPECT_THAT(script_of(order, ur5e(), 7), testing::HasSubstr("if silent >= 40:"));
+}
+
+TEST(VirtualController, OrderBringsTheTipToItsEndInTheTimeForeseen) {
+  for (const RobotModel& model : {ur5(), ur5e()}) {
+    VirtualController controller = robot(model);
+    const RigidTransform here = controller.state().base_from_tcp;
+    const TunnelAxis axis{here * Eigen::Vector3d(10, 20, 90), here * Eigen::Vector3d(10, 22, 120)};
+    const auto order = plan_approach("femur", model, drill(), resting_joints(), axis);
+    ASSERT_TRUE(order) << order.error().message;
+    controller.run_script(script_of(*order, model, 3));
+    const double took_s = run_until(controller);
+    EXPECT_EQ(controller.script_error(), "");
+    EXPECT_EQ(controller.state().progress, progress_of(3, ScriptStage::done));
+    const RigidTransform& end = order->waypoints.back().base_from_tcp;
+    EXPECT_LT((controller.state().base_from_tcp.translation - end.translation).norm(), 1e-5);
+    EXPECT_NEAR(took_s, duration_s(*order), 0.2);
+  }
+}
+
+TEST(VirtualController, SilenceStopsTheFastestOrderWithin200Milliseconds) {
+  for (const RobotModel& model : {ur5(), ur5e()}) {
+    double longest_s = 0;
+    for (int moment = 5; moment < 50; moment += 6) {
+      VirtualController controller = robot(model);
+      RobotOrder order{"fast", model.name, drill(), resting_joints(), {}, {}, {}};
+      RigidTransform aside = controller.state().base_from_tcp;
+      aside.translation.y() += 200;
+      order.waypoints = {{aside, 250, 1200}};
+      ASSERT_TRUE(check_order(order, controller.state()))
+          << check_order(order, controller.state()).error().message;
+      controller.run_script(script_of(order, model, 1));
+      const double begun_s = controller.time_s();
+      run_until(controller, [&] { return controller.time_s() - begun_s > 0.016 * moment; });
+      ASSERT_TRUE(controller.moving());
+      const double silent_since_s = controller.time_s();
+      rest(controller);
+      EXPECT_EQ(controller.state().progress, progress_of(1, ScriptStage::begun));
+      controller.step();
+      EXPECT_EQ(controller.state().progress, progress_of(1, ScriptStage::silent));
+      longest_s = std::max(longest_s, *controller.rest_since_s() - silent_since_s);
+    }
+    EXPECT_LE(longest_s, 0.2);
+    EXPECT_GE(longest_s, silence_s);
+    RecordProperty("stop_ms_" + model.name, static_cast<int>(1000 * longest_s));
+  }
+}
+
+TEST(VirtualController, EmergencyStopBrakesAndNeedsPowerAndBrakesAfterwards) {
+  VirtualController controller = robot();
+  controller.run_script(script_of(planned(), ur5(), 1));
+  run_until(controller, [&] { return controller.time_s() > 1; });
+  const double pressed_s = controller.time_s();
+  controller.set(RobotFault::emergency_stop, true);
+  rest(controller);
+  EXPECT_LT(*controller.rest_since_s() - pressed_s, 0.5);
+  EXPECT_EQ(controller.state().safety_mode, SafetyMode::robot_emergency_stop);
+  controller.set(RobotFault::emergency_stop, false);
+  EXPECT_TRUE(why_stopped(controller.state()));
+  EXPECT_EQ(controller.dashboard("power on"), "Powering on");
+  EXPECT_EQ(controller.dashboard("brake release"), "Brake releasing");
+  EXPECT_FALSE(why_stopped(controller.state()));
+  EXPECT_EQ(controller.state().runtime, RuntimeState::stopped);
+}
+
+TEST(VirtualController, ProtectiveStopUnlocksAfterFiveSeconds) {
+  VirtualController controller = robot();
+  controller.set(RobotFault::protective_stop, true);
+  EXPECT_THAT(controller.dashboard("unlock protective stop"), testing::StartsWith("Cannot unlock"));
+  for (int i = 0; i < 626; ++i) controller.step();
+  EXPECT_EQ(controller.dashboard("unlock protective stop"), "Protective stop releasing");
+  EXPECT_FALSE(why_stopped(controller.state()));
+}
+
+TEST(VirtualController, MotionBeyondTheJointsIsAProtectiveStop) {
+  VirtualController controller = robot();
+  controller.run_script("def f():\n  movej([3, -1.7, -1.5, -1.4, 1.5, 0.3], a=40, v=9)\nend\n");
+  run_until(controller);
+  rest(controller);
+  EXPECT_EQ(controller.state().safety_mode, SafetyMode::protective_stop);
+  VirtualController other = robot();
+  other.run_script("def f():\n  movel(p[3, 0, 0, 0, 0, 0], a=1, v=0.1)\nend\n");
+  run_until(other);
+  EXPECT_EQ(other.state().safety_mode, SafetyMode::protective_stop);
+  EXPECT_EQ(other.state().joints, resting_joints());
+}
+
+TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
+  VirtualController controller = robot();
+  controller.run_script("def f():\n  os_command(1)\nend\n");
+  controller.step();
+  EXPECT_THAT(controller.script_error(), testing::HasSubstr("os_command"));
+  controller.set(RobotFault::local_mode, true);
+  controller.run_script(script_of(planned(), ur5(), 1));
+  controller.step();
+  EXPECT_EQ(controller.state().runtime, RuntimeState::stopped);
+  EXPECT_FALSE(controller.moving());
+}
+
+TEST(VirtualController, FaultsHaveNames) {
+  EXPECT_EQ(*robot_fault("cut_cable"), RobotFault::cut_cable);
+  EXPECT_EQ(*robot_fault("not_finite"), RobotFault::not_finite);
+  EXPECT_EQ(robot_fault("smoke").error().reason, Reason::bad_value);
+}
+
+}  // namespace
+}  // namespace helicarm
