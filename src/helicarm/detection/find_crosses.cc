@@ -110,8 +110,20 @@ struct Pixel {
   double x, y, grey, weight;
 };
 
-std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, double half_width,
+/// Whether a pixel lies outside the field or in its blurred rim.
+bool at_the_rim(const Exposure& exposure, int u, int v) {
+  constexpr int rim_px = 3;  // the screen's blur and the ramp of the field's edge
+  const float black = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);  // as in usable.cc
+  const Image<float>& image = exposure.pixels;
+  for (int y = -rim_px; y <= rim_px; ++y)
+    for (int x = -rim_px; x <= rim_px; ++x)
+      if (image.contains(u + x, v + y) && image(u + x, v + y) <= black) return true;
+  return false;
+}
+
+std::optional<Dot> fit_wires(const Exposure& exposure, const Vector2d& start, double half_width,
                              const Arms& arms, std::span<const Disc> discs) {
+  const Image<float>& image = exposure.pixels;
   const int u0 = static_cast<int>(std::lround(start.x()));
   const int v0 = static_cast<int>(std::lround(start.y()));
   const double window = 4 * half_width + 4;
@@ -124,7 +136,7 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
         const bool hidden = std::any_of(discs.begin(), discs.end(), [&](const Disc& disc) {
           return (disc.centre - Vector2d(u0 + x, v0 + y)).squaredNorm() < disc.radius * disc.radius;
         });
-        if (hidden) continue;
+        if (hidden || at_the_rim(exposure, u0 + x, v0 + y)) continue;
         pixels.push_back({double(x), double(y), double(image(u0 + x, v0 + y)), 1});
         mean += pixels.back().grey;
       }
@@ -213,8 +225,8 @@ std::optional<Dot> fit_wires(const Image<float>& image, const Vector2d& start, d
 
 std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs) {
-  return fit_wires(exposure.pixels, start.centre_px, start.radius_px,
-                   {first_angle, second_angle, start.contrast}, discs);
+  return fit_wires(exposure, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast},
+                   discs);
 }
 
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options) {
@@ -232,7 +244,7 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
     if (!arms) continue;
     Arms signed_arms = *arms;
     signed_arms.depth *= sign;
-    const auto cross = fit_wires(exposure.pixels, blob.centre_px, half_width, signed_arms, {});
+    const auto cross = fit_wires(exposure, blob.centre_px, half_width, signed_arms, {});
     if (!cross || cross->sigma_px > options.max_sigma_px) continue;
     const auto twin = std::find_if(crosses.begin(), crosses.end(), [&](const Dot& other) {
       return (other.centre_px - cross->centre_px).norm() <

@@ -21,7 +21,8 @@ struct CrossOptions {
 };
 
 /// Crossings of two wires, each with the sub-pixel place where the wires' axes meet. `radius_px` is half the
-/// wires' width. Round dots, single wires and wire ends are no crossings.
+/// wires' width. Round dots, single wires and wire ends are no crossings; black pixels (outside
+/// the field) and those beside them tell nothing.
 std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options);
 
 /// The crossing near `start` (place, half width, contrast) of two wires that run about along the given angles

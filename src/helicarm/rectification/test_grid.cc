@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <optional>
+#include <set>
 
 #include <fmt/format.h>
 
@@ -110,6 +111,31 @@ struct Likeness {
   }
 };
 
+/// Where the plate's dots are in the way of some crossings: those found, and those that a wire hides from the
+/// search, between or beyond two others.
+std::vector<Disc> plate_dots(const Exposure& exposure, const Grid& crossings) {
+  std::vector<Dot> found = find_dots(exposure, {});
+  std::erase_if(found, [&](const Dot& dot) {
+    return dot.misfit >= 0.15 || std::any_of(crossings.begin(), crossings.end(), [&](const auto& entry) {
+             return (entry.second.centre_px - dot.centre_px).norm() < 0.6 * dot.radius_px;
+           });
+  });
+  std::vector<Disc> discs;
+  for (const Dot& dot : found) discs.push_back({dot.centre_px, dot.radius_px + 2});
+  const IndexedLattice lattice = index_lattice(found, Lattice::square, {});
+  Grid plate;
+  for (const IndexedDot& d : lattice.dots) plate[d.index] = found[d.dot];
+  std::set<Vector2i, IndexLess> missing;
+  for (const auto& [at, dot] : plate)
+    for (const Vector2i& step : {Vector2i(1, 0), Vector2i(-1, 0), Vector2i(0, 1), Vector2i(0, -1)})
+      if (!plate.contains(at + step)) missing.insert(at + step);
+  for (const Vector2i& at : missing)
+    for (const Vector2i& step : {Vector2i(1, 0), Vector2i(0, 1)})
+      if (const auto place = predicted(plate, at, step))
+        discs.push_back({*place, plate.begin()->second.radius_px + 3});
+  return discs;
+}
+
 }  // namespace
 
 std::vector<Dot> find_grid(const Exposure& exposure) {
@@ -126,14 +152,7 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
     low = low.cwiseMin(d.index);
     high = high.cwiseMax(d.index);
   }
-  // The plate's dots are in the way of some crossings.
-  std::vector<Disc> dots;
-  for (const Dot& dot : find_dots(exposure, {})) {
-    const bool crossing = std::any_of(grid.begin(), grid.end(), [&](const auto& entry) {
-      return (entry.second.centre_px - dot.centre_px).norm() < 0.6 * dot.radius_px;
-    });
-    if (!crossing && dot.misfit < 0.15) dots.push_back({dot.centre_px, dot.radius_px + 2});
-  }
+  const std::vector<Disc> dots = plate_dots(exposure, grid);
   const Dot typical = grid.begin()->second;
   std::vector<Dot> complete;
   for (int j = low.y(); j <= high.y(); ++j)

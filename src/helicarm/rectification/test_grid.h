@@ -31,7 +31,7 @@ struct TestGrid {
 };
 
 /// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their
-/// neighbours put them.
+/// neighbours put them, without the dots' pixels.
 std::vector<Dot> find_grid(const Exposure& exposure);
 
 /// The crossings that define the ideal grid: the paper's nine, or all of them.

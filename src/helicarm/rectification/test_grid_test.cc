@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/simulation/simulate_case.h"
 
 namespace helicarm {
 namespace {
@@ -133,6 +134,24 @@ TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
   ASSERT_TRUE(measured);
   EXPECT_LT(measured->raw.max_px, 0.5);
+}
+
+TEST(FindGrid, NeitherThePlatesDotsNorTheFieldsRimMoveACrossing) {
+  for (const std::uint64_t seed : {1, 8}) {  // at 30 and 90 mm wires run over dots and cross on the rim
+    simulation::SimulationOptions options;
+    options.seed = seed;
+    options.kind = simulation::CaseKind::grid;
+    options.grid_distances_mm = {seed == 1 ? 90.0 : 30.0};
+    const simulation::SimulatedView view = simulation::simulate_case(options)->views[1];
+    const std::vector<Dot> crosses = find_grid(exposure_of(view));
+    EXPECT_GE(crosses.size(), 70u);
+    for (const Dot& cross : crosses) {
+      double nearest = 1e9;
+      for (const simulation::TruePoint& truth : view.crosses)
+        nearest = std::min(nearest, (truth.raw - cross.centre_px).norm());
+      EXPECT_LT(nearest, 0.3) << cross.centre_px.transpose();
+    }
+  }
 }
 
 TEST(FindGrid, EmptyFieldHasNoCrossings) { EXPECT_TRUE(find_grid(noisy(drawn::Shade(side, side))).empty()); }

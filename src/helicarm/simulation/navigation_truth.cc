@@ -16,9 +16,9 @@ using Eigen::Vector3d;
 /// Somewhere around a place in the tracker's frame, turned any way that the tracker sees.
 RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
                          RandomStream& random) {
-  const Vector3d moved_place = place + random_motion(random, 0, spread_mm).translation;
   for (;;) {
-    const RigidTransform pose{random_rotation(random), moved_place};
+    const RigidTransform pose{random_rotation(random),
+                              place + random_motion(random, 0, spread_mm).translation};
     if (pose_covariance(room_tracker(), body, pose)) return pose;
   }
 }
@@ -74,6 +74,8 @@ TrackerModel room_tracker() {
   TrackerModel model;
   model.drift_sigma_mm = {0.07, 0.07, 0.17};
   model.lost_sample = 0.02;
+  model.nearest_mm = 300;  // the markers lie about 900 mm away, up to 300 mm from each other
+  model.half_field_deg = 50;
   return model;
 }
 

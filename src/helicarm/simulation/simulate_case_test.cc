@@ -197,6 +197,25 @@ TEST(SimulateCase, TunnelPointsAgreeInEveryFrame) {
       EXPECT_LT((view.clicks[i].raw - view.tunnel_points[i].raw).norm(), 3.1);
 }
 
+TEST(SimulateCase, ReadingsScatterAsTheCaseSaysOverManySeeds) {
+  double shift2 = 0;
+  double turn2 = 0;
+  constexpr int seeds = 500;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const NavigationTruth truth = set_up_navigation(seed, {});
+    for (const auto& [frame, pose] : truth.tracker_from) {
+      const RigidTransform& read = truth.read.at(frame);
+      const double shift = (read.translation - pose.translation).norm() / truth.sigma_mm;
+      const double turn =
+          Eigen::AngleAxisd(read.rotation * pose.rotation.transpose()).angle() * 180 / EIGEN_PI;
+      shift2 += shift * shift / (3 * 4 * seeds);
+      turn2 += turn * turn / (truth.sigma_deg * truth.sigma_deg) / (3 * 4 * seeds);
+    }
+  }
+  EXPECT_NEAR(shift2, 1, 0.1);
+  EXPECT_NEAR(turn2, 1, 0.1);
+}
+
 TEST(SimulateCase, TunnelsRunInsideTheirBones) {
   const Scene knee = knee_body();
   const auto inside = [&](const char* bone, const Eigen::Vector3d& point) {
