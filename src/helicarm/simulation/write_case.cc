@@ -23,29 +23,6 @@ std::string uid(std::uint64_t seed, std::uint64_t item) {
   return make_uid(random);
 }
 
-DerivedImage dicom(const SimulatedCase& simulated, std::size_t number) {
-  const SimulatedView& view = simulated.views[number];
-  const Shot& shot = view.shot;
-  DerivedImage image;
-  image.pixels = view.pixels;
-  image.bits_stored = simulated.options.bits;
-  image.acquisition.pixel_mm = Eigen::Vector2d::Constant(shot.detector.pixel_mm);
-  image.acquisition.source_detector_mm = shot.nominal_f_mm;
-  image.acquisition.primary_angle_deg = shot.primary_angle_deg;
-  image.acquisition.secondary_angle_deg = shot.secondary_angle_deg;
-  image.acquisition.flip_hint = shot.mirrored;
-  image.acquisition.logarithmic = shot.imaging.logarithmic;
-  image.acquisition.modality = "XA";
-  image.derived = false;
-  image.series_description = shot.name;
-  image.patient_name = "SIMULATED";
-  image.patient_id = fmt::format("SIM{}", simulated.options.seed);
-  image.study_uid = uid(simulated.options.seed, 0);
-  image.series_uid = uid(simulated.options.seed, 1 + 2 * number);
-  image.instance_uid = uid(simulated.options.seed, 2 + 2 * number);
-  return image;
-}
-
 Json poses_json(const NavigationTruth& truth, std::initializer_list<const char*> frames) {
   Json poses;
   for (const char* frame : frames)
@@ -96,6 +73,29 @@ void remove_leftovers(const std::filesystem::path& folder) {
 
 }  // namespace
 
+DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
+  const SimulatedView& view = simulated.views[number];
+  const Shot& shot = view.shot;
+  DerivedImage image;
+  image.pixels = view.pixels;
+  image.bits_stored = simulated.options.bits;
+  image.acquisition.pixel_mm = Eigen::Vector2d::Constant(shot.detector.pixel_mm);
+  image.acquisition.source_detector_mm = shot.nominal_f_mm;
+  image.acquisition.primary_angle_deg = shot.primary_angle_deg;
+  image.acquisition.secondary_angle_deg = shot.secondary_angle_deg;
+  image.acquisition.flip_hint = shot.mirrored;
+  image.acquisition.logarithmic = shot.imaging.logarithmic;
+  image.acquisition.modality = "XA";
+  image.derived = false;
+  image.series_description = shot.name;
+  image.patient_name = "SIMULATED";
+  image.patient_id = fmt::format("SIM{}", simulated.options.seed);
+  image.study_uid = uid(simulated.options.seed, 0);
+  image.series_uid = uid(simulated.options.seed, 1 + 2 * number);
+  image.instance_uid = uid(simulated.options.seed, 2 + 2 * number);
+  return image;
+}
+
 Json case_json(const SimulatedCase& simulated) {
   Json json = {{"format", "helicarm-case/1"},
                {"calibrator", calibrator_file},
@@ -131,7 +131,7 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
     // The truth goes first: it marks the folder as a simulation should the rest be cut short.
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)
-      value_or_throw(write_dicom(folder / (simulated.views[i].shot.name + ".dcm"), dicom(simulated, i)));
+      value_or_throw(write_dicom(folder / (simulated.views[i].shot.name + ".dcm"), dicom_of(simulated, i)));
     if (simulated.plate) value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
     if (simulated.options.kind == CaseKind::grid) return;
     value_or_throw(write_json(folder / calibrator_file, to_json(simulated.calibrator)));

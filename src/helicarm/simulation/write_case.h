@@ -5,11 +5,15 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/simulation/simulate_case.h"
+#include "helicarm/xray/write_dicom.h"
 
 namespace helicarm::simulation {
 
 /// case.json as docs/formats.md describes it; not of kind grid, which has no calibrator.
 Json case_json(const SimulatedCase& simulated);
+
+/// The picture of one view as it is written, with the UIDs of its seed.
+DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t view);
 
 /// Refuses (cannot_write) a folder that holds anything but an earlier simulation.
 Expected<void> check_case_folder(const std::filesystem::path& folder);

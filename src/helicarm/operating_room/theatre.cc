@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operating_room/theatre.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace helicarm::operating_room {
+namespace {
+
+using Eigen::Vector3d;
+using simulation::MarkerFacet;
+using simulation::TrackedBody;
+
+/// The base beside the knee at the height of the table's edge, x towards the patient, z up (the knee's
+/// anterior side): both tunnels' axes lie within the arm's reach.
+const RigidTransform calibrator_from_base{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(),
+                                          {60, 520, -160}};
+
+/// Turns z into the direction.
+Eigen::Matrix3d facing(const Vector3d& direction) {
+  return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<Theatre>> Theatre::set_up(std::uint64_t seed, int picture_size) {
+  simulation::SimulationOptions options;
+  options.seed = seed;
+  options.kind = simulation::CaseKind::tunnels;
+  options.size = picture_size;
+  auto room = simulation::simulate_case(options);
+  if (!room) return tl::unexpected<Failure>(room.error());
+  return std::unique_ptr<Theatre>(new Theatre(*std::move(room)));
+}
+
+Theatre::Theatre(simulation::SimulatedCase room)
+    : room_(std::move(room)), tracker_from_(room_.navigation->tracker_from) {
+  tracker_from_base_ = tracker_from_.at("calibrator") * calibrator_from_base;
+}
+
+RigidTransform Theatre::tracker_from(const std::string& body) const {
+  const std::lock_guard lock(mutex_);
+  return tracker_from_.at(body);
+}
+
+void Theatre::move_bone(const std::string& bone, const RigidTransform& motion_in_tracker) {
+  const std::lock_guard lock(mutex_);
+  RigidTransform& pose = tracker_from_.at(bone);
+  pose = {motion_in_tracker.rotation * pose.rotation, pose.translation + motion_in_tracker.translation};
+}
+
+Vector3d Theatre::point_in_tracker(const std::string& name) const {
+  const auto point = std::ranges::find(room_.navigation->points, name, &simulation::TunnelPoint::name);
+  if (point == room_.navigation->points.end()) throw std::invalid_argument("no point " + name);
+  return tracker_from(point->bone) * point->in_bone;
+}
+
+RobotTool Theatre::tool() const { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
+
+RigidTransform Theatre::flange_from_marker() const {
+  // Clamped to the drill's side, by hand.
+  return {Eigen::AngleAxisd(0.35, Vector3d(0.2, 0.9, -0.4).normalized()).toRotationMatrix(), {12, 70, 40}};
+}
+
+TrackedBody tool_markers() {
+  TrackedBody body;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1.0, 1.0}) {
+      const Vector3d normal = side * Vector3d::Unit(axis);
+      MarkerFacet facet{normal, {}};
+      for (const auto& [x, y] : {std::pair{-30.0, -24.0}, {28.0, -30.0}, {22.0, 30.0}, {-18.0, 16.0}})
+        facet.markers_in_body.push_back(facing(normal) * Vector3d(x, y, 30));
+      body.facets.push_back(facet);
+    }
+  return body;
+}
+
+std::vector<TrackedFacet> calibrator_facets() {
+  std::vector<TrackedFacet> facets;
+  for (const MarkerFacet& facet : simulation::calibrator_markers().facets) {
+    Vector3d middle = Vector3d::Zero();
+    for (const Vector3d& marker : facet.markers_in_body)
+      middle += marker / double(facet.markers_in_body.size());
+    const RigidTransform calibrator_from_facet{facing(facet.normal_in_body), middle};
+    MarkerFacet own{Vector3d::UnitZ(), {}};
+    for (const Vector3d& marker : facet.markers_in_body)
+      own.markers_in_body.push_back(calibrator_from_facet.inverse() * marker);
+    facets.push_back({fmt::format("calibrator/{}", facets.size() + 1), calibrator_from_facet, {{own}}});
+  }
+  return facets;
+}
+
+}  // namespace helicarm::operating_room

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "helicarm/devices/robot/kinematics.h"
+#include "helicarm/devices/robot/robot_order.h"
+#include "helicarm/simulation/simulate_case.h"
+#include "helicarm/simulation/tracker_model.h"
+
+/// The virtual operating room: C-arm, tracker and robot that share one truth and speak their real protocols.
+namespace helicarm::operating_room {
+
+/// What stands where, truly: the simulated knee with its calibrator, bones that can be moved, and the robot
+/// beside the table. All members may be called from any thread.
+class Theatre {
+ public:
+  /// Draws the X-rays of the seed's AP and lateral view. Refuses as `simulate_case`.
+  static Expected<std::unique_ptr<Theatre>> set_up(std::uint64_t seed, int picture_size = 1024);
+
+  const simulation::SimulatedCase& room() const { return room_; }
+
+  /// "calibrator", "femur" or "tibia".
+  RigidTransform tracker_from(const std::string& body) const;
+  /// Moves a bone with its marker, about the marker (tracker's axes).
+  void move_bone(const std::string& bone, const RigidTransform& motion_in_tracker);
+
+  /// A ball at a tunnel's end (FS, FE, TS, TE) where it is now.
+  Eigen::Vector3d point_in_tracker(const std::string& name) const;
+
+  RigidTransform tracker_from_base() const { return tracker_from_base_; }
+  /// Of the drill in the robot's hand: tip and axis (z).
+  RobotTool tool() const;
+  /// The robot's marker: a crown of facets, of which some face the tracker whatever the hand does.
+  RigidTransform flange_from_marker() const;
+
+ private:
+  explicit Theatre(simulation::SimulatedCase room);
+
+  simulation::SimulatedCase room_;
+  RigidTransform tracker_from_base_;
+  mutable std::mutex mutex_;
+  std::map<std::string, RigidTransform> tracker_from_;
+};
+
+/// Facets on all sides of a cube.
+simulation::TrackedBody tool_markers();
+
+/// The calibrator's facets as bodies of their own; origin in the middle of a facet's markers, z outward.
+struct TrackedFacet {
+  std::string name;  ///< calibrator/1 .. calibrator/4
+  RigidTransform calibrator_from_facet;
+  simulation::TrackedBody body;
+};
+std::vector<TrackedFacet> calibrator_facets();
+
+}  // namespace helicarm::operating_room

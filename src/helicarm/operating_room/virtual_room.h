@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "helicarm/devices/robot/virtual_ur.h"
+#include "helicarm/operating_room/virtual_c_arm.h"
+#include "helicarm/operating_room/virtual_tracker.h"
+
+namespace helicarm::operating_room {
+
+struct VirtualRoomOptions {
+  std::uint64_t seed = 1;
+  int picture_size = 1024;
+  double tracker_rate_hz = 30;
+  std::uint16_t tracker_port = 18944;  ///< each 0: any that is free
+  std::uint16_t rtde_port = 30004;
+  std::uint16_t dashboard_port = 29999;
+  std::uint16_t script_port = 30002;
+};
+
+/// A theatre with tracker and robot switched on; the C-arm shoots by `shoot`. Everything listens on this
+/// machine alone.
+class VirtualRoom {
+ public:
+  /// Refuses as `Theatre::set_up`, VirtualTracker and VirtualUr.
+  static Expected<std::unique_ptr<VirtualRoom>> open(const VirtualRoomOptions& options);
+
+  Theatre& theatre() { return *theatre_; }
+  VirtualTracker& tracker() { return *tracker_; }
+  VirtualUr& robot() { return *robot_; }
+
+  /// Where the tip of the tool truly is, and its axis (z).
+  RigidTransform tracker_from_tip();
+
+  /// Switches a fault on or off by its name: hide:BODY, those of the tracker (frozen, identity,
+  /// not_finite_poses, time_jump, silent) and of the robot (`robot_fault`). An unknown one is bad_value.
+  Expected<void> set_fault(const std::string& name, bool on);
+
+ private:
+  VirtualRoom() = default;
+
+  std::unique_ptr<Theatre> theatre_;
+  std::unique_ptr<VirtualUr> robot_;
+  std::unique_ptr<VirtualTracker> tracker_;
+};
+
+/// Names of the tools that the tracker follows: the bones, the tool and the calibrator's facets.
+inline constexpr const char* tool_marker = "tool";
+
+}  // namespace helicarm::operating_room

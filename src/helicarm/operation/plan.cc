@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/plan.h"
+
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm {
+namespace {
+
+constexpr const char* plan_format = "helicarm-plan/1";
+constexpr Range millimetres{-100000, 100000};
+
+RigidTransform pose_from(JsonReader& reader, const char* key) {
+  const auto numbers = reader.matrix(key, 4, 4, millimetres);
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+  return value_or_throw(rigid_transform_from(matrix, reader.where() + ": " + key));
+}
+
+std::uint16_t port_from(JsonReader& reader, const char* key) {
+  return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
+}
+
+void take_once(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
+  if (name.empty()) reader.refuse(Reason::bad_value, "name", "is empty");
+  if (!names.insert(name).second)
+    reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
+}
+
+TrackerPlan tracker_from(JsonReader reader) {
+  TrackerPlan tracker;
+  tracker.address = reader.text("address");
+  tracker.port = port_from(reader, "port");
+  tracker.femur = reader.text("femur");
+  tracker.tibia = reader.text("tibia");
+  tracker.tool = reader.text("tool");
+  std::set<std::string> names;
+  for (JsonReader& entry : reader.objects("facets", true, 16)) {
+    Facet facet{entry.text("name"), pose_from(entry, "calibrator_from_facet")};
+    take_once(entry, names, facet.name);
+    entry.finish();
+    tracker.facets.push_back(std::move(facet));
+  }
+  tracker.sigma_mm = reader.number("sigma_mm", {0, 10});
+  tracker.sigma_deg = reader.number("sigma_deg", {0, 10});
+  reader.finish();
+  return tracker;
+}
+
+KeepOut keep_out_from(JsonReader& reader) {
+  const KeepOut keep_out{Eigen::Vector3d(reader.numbers("point_in_base", 3, millimetres).data()),
+                         Eigen::Vector3d(reader.numbers("normal", 3, {-1, 1}).data())};
+  if (std::abs(keep_out.normal.norm() - 1) > 1e-6)
+    reader.refuse(Reason::bad_value, "normal", "must be of unit length");
+  reader.finish();
+  return keep_out;
+}
+
+ApproachOptions approach_from(JsonReader reader) {
+  ApproachOptions approach;
+  approach.stand_off_mm = reader.number("stand_off_mm", {1, 500});
+  approach.gap_mm = reader.number("gap_mm", {-200, 500});
+  approach.travel_mm_s = reader.number("travel_mm_s", {0.1, 250});
+  approach.approach_mm_s = reader.number("approach_mm_s", {0.1, 250});
+  approach.corrections.most = reader.integer("corrections", 0, 20);
+  approach.corrections.tolerance_mm = reader.number("tolerance_mm", {0.01, 10});
+  approach.corrections.tolerance_deg = reader.number("tolerance_deg", {0.01, 10});
+  for (JsonReader& entry : reader.objects("keep_outs", false, 100))
+    approach.keep_outs.push_back(keep_out_from(entry));
+  reader.finish();
+  return approach;
+}
+
+RobotPlan robot_from(JsonReader reader) {
+  RobotPlan robot;
+  robot.model = reader.text("model");
+  value_or_throw(robot_model(robot.model));
+  robot.address = reader.text("address");
+  robot.rtde_port = port_from(reader, "rtde_port");
+  robot.dashboard_port = port_from(reader, "dashboard_port");
+  robot.script_port = port_from(reader, "script_port");
+  robot.tool = {pose_from(reader, "flange_from_tcp"), reader.number("payload_kg", {0, 20})};
+  robot.approach = approach_from(reader.object("approach"));
+  reader.finish();
+  return robot;
+}
+
+PlannedTunnel tunnel_from(JsonReader& reader) {
+  PlannedTunnel tunnel{reader.text("name"), static_cast<Bone>(reader.choice("bone", {"femur", "tibia"})),
+                       reader.text("start"), reader.text("end"),
+                       static_cast<TunnelEnd>(reader.choice("enter_at", {"start", "end"}))};
+  reader.finish();
+  return tunnel;
+}
+
+std::vector<std::string> views_from(JsonReader& reader) {
+  const Json& names = reader.raw("views");
+  if (!names.is_array() || names.size() < 2 || names.size() > 50)
+    reader.refuse(Reason::bad_value, "views", "must be a list of 2 to 50 names");
+  std::vector<std::string> views;
+  std::set<std::string> once;
+  for (const Json& name : names) {
+    if (!name.is_string()) reader.refuse(Reason::bad_value, "views", "must hold names");
+    views.push_back(name.get<std::string>());
+    if (views.back().empty() || views.back().find_first_of("/\\") != std::string::npos)
+      reader.refuse(Reason::bad_value, "views", "holds a name that cannot be a file's");
+    take_once(reader, once, views.back());
+  }
+  return views;
+}
+
+Json to_json(const TrackerPlan& tracker) {
+  Json facets = Json::array();
+  for (const Facet& facet : tracker.facets)
+    facets.push_back(
+        {{"name", facet.name}, {"calibrator_from_facet", json_rows(facet.calibrator_from_facet.matrix())}});
+  return {{"address", tracker.address},   {"port", tracker.port},   {"femur", tracker.femur},
+          {"tibia", tracker.tibia},       {"tool", tracker.tool},   {"facets", std::move(facets)},
+          {"sigma_mm", tracker.sigma_mm}, {"sigma_deg", tracker.sigma_deg}};
+}
+
+Json to_json(const RobotPlan& robot) {
+  const ApproachOptions& approach = robot.approach;
+  Json keep_outs = Json::array();
+  for (const KeepOut& keep_out : approach.keep_outs)
+    keep_outs.push_back(
+        {{"point_in_base", json_list(keep_out.point_in_base)}, {"normal", json_list(keep_out.normal)}});
+  return {{"model", robot.model},
+          {"address", robot.address},
+          {"rtde_port", robot.rtde_port},
+          {"dashboard_port", robot.dashboard_port},
+          {"script_port", robot.script_port},
+          {"flange_from_tcp", json_rows(robot.tool.flange_from_tcp.matrix())},
+          {"payload_kg", robot.tool.payload_kg},
+          {"approach",
+           {{"stand_off_mm", approach.stand_off_mm},
+            {"gap_mm", approach.gap_mm},
+            {"travel_mm_s", approach.travel_mm_s},
+            {"approach_mm_s", approach.approach_mm_s},
+            {"corrections", approach.corrections.most},
+            {"tolerance_mm", approach.corrections.tolerance_mm},
+            {"tolerance_deg", approach.corrections.tolerance_deg},
+            {"keep_outs", std::move(keep_outs)}}}};
+}
+
+}  // namespace
+
+Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    reader.choice("format", {plan_format});
+    OperationPlan plan;
+    plan.calibrator = reader.text("calibrator");
+    plan.plate = reader.optional_text("plate");
+    plan.views = views_from(reader);
+    plan.tracker = tracker_from(reader.object("tracker"));
+    plan.robot = robot_from(reader.object("robot"));
+    std::set<std::string> names;
+    for (JsonReader& entry : reader.objects("tunnels", true, 20)) {
+      plan.tunnels.push_back(tunnel_from(entry));
+      take_once(entry, names, plan.tunnels.back().name);
+    }
+    if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
+    plan.max_error_mm = reader.optional_number("max_error_mm", {1e-6, 1000});
+    reader.finish();
+    return plan;
+  });
+}
+
+Json to_json(const OperationPlan& plan) {
+  Json tunnels = Json::array();
+  for (const PlannedTunnel& tunnel : plan.tunnels)
+    tunnels.push_back({{"name", tunnel.name},
+                       {"bone", tunnel.bone == Bone::femur ? "femur" : "tibia"},
+                       {"start", tunnel.start},
+                       {"end", tunnel.end},
+                       {"enter_at", tunnel.enter_at == TunnelEnd::start ? "start" : "end"}});
+  return {{"format", plan_format},
+          {"calibrator", plan.calibrator},
+          {"plate", plan.plate ? Json(*plan.plate) : Json()},
+          {"views", plan.views},
+          {"tracker", to_json(plan.tracker)},
+          {"robot", to_json(plan.robot)},
+          {"tunnels", std::move(tunnels)},
+          {"picks", plan.picks},
+          {"max_error_mm", plan.max_error_mm ? Json(*plan.max_error_mm) : Json()}};
+}
+
+}  // namespace helicarm

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/core/json.h"
+#include "helicarm/devices/robot/plan_approach.h"
+#include "helicarm/devices/tracker/facets.h"
+#include "helicarm/guidance/poses.h"
+
+namespace helicarm {
+
+/// Where the tracker's words come from, and what it calls things.
+struct TrackerPlan {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 18944;
+  std::string femur = "femur";
+  std::string tibia = "tibia";
+  std::string tool = "tool";
+  std::vector<Facet> facets;  ///< of the calibrator; a single marker is one facet
+  double sigma_mm = 0.12;     ///< of a reading, per axis: what no averaging over a second takes away
+  double sigma_deg = 0.05;
+};
+
+struct RobotPlan {
+  std::string model = "UR5";
+  std::string address = "127.0.0.1";
+  std::uint16_t rtde_port = 30004;
+  std::uint16_t dashboard_port = 29999;
+  std::uint16_t script_port = 30002;
+  RobotTool tool;
+  ApproachOptions approach;
+};
+
+enum class TunnelEnd { start, end };
+
+struct PlannedTunnel {
+  std::string name;
+  Bone bone;
+  std::string start;  ///< names of picks
+  std::string end;
+  TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill comes in
+};
+
+/// All that an operation needs to know beforehand (plan.json, docs/formats.md).
+struct OperationPlan {
+  std::string calibrator = "udcsc";  ///< a built-in's name or a file beside the plan
+  std::optional<std::string> plate = "plate48";
+  std::vector<std::string> views{"AP", "LAT"};  ///< in the order of the exposures
+  TrackerPlan tracker;
+  RobotPlan robot;
+  std::vector<PlannedTunnel> tunnels;
+  Json picks = Json::array();  ///< as in case.json; may come later, once the pictures are seen
+  std::optional<double> max_error_mm;
+};
+
+/// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when they
+/// become a case.
+Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
+Json to_json(const OperationPlan& plan);
+
+}  // namespace helicarm
