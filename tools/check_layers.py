@@ -25,13 +25,14 @@ ROOMS = {
     "localization": "core geometry image phantom xray detection rectification fiducials calibration",
     "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
-    "simulation": "core geometry image phantom xray",
+    "volume": "core geometry image xray",
+    "simulation": "core geometry image phantom xray volume",
     "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                  " verification simulation",
+                  " verification volume simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-              " verification simulation navigation",
+              " verification volume simulation navigation",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-             " verification simulation navigation report",
+             " verification volume simulation navigation report",
 }
 FOR_TESTS = {"core", "simulation"}
 
