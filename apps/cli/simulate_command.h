@@ -17,6 +17,9 @@ struct SimulateArguments {
   int size = 1024;                ///< 512 or 1024 pixels a side
   int bits = 12;                  ///< 8, 12 or 16
   bool knee = true;
+  std::filesystem::path ct;          ///< a CT volume in place of the drawn knee
+  std::vector<double> ct_centre_mm;  ///< three numbers or none
+  std::vector<double> ct_turn_deg;
   /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
   std::vector<std::string> faults;
   std::vector<double> distances_mm;  ///< kind grid: of the wires from the receiver; none: 45 mm

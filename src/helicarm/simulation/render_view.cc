@@ -2,6 +2,7 @@
 #include "helicarm/simulation/render_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -38,8 +39,8 @@ Bounds shadow(const Body& body, const View& view) {
 
 class Tracer {
  public:
-  Tracer(const Scene& scene, const VirtualDetector& detector, const View& view)
-      : scene_(scene), detector_(detector), source_(view.source_in_world()) {
+  Tracer(const Scene& scene, const VirtualDetector& detector, const View& view, const CtBody* ct)
+      : scene_(scene), detector_(detector), ct_(ct), source_(view.source_in_world()) {
     direction_from_pixel_ = view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
     for (const Body& body : scene) bounds_.push_back(shadow(body, view));
   }
@@ -69,15 +70,26 @@ class Tracer {
         if (scene_[i].metal) metal[u] += static_cast<float>(path);
       }
     }
+    if (ct_) ct_->add_depths(source_, direction, depth);
     for (std::size_t u = 0; u < width; ++u)
       signal[u] = static_cast<float>(field_weight(detector_, {static_cast<double>(u), v}) *
                                      (beam * (-depth[u]).exp()).sum());
   }
 
   float supersampled(int u, int v) const {
+    std::array<Vector2d, 9> raw;
+    std::array<Vector3d, 9> direction;
+    std::array<Array3d, 9> depth;
+    for (std::size_t i = 0; i < 9; ++i) {
+      raw[i] = Vector2d(u + (static_cast<int>(i % 3) - 1) / 3.0, v + (static_cast<int>(i / 3) - 1) / 3.0);
+      const Vector2d ideal = detector_.distortion.ideal_from_raw(raw[i]);
+      direction[i] = ray(ideal);
+      depth[i] = depth_of_scene(ideal, direction[i]);
+    }
+    if (ct_) ct_->add_depths(source_, direction, depth);
     double sum = 0;
-    for (int row = -1; row <= 1; ++row)
-      for (int column = -1; column <= 1; ++column) sum += through(Vector2d(u + column / 3.0, v + row / 3.0));
+    for (std::size_t i = 0; i < 9; ++i)
+      sum += field_weight(detector_, raw[i]) * (beam * (-depth[i]).exp()).sum();
     return static_cast<float>(sum / 9);
   }
 
@@ -87,18 +99,17 @@ class Tracer {
     return (direction_from_pixel_ * Vector3d(ideal.x(), ideal.y(), 1)).normalized();
   }
 
-  double through(const Vector2d& raw) const {
-    const Vector2d ideal = detector_.distortion.ideal_from_raw(raw);
-    const Vector3d direction = ray(ideal);
+  Array3d depth_of_scene(const Vector2d& ideal, const Vector3d& direction) const {
     Array3d depth = Array3d::Zero();
     for (std::size_t i = 0; i < scene_.size(); ++i)
       if ((ideal.array() >= bounds_[i].low.array()).all() && (ideal.array() <= bounds_[i].high.array()).all())
         depth += union_length(scene_[i].solids, source_, direction) * scene_[i].attenuation;
-    return field_weight(detector_, raw) * (beam * (-depth).exp()).sum();
+    return depth;
   }
 
   const Scene& scene_;
   const VirtualDetector& detector_;
+  const CtBody* ct_;
   Vector3d source_;
   Eigen::Matrix3d direction_from_pixel_;
   std::vector<Bounds> bounds_;
@@ -121,8 +132,8 @@ double field_weight(const VirtualDetector& detector, const Vector2d& raw) {
 }
 
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
-                         unsigned threads) {
-  const Tracer tracer(scene, detector, view);
+                         unsigned threads, const CtBody* ct) {
+  const Tracer tracer(scene, detector, view, ct);
   Image<float> picture(detector.width, detector.height);
   Image<float> metal(detector.width, detector.height);
   const auto rows = static_cast<std::size_t>(detector.height);

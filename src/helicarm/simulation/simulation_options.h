@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/simulation/ct_body.h"
 
 namespace helicarm::simulation {
 
@@ -50,6 +52,7 @@ struct SimulationOptions {
   int size = 1024;                    ///< 512 or 1024 pixels a side
   int bits = 12;                      ///< 8, 12 or 16
   bool knee = true;
+  std::shared_ptr<const CtOptions> ct = {};  ///< instead of the drawn knee
   std::vector<Fault> faults;
   std::vector<double> grid_distances_mm = {
       45};                              ///< kind grid: from the receiver to the wires' axes; up to 20
