@@ -25,15 +25,19 @@ ROOMS = {
     "localization": "core geometry image phantom xray detection rectification fiducials calibration",
     "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
-    "simulation": "core geometry image phantom xray",
+    "volume": "core geometry image xray",
+    "simulation": "core geometry image phantom xray volume",
     "devices": "core geometry image xray",
+    "operating_room": "core geometry image phantom xray volume simulation devices",
     "session": "core",
     "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                  " verification simulation",
+                  " verification volume simulation",
+    "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
+                 " verification devices session navigation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-              " verification simulation navigation",
+              " verification volume simulation navigation",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-             " verification simulation navigation report",
+             " verification volume simulation navigation report",
 }
 FOR_TESTS = {"core", "simulation"}
 

@@ -10,6 +10,7 @@
 #include "command_line.h"
 #include "demo_command.h"
 #include "detect_command.h"
+#include "drr_command.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/navigation/result.h"
@@ -177,6 +178,44 @@ void add_import(CLI::App& app, Action& action) {
   command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")->capture_default_str();
 }
 
+void add_drr(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "drr", "Project a CT volume: its line integrals on a flat detector",
+                              "helicarm drr knee.nii.gz --angle 90 --out lateral.png --raw lateral.f32");
+  auto& a = arguments_of(command, action, drr_command);
+  command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices")
+      ->required();
+  command->add_option("--out", a.out, "PNG, 16 bits, from no attenuation (black) to the greatest (white)");
+  command->add_option("--raw", a.raw, "The line integrals as 32-bit floats, little endian, row by row");
+  command->add_option("--size", a.size, "Pixels a side")->check(within(1, 8192))->capture_default_str();
+  command->add_option("--pixel", a.pixel_mm, "Pixel on the detector, mm")
+      ->check(within(0.01, 20))
+      ->capture_default_str();
+  command->add_option("--source-detector", a.source_detector_mm, "mm")
+      ->check(within(10, 1e5))
+      ->capture_default_str();
+  command->add_option("--source-centre", a.source_centre_mm, "mm")
+      ->check(within(1, 1e5))
+      ->capture_default_str();
+  command
+      ->add_option("--centre", a.centre_mm,
+                   "x,y,z (L, P, S; mm) on the central ray; default: the volume's middle")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-1e5, 1e5));
+  command
+      ->add_option("--angle", a.angle_deg, "Where the source is: 0 before the patient, 90 at the left side")
+      ->check(within(-360, 360))
+      ->capture_default_str();
+  command->add_option("--tilt", a.tilt_deg, "The source towards the head")
+      ->check(within(-89, 89))
+      ->capture_default_str();
+  command
+      ->add_option("--values", a.values,
+                   "hu: attenuation by Hounsfield units, water 0.02059 / mm, 0 below -800\n"
+                   "raw: integrate the voxels' values as they are")
+      ->capture_default_str();
+}
+
 void add_simulate(CLI::App& app, Action& action) {
   auto* command =
       add_command(app, "simulate", "Draw a case with known truth: X-rays of a knee with the calibrator",
@@ -217,6 +256,20 @@ void add_simulate(CLI::App& app, Action& action) {
           "LAT:90,0 from the side (default: these two, roughly)")
       ->allow_extra_args(false);
   command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm itself (default: the seed)");
+  command->add_option("--ct", a.ct,
+                      "A CT in place of the drawn knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
+  command
+      ->add_option("--ct-centre", a.ct_centre_mm,
+                   "x,y,z (L, P, S; mm) of the CT that comes to the knee's origin; default: its middle")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-1e5, 1e5));
+  command
+      ->add_option("--ct-turn", a.ct_turn_deg,
+                   "x,y,z: turn it about the knee's distal, lateral and anterior axis, degrees")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(within(-360, 360));
   command->add_option(
       "--fault", a.faults,
       "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable");
@@ -270,7 +323,7 @@ int run(int argc, char** argv) {
       ->check(within(0, 1e19))
       ->capture_default_str();
   for (const auto add : {add_demo, add_run, add_predict, add_study, add_solve, add_locate, add_rectify,
-                         add_detect, add_import, add_simulate, add_phantom})
+                         add_detect, add_import, add_drr, add_simulate, add_phantom})
     add(app, action);
   add_device_commands(app, action);
   try {

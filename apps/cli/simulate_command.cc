@@ -6,11 +6,39 @@
 #include <fmt/format.h>
 
 #include "helicarm/simulation/write_case.h"
+#include "helicarm/volume/read_volume.h"
 
 namespace helicarm::cli {
 namespace {
 
 using simulation::Visibility;
+
+Eigen::Vector3d three(const std::vector<double>& numbers, const char* option) {
+  if (numbers.size() != 3)
+    throw BadInput(Reason::usage, fmt::format("simulate: {} takes three numbers", option));
+  return Eigen::Vector3d::Map(numbers.data());
+}
+
+std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& arguments,
+                                                     const Console& console) {
+  if (arguments.ct.empty()) {
+    if (!arguments.ct_centre_mm.empty() || !arguments.ct_turn_deg.empty())
+      throw BadInput(Reason::usage, "simulate: --ct-centre and --ct-turn are for --ct");
+    return nullptr;
+  }
+  if (!arguments.knee) throw BadInput(Reason::usage, "simulate: --ct is the knee; not with --no-knee");
+  if (arguments.kind == "grid")
+    throw BadInput(Reason::usage, "simulate: --kind grid has no knee, so no --ct");
+  simulation::CtOptions ct;
+  ct.volume = value_or_throw(read_volume(arguments.ct));
+  for (const Warning& warning : ct.volume.warnings)
+    console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
+  const std::filesystem::path whole = std::filesystem::absolute(arguments.ct).lexically_normal();
+  ct.name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+  if (!arguments.ct_centre_mm.empty()) ct.centre = three(arguments.ct_centre_mm, "--ct-centre");
+  if (!arguments.ct_turn_deg.empty()) ct.turn_deg = three(arguments.ct_turn_deg, "--ct-turn");
+  return std::make_shared<simulation::CtOptions>(std::move(ct));
+}
 
 simulation::SimulationOptions options_from(const SimulateArguments& arguments, const Console& console) {
   simulation::SimulationOptions options;
@@ -31,6 +59,7 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
       throw BadInput(Reason::usage, "simulate: --distance is for --kind grid");
     options.grid_distances_mm = arguments.distances_mm;
   }
+  options.ct = ct_from(arguments, console);
   constexpr std::string_view lost = "lost:";
   for (const std::string& fault : arguments.faults)
     if (fault.starts_with(lost))

@@ -22,6 +22,9 @@ struct SimulateArguments {
   std::string response;                   ///< linear or log; empty: log with the knee
   std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
   std::optional<std::uint64_t> arm_seed;  ///< none: the seed
+  std::filesystem::path ct;               ///< a CT volume in place of the drawn knee
+  std::vector<double> ct_centre_mm;       ///< three numbers or none
+  std::vector<double> ct_turn_deg;
   /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
   std::vector<std::string> faults;
   std::vector<double> distances_mm;  ///< kind grid: of the wires from the receiver; none: 45 mm

@@ -2,6 +2,7 @@
 #include "helicarm/simulation/render_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -69,8 +70,8 @@ RayRange lit_range(const std::vector<double>& weight) {
 
 class Tracer {
  public:
-  Tracer(const Scene& scene, const VirtualDetector& detector, const View& view)
-      : scene_(scene), detector_(detector), source_(view.source_in_world()) {
+  Tracer(const Scene& scene, const VirtualDetector& detector, const View& view, const CtBody* ct)
+      : scene_(scene), detector_(detector), ct_(ct), source_(view.source_in_world()) {
     direction_from_pixel_ = view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
     for (const Body& body : scene) {
       std::vector<Bounds>& bounds = bounds_.emplace_back();
@@ -114,6 +115,7 @@ class Tracer {
         depth.col(line).segment(first, count) += scene_[i].attenuation[line] * path.segment(first, count);
       if (scene_[i].metal) in_metal.segment(first, count) += path.segment(first, count);
     }
+    if (ct_) add_ct(rays, lit, depth);
     using RowOfFloats = Eigen::Map<Eigen::ArrayXf>;
     RowOfFloats(signal, depth.rows()) = (Eigen::Map<const Eigen::ArrayXd>(weight.data(), depth.rows()) *
                                          ((-depth.col(0)).exp() * beam[0] + (-depth.col(1)).exp() * beam[1] +
@@ -123,9 +125,19 @@ class Tracer {
   }
 
   float supersampled(int u, int v) const {
+    std::array<Vector2d, 9> raw;
+    std::array<Vector3d, 9> direction;
+    std::array<Array3d, 9> depth;
+    for (std::size_t i = 0; i < 9; ++i) {
+      raw[i] = Vector2d(u + (static_cast<int>(i % 3) - 1) / 3.0, v + (static_cast<int>(i / 3) - 1) / 3.0);
+      const Vector2d ideal = detector_.distortion.ideal_from_raw(raw[i]);
+      direction[i] = ray(ideal);
+      depth[i] = depth_of_scene(ideal, direction[i]);
+    }
+    if (ct_) ct_->add_depths(source_, direction, depth);
     double sum = 0;
-    for (int row = -1; row <= 1; ++row)
-      for (int column = -1; column <= 1; ++column) sum += through(Vector2d(u + column / 3.0, v + row / 3.0));
+    for (std::size_t i = 0; i < 9; ++i)
+      sum += field_weight(detector_, raw[i]) * (beam * (-depth[i]).exp()).sum();
     return static_cast<float>(sum / 9);
   }
 
@@ -142,20 +154,27 @@ class Tracer {
     return weight;
   }
 
-  double through(const Vector2d& raw) const {
-    const double weight = field_weight(detector_, raw);
-    if (weight == 0) return 0;
-    const Vector2d ideal = detector_.distortion.ideal_from_raw(raw);
-    const Vector3d direction = ray(ideal);
+  void add_ct(const RayRow& rays, const RayRange& lit, Eigen::ArrayX3d& depth) const {
+    std::vector<Vector3d> direction;
+    for (std::size_t u = lit.first; u < lit.last; ++u)
+      direction.emplace_back(rays.x[u], rays.y[u], rays.z[u]);
+    std::vector<Array3d> in_ct(direction.size(), Array3d::Zero());
+    ct_->add_depths(source_, direction, in_ct);
+    for (std::size_t i = 0; i < in_ct.size(); ++i)
+      depth.row(static_cast<Eigen::Index>(lit.first + i)) += in_ct[i].transpose();
+  }
+
+  Array3d depth_of_scene(const Vector2d& ideal, const Vector3d& direction) const {
     Array3d depth = Array3d::Zero();
     for (std::size_t i = 0; i < scene_.size(); ++i)
       if (std::ranges::any_of(bounds_[i], [&](const Bounds& box) { return box.holds(ideal); }))
         depth += union_length(scene_[i].solids, source_, direction) * scene_[i].attenuation;
-    return weight * (beam * (-depth).exp()).sum();
+    return depth;
   }
 
   const Scene& scene_;
   const VirtualDetector& detector_;
+  const CtBody* ct_;
   Vector3d source_;
   Eigen::Matrix3d direction_from_pixel_;
   std::vector<std::vector<Bounds>> bounds_;  ///< of each body's solids
@@ -178,8 +197,8 @@ double field_weight(const VirtualDetector& detector, const Vector2d& raw) {
 }
 
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
-                         unsigned threads) {
-  const Tracer tracer(scene, detector, view);
+                         unsigned threads, const CtBody* ct) {
+  const Tracer tracer(scene, detector, view, ct);
   Image<float> picture(detector.width, detector.height);
   Image<float> metal(detector.width, detector.height);
   const auto rows = static_cast<std::size_t>(detector.height);

@@ -7,6 +7,7 @@
 
 #include "helicarm/geometry/view.h"
 #include "helicarm/image/image.h"
+#include "helicarm/simulation/ct_body.h"
 #include "helicarm/simulation/intensifier_distortion.h"
 #include "helicarm/simulation/scene.h"
 
@@ -23,9 +24,10 @@ struct VirtualDetector {
 
 /// The noise-free picture, open beam = 1, black outside the round field. Every raw pixel's own ray is traced
 /// (nothing is resampled); pixels at the edge of metal average 3 x 3 rays. `view`: ideal pixels, world = the
-/// scene's frame, in which the picture is not mirrored. The same numbers whatever `threads` (0: all cores).
+/// scene's frame, in which the picture is not mirrored. `ct`, if any, is in the beam too; the source must not
+/// be in it. The same numbers whatever `threads` (0: all cores).
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
-                         unsigned threads = 0);
+                         unsigned threads = 0, const CtBody* ct = nullptr);
 
 /// 1 well inside the field, 0 outside, a one-pixel ramp on its edge; 1 everywhere without one.
 double field_weight(const VirtualDetector& detector, const Eigen::Vector2d& raw);

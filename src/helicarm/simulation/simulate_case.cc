@@ -24,6 +24,7 @@ constexpr double least_distance_mm = 20;  // clear of plate48, whose balls end 1
 constexpr double most_distance_mm = 500;
 
 Expected<void> check_grid(const SimulationOptions& options) {
+  if (options.ct) return fail(Reason::usage, "CT: kind grid has no knee");
   if (options.machine() == Preset::paper_sim)
     return fail(Reason::bad_value,
                 "preset: paper-sim has no distortion, and its picture does not hold the plate; "
@@ -84,6 +85,8 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
                                                word(options.machine())));
+  if (options.ct && !options.knee)
+    return fail(Reason::usage, "CT: it is the knee, so the knee cannot be left out");
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
                      [&](const CalibratorBall& ball) { return ball.label == lost; }))
@@ -99,9 +102,10 @@ Click click(const TruePoint& point, RandomStream& random) {
   return {point.name, (raw * 10).array().round().matrix() / 10};
 }
 
-void expose(SimulatedView& view, const Scene& scene, const SimulationOptions& options, std::uint32_t number) {
+void expose(SimulatedView& view, const Scene& scene, const SimulationOptions& options, std::uint32_t number,
+            const CtBody* ct = nullptr) {
   const Shot& shot = view.shot;
-  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads);
+  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads, ct);
   view.pixels = develop(signal, shot.imaging, options.seed, stream::noise + 2 * number, options.threads);
   if (shot.mirrored) view.pixels = mirrored(view.pixels);
 }
@@ -118,7 +122,7 @@ void add_plate_dots(SimulatedView& view, const Plate& plate, const Scene& scene)
 }
 
 SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const Shot& shot,
-                        std::uint32_t number) {
+                        std::uint32_t number, const CtBody* ct) {
   const SimulationOptions& options = room.options;
   Scene scene = patient;
   if (room.plate)
@@ -127,7 +131,7 @@ SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const S
 
   SimulatedView view;
   view.shot = shot;
-  expose(view, scene, options, number);
+  expose(view, scene, options, number, ct);
   for (const CalibratorBall& ball : room.calibrator.balls)
     view.balls.push_back(true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, shot));
   for (const CalibratorTarget& target : room.calibrator.targets)
@@ -193,7 +197,16 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
     return std::find(options.lost_balls.begin(), options.lost_balls.end(), body.name) !=
            options.lost_balls.end();
   });
-  if (options.knee)
+  std::optional<CtBody> ct;
+  if (options.ct) {
+    room.calibrator_from_ct = calibrator_from_knee * knee_from_patient(*options.ct);
+    ct.emplace(*options.ct, calibrator_from_knee, options.threads);
+    for (const Shot& shot : shots)
+      if (ct->contains(shot.view.source_in_world()))
+        return fail(Reason::bad_value, fmt::format("{}: the X-ray source of {} lies inside the volume",
+                                                   options.ct->name, shot.name));
+  }
+  if (options.knee && !ct)
     for (const Body& body : knee_body()) patient.push_back(moved(body, calibrator_from_knee));
   for (const Body& body : stray_metal(options, room.calibrator, shots, calibrator_from_knee))
     patient.push_back(body);
@@ -203,7 +216,8 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
       patient.push_back(steel(point.name, {sphere(point.in_calibrator, tunnel_ball_mm / 2)}));
   }
   for (std::size_t i = 0; i < shots.size(); ++i)
-    room.views.push_back(take_view(room, patient, shots[i], static_cast<std::uint32_t>(i)));
+    room.views.push_back(
+        take_view(room, patient, shots[i], static_cast<std::uint32_t>(i), ct ? &*ct : nullptr));
   return room;
 }
 

@@ -171,6 +171,14 @@ Json truth_json(const SimulatedCase& simulated) {
     json["views"].push_back(view_json(view, grid ? "grid" : "calibrator"));
   for (const CalibratorTarget& target : simulated.calibrator.targets)
     json["targets_in_calibrator"][target.name] = vector_json(target.point_in_calibrator);
+  if (simulated.calibrator_from_ct) {
+    const Volume& volume = simulated.options.ct->volume;
+    json["ct"] = {{"file", simulated.options.ct->name},
+                  {"digest", volume_key(volume)},
+                  {"size", volume.size},
+                  {"patient_from_voxel", matrix_json(volume.patient_from_voxel.matrix())},
+                  {"calibrator_from_patient", matrix_json(simulated.calibrator_from_ct->matrix())}};
+  }
   if (simulated.navigation) json["navigation"] = navigation_json(simulated);
   return json;
 }

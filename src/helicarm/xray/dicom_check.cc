@@ -25,7 +25,7 @@ constexpr std::array<std::string_view, 8> xray_classes = {
 constexpr std::array<std::string_view, 9> xray_modalities = {"XA", "RF", "CR", "DX", "DR",
                                                              "RG", "OT", "SC", ""};
 
-void check_kind(const DicomElements& elements) {
+void check_xray(const DicomElements& elements) {
   const std::string_view sop_class = elements.text(tags::sop_class);
   if (sop_class.empty() && !elements.find(tags::pixel_data))
     elements.refuse(Reason::not_an_image, tags::pixel_data, "is missing: the file holds no picture");
@@ -36,6 +36,14 @@ void check_kind(const DicomElements& elements) {
   const std::string_view modality = elements.text(tags::modality);
   if (std::ranges::find(xray_modalities, modality) == xray_modalities.end())
     elements.refuse(Reason::unsupported, tags::modality, fmt::format("is {}: not an X-ray", quote(modality)));
+}
+
+void check_kind(const DicomElements& elements, DicomKind kind) {
+  if (kind == DicomKind::xray)
+    check_xray(elements);
+  else if (elements.text(tags::sop_class) != ct_class)
+    elements.refuse(Reason::unsupported, tags::sop_class,
+                    fmt::format("is {}: not a CT slice", quote(elements.text(tags::sop_class))));
   if (elements.text(tags::sop_instance).empty())
     elements.refuse(Reason::bad_value, tags::sop_instance, "is missing");
   if (!elements.find(tags::pixel_data)) elements.refuse(Reason::bad_value, tags::pixel_data, "is missing");
@@ -101,11 +109,11 @@ bool is_xray_class(std::string_view sop_class) {
   return std::ranges::find(xray_classes, sop_class) != xray_classes.end();
 }
 
-Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin) {
+Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin, DicomKind kind) {
   return guarded([&] {
     DicomOutline outline;
     outline.elements = value_or_throw(walk_dicom(bytes, origin));
-    check_kind(outline.elements);
+    check_kind(outline.elements, kind);
     check_photometric(outline);
     check_bits(outline);
     check_size(outline);

@@ -7,6 +7,7 @@ namespace helicarm::tags {
 
 inline constexpr DicomTag meta_length{0x00020000, "File Meta Information Group Length"};
 inline constexpr DicomTag transfer_syntax{0x00020010, "Transfer Syntax UID"};
+inline constexpr DicomTag image_type{0x00080008, "Image Type"};
 inline constexpr DicomTag sop_class{0x00080016, "SOP Class UID"};
 inline constexpr DicomTag sop_instance{0x00080018, "SOP Instance UID"};
 inline constexpr DicomTag modality{0x00080060, "Modality"};
@@ -20,6 +21,8 @@ inline constexpr DicomTag field_rotation{0x00187032, "Field of View Rotation"};
 inline constexpr DicomTag field_flip{0x00187034, "Field of View Horizontal Flip"};
 inline constexpr DicomTag study{0x0020000D, "Study Instance UID"};
 inline constexpr DicomTag series{0x0020000E, "Series Instance UID"};
+inline constexpr DicomTag image_position{0x00200032, "Image Position (Patient)"};
+inline constexpr DicomTag image_orientation{0x00200037, "Image Orientation (Patient)"};
 inline constexpr DicomTag frame_of_reference{0x00200052, "Frame of Reference UID"};
 inline constexpr DicomTag samples_per_pixel{0x00280002, "Samples per Pixel"};
 inline constexpr DicomTag photometric{0x00280004, "Photometric Interpretation"};
@@ -31,6 +34,8 @@ inline constexpr DicomTag bits_allocated{0x00280100, "Bits Allocated"};
 inline constexpr DicomTag bits_stored{0x00280101, "Bits Stored"};
 inline constexpr DicomTag high_bit{0x00280102, "High Bit"};
 inline constexpr DicomTag pixel_representation{0x00280103, "Pixel Representation"};
+inline constexpr DicomTag rescale_intercept{0x00281052, "Rescale Intercept"};
+inline constexpr DicomTag rescale_slope{0x00281053, "Rescale Slope"};
 inline constexpr DicomTag intensity_relationship{0x00281040, "Pixel Intensity Relationship"};
 inline constexpr DicomTag intensity_sign{0x00281041, "Pixel Intensity Relationship Sign"};
 inline constexpr DicomTag lossy_compression{0x00282110, "Lossy Image Compression"};

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <benchmark/benchmark.h>
+
+#include "helicarm/volume/drr.h"
+
+namespace helicarm {
+namespace {
+
+/// 256 voxels of 1 mm a side, none of them empty: every ray through it takes all its slabs.
+Volume full_volume() {
+  Volume volume;
+  volume.size.setConstant(256);
+  volume.voxels.resize(std::size_t{256} * 256 * 256);
+  for (std::size_t i = 0; i < volume.voxels.size(); ++i) volume.voxels[i] = static_cast<float>(i * 7 % 613);
+  volume.patient_from_voxel = Eigen::Translation3d(-127.5, -127.5, -127.5);
+  return volume;
+}
+
+View view_along(int axis) {
+  View view;
+  view.intrinsics = {4000, 4000, 511.5, 511.5, 0};
+  const Eigen::Vector3d ray = Eigen::Vector3d::Unit(axis);
+  const Eigen::Vector3d right = Eigen::Vector3d::Unit(axis == 0 ? 1 : 0);
+  view.camera_from_world.rotation << right.transpose(), ray.cross(right).transpose(), ray.transpose();
+  view.camera_from_world.translation = {0, 0, 1000};
+  return view;
+}
+
+/// 1024 x 1024 rays that all meet the volume, along an axis, on so many threads.
+void drr_of_256(benchmark::State& state) {
+  const Absorber absorber(full_volume(), attenuation_from_hu);
+  const View view = view_along(static_cast<int>(state.range(0)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(drr(absorber, view, 1024, 1024, static_cast<unsigned>(state.range(1))));
+}
+BENCHMARK(drr_of_256)->ArgsProduct({{0, 1, 2}, {1, 2}})->Unit(benchmark::kMillisecond)->UseRealTime();
+
+void prepare_256(benchmark::State& state) {
+  const Volume volume = full_volume();
+  for (auto _ : state)
+    benchmark::DoNotOptimize(Absorber(volume, attenuation_from_hu, static_cast<unsigned>(state.range(0)))
+                                 .contains(Eigen::Vector3d::Zero()));
+}
+BENCHMARK(prepare_256)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/geometry/view.h"
+#include "helicarm/image/image.h"
+#include "helicarm/volume/absorber.h"
+
+namespace helicarm {
+
+/// Line integrals of the attenuation from the source through each pixel's centre, on through the whole
+/// volume. World of `view`: the patient frame. Refuses (bad_value) a source inside the volume. The same bytes
+/// whatever `threads` (0: all cores).
+Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width, int height,
+                           unsigned threads = 0);
+
+}  // namespace helicarm

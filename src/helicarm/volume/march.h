@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace helicarm {
+
+#ifdef __AVX2__
+inline constexpr int march_lanes = 8;
+#else
+inline constexpr int march_lanes = 4;
+#endif
+
+/// Rays that run mainly along one axis d of a padded block, in voxels; p is the axis of stride 1, q the
+/// third. Within the slab k of one voxel a ray moves by at most one voxel along p and q.
+struct MarchRays {
+  float p[march_lanes];  ///< lower end of the ray's p within slab 0; the margin's voxel is 0 .. 1
+  float dp[march_lanes];
+  float per_dp[march_lanes];  ///< 1 / |dp|, at most 1e20
+  float q[march_lanes];
+  float dq[march_lanes];
+  float per_dq[march_lanes];
+  float alike[march_lanes];  ///< 1 where p and q rise together, else 0
+};
+
+struct MarchBlock {
+  const std::int16_t* values;  ///< first margin voxel of slab 0
+  std::ptrdiff_t slab;         ///< stride from slab to slab
+  int row;                     ///< stride along q
+  float p_end;                 ///< index of the upper margin's voxel
+  float q_end;
+};
+
+/// Sums value times length (in slabs) over the slabs first .. last - 1, exactly for constant voxels.
+void march(const MarchBlock& block, const MarchRays& rays, int first, int last, float* sums);
+
+}  // namespace helicarm

@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/volume/voxels.h"
+#include "helicarm/xray/dicom_check.h"
+#include "helicarm/xray/dicom_frame.h"
+#include "helicarm/xray/dicom_tags.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::uintmax_t most_slice_bytes = std::uintmax_t{64} << 20;
+constexpr double most_coordinate_mm = 1e5;
+// Positions are decimal text of some digits; a part of the spacing allows for more rounding in thick slices.
+constexpr double uneven_mm = 0.1;
+constexpr double uneven_part = 0.02;
+
+/// Where one slice lies; columns of `axes`: along a row, along a column, mm a pixel.
+struct Slice {
+  std::filesystem::path path;
+  Eigen::Matrix<double, 3, 2> axes;
+  Vector3d corner;
+  int columns = 0;
+  int rows = 0;
+
+  Vector3d normal() const { return axes.col(0).cross(axes.col(1)).normalized(); }
+};
+
+std::vector<double> needed(const DicomElements& elements, DicomTag tag, std::size_t count, double low,
+                           double high) {
+  const auto numbers = elements.numbers(tag, count, low, high);
+  if (!numbers) elements.refuse(Reason::bad_value, tag, "is missing");
+  return *numbers;
+}
+
+Slice slice_of(const DicomOutline& outline) {
+  const DicomElements& elements = outline.elements;
+  Slice slice;
+  slice.columns = outline.columns;
+  slice.rows = outline.rows;
+  const auto corner = needed(elements, tags::image_position, 3, -most_coordinate_mm, most_coordinate_mm);
+  const auto turn = needed(elements, tags::image_orientation, 6, -1.001, 1.001);
+  const auto spacing = needed(elements, tags::pixel_spacing, 2, 1e-3, 100);
+  slice.corner = Vector3d::Map(corner.data());
+  slice.axes.col(0) = Vector3d::Map(turn.data()) * spacing[1];
+  slice.axes.col(1) = Vector3d::Map(turn.data() + 3) * spacing[0];
+  const auto directions = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(turn.data());
+  if (!(directions.transpose() * directions).isIdentity(1e-3))
+    elements.refuse(Reason::bad_value, tags::image_orientation, "is no pair of perpendicular unit vectors");
+  return slice;
+}
+
+/// The slices of each series in the folder by its UID; other files, and the scanner's overviews, are left
+/// out.
+std::map<std::string, std::vector<Slice>> find_series(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.is_regular_file()) paths.push_back(entry.path());
+  std::ranges::sort(paths);
+  std::map<std::string, std::vector<Slice>> series;
+  for (const auto& path : paths) {
+    const auto bytes = read_file(path, most_slice_bytes);
+    if (!bytes || bytes->size() < 132 || bytes->compare(128, 4, "DICM") != 0) continue;
+    const DicomElements elements = value_or_throw(walk_dicom(*bytes, path.string()));
+    if (elements.text(tags::sop_class) != ct_class) continue;
+    if (elements.text(tags::image_type).find("LOCALIZER") != std::string_view::npos) continue;
+    const DicomOutline outline = value_or_throw(check_dicom(*bytes, path.string(), DicomKind::ct));
+    Slice slice = slice_of(outline);
+    slice.path = path;
+    series[std::string(elements.text(tags::series))].push_back(std::move(slice));
+  }
+  return series;
+}
+
+void check_alike(const std::vector<Slice>& slices) {
+  for (const Slice& slice : slices) {
+    if (slice.columns != slices[0].columns || slice.rows != slices[0].rows)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: {} x {} pixels, the first slice has {} x {}", slice.path.string(),
+                                 slice.columns, slice.rows, slices[0].columns, slices[0].rows));
+    if (!slice.axes.isApprox(slices[0].axes, 1e-3))
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: lies another way than the first slice", slice.path.string()));
+  }
+}
+
+/// From slice to slice; refuses slices that are missing, double or out of line.
+Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) {
+  const Vector3d normal = slices[0].normal();
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < slices.size(); ++i)
+    gaps.push_back(normal.dot(slices[i].corner - slices[i - 1].corner));
+  std::vector<double> sorted = gaps;
+  std::ranges::sort(sorted);
+  const double usual = sorted[sorted.size() / 2];
+  const double allowed = std::max(uneven_mm, uneven_part * usual);
+  for (std::size_t i = 0; i < gaps.size(); ++i)
+    if (std::abs(gaps[i] - usual) > allowed || gaps[i] < 1e-3)
+      throw BadInput(
+          Failure{Reason::bad_value,
+                  fmt::format("{}: slices {} and {} of {} are {:.4g} mm apart, the others {:.4g} mm: a slice "
+                              "is missing, double or of another stack",
+                              origin, i + 1, i + 2, slices.size(), gaps[i], usual),
+                  {},
+                  {{"gap_mm", gaps[i]}, {"usual_mm", usual}}});
+  const Vector3d step = (slices.back().corner - slices[0].corner) / static_cast<double>(slices.size() - 1);
+  for (std::size_t i = 0; i < slices.size(); ++i) {
+    const double off = (slices[0].corner + static_cast<double>(i) * step - slices[i].corner).norm();
+    if (off > std::max(2 * allowed, 0.5 * usual))
+      throw BadInput(Reason::bad_value, fmt::format("{}: slice {} of {} is {:.4g} mm out of line", origin,
+                                                    i + 1, slices.size(), off));
+  }
+  return step;
+}
+
+void decode_slice(const Slice& slice, float* voxels) {
+  const std::string origin = slice.path.string();
+  const std::string bytes = value_or_throw(read_file(slice.path, most_slice_bytes));
+  const DicomOutline outline = value_or_throw(check_dicom(bytes, origin, DicomKind::ct));
+  if (outline.columns != slice.columns || outline.rows != slice.rows)
+    throw BadInput(Reason::bad_size, origin + ": changed while it was read");
+  const double slope =
+      outline.elements.numbers(tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
+  const double shift =
+      outline.elements.numbers(tags::rescale_intercept, 1, -1e6, 1e6).value_or(std::vector{0.0})[0];
+  const Image<float> pixels = value_or_throw(decode_frame(outline, 0));
+  for (const float pixel : pixels.pixels())
+    *voxels++ = static_cast<float>(slope * static_cast<double>(pixel) + shift);
+}
+
+}  // namespace
+
+Volume read_ct_series(const std::filesystem::path& folder) {
+  const std::string origin = folder.string();
+  auto series = find_series(folder);
+  if (series.empty()) throw BadInput(Reason::not_an_image, origin + ": no file here is a DICOM CT slice");
+  const auto largest =
+      std::ranges::max_element(series, {}, [](const auto& entry) { return entry.second.size(); });
+  Volume volume;
+  if (series.size() > 1) {
+    std::vector<std::size_t> counts;
+    for (const auto& entry : series) counts.push_back(entry.second.size());
+    if (std::ranges::count(counts, largest->second.size()) > 1)
+      throw BadInput(Reason::name_clash, fmt::format("{}: {} CT series of {} slices: leave one in the folder",
+                                                     origin, series.size(), fmt::join(counts, ", ")));
+    volume.warnings.push_back(
+        {Reason::name_clash, fmt::format("{}: {} CT series of {} slices: the largest was taken", origin,
+                                         series.size(), fmt::join(counts, ", "))});
+  }
+  std::vector<Slice>& slices = largest->second;
+  if (slices.size() < 2) throw BadInput(Reason::bad_size, origin + ": one slice is no volume");
+  check_alike(slices);
+  const Vector3d normal = slices[0].normal();
+  std::ranges::stable_sort(slices, {}, [&](const Slice& slice) { return normal.dot(slice.corner); });
+  const Vector3d step = even_step(slices, origin);
+  volume.size = {slices[0].columns, slices[0].rows, static_cast<int>(slices.size())};
+  const std::size_t count = value_or_throw(voxel_count(volume.size.cast<double>(), origin));
+  volume.patient_from_voxel.linear() << slices[0].axes, step;
+  volume.patient_from_voxel.translation() = slices[0].corner;
+  volume.voxels.resize(count);
+  const std::size_t area = count / slices.size();
+  for (std::size_t i = 0; i < slices.size(); ++i) decode_slice(slices[i], volume.voxels.data() + i * area);
+  return volume;
+}
+
+}  // namespace helicarm

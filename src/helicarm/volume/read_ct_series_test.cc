@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/volume/read_volume.h"
+#include "helicarm/xray/dicom_builder.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+class CtSeries : public testing::Test {
+ protected:
+  CtSeries() { fs::create_directories(folder_); }
+  ~CtSeries() override { fs::remove_all(folder_); }
+
+  static DicomBuilder slice(double z, const std::string& series = "2.25.7") {
+    DicomBuilder builder;
+    builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.2").text(0x00080060, "CS", "CT");
+    builder.text(0x0020000E, "UI", series).text(0x00200032, "DS", fmt::format("-3\\4\\{}", z));
+    builder.text(0x00200037, "DS", "1\\0\\0\\0\\1\\0").text(0x00280030, "DS", "0.5\\0.25");
+    builder.text(0x00281052, "DS", "-1000").text(0x00281053, "DS", "2");
+    return builder;
+  }
+  void put(const DicomBuilder& builder) {
+    ASSERT_TRUE(write_file(folder_ / fmt::format("{:03}", count_++), builder.bytes()));
+  }
+  Expected<Volume> read() const { return read_volume(folder_); }
+
+  int count_ = 0;
+  fs::path folder_ = fs::temp_directory_path() / fmt::format("helicarm_ct_series_{}", ::getpid());
+};
+
+TEST_F(CtSeries, SlicesAreSortedByPlaceAndScaled) {
+  put(slice(12.5).word(0x00280002, 1));
+  put(slice(10));
+  put(slice(15));
+  ASSERT_TRUE(write_file(folder_ / "notes.txt", "not a slice"));
+  const auto volume = read();
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size, Eigen::Vector3i(8, 6, 3));
+  EXPECT_EQ(volume->voxels[9], 2 * 109 - 1000);
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(1, 1, 1), Vector3d(-2.75, 4.5, 12.5));
+  EXPECT_TRUE(volume->warnings.empty());
+}
+
+TEST_F(CtSeries, MissingOrDoubleSliceIsRefusedWithFigures) {
+  for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0}) put(slice(z));
+  const auto gap = read();
+  ASSERT_FALSE(gap.has_value());
+  EXPECT_EQ(gap.error().reason, Reason::bad_value);
+  EXPECT_NEAR(gap.error().figures.at("gap_mm"), 2, 1e-9);
+  put(slice(3));
+  EXPECT_TRUE(read().has_value());
+  put(slice(3));
+  EXPECT_EQ(read().error().reason, Reason::bad_value);
+}
+
+TEST_F(CtSeries, LargestOfSeveralSeriesIsTakenWithAWarning) {
+  for (const double z : {0.0, 1.0, 2.0}) put(slice(z));
+  put(slice(0, "2.25.8"));
+  put(slice(1, "2.25.8"));
+  put(slice(7, "2.25.9").text(0x00080008, "CS", "ORIGINAL\\PRIMARY\\LOCALIZER"));
+  const auto volume = read();
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size.z(), 3);
+  ASSERT_EQ(volume->warnings.size(), 1u);
+  put(slice(2, "2.25.8"));
+  EXPECT_EQ(read().error().reason, Reason::name_clash);
+}
+
+TEST_F(CtSeries, OddSlices) {
+  EXPECT_EQ(read().error().reason, Reason::not_an_image);
+  put(slice(0));
+  EXPECT_EQ(read().error().reason, Reason::bad_size);
+  const auto with = [&](const DicomBuilder& odd) {
+    put(odd);
+    const auto volume = read();
+    fs::remove(folder_ / fmt::format("{:03}", --count_));
+    return volume ? Reason::usage : volume.error().reason;
+  };
+  EXPECT_EQ(with(slice(1).text(0x00200037, "DS", "1\\0\\0\\1\\0\\0")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).text(0x00200037, "DS", "0\\1\\0\\1\\0\\0")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).erase(0x00200032)), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).text(0x00280030, "DS", "0\\0")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).text(0x00281053, "DS", "nan")), Reason::bad_value);
+  EXPECT_EQ(with(slice(1).word(0x00280011, 4)), Reason::bad_size);
+  EXPECT_EQ(with(slice(1).word(0x00280010, 600)), Reason::truncated);
+  DicomBuilder cut = slice(1);
+  ASSERT_TRUE(write_file(folder_ / "zzz", cut.bytes().substr(0, cut.bytes().size() - 9)));
+  EXPECT_EQ(read().error().reason, Reason::truncated);
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/volume/read_volume.h"
+
+#include <bit>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/volume/voxels.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class ReadVolume : public testing::Test {
+ protected:
+  ReadVolume() { fs::create_directories(folder_); }
+  ~ReadVolume() override { fs::remove_all(folder_); }
+
+  fs::path put(const std::string& name, const std::string& bytes) const {
+    EXPECT_TRUE(write_file(folder_ / name, bytes));
+    return folder_ / name;
+  }
+  Expected<Volume> read(const std::string& name, const std::string& bytes) const {
+    return read_volume(put(name, bytes));
+  }
+  Reason refusal(const std::string& bytes) const {
+    const auto volume = read("odd", bytes);
+    EXPECT_FALSE(volume.has_value());
+    return volume ? Reason::usage : volume.error().reason;
+  }
+
+  fs::path folder_ = fs::temp_directory_path() / fmt::format("helicarm_read_volume_{}", ::getpid());
+};
+
+template <class T>
+std::string stored(std::initializer_list<T> values, bool big = false) {
+  std::string bytes;
+  for (const T value : values) {
+    std::string word(sizeof value, '\0');
+    std::memcpy(word.data(), &value, sizeof value);
+    bytes += big ? std::string(word.rbegin(), word.rend()) : word;
+  }
+  return bytes;
+}
+
+std::string packed(const std::string& bytes, bool gzip) {
+  z_stream stream{};
+  deflateInit2(&stream, 9, Z_DEFLATED, 15 + (gzip ? 16 : 0), 8, Z_DEFAULT_STRATEGY);
+  std::string out(compressBound(bytes.size()) + 32, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+std::string meta(const std::string& lines, const std::string& data, const std::string& size = "2 1 2") {
+  return "ObjectType = Image\nNDims = 3\nDimSize = " + size + "\n" + lines + "ElementDataFile = LOCAL\n" +
+         data;
+}
+
+std::string nrrd(const std::string& lines, const std::string& data, const std::string& type = "short") {
+  return "NRRD0004\n# a comment\ntype: " + type + "\ndimension: 3\nsizes: 2 1 2\nendian: little\n" + lines +
+         "\n" + data;
+}
+
+/// A NIfTI-1 header for 2 x 1 x 2 voxels of int16, then the voxels.
+struct Nifti {
+  std::string bytes = std::string(352, '\0');
+  bool big = false;
+
+  explicit Nifti(bool big_endian = false) : big(big_endian) {
+    set<std::int32_t>(0, 348);
+    for (const auto& [at, value] : {std::pair{40, 3}, {42, 2}, {44, 1}, {46, 2}, {70, 4}, {72, 16}, {254, 1}})
+      set<std::int16_t>(static_cast<std::size_t>(at), static_cast<std::int16_t>(value));
+    for (const auto& [at, value] : {std::pair{80, 1.F},
+                                    {84, 2.F},
+                                    {88, 3.F},
+                                    {108, 352.F},
+                                    {280, 1.F},
+                                    {292, 10.F},
+                                    {300, 2.F},
+                                    {308, 20.F},
+                                    {320, 3.F},
+                                    {324, 30.F}})
+      set<float>(static_cast<std::size_t>(at), value);
+    bytes.replace(344, 4, std::string("n+1\0", 4));
+    bytes += stored<std::int16_t>({1, 2, -3, 4}, big);
+  }
+  template <class T>
+  Nifti& set(std::size_t at, T value) {
+    bytes.replace(at, sizeof value, stored({value}, big));
+    return *this;
+  }
+};
+
+const std::string four = stored<std::int16_t>({1, 2, -3, 4});
+
+TEST_F(ReadVolume, MetaImageWithMatrixSpacingAndOffset) {
+  const auto volume = read("a.mha", meta("TransformMatrix = 0 1 0 -1 0 0 0 0 -1\nOffset = 5 6 7\n"
+                                         "ElementSpacing = 2 3 4\nElementType = MET_SHORT\n",
+                                         four));
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->size, Eigen::Vector3i(2, 1, 2));
+  EXPECT_THAT(volume->voxels, ElementsAre(1, 2, -3, 4));
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(1, 0, 0), Vector3d(5, 8, 7));
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(0, 1, 0), Vector3d(2, 6, 7));
+  EXPECT_EQ(volume->patient_from_voxel * Vector3d(0, 0, 1), Vector3d(5, 6, 3));
+  EXPECT_EQ(volume->centre(), Vector3d(5, 7, 5));
+}
+
+TEST_F(ReadVolume, MetaImageOfEveryKindOrderAndPacking) {
+  const auto expect = [&](const std::string& lines, const std::string& data) {
+    const auto volume = read("a.mha", meta(lines, data));
+    ASSERT_TRUE(volume.has_value()) << volume.error().message;
+    EXPECT_THAT(volume->voxels, ElementsAre(1, 2, 3, 100)) << lines;
+  };
+  expect("ElementType = MET_CHAR\n", stored<std::int8_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_UCHAR\n", stored<std::uint8_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_USHORT\n", stored<std::uint16_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_INT\n", stored<std::int32_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_UINT\n", stored<std::uint32_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_LONG_LONG\n", stored<std::int64_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_ULONG_LONG\n", stored<std::uint64_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_FLOAT\n", stored<float>({1, 2, 3, 100}));
+  expect("ElementType = MET_DOUBLE\nBinaryDataByteOrderMSB = True\n", stored<double>({1, 2, 3, 100}, true));
+  expect("ElementType = MET_SHORT\nElementByteOrderMSB = True\n", stored<std::int16_t>({1, 2, 3, 100}, true));
+  expect("ElementType = MET_SHORT\nCompressedData = True\n",
+         packed(stored<std::int16_t>({1, 2, 3, 100}), false));
+  expect("ElementType = MET_SHORT\nHeaderSize = 3\n", "abc" + stored<std::int16_t>({1, 2, 3, 100}));
+  expect("ElementType = MET_SHORT\nHeaderSize = -1\n", "abcde" + stored<std::int16_t>({1, 2, 3, 100}));
+}
+
+TEST_F(ReadVolume, MetaImageWhoseVoxelsAreBeside) {
+  put("a.raw", four);
+  const std::string head =
+      "NDims = 3\nDimSize = 2 1 2\nElementType = MET_SHORT\nAnatomicalOrientation = LPI\nElementDataFile = ";
+  const auto volume = read("a.mhd", head + "a.raw\n");
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_EQ(volume->patient_from_voxel.linear(), Eigen::Matrix3d(Vector3d(-1, -1, 1).asDiagonal()));
+  EXPECT_EQ(read("a.mhd", head + "../a.raw\n").error().reason, Reason::path_outside);
+  EXPECT_EQ(read("a.mhd", head + "none.raw\n").error().reason, Reason::missing_file);
+  EXPECT_EQ(read("a.mhd", head + "LIST\n").error().reason, Reason::unsupported);
+}
+
+TEST_F(ReadVolume, OddMetaImages) {
+  const std::string type = "ElementType = MET_SHORT\n";
+  EXPECT_EQ(refusal(meta(type, four.substr(1))), Reason::truncated);
+  EXPECT_EQ(refusal("ObjectType = Image\nNDims = 3\n"), Reason::truncated);
+  EXPECT_EQ(refusal(meta(type, four, "2 1")), Reason::bad_value);
+  EXPECT_EQ(refusal(meta(type, four, "2 0 2")), Reason::bad_size);
+  EXPECT_EQ(refusal(meta(type, four, "2 -1 2")), Reason::bad_size);
+  EXPECT_EQ(refusal(meta(type, four, "2 1.5 2")), Reason::bad_size);
+  EXPECT_EQ(refusal(meta(type, four, "16384 16384 16384")), Reason::bad_size);
+  EXPECT_EQ(refusal(meta(type, four, "99999999999999999999 1 2")), Reason::bad_size);
+  EXPECT_EQ(refusal(meta(type + "ElementSpacing = 1 nan 1\n", four)), Reason::not_finite);
+  EXPECT_EQ(refusal(meta(type + "ElementSpacing = 1 0 1\n", four)), Reason::bad_value);
+  EXPECT_EQ(refusal(meta(type + "ElementSpacing = 1 one 1\n", four)), Reason::bad_value);
+  EXPECT_EQ(refusal(meta(type + "TransformMatrix = 1 0 0 1 0 0 0 0 1\n", four)), Reason::bad_value);
+  EXPECT_EQ(refusal(meta(type + "NDims = 3\n", four)), Reason::bad_value);
+  EXPECT_EQ(refusal(meta("ElementType = MET_STRING\n", four)), Reason::unsupported);
+  EXPECT_EQ(refusal(meta(type + "ElementNumberOfChannels = 3\n", four)), Reason::unsupported);
+  EXPECT_EQ(refusal(meta(type + "HeaderSize = 99\n", four)), Reason::truncated);
+  EXPECT_EQ(refusal(meta(type + "CompressedData = True\n", "no deflate at all")), Reason::bad_value);
+  EXPECT_EQ(refusal(meta("ElementType = MET_FLOAT\n", stored<float>({1, NAN, 2, 3}))), Reason::not_finite);
+  EXPECT_EQ(refusal("hello"), Reason::not_an_image);
+  EXPECT_EQ(refusal(""), Reason::not_an_image);
+  EXPECT_EQ(read_volume(folder_ / "none.mha").error().reason, Reason::missing_file);
+}
+
+TEST_F(ReadVolume, PackedVoxelsNeitherBurstNorPromiseTooMuch) {
+  const std::string bomb = packed(std::string(std::size_t{64} << 20, '\0'), false);
+  const std::string head = "ElementType = MET_SHORT\nCompressedData = True\n";
+  const auto small = read("a.mha", meta(head, bomb));  // only what is asked for is unpacked
+  ASSERT_TRUE(small.has_value());
+  EXPECT_EQ(small->voxels.size(), 4u);
+  EXPECT_EQ(refusal(meta(head, bomb, "1024 1024 512")), Reason::truncated);
+  EXPECT_EQ(refusal(meta(head, bomb.substr(0, bomb.size() / 2), "1024 1024 17")), Reason::truncated);
+}
+
+TEST_F(ReadVolume, NrrdInEachSpaceAndEncoding) {
+  const std::string place = "space directions: (0,2,0) (3,0,0) (0,0,-4)\nspace origin: (5,6,7)\n";
+  const auto lps = read("a.nrrd", nrrd("space: left-posterior-superior\nencoding: raw\n" + place, four));
+  ASSERT_TRUE(lps.has_value()) << lps.error().message;
+  EXPECT_THAT(lps->voxels, ElementsAre(1, 2, -3, 4));
+  EXPECT_EQ(lps->patient_from_voxel * Vector3d(1, 0, 1), Vector3d(5, 8, 3));
+  const auto ras = read("a.nrrd", nrrd("space: RAS\nencoding: gzip\n" + place, packed(four, true)));
+  ASSERT_TRUE(ras.has_value()) << ras.error().message;
+  EXPECT_THAT(ras->voxels, ElementsAre(1, 2, -3, 4));
+  EXPECT_EQ(ras->patient_from_voxel * Vector3d(1, 0, 1), Vector3d(-5, -8, 3));
+  const auto text = read("a.nrrd", nrrd("spacings: 1 2 3\nencoding: ascii\nnote:=kept\n", "1 2\n-3 4\n"));
+  ASSERT_TRUE(text.has_value()) << text.error().message;
+  EXPECT_THAT(text->voxels, ElementsAre(1, 2, -3, 4));
+  EXPECT_EQ(text->patient_from_voxel * Vector3d(1, 1, 1), Vector3d(1, 2, 3));
+  put("a.raw", "xx" + four);
+  const auto beside = read("a.nhdr", nrrd("encoding: raw\nbyte skip: -1\ndata file: a.raw\n", ""));
+  ASSERT_TRUE(beside.has_value()) << beside.error().message;
+  EXPECT_THAT(beside->voxels, ElementsAre(1, 2, -3, 4));
+}
+
+TEST_F(ReadVolume, OddNrrds) {
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nflavour: sweet\n", four)), Reason::unknown_key);
+  EXPECT_EQ(refusal(nrrd("encoding: bzip2\n", four)), Reason::unsupported);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\n", four.substr(2))), Reason::truncated);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspace: scanner-xyz\n", four)), Reason::unsupported);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspace directions: none (1,0,0) (0,1,0)\n", four)),
+            Reason::bad_value);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspace directions: (1,0,0) (1,0,0) (0,1,0)\n", four)),
+            Reason::bad_value);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nspacings: 1 nan 1\n", four)), Reason::not_finite);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\n", four, "block")), Reason::unsupported);
+  EXPECT_EQ(refusal(nrrd("encoding: ascii\n", "1 2 3")), Reason::truncated);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\nbyte skip: 99\n", four)), Reason::truncated);
+  EXPECT_EQ(refusal(nrrd("encoding: raw\ndata file: /etc/passwd\n", four)), Reason::path_outside);
+  EXPECT_EQ(refusal("NRRD0004\ntype: short\ndimension: 3\nsizes: 2 1 2\nendian: little\nencoding: raw"),
+            Reason::truncated);
+  EXPECT_EQ(refusal("NRRD0004\ntype: short\ndimension: 4\nsizes: 2 1 2 1\n\n"), Reason::unsupported);
+}
+
+TEST_F(ReadVolume, NiftiOfEitherEndTurnsToLps) {
+  for (const bool big : {false, true}) {
+    const auto volume = read("a.nii", Nifti(big).set(112, 2.0F).set(116, -1.0F).bytes);
+    ASSERT_TRUE(volume.has_value()) << volume.error().message;
+    EXPECT_THAT(volume->voxels, ElementsAre(1, 3, -7, 7));
+    EXPECT_EQ(volume->patient_from_voxel * Vector3d(1, 1, 1), Vector3d(-11, -22, 33));
+  }
+  const auto volume = read("a.nii.gz", packed(Nifti().bytes, true));
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_THAT(volume->voxels, ElementsAre(1, 2, -3, 4));
+}
+
+TEST_F(ReadVolume, NiftiByQuaternionAndByNone) {
+  Nifti nifti;
+  nifti.set<std::int16_t>(254, 0).set<std::int16_t>(252, 1);
+  nifti.set(76, -1.0F).set(264, static_cast<float>(std::sqrt(0.5))).set(268, 1.0F);  // 90 degrees about z
+  const auto volume = read("a.nii", nifti.bytes);
+  ASSERT_TRUE(volume.has_value()) << volume.error().message;
+  EXPECT_LT((volume->patient_from_voxel * Vector3d(1, 1, 1) - Vector3d(1, -1, -3)).norm(), 1e-5);
+  const auto bare = read("a.nii", nifti.set<std::int16_t>(252, 0).bytes);
+  ASSERT_TRUE(bare.has_value());
+  EXPECT_EQ(bare->warnings.size(), 1u);
+}
+
+TEST_F(ReadVolume, OddNiftis) {
+  EXPECT_EQ(refusal(Nifti().bytes.substr(0, 357)), Reason::truncated);
+  EXPECT_EQ(refusal(Nifti().set<std::int16_t>(42, -2).bytes), Reason::bad_size);
+  EXPECT_EQ(refusal(Nifti().set<std::int16_t>(40, 30000).bytes), Reason::unsupported);
+  EXPECT_EQ(refusal(Nifti().set<std::int16_t>(40, 4).set<std::int16_t>(48, 7).bytes), Reason::unsupported);
+  EXPECT_EQ(refusal(Nifti().set<std::int16_t>(70, 128).bytes), Reason::unsupported);
+  EXPECT_EQ(refusal(Nifti().set<float>(108, 1e30F).bytes), Reason::bad_value);
+  EXPECT_EQ(refusal(Nifti().set<float>(108, NAN).bytes), Reason::not_finite);
+  EXPECT_EQ(refusal(Nifti().set<float>(280, NAN).bytes), Reason::not_finite);
+  EXPECT_EQ(refusal(Nifti().set<float>(280, 0).bytes), Reason::bad_value);
+  EXPECT_EQ(refusal(Nifti().set<float>(112, 3e38F).bytes), Reason::not_finite);
+  EXPECT_EQ(refusal(packed(Nifti().bytes.substr(0, 300), true)), Reason::truncated);
+  EXPECT_EQ(refusal(packed(Nifti().set<std::int16_t>(42, 10000).set<std::int16_t>(44, 10000).bytes, true)),
+            Reason::truncated);
+  EXPECT_EQ(refusal(packed("hello", true)), Reason::truncated);
+}
+
+TEST_F(ReadVolume, EveryCutAndEveryChangedByteIsAnsweredWithoutACrash) {
+  for (const std::string& whole :
+       {meta("ElementType = MET_SHORT\n", four), nrrd("encoding: raw\n", four), Nifti().bytes})
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      std::string other = whole;
+      other[at] = static_cast<char>(other[at] ^ 0x15);
+      for (const std::string& bytes : {whole.substr(0, at), other})
+        guarded([&] {
+          if (whole.starts_with("NRRD")) return read_nrrd(folder_ / "a", bytes).size.x();
+          if (whole.starts_with("Obj")) return read_metaimage(folder_ / "a", bytes).size.x();
+          return read_nifti(folder_ / "a", bytes).size.x();
+        });
+    }
+}
+
+}  // namespace
+}  // namespace helicarm

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/volume/volume.h"
+
+#include <cmath>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "helicarm/xray/digest.h"
+
+namespace helicarm {
+namespace {
+
+// A micro-CT has some micrometres; a gap of 100 mm between voxels is no scan of a knee.
+constexpr double least_spacing_mm = 1e-3;
+constexpr double most_spacing_mm = 100;
+// Of a unit cell: 0.5 is a shear of 60 degrees, more than any gantry tilts.
+constexpr double least_cell = 0.5;
+
+}  // namespace
+
+Expected<std::size_t> voxel_count(const Eigen::Vector3d& size, const std::string& origin) {
+  double count = 1;
+  for (const double side : size) {
+    if (!(side >= 1 && side <= max_volume_side && side == std::floor(side)))
+      return fail(Reason::bad_size,
+                  fmt::format("{}: a side of {} voxels, must be 1 to {}", origin, side, max_volume_side));
+    count *= side;
+  }
+  if (count * sizeof(float) > static_cast<double>(max_volume_bytes))
+    return fail(Reason::bad_size, fmt::format("{}: {} x {} x {} voxels, limit {} in all", origin, size.x(),
+                                              size.y(), size.z(), max_volume_bytes / sizeof(float)));
+  return static_cast<std::size_t>(count);
+}
+
+Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::string& origin) {
+  if (!patient_from_voxel.matrix().allFinite())
+    return fail(Reason::not_finite, fmt::format("{}: the voxels' places are not finite", origin));
+  const Eigen::Vector3d spacing = patient_from_voxel.linear().colwise().norm();
+  for (const double step : spacing)
+    if (!(step >= least_spacing_mm && step <= most_spacing_mm))
+      return fail(Reason::bad_value, fmt::format("{}: a spacing of {} mm, must be {} to {}", origin, step,
+                                                 least_spacing_mm, most_spacing_mm));
+  const double cell = std::abs(patient_from_voxel.linear().determinant()) / spacing.prod();
+  if (!(cell >= least_cell))
+    return fail(Reason::bad_value,
+                fmt::format("{}: the directions of the axes are nearly in one plane (volume of their unit "
+                            "vectors {:.3g}, must be at least {})",
+                            origin, cell, least_cell));
+  return {};
+}
+
+std::string volume_key(const Volume& volume) {
+  const Eigen::Matrix4d place = volume.patient_from_voxel.matrix();
+  const auto bytes = [](const auto* data, std::size_t size) {
+    return digest({reinterpret_cast<const char*>(data), size});
+  };
+  return digest(bytes(volume.size.data(), sizeof(int) * 3) + bytes(place.data(), sizeof place) +
+                bytes(volume.voxels.data(), volume.voxels.size() * sizeof(float)));
+}
+
+}  // namespace helicarm

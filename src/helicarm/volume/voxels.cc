@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/volume/voxels.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include <fmt/format.h>
+#define ZLIB_CONST
+#include <zlib.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/xray/dicom_elements.h"
+
+namespace helicarm {
+namespace {
+
+template <class Stored>
+void decode(std::string_view bytes, bool swap, std::vector<float>& voxels, const std::string& origin) {
+  const char* from = bytes.data();
+  for (float& voxel : voxels) {
+    char word[sizeof(Stored)];
+    std::memcpy(word, from, sizeof word);
+    if (swap) std::reverse(word, word + sizeof word);
+    Stored stored;
+    std::memcpy(&stored, word, sizeof word);
+    voxel = static_cast<float>(stored);
+    if constexpr (std::is_floating_point_v<Stored>)
+      if (!std::isfinite(voxel))
+        throw BadInput(Reason::not_finite,
+                       fmt::format("{}: voxel {} is {}", origin,
+                                   static_cast<std::size_t>(from - bytes.data()) / sizeof word, stored));
+    from += sizeof word;
+  }
+}
+
+// One byte of deflate gives at most 1032 (RFC 1951: 258 bytes for two bits).
+constexpr std::size_t most_from_a_byte = 1032;
+
+}  // namespace
+
+std::size_t VoxelFormat::bytes() const {
+  switch (kind) {
+    case Kind::int8:
+    case Kind::uint8:
+      return 1;
+    case Kind::int16:
+    case Kind::uint16:
+      return 2;
+    case Kind::int32:
+    case Kind::uint32:
+    case Kind::float32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, const VoxelFormat& format,
+                                 const std::string& origin) {
+  if (bytes.size() / format.bytes() < count)
+    throw BadInput(Reason::truncated, fmt::format("{}: {} bytes of voxels, {} are needed", origin,
+                                                  bytes.size(), count * format.bytes()));
+  std::vector<float> voxels(count);
+  using Kind = VoxelFormat::Kind;
+  const auto as = [&]<class Stored>(Stored) { decode<Stored>(bytes, format.big_endian, voxels, origin); };
+  switch (format.kind) {
+    case Kind::int8:
+      as(std::int8_t{});
+      break;
+    case Kind::uint8:
+      as(std::uint8_t{});
+      break;
+    case Kind::int16:
+      as(std::int16_t{});
+      break;
+    case Kind::uint16:
+      as(std::uint16_t{});
+      break;
+    case Kind::int32:
+      as(std::int32_t{});
+      break;
+    case Kind::uint32:
+      as(std::uint32_t{});
+      break;
+    case Kind::int64:
+      as(std::int64_t{});
+      break;
+    case Kind::uint64:
+      as(std::uint64_t{});
+      break;
+    case Kind::float32:
+      as(float{});
+      break;
+    case Kind::float64:
+      as(double{});
+      break;
+  }
+  return voxels;
+}
+
+std::string inflate(std::string_view packed, std::size_t size, const std::string& origin) {
+  const auto short_of = [&](std::size_t found) {
+    return BadInput(Reason::truncated, fmt::format("{}: {} packed bytes hold at most {}, {} are needed",
+                                                   origin, packed.size(), found, size));
+  };
+  if (size / most_from_a_byte > packed.size()) throw short_of(packed.size() * most_from_a_byte);
+  z_stream stream{};
+  constexpr int zlib_or_gzip = 15 + 32;
+  if (inflateInit2(&stream, zlib_or_gzip) != Z_OK) throw std::bad_alloc();
+  const std::unique_ptr<z_stream, int (*)(z_stream*)> closing(&stream, inflateEnd);
+  std::string bytes(size, '\0');
+  stream.next_in = reinterpret_cast<const Bytef*>(packed.data());
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(bytes.data());
+  stream.avail_out = static_cast<uInt>(size);
+  const int state = ::inflate(&stream, Z_SYNC_FLUSH);
+  if (stream.avail_out == 0) return bytes;
+  if (state == Z_OK || state == Z_BUF_ERROR || state == Z_STREAM_END) throw short_of(size - stream.avail_out);
+  throw BadInput(Reason::bad_value, fmt::format("{}: the packed voxels are damaged after {} of {} bytes",
+                                                origin, size - stream.avail_out, size));
+}
+
+std::vector<double> read_numbers(std::string_view text, std::size_t count, const std::string& origin,
+                                 std::string_view separators) {
+  std::vector<double> numbers;
+  const std::string between = " \t\r\n" + std::string(separators);
+  for (std::size_t at = text.find_first_not_of(between);
+       at != std::string_view::npos && numbers.size() <= count;) {
+    const std::size_t end = std::min(text.find_first_of(between, at), text.size());
+    std::string_view word = text.substr(at, end - at);
+    if (word.starts_with('+')) word.remove_prefix(1);
+    double number = 0;
+    const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+    if (error != std::errc{} || stop != word.data() + word.size())
+      throw BadInput(Reason::bad_value, fmt::format("{}: {} is not a number", origin, quote(word)));
+    if (!std::isfinite(number))
+      throw BadInput(Reason::not_finite, fmt::format("{}: {} is not finite", origin, quote(word)));
+    numbers.push_back(number);
+    at = text.find_first_not_of(between, end);
+  }
+  if (numbers.size() != count)
+    throw BadInput(Reason::bad_value, fmt::format("{}: {} must be {} number(s)", origin, quote(text), count));
+  return numbers;
+}
+
+std::string read_volume_file(const std::filesystem::path& path) {
+  return value_or_throw(read_file(path, max_volume_bytes));
+}
+
+std::string read_data_file(const std::filesystem::path& header, const std::string& name) {
+  return read_volume_file(
+      value_or_throw(path_inside(header.parent_path().empty() ? "." : header.parent_path(), name)));
+}
+
+std::string_view trim(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r";
+  const std::size_t first = text.find_first_not_of(blanks);
+  return first == std::string_view::npos ? std::string_view{}
+                                         : text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+std::string_view take_line(std::string_view& rest) {
+  const std::size_t end = rest.find('\n');
+  const std::string_view line = rest.substr(0, end);
+  rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+  return line.ends_with('\r') ? line.substr(0, line.size() - 1) : line;
+}
+
+}  // namespace helicarm

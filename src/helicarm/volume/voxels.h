@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/volume/volume.h"
+
+namespace helicarm {
+
+/// How a file stores a voxel.
+struct VoxelFormat {
+  enum class Kind { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
+  Kind kind = Kind::int16;
+  bool big_endian = false;
+
+  std::size_t bytes() const;
+};
+
+/// `count` voxels from the start of `bytes`. Throws BadInput: truncated, not_finite.
+std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, const VoxelFormat& format,
+                                 const std::string& origin);
+
+/// The first `size` bytes of what zlib's or gzip's deflate has packed; not a byte more is unpacked, and no
+/// memory is taken that so small a file could not fill. Throws BadInput: truncated, bad_value (damaged).
+std::string inflate(std::string_view packed, std::size_t size, const std::string& origin);
+
+/// `count` finite numbers parted by blanks or `separators`. Throws BadInput: bad_value, not_finite.
+std::vector<double> read_numbers(std::string_view text, std::size_t count, const std::string& origin,
+                                 std::string_view separators = "");
+
+/// Content of a volume's file, or of the data file `name` that the header in `header` names: beside it.
+std::string read_volume_file(const std::filesystem::path& path);
+std::string read_data_file(const std::filesystem::path& header, const std::string& name);
+
+/// Without blanks (and a carriage return) at either end.
+std::string_view trim(std::string_view text);
+
+/// Cuts the first line off `rest`, without its end.
+std::string_view take_line(std::string_view& rest);
+
+// The formats; all throw BadInput. `bytes` is the whole file.
+Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes);
+Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes);
+Volume read_nifti(const std::filesystem::path& path, std::string_view bytes);
+Volume read_ct_series(const std::filesystem::path& folder);
+
+}  // namespace helicarm
