@@ -42,7 +42,11 @@ Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(
   return *arguments;
 }
 
-/// The commands that speak with C-arm, tracker and robot.
+/// Pictures to points and error bars.
+void add_measuring_commands(CLI::App& app, Action& action);
+/// What needs no hardware: simulations, studies, the phantom.
+void add_rehearsal_commands(CLI::App& app, Action& action);
+/// What speaks with C-arm, tracker and robot.
 void add_device_commands(CLI::App& app, Action& action);
 
 }  // namespace helicarm::cli

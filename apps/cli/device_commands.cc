@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
 #include "receive_command.h"
+#include "tracker_command.h"
 
 namespace helicarm::cli {
 namespace {
@@ -34,8 +35,46 @@ void add_receive(CLI::App& app, Action& action) {
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
 
+void add_tracker(CLI::App& app, Action& action) {
+  auto* tracker =
+      add_command(app, "tracker", "Watch, record or play a tracker (OpenIGTLink); calibrate a pointer",
+                  "helicarm tracker watch 127.0.0.1:18944\n"
+                  "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
+                  "  helicarm tracker replay poses.mha --port 18944\n"
+                  "  helicarm tracker pivot poses.mha --tool PointerToTracker");
+  tracker->require_subcommand(1);
+  auto* watch = tracker->add_subcommand("watch", "What comes, tool by tool");
+  add_tracker_link(watch, arguments_of(watch, action, tracker_watch_command));
+
+  auto* record = tracker->add_subcommand("record", "Into a MetaImage sequence file");
+  auto& recorded = arguments_of(record, action, tracker_record_command);
+  add_tracker_link(record, recorded);
+  record->add_option("FILE", recorded.file, "The file to write")->required();
+
+  auto* replay = tracker->add_subcommand("replay", "A MetaImage sequence file as a tracker, over and over");
+  auto& replayed = arguments_of(replay, action, tracker_replay_command);
+  replay->add_option("FILE", replayed.file, "The file to play")->required();
+  replay->add_option("--port", replayed.options.port, "Port to listen at; 0: any")->capture_default_str();
+  replay
+      ->add_option("--address", replayed.options.address,
+                   "Address to listen at: whoever reaches it may connect")
+      ->capture_default_str();
+  replay->add_option("--seconds", replayed.seconds, "End by itself; otherwise when interrupted")
+      ->check(within(0, 1e6));
+  replay->add_flag("--tdata", replayed.as_tracking,
+                   "Send TDATA to those who ask instead of TRANSFORM to all");
+
+  auto* pivot = tracker->add_subcommand("pivot", "A pointer's tip from a file of it turning about its tip");
+  auto& turned = arguments_of(pivot, action, tracker_pivot_command);
+  pivot->add_option("FILE", turned.file, "A MetaImage sequence file")->required();
+  pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
+}
+
 }  // namespace
 
-void add_device_commands(CLI::App& app, Action& action) { add_receive(app, action); }
+void add_device_commands(CLI::App& app, Action& action) {
+  add_receive(app, action);
+  add_tracker(app, action);
+}
 
 }  // namespace helicarm::cli

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tracker_command.h"
+
+#include <charconv>
+#include <csignal>
+#include <ctime>
+#include <limits>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/devices/tracker/sequence_stream.h"
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm::cli {
+namespace {
+
+/// Blocks the signals that end a program, for this thread and those it starts, so that they can be waited
+/// for.
+class Interrupt {
+ public:
+  Interrupt() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
+  }
+  ~Interrupt() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  /// Whether one came within so many seconds.
+  bool within(double seconds) const {
+    const auto whole = static_cast<std::time_t>(seconds);
+    const timespec wait{whole, static_cast<long>((seconds - static_cast<double>(whole)) * 1e9)};
+    return sigtimedwait(&signals_, nullptr, &wait) >= 0;
+  }
+
+ private:
+  sigset_t signals_;
+  sigset_t before_;
+};
+
+/// Calls `tell` each second until the time is over or the user interrupts.
+template <class Tell>
+void wait_telling(const Interrupt& interrupt, std::optional<double> seconds, Tell tell) {
+  const double until = seconds ? monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
+  while (true) {
+    const double left = until - monotonic_seconds();
+    if (left <= 0 || interrupt.within(std::min(left, 1.0))) return;
+    tell();
+  }
+}
+
+/// Options with the address and port of "address:port".
+Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
+  IgtlClientOptions options = arguments.options;
+  const std::string& peer = arguments.peer;
+  const auto colon = peer.rfind(':');
+  if (colon != peer.npos) {
+    const auto [end, error] =
+        std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), options.port);
+    if (error != std::errc() || end != peer.data() + peer.size())
+      return fail(Reason::usage, fmt::format("\"{}\" is no address:port", peer));
+  }
+  options.address = peer.substr(0, colon);
+  return options;
+}
+
+Json json_of(const LinkStatus& link, const std::vector<ToolState>& tools) {
+  Json json;
+  json["state"] = code(link.state);
+  json["trouble"] = link.trouble;
+  json["counters"] = link.counters;
+  json["tools"] = Json::array();
+  for (const ToolState& tool : tools) {
+    Json& one = json["tools"].emplace_back();
+    one["name"] = tool.name;
+    one["age_s"] = tool.age_s ? Json(*tool.age_s) : Json();
+    one["rate_hz"] = tool.rate_hz;
+    one["accepted"] = tool.accepted;
+    one["rejected"] = tool.rejected;
+    one["tracker_from_tool"] = tool.tracker_from_tool ? json_rows(tool.tracker_from_tool->matrix()) : Json();
+  }
+  return json;
+}
+
+std::string table_of(const LinkStatus& link, const std::vector<ToolState>& tools) {
+  std::string table = fmt::format("{}  {}\n", code(link.state), link.trouble);
+  for (const ToolState& tool : tools) {
+    table +=
+        fmt::format("  {:20} {:>9} {:6.1f} Hz {:9} taken", tool.name,
+                    tool.age_s ? fmt::format("{:.3f} s", *tool.age_s) : "never", tool.rate_hz, tool.accepted);
+    for (const auto& [fault, count] : tool.rejected) table += fmt::format("  {} {}", fault, count);
+    table += '\n';
+  }
+  return table;
+}
+
+}  // namespace
+
+CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console) {
+  const auto options = client_options(arguments);
+  if (!options) return tl::unexpected(options.error());
+  const Interrupt interrupt;
+  PoseBoard board;
+  const auto client = IgtlClient::start(
+      *options, [&](const IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
+      [&] { board.forget_time(); });
+  if (!client) return tl::unexpected(client.error());
+  const auto tools = [&] { return board.tools(monotonic_seconds()); };
+  wait_telling(interrupt, arguments.seconds, [&] {
+    if (!console.json && !console.quiet)
+      console.progress << table_of((*client)->status(), tools()) << std::flush;
+  });
+  const LinkStatus link = (*client)->status();
+  if (console.json)
+    console.out << to_text(json_of(link, tools())) << '\n';
+  else
+    console.out << table_of(link, tools());
+  return {};
+}
+
+CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Console& console) {
+  const auto options = client_options(arguments);
+  if (!options) return tl::unexpected(options.error());
+  const Interrupt interrupt;
+  std::mutex mutex;
+  std::vector<SequenceFrame> frames;
+  const auto client = IgtlClient::start(*options, [&](const IgtlMessage& message, double arrival_s) {
+    SequenceFrame frame = frame_of(message, arrival_s);
+    const std::lock_guard lock(mutex);
+    if (!frame.poses.empty()) frames.push_back(std::move(frame));
+  });
+  if (!client) return tl::unexpected(client.error());
+  wait_telling(interrupt, arguments.seconds, [] {});
+  (*client)->stop();
+  if (auto written = write_sequence(arguments.file, frames); !written) return written;
+  if (console.json)
+    console.out << to_text({{"frames", frames.size()}}) << '\n';
+  else if (!console.quiet)
+    console.out << fmt::format("{} frames in {}\n", frames.size(), arguments.file.string());
+  return {};
+}
+
+CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Console& console) {
+  const auto frames = read_sequence(arguments.file);
+  if (!frames) return tl::unexpected(frames.error());
+  const Interrupt interrupt;
+  const auto server = IgtlServer::start(arguments.options);
+  if (!server) return tl::unexpected(server.error());
+  if (!console.quiet)
+    console.progress << fmt::format("{} frames at {} port {}\n", frames->size(), arguments.options.address,
+                                    (*server)->port())
+                     << std::flush;
+  const std::jthread player([&](std::stop_token stop) {
+    replay(
+        *frames, arguments.as_tracking, [&](const IgtlMessage& message) { (*server)->send(message); }, stop);
+  });
+  wait_telling(interrupt, arguments.seconds, [] {});
+  const IgtlServerStatus status = (*server)->status();
+  if (console.json)
+    console.out << to_text({{"clients", status.clients}, {"counters", status.counters}}) << '\n';
+  return {};
+}
+
+CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Console& console) {
+  const auto frames = read_sequence(arguments.file);
+  if (!frames) return tl::unexpected(frames.error());
+  const GatedPoses poses = gated_poses(*frames, arguments.tool);
+  const auto pivot = calibrate_pivot(poses.tracker_from_tool, arguments.options);
+  if (!pivot) return tl::unexpected(pivot.error());
+  if (console.json) {
+    Json json;
+    json["tip_in_tool"] = json_list(pivot->tip_in_tool);
+    json["pivot_in_tracker"] = json_list(pivot->pivot_in_tracker);
+    json["covariance_mm2"] = json_rows(pivot->covariance);
+    json["rms_mm"] = pivot->rms_mm;
+    json["turn_deg"] = pivot->turn_deg;
+    json["used"] = pivot->used;
+    json["outliers"] = pivot->outliers;
+    json["rejected"] = poses.rejected;
+    console.out << to_text(json) << '\n';
+  } else {
+    const Eigen::Vector3d sigma = pivot->covariance.diagonal().head<3>().cwiseSqrt();
+    for (int axis = 0; axis < 3; ++axis)
+      console.out << fmt::format("tip {} {:9.3f} +- {:.3f} mm\n", "xyz"[axis], pivot -> tip_in_tool[axis],
+                                 sigma[axis]);
+    console.out << fmt::format("rms {:.3f} mm over {} poses, {} outliers\n", pivot->rms_mm, pivot->used,
+                               pivot->outliers);
+  }
+  return {};
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/tracker/facets.h"
+
+#include <algorithm>
+#include <numbers>
+#include <optional>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+/// 99.9 % of chi-square, Wilson and Hilferty's approximation.
+double chi2_limit(double dof) {
+  constexpr double normal_at_999 = 3.0902323061678132;
+  const double w = 2 / (9 * dof);
+  return dof * std::pow(1 - w + normal_at_999 * std::sqrt(w), 3);
+}
+
+struct SeenFacet {
+  std::string name;
+  RigidTransform calibrator_from_facet;
+  RigidTransform tracker_from_facet;
+  PoseCovariance information;
+};
+
+std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const FacetPose> seen,
+                             const FacetsOptions& options) {
+  std::vector<SeenFacet> matched;
+  const double body_rad = options.body_deg * std::numbers::pi / 180;
+  for (const FacetPose& pose : seen) {
+    const auto facet = std::ranges::find(facets, pose.name, &Facet::name);
+    if (facet == facets.end())
+      throw BadInput(Reason::bad_value, fmt::format("the calibrator has no facet \"{}\"", pose.name));
+    if (std::ranges::count(seen, pose.name, &FacetPose::name) > 1)
+      throw BadInput(Reason::name_clash, fmt::format("facet \"{}\" is seen twice", pose.name));
+    PoseCovariance covariance = pose.covariance;
+    covariance.diagonal().head<3>().array() += options.body_mm * options.body_mm;
+    covariance.diagonal().tail<3>().array() += body_rad * body_rad;
+    matched.push_back({pose.name, facet->calibrator_from_facet, pose.tracker_from_facet,
+                       covariance.llt().solve(PoseCovariance::Identity())});
+  }
+  return matched;
+}
+
+FusedPose fuse(const std::vector<SeenFacet>& seen) {
+  constexpr int max_iterations = 10;
+  constexpr double small_step = 1e-12;
+  FusedPose fused;
+  RigidTransform& pose = fused.tracker_from_calibrator;
+  pose = seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse();
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    PoseCovariance information = PoseCovariance::Zero();
+    Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
+    fused.chi2 = 0;
+    for (const SeenFacet& facet : seen) {
+      const RigidTransform predicted = pose * facet.calibrator_from_facet;
+      Eigen::Matrix<double, 6, 1> residual;
+      residual.head<3>() = facet.tracker_from_facet.translation - predicted.translation;
+      residual.tail<3>() =
+          vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
+      PoseCovariance jacobian = PoseCovariance::Identity();
+      jacobian.topRightCorner<3, 3>() = -cross_matrix(predicted.translation - pose.translation);
+      information += jacobian.transpose() * facet.information * jacobian;
+      gradient += jacobian.transpose() * facet.information * residual;
+      fused.chi2 += residual.dot(facet.information * residual);
+    }
+    const Eigen::LLT<PoseCovariance> solver(information);
+    const Eigen::Matrix<double, 6, 1> step = solver.solve(gradient);
+    pose = {rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
+    fused.covariance = solver.solve(PoseCovariance::Identity());
+    if (step.norm() < small_step) break;
+  }
+  for (const SeenFacet& facet : seen) fused.used.push_back(facet.name);
+  return fused;
+}
+
+bool agrees(const FusedPose& fused) {
+  return fused.used.size() < 2 || fused.chi2 <= chi2_limit(6 * static_cast<double>(fused.used.size() - 1));
+}
+
+/// The best fusion that leaves one facet out.
+FusedPose fuse_without_one(const std::vector<SeenFacet>& seen) {
+  std::optional<FusedPose> best;
+  for (std::size_t out = 0; out < seen.size(); ++out) {
+    std::vector<SeenFacet> others = seen;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
+    FusedPose fused = fuse(others);
+    fused.thrown_out = {seen[out].name};
+    if (!best || fused.chi2 < best->chi2) best = std::move(fused);
+  }
+  return *std::move(best);
+}
+
+}  // namespace
+
+Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const FacetPose> seen,
+                                const FacetsOptions& options) {
+  return guarded([&] {
+    if (seen.empty()) throw BadInput(Reason::no_pose, "none of the calibrator's facets is seen");
+    const std::vector<SeenFacet> matched = match(facets, seen, options);
+    const FusedPose all = fuse(matched);
+    if (agrees(all)) return all;
+    if (matched.size() > 2)
+      if (const FusedPose fewer = fuse_without_one(matched); agrees(fewer)) return fewer;
+    throw BadInput({Reason::residual_too_large,
+                    fmt::format("{} facets of the calibrator disagree: chi2 {:.4g}, limit {:.4g}",
+                                seen.size(), all.chi2, chi2_limit(6 * static_cast<double>(seen.size() - 1))),
+                    {},
+                    {{"chi2", all.chi2}, {"facets", static_cast<double>(seen.size())}}});
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/tracker/hand_eye.h"
+
+#include <algorithm>
+#include <numbers>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+using Matrix12 = Eigen::Matrix<double, 12, 12>;
+using Vector12 = Eigen::Matrix<double, 12, 1>;
+using Residual = Eigen::Matrix<double, 6, 1>;
+
+constexpr double deg_per_rad = 180 / std::numbers::pi;
+
+/// A in the flange, B in the marker: AX = XB.
+struct Motion {
+  RigidTransform a;
+  RigidTransform b;
+};
+
+/// Each pose against the next one and against the one half the list away.
+std::vector<Motion> motions_of(std::span<const HandEyePair> pairs) {
+  std::vector<Motion> motions;
+  const std::size_t count = pairs.size();
+  for (std::size_t i = 0; i < count; ++i)
+    for (const std::size_t j : {(i + 1) % count, (i + (count + 1) / 2) % count})
+      motions.push_back({pairs[i].base_from_flange.inverse() * pairs[j].base_from_flange,
+                         pairs[i].tracker_from_marker.inverse() * pairs[j].tracker_from_marker});
+  return motions;
+}
+
+/// Rms turn about the second main axis of the turns, deg: 0 where all axes are parallel.
+double second_turn_deg(const std::vector<Motion>& motions) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Motion& motion : motions) {
+    const Eigen::Vector3d turn = vector_from_rotation(motion.a.rotation);
+    spread += turn * turn.transpose() / static_cast<double>(motions.size());
+  }
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[1]) * deg_per_rad;
+}
+
+RigidTransform start_of_x(const std::vector<Motion>& motions) {
+  // Near half a turn the rotation vector may point either way.
+  constexpr double widest_turn = 170 / deg_per_rad;
+  Eigen::Matrix3d together = Eigen::Matrix3d::Zero();
+  for (const Motion& motion : motions) {
+    const Eigen::Vector3d alpha = vector_from_rotation(motion.a.rotation);
+    const Eigen::Vector3d beta = vector_from_rotation(motion.b.rotation);
+    if (alpha.norm() < widest_turn) together += alpha * beta.transpose();
+  }
+  RigidTransform x;
+  x.rotation = nearest_rotation(together);
+  const auto rows = static_cast<Eigen::Index>(3 * motions.size());
+  Eigen::MatrixX3d left(rows, 3);
+  Eigen::VectorXd right(rows);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    left.middleRows<3>(row) = motions[i].a.rotation - Eigen::Matrix3d::Identity();
+    right.segment<3>(row) = x.rotation * motions[i].b.translation - motions[i].a.translation;
+  }
+  x.translation = left.colPivHouseholderQr().solve(right);
+  return x;
+}
+
+RigidTransform start_of_y(std::span<const HandEyePair> pairs, const RigidTransform& x) {
+  RigidTransform sum{Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()};
+  for (const HandEyePair& pair : pairs) {
+    const RigidTransform one = pair.tracker_from_marker * (pair.base_from_flange * x).inverse();
+    sum.rotation += one.rotation;
+    sum.translation += one.translation / static_cast<double>(pairs.size());
+  }
+  return {nearest_rotation(sum.rotation), sum.translation};
+}
+
+Residual residual_of(const HandEyePair& pair, const HandEye& at) {
+  const RigidTransform predicted = at.tracker_from_base * pair.base_from_flange * at.flange_from_marker;
+  Residual residual;
+  residual.head<3>() = pair.tracker_from_marker.translation - predicted.translation;
+  residual.tail<3>() =
+      vector_from_rotation(pair.tracker_from_marker.rotation * predicted.rotation.transpose());
+  return residual;
+}
+
+/// Of the predicted marker's place and rotation by X's place and rotation, then Y's.
+Eigen::Matrix<double, 6, 12> jacobian_of(const HandEyePair& pair, const HandEye& at) {
+  const Eigen::Matrix3d tracker_from_flange = at.tracker_from_base.rotation * pair.base_from_flange.rotation;
+  const Eigen::Vector3d lever =
+      at.tracker_from_base.rotation * (pair.base_from_flange * at.flange_from_marker.translation);
+  Eigen::Matrix<double, 6, 12> jacobian = Eigen::Matrix<double, 6, 12>::Zero();
+  jacobian.block<3, 3>(0, 0) = tracker_from_flange;
+  jacobian.block<3, 3>(3, 3) = tracker_from_flange;
+  jacobian.block<3, 3>(0, 6).setIdentity();
+  jacobian.block<3, 3>(0, 9) = -cross_matrix(lever);
+  jacobian.block<3, 3>(3, 9).setIdentity();
+  return jacobian;
+}
+
+RigidTransform moved(const RigidTransform& pose, const Eigen::Ref<const Residual>& step) {
+  return {rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
+}
+
+void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double sigma_rad, HandEye& at) {
+  constexpr int max_iterations = 20;
+  constexpr double small_step = 1e-11;
+  Residual weights;
+  weights << Eigen::Vector3d::Constant(1 / (sigma_mm * sigma_mm)),
+      Eigen::Vector3d::Constant(1 / (sigma_rad * sigma_rad));
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    Matrix12 information = Matrix12::Zero();
+    Vector12 gradient = Vector12::Zero();
+    for (const HandEyePair& pair : pairs) {
+      const Eigen::Matrix<double, 6, 12> jacobian = jacobian_of(pair, at);
+      const Eigen::Matrix<double, 12, 6> weighted = jacobian.transpose() * weights.asDiagonal();
+      information += weighted * jacobian;
+      gradient += weighted * residual_of(pair, at);
+    }
+    const Eigen::LDLT<Matrix12> solver(information);
+    const Vector12 step = solver.solve(gradient);
+    at.flange_from_marker = moved(at.flange_from_marker, step.head<6>());
+    at.tracker_from_base = moved(at.tracker_from_base, step.tail<6>());
+    at.covariance = solver.solve(Matrix12::Identity());
+    if (step.norm() < small_step) break;
+  }
+}
+
+}  // namespace
+
+Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const HandEyeOptions& options) {
+  constexpr std::size_t min_pairs = 3;
+  constexpr int noise_rounds = 3;
+  HandEye result;
+  const std::vector<Motion> motions = motions_of(pairs);
+  if (pairs.size() >= min_pairs) result.turn_deg = second_turn_deg(motions);
+  if (result.turn_deg < options.min_turn_deg || pairs.size() < min_pairs)
+    return fail(
+        Reason::poses_too_alike,
+        fmt::format("{} poses turn by {:.3g} degrees rms about a second axis, at least {} poses and {:g} "
+                    "degrees",
+                    pairs.size(), result.turn_deg, min_pairs, options.min_turn_deg),
+        {{"poses", static_cast<double>(pairs.size())}, {"turn_deg", result.turn_deg}});
+
+  result.flange_from_marker = start_of_x(motions);
+  result.tracker_from_base = start_of_y(pairs, result.flange_from_marker);
+  const bool known_noise = options.sigma_mm > 0 && options.sigma_deg > 0;
+  double sigma_mm = known_noise ? options.sigma_mm : 0.2;  // a start: what trackers have
+  double sigma_rad = (known_noise ? options.sigma_deg : 0.1) / deg_per_rad;
+  const double count = static_cast<double>(pairs.size());
+  for (int round = 0; round < (known_noise ? 1 : noise_rounds); ++round) {
+    refine_hand_eye(pairs, sigma_mm, sigma_rad, result);
+    double square_mm = 0, square_rad = 0;
+    for (const HandEyePair& pair : pairs) {
+      const Residual residual = residual_of(pair, result);
+      square_mm += residual.head<3>().squaredNorm();
+      square_rad += residual.tail<3>().squaredNorm();
+    }
+    result.rms_mm = std::sqrt(square_mm / count);
+    result.rms_deg = std::sqrt(square_rad / count) * deg_per_rad;
+    // Six of the twelve unknowns are rotations.
+    sigma_mm = std::sqrt(std::max(square_mm / (3 * count - 6), 1e-18));
+    sigma_rad = std::sqrt(std::max(square_rad / (3 * count - 6), 1e-24));
+  }
+  if (result.rms_mm > options.max_rms_mm || result.rms_deg > options.max_rms_deg)
+    return fail(
+        Reason::residual_too_large,
+        fmt::format("robot and tracker disagree by {:.3g} mm and {:.3g} degrees rms, limits {:g} mm and {:g} "
+                    "degrees",
+                    result.rms_mm, result.rms_deg, options.max_rms_mm, options.max_rms_deg),
+        {{"rms_mm", result.rms_mm}, {"rms_deg", result.rms_deg}});
+  return result;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "helicarm/devices/tracker/igtl_message.h"
+#include "helicarm/devices/tracker/pose_sample.h"
+#include "helicarm/devices/tracker/sequence_file.h"
+
+namespace helicarm {
+
+/// The poses of a message as they came, at the device's time or else at the arrival's; no poses where it has
+/// none. What a file cannot hold in a name becomes "_".
+SequenceFrame frame_of(const IgtlMessage& message, double arrival_s);
+
+/// A frame as one TDATA, or as a TRANSFORM for each tool; hidden tools are absent.
+std::vector<IgtlMessage> messages_of(const SequenceFrame& frame, bool as_tracking, double time_s);
+
+struct GatedPoses {
+  std::vector<RigidTransform> tracker_from_tool;
+  Counters rejected;  ///< by code of PoseFault
+};
+
+/// One tool's poses as a live PoseGate would have passed them.
+GatedPoses gated_poses(std::span<const SequenceFrame> frames, const std::string& tool);
+
+/// Sends the frames over and over in their own rhythm, stamped as if they happened now, until stopped: at
+/// once. Frames must be in the order of their times.
+void replay(std::span<const SequenceFrame> frames, bool as_tracking,
+            const std::function<void(const IgtlMessage&)>& send, std::stop_token stop);
+
+}  // namespace helicarm
