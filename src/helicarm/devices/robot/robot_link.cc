@@ -35,7 +35,11 @@ std::string_view name(LinkPhase phase) {
 
 RobotLink::RobotLink(RobotConfig config)
     : config_(std::move(config)),
-      client_({.address = config_.address, .port = config_.rtde_port, .rate_hz = config_.model.rate_hz},
+      client_({.address = config_.address,
+               .port = config_.rtde_port,
+               .rate_hz = config_.model.rate_hz,
+               .handshake_s = config_.lost_s,
+               .silence_s = config_.lost_s},
               {.connected =
                    [this](const ControllerVersion& version) {
                      const std::lock_guard lock(guard_);
@@ -125,9 +129,10 @@ Expected<void> RobotLink::unlock(const std::string& who) {
     const auto answer =
         ask_dashboard(config_.address, config_.dashboard_port, DashboardCommand::unlock_protective_stop);
     if (!answer) return fail(Reason::robot_stopped, answer.error().message);
+    std::unique_lock lock(guard_);
+    news_.wait_for(lock, duration_of(config_.start_s), [&] { return state_ && !why_stopped(*state_); });
   }
-  std::unique_lock lock(guard_);
-  news_.wait_for(lock, duration_of(config_.start_s), [&] { return state_ && !why_stopped(*state_); });
+  const std::lock_guard lock(guard_);
   if (!state_ || age_s() > config_.stale_s)
     return fail(Reason::stale_state, "the robot's state is not known");
   if (const auto why = why_stopped(*state_)) return tl::unexpected<Failure>(*why);
@@ -145,7 +150,7 @@ void RobotLink::stop() {
 /// To be called under the guard.
 Expected<void> RobotLink::refuse_unless_ready() const {
   if (phase_ == LinkPhase::disconnected)
-    return tl::unexpected<Failure>(why_.value_or(Failure{Reason::not_connected, "there is no connection"}));
+    return fail(Reason::not_connected, "there is no connection" + (why_ ? ": " + why_->message : ""));
   if (phase_ != LinkPhase::ready)
     return fail(Reason::robot_locked, fmt::format("the robot is {}{}", name(phase_),
                                                   why_ ? ": " + why_->message : ": nobody has unlocked it"));

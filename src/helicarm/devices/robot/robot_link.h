@@ -23,6 +23,7 @@ struct RobotConfig {
   std::uint16_t script_port = 30002;
   double stale_s = 0.1;            ///< a state older than this is no state
   double program_silence_s = 0.1;  ///< the heartbeat ends so long after this program last looked
+  double lost_s = 1;               ///< without an answer or a state for so long, it is connected anew
   double start_s = 2;              ///< patience with a script to begin
   double mismatch_mm = 0.5;        ///< of the arm's kinematics, from which on it is told
   RobotLimits limits = {};

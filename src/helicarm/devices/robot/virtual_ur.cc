@@ -117,6 +117,8 @@ class VirtualUr::Server {
     tell_state();
   }
 
+  std::string dashboard(const std::string& command) { return controller_.dashboard(command); }
+
   VirtualTruth truth() const {
     VirtualTruth truth{controller_.state(),
                        {},
@@ -307,6 +309,10 @@ std::uint16_t VirtualUr::script_port() const { return server_->port(2); }
 
 void VirtualUr::set(RobotFault fault, bool on) {
   server_->there([&] { server_->set(fault, on); });
+}
+
+std::string VirtualUr::dashboard(const std::string& command) {
+  return server_->there([&] { return server_->dashboard(command); });
 }
 
 void VirtualUr::advance(double seconds) {

@@ -47,6 +47,8 @@ class VirtualUr {
   std::uint16_t script_port() const;
 
   void set(RobotFault fault, bool on = true);
+  /// As if somebody had asked at the dashboard.
+  std::string dashboard(const std::string& command);
   /// In lockstep: lets this much time pass on the robot's clock, whether anybody beats or not.
   void advance(double seconds);
   VirtualTruth truth();

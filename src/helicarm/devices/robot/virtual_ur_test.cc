@@ -112,6 +112,15 @@ TEST(VirtualUr, PortThatIsTakenIsTold) {
   EXPECT_EQ(VirtualUr::start(options).error().reason, Reason::bad_value);
 }
 
+TEST(VirtualUr, ClockGoesWithTheTimeOfDayUnlessInLockstep) {
+  VirtualUrOptions options;
+  options.rtde_port = options.dashboard_port = options.script_port = 0;
+  options.controller = options.arm = ur5e();
+  const auto robot = VirtualUr::start(options).value();
+  for (int i = 0; i < 10000 && robot->truth().state.time_s < 0.05; ++i) std::this_thread::sleep_for(1ms);
+  EXPECT_GE(robot->truth().state.time_s, 0.05);
+}
+
 TEST(Dashboard, AnswersAreMatchedWithTheirCommands) {
   const auto robot = robot_on_any_port();
   const auto ask = [&](DashboardCommand command) {
