@@ -77,6 +77,14 @@ struct Drill {
     return robot->truth().rest_since_s.value_or(1e9) - now_s;
   }
 
+  /// Lets time pass on the robot's clock, until the link knows.
+  void pass(double seconds) {
+    robot->advance(seconds);
+    const double now_s = robot->truth().state.time_s;
+    for (auto status = link.status(); status.state && status.state->time_s < now_s; status = link.status())
+      std::this_thread::yield();
+  }
+
   void expect_locked() {
     const RobotOrder order = slow_order();
     const auto refused = link.execute(order, link.confirm(order));
@@ -127,11 +135,11 @@ TEST(RobotDrill, EveryStopIsLatchedUntilAPersonUnlocks) {
     drill.robot->set(fault, false);
     for (const auto command : {"restart safety", "power on", "brake release"})
       drill.robot->dashboard(command);
-    drill.robot->advance(0.1);
+    drill.pass(0.1);
     EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
     drill.expect_locked();
     const Joints rested = drill.robot->truth().state.joints;
-    drill.robot->advance(1);
+    drill.pass(1);
     EXPECT_EQ(drill.robot->truth().state.joints, rested);
     EXPECT_TRUE(drill.link.unlock("tester"));
   }
@@ -147,7 +155,7 @@ TEST(RobotDrill, EmergencyStopNeedsPowerBrakesAndAPerson) {
   EXPECT_EQ(drill.link.unlock("tester").error().reason, Reason::robot_stopped);
   for (const auto command : {DashboardCommand::power_on, DashboardCommand::brake_release})
     EXPECT_TRUE(ask_dashboard("127.0.0.1", drill.robot->dashboard_port(), command, 10s));
-  drill.robot->advance(0.1);
+  drill.pass(0.1);
   EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
   drill.expect_locked();
   EXPECT_TRUE(drill.link.unlock("tester"));
@@ -159,7 +167,7 @@ TEST(RobotDrill, ProtectiveStopIsReleasedByUnlockAfterFiveSeconds) {
   EXPECT_EQ(drill
                 .fault_on_the_way([&] {
                   drill.robot->set(RobotFault::protective_stop);
-                  drill.robot->advance(0.1);
+                  drill.pass(0.1);
                   drill.robot->set(RobotFault::frozen_states);
                 })
                 .reason,
@@ -224,11 +232,11 @@ TEST(RobotDrill, ArmMovedByHandOrOtherToolIsPlannedAnew) {
   ASSERT_TRUE(drill.link.unlock("tester"));
   const RobotOrder order = planned();
   drill.robot->set(RobotFault::other_tool);
-  drill.robot->advance(0.1);
+  drill.pass(0.1);
   EXPECT_EQ(drill.link.execute(order, drill.link.confirm(order)).error().reason, Reason::robot_moved);
   drill.robot->set(RobotFault::other_tool, false);
   drill.robot->set(RobotFault::moved_by_hand);
-  drill.robot->advance(0.1);
+  drill.pass(0.1);
   EXPECT_EQ(drill.link.execute(order, drill.link.confirm(order)).error().reason, Reason::robot_moved);
   EXPECT_FALSE(drill.robot->truth().moving);
 }
@@ -242,7 +250,7 @@ TEST(RobotDrill, LocalModeAndClosedBrakesRefuse) {
   EXPECT_EQ(drill.link.unlock("tester").error().reason, Reason::robot_locked);
   drill.robot->set(RobotFault::local_mode, false);
   drill.robot->set(RobotFault::brake_not_released);
-  drill.robot->advance(0.1);
+  drill.pass(0.1);
   while (drill.link.status().phase != LinkPhase::stopped) std::this_thread::yield();
   drill.expect_locked();
 }
