@@ -29,6 +29,7 @@ inline TunnelAxis knee_tunnel() {
 /// Its top 200 mm below the base.
 inline KeepOut table() { return {{0, 0, -200}, Eigen::Vector3d::UnitZ()}; }
 
+/// To the knee's tunnel from the resting pose.
 inline RobotOrder planned(const ApproachOptions& options = {}) {
   return plan_approach("femur", ur5(), drill(), resting_joints(), knee_tunnel(), options).value();
 }

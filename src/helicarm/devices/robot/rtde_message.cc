@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/rtde_message.h"
 
+#include <array>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/big_endian.h"
@@ -41,8 +43,15 @@ Eigen::Matrix<double, 6, 1> take_six(BigEndianReader& reader) {
   return six;
 }
 
-void put_six(BigEndianWriter& writer, const Eigen::Matrix<double, 6, 1>& six) {
+template <class T>
+std::string packed(T value) {
+  return BigEndianWriter().put(value).bytes();
+}
+
+std::string packed(const Eigen::Matrix<double, 6, 1>& six) {
+  BigEndianWriter writer;
   for (const double value : six) writer.put(value);
+  return writer.bytes();
 }
 
 }  // namespace
@@ -171,21 +180,25 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
   });
 }
 
-RtdeMessage state_message(std::uint8_t recipe, const RobotState& state) {
-  BigEndianWriter writer;
-  writer.put(recipe).put(state.time_s);
-  put_six(writer, state.joints);
-  put_six(writer, state.joint_speeds);
-  put_six(writer, ur_pose(state.base_from_tcp));
-  put_six(writer, ur_pose(state.flange_from_tcp));
-  writer.put(state.payload_kg)
-      .put(static_cast<std::int32_t>(state.robot_mode))
-      .put(static_cast<std::int32_t>(state.safety_mode))
-      .put(state.safety_bits)
-      .put(static_cast<std::uint32_t>(state.runtime))
-      .put(state.speed_scaling)
-      .put(state.progress);
-  return {RtdeKind::data, writer.bytes()};
+RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
+                          const std::vector<std::string>& names) {
+  const std::array<std::string, 12> fields = {packed(state.time_s),
+                                              packed(state.joints),
+                                              packed(state.joint_speeds),
+                                              packed(ur_pose(state.base_from_tcp)),
+                                              packed(ur_pose(state.flange_from_tcp)),
+                                              packed(state.payload_kg),
+                                              packed(static_cast<std::int32_t>(state.robot_mode)),
+                                              packed(static_cast<std::int32_t>(state.safety_mode)),
+                                              packed(state.safety_bits),
+                                              packed(static_cast<std::uint32_t>(state.runtime)),
+                                              packed(state.speed_scaling),
+                                              packed(state.progress)};
+  std::string content(1, static_cast<char>(recipe));
+  for (const std::string& name : names)
+    for (std::size_t i = 0; i < fields.size(); ++i)
+      if (state_names[i] == name) content += fields[i];
+  return {RtdeKind::data, content};
 }
 
 }  // namespace helicarm

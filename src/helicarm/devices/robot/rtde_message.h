@@ -76,7 +76,8 @@ Expected<std::string> read_text(const RtdeMessage& message);
 /// Refuses another recipe, another length, or numbers that are not finite.
 Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe);
 
-/// As a robot sends it.
-RtdeMessage state_message(std::uint8_t recipe, const RobotState& state);
+/// As a robot sends it: those of `state_names` that were asked for, in their order.
+RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
+                          const std::vector<std::string>& names = state_names);
 
 }  // namespace helicarm

@@ -12,7 +12,7 @@ namespace helicarm {
 namespace {
 
 constexpr std::size_t longest_script = 65536;
-constexpr int deepest_expression = 50;
+constexpr int longest_expression = 200;  ///< parts, so that nesting is bounded too
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front()))) text.remove_prefix(1);
@@ -107,7 +107,7 @@ class Expression {
     return value;
   }
   UrValue primary() {
-    if (++depth_ > deepest_expression) throw BadInput(Reason::bad_value, "expression nests too deeply");
+    if (++parts_ > longest_expression) throw BadInput(Reason::bad_value, "expression is too long");
     if (taken("-")) return {-number(primary())};
     if (taken("(")) {
       UrValue value = comparison();
@@ -164,7 +164,7 @@ class Expression {
   std::string_view rest_;
   const std::map<std::string, UrValue>& variables_;
   UrScriptHost& host_;
-  int depth_ = 0;
+  int parts_ = 0;
 };
 
 bool is_motion(std::string_view name) { return name == "movel" || name == "movej" || name == "stopj"; }

@@ -72,7 +72,7 @@ TEST(UrScript, WhatItDoesNotKnowIsRefused) {
   EXPECT_EQ(refused("def f():\n  else:\n  end\nend\n"), Reason::bad_value);
   EXPECT_EQ(refused("def f():\n  while True:\n  end\nend\n"), Reason::bad_value);
   EXPECT_EQ(refused("def f():\n  x = run nothing()\nend\n"), Reason::bad_value);
-  EXPECT_EQ(refused("def f():\n  note(" + std::string(200, '(') + ")\nend\n"), Reason::bad_value);
+  EXPECT_EQ(refused("def f():\n  note(" + std::string(5000, '(') + ")\nend\n"), Reason::bad_value);
   EXPECT_EQ(refused(std::string(70000, ' ')), Reason::bad_size);
 }
 

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/dashboard.h"
+
+#include <array>
+
+#include "helicarm/core/text.h"
+#include "helicarm/devices/robot/timed_socket.h"
+
+namespace helicarm {
+namespace {
+
+struct Exchange {
+  std::string_view command;
+  std::string_view answer;        ///< its beginning
+  std::string_view or_else = {};  ///< another one
+};
+
+// Universal Robots, "Dashboard Server", CB3 and e-Series.
+constexpr std::array<Exchange, 10> exchanges = {{
+    {"robotmode\n", "Robotmode: "},
+    {"safetymode\n", "Safetymode: "},
+    {"programState\n", "STOPPED", "P"},  // PLAYING, PAUSED
+    {"is in remote control\n", "true", "false"},
+    {"PolyscopeVersion\n", "URSoftware "},
+    {"stop\n", "Stopped"},
+    {"close safety popup\n", "closing safety popup"},
+    {"unlock protective stop\n", "Protective stop releasing"},
+    {"power on\n", "Powering on"},
+    {"brake release\n", "Brake releasing"},
+}};
+
+constexpr std::size_t longest_line = 1000;
+
+/// The next line; what follows it stays in `rest`.
+Expected<std::string> next_line(TimedSocket& socket, std::string& rest, std::chrono::milliseconds patience) {
+  const auto until = std::chrono::steady_clock::now() + patience;
+  for (;;) {
+    if (const std::size_t end = rest.find('\n'); end != std::string::npos) {
+      std::string line = rest.substr(0, end);
+      rest.erase(0, end + 1);
+      if (!line.empty() && line.back() == '\r') line.pop_back();
+      return without_control_characters(std::move(line));
+    }
+    if (rest.size() > longest_line) return fail(Reason::bad_size, "dashboard: a line does not end");
+    const auto left = until - std::chrono::steady_clock::now();
+    if (left <= left.zero()) return fail(Reason::not_connected, "dashboard: no answer in time");
+    const auto bytes = socket.receive(left);
+    if (!bytes) return bytes;
+    rest += *bytes;
+  }
+}
+
+}  // namespace
+
+Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t port, DashboardCommand command,
+                                    std::chrono::milliseconds patience) {
+  const Exchange& exchange = exchanges.at(static_cast<std::size_t>(command));
+  std::string rest;
+  auto socket = TimedSocket::connect(address, port, patience);
+  if (!socket) return tl::unexpected<Failure>(socket.error());
+  if (auto greeting = next_line(*socket, rest, patience); !greeting) return greeting;
+  if (auto sent = socket->send(exchange.command, patience); !sent)
+    return tl::unexpected<Failure>(sent.error());
+  auto answer = next_line(*socket, rest, patience);
+  if (answer && !answer->starts_with(exchange.answer) &&
+      !(exchange.or_else.size() && answer->starts_with(exchange.or_else)))
+    return fail(Reason::bad_value, "dashboard: " + *answer);
+  return answer;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// All that is ever said to a robot's dashboard: fixed words, none with text of a user's.
+enum class DashboardCommand {
+  robot_mode,
+  safety_mode,
+  program_state,
+  remote_control,
+  version,
+  stop,
+  close_safety_popup,
+  unlock_protective_stop,
+  power_on,
+  brake_release,
+};
+
+/// Asks on a connection of its own and gives the answer's line. An answer that does not belong to the command
+/// is `bad_value` with the answer as message; silence is `not_connected`.
+Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t port, DashboardCommand command,
+                                    std::chrono::milliseconds patience = std::chrono::milliseconds(1000));
+
+}  // namespace helicarm

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/follow_target.h"
+
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+tl::unexpected<Failure> refuse(Reason reason, const std::string& why, const std::vector<Miss>& misses) {
+  const Miss& last = misses.back();
+  return fail(reason,
+              fmt::format("the tool is {:.2f} mm and {:.2f} degrees off after {} corrections: {}",
+                          last.distance_mm, last.turn_deg, misses.size() - 1, why),
+              {{"distance_mm", last.distance_mm},
+               {"turn_deg", last.turn_deg},
+               {"sigma_mm", last.sigma_mm},
+               {"corrections", static_cast<double>(misses.size() - 1)}});
+}
+
+}  // namespace
+
+Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const Measure& measure,
+                                          const MoveTool& move) {
+  std::vector<Miss> misses;
+  for (;;) {
+    const auto seen = measure();
+    if (!seen) return tl::unexpected<Failure>(seen.error());
+    const RigidTransform tcp_from_target = seen->tracker_from_tcp.inverse() * seen->tracker_from_target;
+    if (!tcp_from_target.matrix().allFinite() || !seen->covariance.allFinite())
+      return fail(Reason::not_finite, "the tracker's measurement of the tool is not finite");
+    misses.push_back({tcp_from_target.translation.norm(),
+                      vector_from_rotation(tcp_from_target.rotation).norm() * 180 / std::numbers::pi,
+                      std::sqrt(std::max(0.0, seen->covariance.topLeftCorner<3, 3>().trace()))});
+    const Miss& now = misses.back();
+    if (2 * now.sigma_mm > corrections.tolerance_mm)
+      return refuse(Reason::uncertain, "the tracker does not measure it well enough", misses);
+    if (now.distance_mm <= corrections.tolerance_mm && now.turn_deg <= corrections.tolerance_deg)
+      return misses;
+    if (static_cast<int>(misses.size()) > corrections.most)
+      return refuse(Reason::off_target, "one more would be too many", misses);
+    if (now.distance_mm > corrections.longest_mm || now.turn_deg > corrections.widest_deg)
+      return refuse(Reason::off_target, "the next one would be too large", misses);
+    if (misses.size() > 1 && now.distance_mm > misses[misses.size() - 2].distance_mm + 2 * now.sigma_mm)
+      return refuse(Reason::off_target, "the last one made it worse", misses);
+    if (const auto moved = move(tcp_from_target); !moved) return tl::unexpected<Failure>(moved.error());
+  }
+}
+
+}  // namespace helicarm

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/rtde_client.h"
+
+#include <condition_variable>
+#include <mutex>
+
+#include "helicarm/devices/robot/timed_socket.h"
+
+namespace helicarm {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+Clock::duration seconds(double s) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
+}
+
+/// How long a wait lasts before it looks whether it should end.
+constexpr auto glance = std::chrono::milliseconds(20);
+
+/// A connection that gives whole messages.
+struct Line {
+  TimedSocket socket;
+  RtdeStream stream = {};
+
+  /// Nothing if none came in this time.
+  Expected<std::optional<RtdeMessage>> receive(Clock::duration patience) {
+    auto message = stream.next();
+    if (!message || *message) return message;
+    const auto bytes = socket.receive(patience);
+    if (!bytes) return tl::unexpected<Failure>(bytes.error());
+    stream.append(*bytes);
+    return stream.next();
+  }
+
+  /// The answer of this kind; texts and whatever else a robot says in between are passed over.
+  RtdeMessage ask(const std::string& request, RtdeKind kind, Clock::duration patience,
+                  const std::stop_token& stop) {
+    value_or_throw(socket.send(request, patience));
+    for (const auto until = Clock::now() + patience; Clock::now() < until && !stop.stop_requested();)
+      if (auto message = value_or_throw(receive(glance)); message && message->kind == kind)
+        return *std::move(message);
+    throw BadInput(Reason::not_connected,
+                   std::string("RTDE: no answer to the request of kind ") + static_cast<char>(kind));
+  }
+};
+
+}  // namespace
+
+RtdeClient::RtdeClient(RtdeOptions options, RtdeListener listener)
+    : options_(std::move(options)),
+      listener_(std::move(listener)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+RtdeClient::~RtdeClient() = default;
+
+void RtdeClient::beat_for(Clock::duration time) { beat_until_ = Clock::now() + time; }
+
+void RtdeClient::run(const std::stop_token& stop) {
+  std::mutex guard;
+  std::condition_variable_any ended;
+  double retry_s = 0.1;
+  while (!stop.stop_requested()) {
+    const auto begun = Clock::now();
+    const auto served = serve(stop);
+    if (stop.stop_requested()) return;
+    beat_for({});
+    if (!served) listener_.lost(served.error());
+    retry_s = Clock::now() - begun > seconds(10) ? 0.1 : std::min(2 * retry_s, options_.longest_retry_s);
+    std::unique_lock lock(guard);
+    ended.wait_for(lock, stop, seconds(retry_s), [] { return false; });
+  }
+}
+
+Expected<void> RtdeClient::serve(const std::stop_token& stop) {
+  return guarded([&] {
+    const auto patience = seconds(options_.handshake_s);
+    Line line{value_or_throw(TimedSocket::connect(options_.address, options_.port, patience))};
+    const auto granted = [&](const std::string& request, RtdeKind kind) {
+      return value_or_throw(read_granted(line.ask(request, kind, patience, stop), kind));
+    };
+    if (!granted(request_version(), RtdeKind::version))
+      throw BadInput(Reason::not_connected, "RTDE: this controller does not speak version 2");
+    const auto version = value_or_throw(read_controller_version(
+        line.ask(request_controller_version(), RtdeKind::controller_version, patience, stop)));
+    const auto states = value_or_throw(
+        read_recipe(line.ask(request_outputs(options_.rate_hz), RtdeKind::outputs, patience, stop),
+                    state_names, state_types));
+    std::uint8_t heartbeats = 0;
+    if (options_.commands)
+      heartbeats = value_or_throw(read_recipe(line.ask(request_inputs(), RtdeKind::inputs, patience, stop),
+                                              {heartbeat_name}, {heartbeat_type}));
+    if (!granted(request_start(), RtdeKind::start))
+      throw BadInput(Reason::not_connected, "RTDE: this controller does not start");
+    listener_.connected(version);
+
+    std::int32_t beat = 0;
+    auto heard = Clock::now();
+    while (!stop.stop_requested()) {
+      const auto message = value_or_throw(line.receive(glance));
+      if (message && message->kind == RtdeKind::data) {
+        listener_.state(value_or_throw(read_state(*message, states)));
+        heard = Clock::now();
+        if (heard < beat_until_.load()) beat = (beat + 1) & 0x7FFFFFFF;
+        if (options_.commands)
+          value_or_throw(line.socket.send(heartbeat_message(heartbeats, beat), patience));
+      } else if (Clock::now() - heard > seconds(options_.silence_s)) {
+        throw BadInput(Reason::stale_state, "RTDE: the robot's states have stopped coming");
+      }
+    }
+  });
+}
+
+}  // namespace helicarm

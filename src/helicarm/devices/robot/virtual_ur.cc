@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/virtual_ur.h"
+
+#include <algorithm>
+#include <array>
+#include <future>
+#include <list>
+#include <thread>
+
+#include <asio.hpp>
+#include <fmt/format.h>
+
+#include "helicarm/core/big_endian.h"
+#include "helicarm/devices/robot/rtde_message.h"
+
+namespace helicarm {
+namespace {
+
+using asio::ip::tcp;
+
+constexpr std::size_t longest_backlog = 1 << 20;
+constexpr std::uint8_t state_recipe = 1, heartbeat_recipe = 2;
+constexpr std::string_view empty_robot_state("\0\0\0\5\x10", 5);
+
+}  // namespace
+
+/// One client of one of the ports.
+struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
+  explicit VirtualUrClient(tcp::socket given) : socket(std::move(given)) {}
+
+  void send(std::string_view bytes) {
+    waiting += bytes;
+    if (waiting.size() > longest_backlog) return close();  // a client that does not read is dropped
+    if (sending.empty()) send_waiting();
+  }
+  void close() {
+    std::error_code ignored;
+    socket.close(ignored);
+  }
+
+  tcp::socket socket;
+  std::array<char, 4096> buffer{};
+  std::string waiting, sending;
+  std::string text;  ///< dashboard and script: what has come
+  RtdeStream stream;
+  std::vector<std::string> names;  ///< RTDE: what it asked for
+  bool started = false;
+  bool commands = false;
+  int unanswered = 0;  ///< states that it has not answered, in lockstep
+
+ private:
+  void send_waiting() {
+    sending.swap(waiting);
+    asio::async_write(socket, asio::buffer(sending),
+                      [self = shared_from_this()](const std::error_code& error, std::size_t) {
+                        self->sending.clear();
+                        if (error) return self->close();
+                        if (!self->waiting.empty()) self->send_waiting();
+                      });
+  }
+};
+
+class VirtualUr::Server {
+ public:
+  explicit Server(const VirtualUrOptions& options)
+      : options_(options), controller_(options.controller, options.tool, options.joints) {}
+  ~Server() {
+    io_.stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Expected<void> listen() {
+    using Handle = void (Server::*)(VirtualUrClient&, std::string_view);
+    const std::array<std::pair<std::uint16_t, Handle>, 3> wanted = {
+        {{options_.rtde_port, &Server::hear_rtde},
+         {options_.dashboard_port, &Server::hear_dashboard},
+         {options_.script_port, &Server::hear_script}}};
+    std::error_code error;
+    const auto ip = asio::ip::make_address(options_.address, error);
+    if (error) return fail(Reason::bad_value, "\"" + options_.address + "\" is no address");
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      tcp::acceptor& acceptor = acceptors_[i];
+      const tcp::endpoint here(ip, wanted[i].first);
+      if (acceptor.open(here.protocol(), error) ||
+          acceptor.set_option(tcp::acceptor::reuse_address(true), error) || acceptor.bind(here, error) ||
+          acceptor.listen(16, error))
+        return fail(
+            error == asio::error::address_in_use ? Reason::port_taken : Reason::bad_value,
+            fmt::format("cannot listen on {}:{}: {}", options_.address, wanted[i].first, error.message()));
+      accept(acceptor, wanted[i].second);
+    }
+    if (!options_.lockstep) tick(std::chrono::steady_clock::now());
+    thread_ = std::thread([this] { io_.run(); });
+    return {};
+  }
+
+  std::uint16_t port(std::size_t i) const { return acceptors_[i].local_endpoint().port(); }
+
+  /// On the server's own thread, and waits for it.
+  template <class Work>
+  auto there(Work work) {
+    std::packaged_task<std::invoke_result_t<Work>()> task(std::move(work));
+    auto result = task.get_future();
+    asio::post(io_, [&task] { task(); });
+    return result.get();
+  }
+
+  void set(RobotFault fault, bool on) {
+    controller_.set(fault, on);
+    if (fault == RobotFault::cut_cable && !on)
+      for (const auto& client : clients_) client->close();
+    if (!on && options_.lockstep) tell_state();
+  }
+
+  void step() {
+    controller_.step();
+    tell_state();
+  }
+
+  std::string dashboard(const std::string& command) { return controller_.dashboard(command); }
+
+  VirtualTruth truth() const {
+    VirtualTruth truth{controller_.state(),
+                       {},
+                       controller_.moving(),
+                       controller_.rest_since_s(),
+                       controller_.script_error()};
+    truth.base_from_tip = base_from_flange(options_.arm, truth.state.joints) * options_.tool.flange_from_tcp;
+    return truth;
+  }
+
+  const VirtualUrOptions& options() const { return options_; }
+
+ private:
+  template <class Handle>
+  void accept(tcp::acceptor& acceptor, Handle handle) {
+    acceptor.async_accept([this, &acceptor, handle](const std::error_code& error, tcp::socket socket) {
+      if (!error) {
+        std::error_code ignored;
+        socket.set_option(tcp::no_delay(true), ignored);
+        auto client = std::make_shared<VirtualUrClient>(std::move(socket));
+        std::erase_if(clients_, [](const auto& one) { return !one->socket.is_open(); });
+        clients_.push_back(client);
+        if (&acceptor == &acceptors_[1]) client->send("Connected: Universal Robots Dashboard Server\n");
+        if (&acceptor == &acceptors_[2]) client->send(empty_robot_state);
+        read(client, handle);
+      }
+      accept(acceptor, handle);
+    });
+  }
+
+  template <class Handle>
+  void read(const std::shared_ptr<VirtualUrClient>& client, Handle handle) {
+    client->socket.async_read_some(asio::buffer(client->buffer),
+                                   [this, client, handle](const std::error_code& error, std::size_t size) {
+                                     if (error) {
+                                       client->close();
+                                       client->started = client->commands = false;
+                                       return;
+                                     }
+                                     if (!controller_.has(RobotFault::cut_cable))
+                                       (this->*handle)(*client, {client->buffer.data(), size});
+                                     if (client->socket.is_open()) read(client, handle);
+                                   });
+  }
+
+  void tick(std::chrono::steady_clock::time_point due) {
+    timer_.expires_at(due);
+    timer_.async_wait([this, due](const std::error_code& error) {
+      if (error) return;
+      step();
+      tick(due + std::chrono::nanoseconds(static_cast<long>(1e9 / options_.controller.rate_hz)));
+    });
+  }
+
+  void hear_dashboard(VirtualUrClient& client, std::string_view bytes) {
+    client.text += bytes;
+    for (std::size_t end = client.text.find('\n'); end != std::string::npos; end = client.text.find('\n')) {
+      const std::string line = client.text.substr(0, end);
+      client.text.erase(0, end + 1);
+      client.send(controller_.dashboard(line) + "\n");
+    }
+    if (client.text.size() > 1000) client.close();
+  }
+
+  void hear_script(VirtualUrClient& client, std::string_view bytes) {
+    client.text += bytes;
+    constexpr std::string_view last = "\nend\n";
+    for (std::size_t end = client.text.find(last); end != std::string::npos; end = client.text.find(last)) {
+      controller_.run_script(client.text.substr(0, end + last.size()));
+      client.text.erase(0, end + last.size());
+    }
+    if (client.text.size() > 1 << 17) client.close();
+  }
+
+  void hear_rtde(VirtualUrClient& client, std::string_view bytes) {
+    client.stream.append(bytes);
+    for (;;) {
+      const auto message = client.stream.next();
+      if (!message) return client.close();
+      if (!*message) return;
+      if (!guarded([&] { answer(client, **message); })) return client.close();
+    }
+  }
+
+  void answer(VirtualUrClient& client, const RtdeMessage& message) {
+    BigEndianReader reader(message.content);
+    const auto reply = [&](std::string content) {
+      client.send(to_bytes({message.kind, std::move(content)}));
+    };
+    switch (message.kind) {
+      case RtdeKind::version:
+        return reply(reader.take<std::uint16_t>() == 2 && !controller_.has(RobotFault::wrong_version)
+                         ? "\1"
+                         : std::string(1, '\0'));
+      case RtdeKind::controller_version: {
+        const bool cb3 = options_.controller.rate_hz < 200;
+        BigEndianWriter version;
+        for (const std::uint32_t part : cb3 ? std::array{3u, 15u, 8u, 0u} : std::array{5u, 25u, 1u, 0u})
+          version.put(part);
+        return reply(version.bytes());
+      }
+      case RtdeKind::outputs:
+        reader.take<double>();
+        return reply(outputs(client, reader.take(reader.left())));
+      case RtdeKind::inputs: {
+        const bool taken = controller_.has(RobotFault::input_in_use) ||
+                           std::ranges::any_of(clients_, [](const auto& one) { return one->commands; });
+        const bool known = reader.take(reader.left()) == heartbeat_name;
+        client.commands = known && !taken;
+        return reply(static_cast<char>(heartbeat_recipe) + std::string(!known  ? "NOT_FOUND"
+                                                                       : taken ? "IN_USE"
+                                                                               : heartbeat_type));
+      }
+      case RtdeKind::start:
+        client.started = !client.names.empty();
+        reply(client.started ? "\1" : std::string(1, '\0'));
+        if (options_.lockstep) tell_state();
+        return;
+      case RtdeKind::pause:
+        client.started = false;
+        return reply("\1");
+      case RtdeKind::data:
+        if (!client.commands || reader.take<std::uint8_t>() != heartbeat_recipe) return;
+        controller_.set_heartbeat(reader.take<std::int32_t>());
+        if (client.unanswered > 0) --client.unanswered;
+        if (options_.lockstep && client.unanswered == 0) step();
+        return;
+      default:
+        return;
+    }
+  }
+
+  std::string outputs(VirtualUrClient& client, std::string_view wanted) {
+    client.names.clear();
+    std::string types(1, static_cast<char>(state_recipe));
+    bool all_known = true;
+    while (!wanted.empty()) {
+      const std::string name(wanted.substr(0, wanted.find(',')));
+      wanted.remove_prefix(std::min(wanted.size(), name.size() + 1));
+      const auto found = std::ranges::find(state_names, name);
+      const bool known = found != state_names.end() &&
+                         !(name == "tcp_offset" && controller_.has(RobotFault::unknown_output));
+      all_known = all_known && known;
+      if (!client.names.empty()) types += ',';
+      types += known ? state_types[static_cast<std::size_t>(found - state_names.begin())] : "NOT_FOUND";
+      client.names.push_back(name);
+    }
+    if (!all_known) client.names.clear();
+    return types;
+  }
+
+  void tell_state() {
+    if (controller_.has(RobotFault::frozen_states) || controller_.has(RobotFault::cut_cable)) return;
+    const RobotState state = controller_.state();
+    for (const auto& client : clients_) {
+      if (!client->started || !client->socket.is_open()) continue;
+      std::string bytes = to_bytes(state_message(state_recipe, state, client->names));
+      if (controller_.has(RobotFault::half_packet)) bytes.resize(bytes.size() / 2);
+      if (controller_.has(RobotFault::huge_packet)) bytes = "\xff\xffU";
+      client->send(bytes);
+      ++client->unanswered;
+    }
+    // The rest of a packet cut in two never comes.
+    if (controller_.has(RobotFault::half_packet)) controller_.set(RobotFault::frozen_states, true);
+  }
+
+  VirtualUrOptions options_;
+  VirtualController controller_;
+  asio::io_context io_;
+  std::array<tcp::acceptor, 3> acceptors_{tcp::acceptor(io_), tcp::acceptor(io_), tcp::acceptor(io_)};
+  asio::steady_timer timer_{io_};
+  std::list<std::shared_ptr<VirtualUrClient>> clients_;
+  std::thread thread_;
+};
+
+VirtualUr::VirtualUr(std::unique_ptr<Server> server) : server_(std::move(server)) {}
+VirtualUr::~VirtualUr() = default;
+
+Expected<std::unique_ptr<VirtualUr>> VirtualUr::start(const VirtualUrOptions& options) {
+  auto server = std::make_unique<Server>(options);
+  if (const auto listening = server->listen(); !listening) return tl::unexpected<Failure>(listening.error());
+  return std::unique_ptr<VirtualUr>(new VirtualUr(std::move(server)));
+}
+
+std::uint16_t VirtualUr::rtde_port() const { return server_->port(0); }
+std::uint16_t VirtualUr::dashboard_port() const { return server_->port(1); }
+std::uint16_t VirtualUr::script_port() const { return server_->port(2); }
+
+void VirtualUr::set(RobotFault fault, bool on) {
+  server_->there([&] { server_->set(fault, on); });
+}
+
+std::string VirtualUr::dashboard(const std::string& command) {
+  return server_->there([&] { return server_->dashboard(command); });
+}
+
+void VirtualUr::advance(double seconds) {
+  server_->there([&] {
+    const auto steps = static_cast<int>(std::ceil(seconds * server_->options().controller.rate_hz));
+    for (int i = 0; i < steps; ++i) server_->step();
+  });
+}
+
+VirtualTruth VirtualUr::truth() {
+  return server_->there([&] { return server_->truth(); });
+}
+
+}  // namespace helicarm
