@@ -34,6 +34,8 @@ ROOMS = {
                   " verification volume simulation",
     "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                  " verification devices session navigation",
+    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session navigation operation"
+                 " guidance verification",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification volume simulation navigation",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"

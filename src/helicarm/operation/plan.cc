@@ -118,8 +118,8 @@ Json to_json(const TrackerPlan& tracker) {
   for (const Facet& facet : tracker.facets)
     facets.push_back(
         {{"name", facet.name}, {"calibrator_from_facet", json_rows(facet.calibrator_from_facet.matrix())}});
-  return {{"address", tracker.address},   {"port", tracker.port},   {"femur", tracker.femur},
-          {"tibia", tracker.tibia},       {"tool", tracker.tool},   {"facets", std::move(facets)},
+  return {{"address", tracker.address},   {"port", tracker.port},          {"femur", tracker.femur},
+          {"tibia", tracker.tibia},       {"tool", tracker.tool},          {"facets", std::move(facets)},
           {"sigma_mm", tracker.sigma_mm}, {"sigma_deg", tracker.sigma_deg}};
 }
 

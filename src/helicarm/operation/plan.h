@@ -57,8 +57,8 @@ struct OperationPlan {
   std::optional<double> max_error_mm;
 };
 
-/// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when they
-/// become a case.
+/// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when
+/// they become a case.
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
 Json to_json(const OperationPlan& plan);
 

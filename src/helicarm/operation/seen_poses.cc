@@ -5,14 +5,32 @@
 #include <numbers>
 #include <thread>
 
-#include <fmt/format.h>
+#include "helicarm/geometry/view_json.h"
 
 namespace helicarm {
 namespace {
 
-/// A picture of 2 MiB over a hospital's network, and its preparation in the C-arm.
+/// A picture's way through the C-arm and a hospital's network.
 constexpr double longest_way_s = 1.5;
-constexpr double now_window_s = 0.25;
+constexpr double now_s = 0.5;
+/// The last samples of a window that ends now are still on their way.
+constexpr double settle_s = 0.1;
+
+constexpr Range any_time{0, 1e12};
+constexpr Range millimetres{-1e6, 1e6};
+
+std::vector<std::string> tools_of(const TrackerPlan& plan) {
+  std::vector<std::string> tools{plan.femur, plan.tibia, plan.tool};
+  for (const Facet& facet : plan.facets) tools.push_back(facet.name);
+  return tools;
+}
+
+PoseWindow window_about(const PoseBoard& board, const TrackerPlan& plan, double middle_s, double half_s) {
+  PoseWindow window{middle_s, half_s, {}};
+  for (const std::string& tool : tools_of(plan))
+    window.samples[tool] = board.between(tool, middle_s - half_s, middle_s + half_s);
+  return window;
+}
 
 /// What the tracker keeps in every reading, about the marker's own origin.
 PoseCovariance kept_by_tracker(const TrackerPlan& plan) {
@@ -23,46 +41,85 @@ PoseCovariance kept_by_tracker(const TrackerPlan& plan) {
   return covariance;
 }
 
-ExposurePoseOptions exposure_window() {
-  ExposurePoseOptions options;
-  options.window_s = longest_way_s / 2;
-  return options;
-}
-
-/// Waits until the window about a moment just gone is full on both sides.
-double settled_now() {
-  const double now = monotonic_seconds();
-  std::this_thread::sleep_for(std::chrono::duration<double>(2 * now_window_s));
-  return now + now_window_s;
-}
-
-ExposurePoseOptions now_options() {
-  ExposurePoseOptions options;
-  options.window_s = now_window_s;
-  return options;
-}
-
 Expected<std::optional<RigidTransform>> bone_if_seen(const Expected<SeenPose>& seen) {
   if (seen) return seen->tracker_from_marker;
   if (seen.error().reason == Reason::pose_spread) return tl::unexpected<Failure>(seen.error());
   return std::nullopt;
 }
 
+Failure named(Failure failure, const std::string& tool) {
+  failure.message = tool + ": " + failure.message;
+  return failure;
+}
+
 }  // namespace
 
-Expected<SeenPose> see_tool(const PoseBoard& board, const TrackerPlan& plan, const std::string& tool,
-                            double time_s, const ExposurePoseOptions& options) {
-  return board.at(tool, time_s, options).map([&](const ExposurePose& pose) {
-    return SeenPose{pose.tracker_from_tool, pose.covariance + kept_by_tracker(plan)};
+Json to_json(const PoseWindow& window) {
+  Json tools = Json::object();
+  for (const auto& [tool, samples] : window.samples) {
+    Json& list = tools[tool] = Json::array();
+    for (const PoseSample& sample : samples)
+      list.push_back({{"time_s", sample.time_s},
+                      {"device_s", sample.device_s},
+                      {"arrival_s", sample.arrival_s},
+                      {"tracker_from_tool", json_rows(sample.tracker_from_tool.matrix())}});
+  }
+  return {{"middle_s", window.middle_s}, {"half_s", window.half_s}, {"tools", std::move(tools)}};
+}
+
+Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    PoseWindow window{reader.number("middle_s", any_time), reader.number("half_s", {0, 60}), {}};
+    const Json& tools = reader.raw("tools");
+    if (!tools.is_object()) reader.refuse(Reason::bad_value, "tools", "must be an object");
+    for (const auto& [tool, list] : tools.items()) {
+      if (!list.is_array()) reader.refuse(Reason::bad_value, "tools", "must hold lists");
+      std::vector<PoseSample>& samples = window.samples[tool];
+      for (const Json& entry : list) {
+        JsonReader sample(entry, origin + ": " + tool);
+        const double time = sample.number("time_s", any_time), device = sample.number("device_s", any_time);
+        const double arrival = sample.number("arrival_s", any_time);
+        const auto rows = sample.matrix("tracker_from_tool", 4, 4, millimetres);
+        const Eigen::Matrix4d matrix =
+            Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
+        sample.finish();
+        samples.push_back(
+            {time, device, arrival, {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()}});
+      }
+    }
+    reader.finish();
+    return window;
   });
 }
 
-Expected<SeenPose> see_calibrator(const PoseBoard& board, const TrackerPlan& plan, double time_s,
-                                  const ExposurePoseOptions& options) {
+PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s) {
+  return window_about(board, plan, arrival_s - longest_way_s / 2, longest_way_s / 2);
+}
+
+PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan) {
+  const double from = monotonic_seconds();
+  std::this_thread::sleep_for(std::chrono::duration<double>(now_s + settle_s));
+  return window_about(board, plan, from + now_s / 2, now_s / 2);
+}
+
+Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, const std::string& tool) {
+  const auto samples = window.samples.find(tool);
+  if (samples == window.samples.end()) return fail(Reason::no_pose, tool + ": the tracker never showed it");
+  ExposurePoseOptions options;
+  options.window_s = window.half_s;
+  return exposure_pose(samples->second, window.middle_s, options)
+      .map([&](const ExposurePose& pose) {
+        return SeenPose{pose.tracker_from_tool, pose.covariance, pose.covariance + kept_by_tracker(plan)};
+      })
+      .map_error([&](const Failure& failure) { return named(failure, tool); });
+}
+
+Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& plan) {
   std::vector<FacetPose> seen;
   std::optional<Failure> why_not;
   for (const Facet& facet : plan.facets) {
-    const auto pose = see_tool(board, plan, facet.name, time_s, options);
+    const auto pose = see_tool(window, plan, facet.name);
     if (pose)
       seen.push_back({facet.name, pose->tracker_from_marker, pose->covariance});
     else if (!why_not || pose.error().reason == Reason::pose_spread)
@@ -71,30 +128,24 @@ Expected<SeenPose> see_calibrator(const PoseBoard& board, const TrackerPlan& pla
   if (why_not && (seen.empty() || why_not->reason == Reason::pose_spread))
     return tl::unexpected<Failure>(*why_not);
   return fuse_facets(plan.facets, seen).map([](const FusedPose& fused) {
-    return SeenPose{fused.tracker_from_calibrator, fused.covariance};
+    return SeenPose{fused.tracker_from_calibrator, fused.covariance, fused.covariance};
   });
 }
 
-Expected<Poses> poses_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s) {
+Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan) {
   return guarded([&] {
-    const ExposurePoseOptions window = exposure_window();
-    const double middle = arrival_s - window.window_s;
     Poses poses;
-    poses.tracker_from_calibrator =
-        value_or_throw(see_calibrator(board, plan, middle, window)).tracker_from_marker;
-    poses.tracker_from_femur =
-        value_or_throw(bone_if_seen(see_tool(board, plan, plan.femur, middle, window)));
-    poses.tracker_from_tibia =
-        value_or_throw(bone_if_seen(see_tool(board, plan, plan.tibia, middle, window)));
+    poses.tracker_from_calibrator = value_or_throw(see_calibrator(window, plan)).tracker_from_marker;
+    poses.tracker_from_femur = value_or_throw(bone_if_seen(see_tool(window, plan, plan.femur)));
+    poses.tracker_from_tibia = value_or_throw(bone_if_seen(see_tool(window, plan, plan.tibia)));
     return poses;
   });
 }
 
-Expected<Poses> poses_now(const PoseBoard& board, const TrackerPlan& plan) {
+Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
   return guarded([&] {
-    const double now = settled_now();
     const auto see = [&](const std::string& tool) {
-      return value_or_throw(see_tool(board, plan, tool, now, now_options())).tracker_from_marker;
+      return value_or_throw(see_tool(window, plan, tool)).tracker_from_marker;
     };
     Poses poses;
     poses.tracker_from_femur = see(plan.femur);
@@ -102,10 +153,6 @@ Expected<Poses> poses_now(const PoseBoard& board, const TrackerPlan& plan) {
     poses.tracker_from_tool = see(plan.tool);
     return poses;
   });
-}
-
-TrackerNoise noise_of(const TrackerPlan& plan) {
-  return {plan.sigma_mm, plan.sigma_deg, Samples::independent};
 }
 
 }  // namespace helicarm

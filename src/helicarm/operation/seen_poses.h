@@ -1,35 +1,50 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
+#include <string>
+#include <vector>
+
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
 namespace helicarm {
 
-/// A marker's pose over a short while, and how exactly it is known: its scatter and what the tracker is known
-/// to keep (TrackerPlan's sigmas).
-struct SeenPose {
-  RigidTransform tracker_from_marker;
-  PoseCovariance covariance;
+/// What the tracker said of every tool about one moment (monotonic seconds).
+struct PoseWindow {
+  double middle_s = 0;
+  double half_s = 0;
+  std::map<std::string, std::vector<PoseSample>> samples;
 };
 
-/// The pose of a tool while it was at rest about `time_s` (monotonic). Refuses as `exposure_pose`.
-Expected<SeenPose> see_tool(const PoseBoard& board, const TrackerPlan& plan, const std::string& tool,
-                            double time_s, const ExposurePoseOptions& options = {});
+Json to_json(const PoseWindow& window);
+/// To the last bit. Fails as JsonReader.
+Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origin);
 
-/// The calibrator's, from whichever facets are seen. Refuses as `fuse_facets`.
-Expected<SeenPose> see_calibrator(const PoseBoard& board, const TrackerPlan& plan, double time_s,
-                                  const ExposurePoseOptions& options = {});
+/// The second and a half before a picture came: the shot lies somewhere in it.
+PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s);
+/// The half second from now on; waits until it is over.
+PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan);
 
-/// Calibrator and bones at an exposure whose picture came at `arrival_s`: the shot lies somewhere in the
-/// second and a half before, so everything must have been at rest all that while. A bone whose marker is not
-/// seen is absent; the calibrator must be seen. Refuses also (pose_spread) where something moved.
-Expected<Poses> poses_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s);
+/// A marker at rest over a window.
+struct SeenPose {
+  RigidTransform tracker_from_marker;
+  PoseCovariance scatter;  ///< of the mean, from its samples
+  PoseCovariance
+      covariance;  ///< with what no averaging over so short a time takes away (TrackerPlan's sigmas)
+};
 
-/// Bones and tool as they are now; all must be seen.
-Expected<Poses> poses_now(const PoseBoard& board, const TrackerPlan& plan);
+/// Refuses as `exposure_pose`: not seen, seen only in a part of the window, moved.
+Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, const std::string& tool);
 
-/// What a case is told of the tracker.
-TrackerNoise noise_of(const TrackerPlan& plan);
+/// From whichever of its facets are seen. Refuses as `fuse_facets`, and where one of them moved.
+Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& plan);
+
+/// Calibrator and bones during an exposure. A bone whose marker is not seen is absent; one that moved is
+/// refused (pose_spread).
+Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan);
+
+/// Bones and tool; all must be seen.
+Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan);
 
 }  // namespace helicarm

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/case_of.h"
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/operation/records.h"
+#include "helicarm/xray/digest.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
+
+Json without(Json json, const char* key) {
+  json.erase(key);
+  return json;
+}
+
+Json picture_json(const CasePicture& picture) {
+  return {{"name", picture.name},
+          {"image", picture.name + ".dcm"},
+          {"poses", without(to_json(picture.poses), "tracker_from_tool")}};
+}
+
+Json tool_line_json(const ToolLine& line) {
+  return {{"name", line.name},
+          {"tunnel", line.tunnel},
+          {"p1_in_calibrator", json_list(line.p1_in_calibrator)},
+          {"p2_in_calibrator", json_list(line.p2_in_calibrator)}};
+}
+
+/// A built-in's name stays; a file is copied into the case.
+std::string brought_along(const std::string& name_or_file, const fs::path& folder) {
+  const fs::path file(name_or_file);
+  if (!fs::exists(file)) return name_or_file;
+  value_or_throw(write_file(folder / file.filename(), value_or_throw(read_file(file, most_file_bytes))));
+  return file.filename().string();
+}
+
+}  // namespace
+
+Expected<void> write_operation_case(const fs::path& folder, const OperationPlan& plan,
+                                    const std::vector<CasePicture>& pictures, const Poses& now,
+                                    const std::vector<ToolLine>& tool_lines) {
+  return guarded([&] {
+    Json json = {{"format", "helicarm-case/1"},
+                 {"calibrator", brought_along(plan.calibrator, folder)},
+                 {"plate", plan.plate ? Json(brought_along(*plan.plate, folder)) : Json()},
+                 {"views", Json::array()},
+                 {"poses_now", without(to_json(now), "tracker_from_calibrator")},
+                 {"tracker",
+                  {{"sigma_mm", plan.tracker.sigma_mm},
+                   {"sigma_deg", plan.tracker.sigma_deg},
+                   {"samples", "independent"}}},
+                 {"picks", plan.picks},
+                 {"tunnels", Json::array()},
+                 {"tool_lines", Json::array()}};
+    for (const CasePicture& picture : pictures) {
+      value_or_throw(write_file(folder / (picture.name + ".dcm"),
+                                value_or_throw(read_file(picture.picture, most_file_bytes))));
+      json["views"].push_back(picture_json(picture));
+    }
+    for (const PlannedTunnel& tunnel : plan.tunnels)
+      json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
+    for (const ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
+    value_or_throw(write_file(folder / "case.json", to_text(json)));
+  });
+}
+
+Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan) {
+  return guarded([&] {
+    const Case given = value_or_throw(read_case(folder));
+    RunOptions options;
+    options.max_error_mm = plan.max_error_mm;
+    CaseRun run{value_or_throw(run_case(given, options)), {}};
+    run.digest = digest(to_text(without(to_json(run.result), "timing_ms")));
+    return run;
+  });
+}
+
+Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan& plan) {
+  return guarded([&] {
+    CaseRun run = value_or_throw(recompute_case(folder, plan));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(run.result))));
+    return run;
+  });
+}
+
+}  // namespace helicarm

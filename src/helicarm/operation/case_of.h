@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/guidance/poses.h"
+#include "helicarm/navigation/result.h"
+#include "helicarm/operation/plan.h"
+
+namespace helicarm {
+
+/// A view as case.json tells it.
+struct CasePicture {
+  std::string name;
+  std::filesystem::path picture;
+  Poses poses;
+};
+
+/// Makes `folder` a case of its own (docs/formats.md): pictures, calibrator, plate, case.json. Refuses
+/// cannot_write, missing_file.
+Expected<void> write_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
+                                    const std::vector<CasePicture>& pictures, const Poses& now,
+                                    const std::vector<ToolLine>& tool_lines);
+
+/// The digest is of the result without its timing: the same case gives the same one.
+struct CaseRun {
+  Result result;
+  std::string digest;
+};
+/// Reads the case and runs it; writes nothing.
+Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan);
+/// The same, and writes result.json.
+Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan);
+
+}  // namespace helicarm

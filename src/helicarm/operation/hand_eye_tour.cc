@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/hand_eye_tour.h"
+
+#include <array>
+#include <numbers>
+
+#include <Eigen/Geometry>
+
+namespace helicarm {
+namespace {
+
+constexpr double turn_rad = 20 * std::numbers::pi / 180;
+constexpr double shift_mm = 25;
+constexpr double tour_acceleration_mm_s2 = 250;
+
+}  // namespace
+
+std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp) {
+  constexpr std::array<std::array<double, 3>, 8> corners{{{1, 0, 0.4},
+                                                          {-1, 0, -0.4},
+                                                          {0, 1, 0.4},
+                                                          {0, -1, -0.4},
+                                                          {0.7, 0.7, -0.8},
+                                                          {-0.7, 0.7, 0.8},
+                                                          {-0.7, -0.7, -0.8},
+                                                          {0.7, -0.7, 0.8}}};
+  std::vector<RigidTransform> tour;
+  for (const auto& [x, y, z] : corners) {
+    const Eigen::Vector3d turn(x, y, z);
+    const RigidTransform moved{
+        Eigen::AngleAxisd(turn_rad * turn.norm(), turn.normalized()).toRotationMatrix(),
+        shift_mm * Eigen::Vector3d(y, z, x)};
+    tour.push_back(base_from_tcp * moved);
+  }
+  tour.push_back(base_from_tcp);
+  return tour;
+}
+
+RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const RigidTransform& base_from_tcp) {
+  RobotOrder order;
+  order.name = "hand-eye";
+  order.model = plan.model;
+  order.tool = plan.tool;
+  order.start = present.joints;
+  order.waypoints = {{base_from_tcp, plan.approach.travel_mm_s, tour_acceleration_mm_s2}};
+  order.keep_outs = plan.approach.keep_outs;
+  order.corrections.tolerance_mm = 0.5;
+  order.corrections.tolerance_deg = 0.5;
+  return order;
+}
+
+}  // namespace helicarm

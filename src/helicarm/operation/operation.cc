@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/operation.h"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "helicarm/operation/case_of.h"
+#include "helicarm/operation/hand_eye_tour.h"
+#include "helicarm/operation/records.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::chrono::seconds robot_patience{5};
+/// The tip is drawn into the X-rays every so many mm.
+constexpr double preview_step_mm = 5;
+
+}  // namespace
+
+std::string_view name_of(Step step) {
+  constexpr std::array names{"acquire", "measure", "register", "plan", "navigate", "verify"};
+  return names[std::size_t(step)];
+}
+
+Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const fs::path& folder,
+                                                      const PoseBoard& board, RobotLink& robot, Tell tell) {
+  return guarded([&] {
+    std::unique_ptr<Operation> operation(
+        new Operation(std::move(plan), folder, board, robot, std::move(tell)));
+    operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
+    if (operation->log_->history().records.size() > 1)
+      throw BadInput(Reason::cannot_write,
+                     fmt::format("{}: holds another operation's record already", folder.string()));
+    operation->record("plan", to_json(operation->plan_));
+    return operation;
+  });
+}
+
+std::vector<std::string> Operation::views_to_come() const {
+  std::vector<std::string> names = plan_.views;
+  std::erase_if(names, [&](const std::string& name) {
+    return std::ranges::find(views_, name, &View::name) != views_.end();
+  });
+  return names;
+}
+
+void Operation::record(const std::string& kind, Json content) {
+  value_or_throw(log_->append(kind, std::move(content)));
+}
+
+PoseWindow Operation::look(const char* why) {
+  PoseWindow window = window_now(board_, plan_.tracker);
+  record("poses", {{"why", why}, {"window", to_json(window)}});
+  return window;
+}
+
+Expected<void> Operation::take(const std::string& view, const Arrival& arrival, double arrival_s) {
+  return guarded([&] {
+    if (std::ranges::find(plan_.views, view) == plan_.views.end())
+      throw BadInput(Reason::bad_value, fmt::format("{}: is no view of the plan", view));
+    tell_(Step::acquire, view);
+    const auto twice = std::ranges::find(views_, arrival.digest, &View::digest);
+    if (twice != views_.end() && twice->name != view)
+      throw BadInput(Reason::views_too_close, fmt::format("{}: is the picture of {}", view, twice->name));
+    const PoseWindow window = window_of_exposure(board_, plan_.tracker, arrival_s);
+    const auto seen = poses_of_exposure(window, plan_.tracker);
+    record("exposure", {{"view", view},
+                        {"picture", arrival.digest},
+                        {"window", to_json(window)},
+                        {"poses", seen ? to_json(*seen) : Json()}});
+    const Poses poses = value_or_throw(seen);
+    std::erase_if(views_, [&](const View& other) { return other.name == view; });
+    views_.push_back({view, arrival.path, arrival.digest, poses});
+    std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
+    result_.reset();
+  });
+}
+
+Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
+  const std::string name = fmt::format("case-{}", ++measurements_);
+  std::vector<CasePicture> pictures;
+  for (const View& view : views_) pictures.push_back({view.name, view.picture, view.poses});
+  value_or_throw(write_operation_case(folder_ / name, plan_, pictures, now, tool_lines));
+  record("case", {{"folder", name}});
+  CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_));
+  record("result", {{"folder", name}, {"digest", run.digest}});
+  if (run.result.failure) throw BadInput(*run.result.failure);
+  return std::move(run.result);
+}
+
+Expected<void> Operation::measure() {
+  return guarded([&] {
+    if (const auto missing = views_to_come(); !missing.empty())
+      throw BadInput(Reason::usage, fmt::format("{}: its picture has not come", missing.front()));
+    tell_(Step::measure, fmt::format("{} views", views_.size()));
+    result_ = run({}, {});
+  });
+}
+
+Expected<void> Operation::register_robot(const Confirm& confirm) {
+  return guarded([&] {
+    tell_(Step::register_robot, "hand-eye calibration");
+    std::vector<HandEyePair> pairs;
+    const RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
+    for (const RigidTransform& pose : hand_eye_tour(begin.base_from_tcp)) {
+      const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+      const RobotOrder order = tour_order(plan_.robot, present, pose);
+      record("order", to_json(order));
+      value_or_throw(robot_.execute(order, value_or_throw(confirm(order))));
+      const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
+      const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
+      pairs.push_back(
+          {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
+      tell_(Step::register_robot, fmt::format("pose {}", pairs.size()));
+    }
+    hand_eye_ = value_or_throw(calibrate_hand_eye(pairs));
+    record("hand_eye", {{"pairs", to_json(pairs)}, {"found", to_json(*hand_eye_)}});
+  });
+}
+
+const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
+  const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
+  if (tunnel == plan_.tunnels.end())
+    throw BadInput(Reason::bad_value, fmt::format("{}: is no tunnel of the plan", name));
+  return *tunnel;
+}
+
+Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
+  return guarded([&] {
+    const PlannedTunnel& tunnel = tunnel_named(name);
+    if (!result_) throw BadInput(Reason::usage, "nothing is measured yet");
+    if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered yet");
+    tell_(Step::plan, name);
+    const Poses now = value_or_throw(poses_now(look("plan"), plan_.tracker));
+    const TunnelAxis axis = axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
+    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    RobotOrder order =
+        value_or_throw(plan_approach(name, value_or_throw(robot_model(plan_.robot.model)), plan_.robot.tool,
+                                     present.joints, axis, plan_.robot.approach));
+    bone_from_target_[name] = now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
+                              order.waypoints.back().base_from_tcp;
+    record("order", to_json(order));
+    return order;
+  });
+}
+
+Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
+  return guarded([&] {
+    PathPreview preview;
+    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    const RigidTransform bone_from_base =
+        bone_from_target_.at(order.name) * order.waypoints.back().base_from_tcp.inverse();
+    for (const View& view : views_) {
+      const auto shown = std::ranges::find(result_->views, view.name, &ViewResult::name);
+      const auto calibrator_from_bone = calibrator_from(tunnel.bone, view.poses);
+      if (shown == result_->views.end() || !shown->calibrated || !calibrator_from_bone) continue;
+      std::vector<Eigen::Vector2d>& path = preview.by_view[view.name];
+      for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
+        const Eigen::Vector3d from = order.waypoints[i - 1].base_from_tcp.translation;
+        const Eigen::Vector3d way = order.waypoints[i].base_from_tcp.translation - from;
+        const int steps = std::max(1, static_cast<int>(way.norm() / preview_step_mm));
+        for (int step = 0; step <= steps; ++step) {
+          const Eigen::Vector3d tip = *calibrator_from_bone * (bone_from_base * (from + way * step / steps));
+          if (shown->calibrated->view.depth(tip) > 0) path.push_back(shown->calibrated->view.project(tip));
+        }
+      }
+    }
+    return preview;
+  });
+}
+
+Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string& token) {
+  return guarded([&] {
+    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    const auto target = bone_from_target_.find(order.name);
+    if (target == bone_from_target_.end())
+      throw BadInput(Reason::usage, fmt::format("{}: was not planned in this operation", order.name));
+    tell_(Step::navigate, order.name);
+    record("confirmed", {{"order", order.name}});
+    const std::vector<Miss> loop = value_or_throw(robot_.execute(order, token, [&] {
+      return guarded([&] {
+        return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, target->second));
+      });
+    }));
+    record("navigated", {{"tunnel", order.name}, {"loop", to_json(loop)}});
+    tell_(Step::verify, order.name);
+    TunnelOutcome outcome = check(tunnel);
+    outcome.loop = loop;
+    return outcome;
+  });
+}
+
+Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
+  return guarded([&] {
+    tell_(Step::navigate, order.name + ": withdraw");
+    RobotOrder back = order;
+    back.start = value_or_throw(robot_.wait_connected(robot_patience)).joints;
+    Waypoint stand_off = order.waypoints.front(), home = stand_off;
+    stand_off.speed_mm_s = order.waypoints.back().speed_mm_s;
+    home.base_from_tcp = rest.base_from_tcp;
+    back.waypoints = {stand_off, home};
+    back.corrections.most = 0;
+    record("order", to_json(back));
+    value_or_throw(robot_.execute(back, value_or_throw(confirm(back))));
+  });
+}
+
+TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
+  const Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
+  const ToolLine line = value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now,
+                                                 marker_from_tcp(*hand_eye_, plan_.robot.tool)));
+  const Result checked = run(now, {line});
+  const auto end = [&](const std::string& name) {
+    const auto point = std::ranges::find(checked.points, name, &PointResult::name);
+    if (point == checked.points.end() || !point->place || !point->place->in_tool)
+      throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool's frame", name));
+    return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, *hand_eye_, plan_.robot.tool);
+  };
+  TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
+  if (!checked.verifications.empty()) outcome.verification = checked.verifications.front();
+  record("outcome",
+         {{"tunnel", tunnel.name}, {"start", to_json(outcome.start)}, {"end", to_json(outcome.end)}});
+  return outcome;
+}
+
+}  // namespace helicarm

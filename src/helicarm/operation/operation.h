@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "helicarm/devices/receiver/inbox.h"
+#include "helicarm/devices/robot/robot_link.h"
+#include "helicarm/operation/tool_line.h"
+#include "helicarm/session/session_log.h"
+
+namespace helicarm {
+
+/// The steps in the order in which they are taken (the application shows them so).
+enum class Step { acquire, measure, register_robot, plan, navigate, verify };
+std::string_view name_of(Step step);
+
+/// How a tool stands to its tunnel after the robot went there.
+struct TunnelOutcome {
+  std::string tunnel;
+  std::vector<Miss> loop;  ///< the closed loop's measurements, the last one within its tolerance
+  EndMiss start;           ///< across the tool's axis, by tracker and X-rays
+  EndMiss end;
+  std::optional<Verification> verification;  ///< Eq. 17 in the X-rays
+};
+
+/// The tip's way as it will be seen in each X-ray, rectified pixels (Eq. 6).
+struct PathPreview {
+  std::map<std::string, std::vector<Eigen::Vector2d>> by_view;
+};
+
+/// One operation from the first X-ray to the last check, over devices that are already connected. Every
+/// decision, with all that led to it, is in the session's record before anything follows from it; a record
+/// that cannot be written stops the operation. Members are called from one thread.
+class Operation {
+ public:
+  /// Told each step as it begins and what came of it, for whoever watches.
+  using Tell = std::function<void(Step, const std::string& what)>;
+
+  /// `folder` takes session.log and a folder for each measurement.
+  static Expected<std::unique_ptr<Operation>> begin(
+      OperationPlan plan, const std::filesystem::path& folder, const PoseBoard& board, RobotLink& robot,
+      Tell tell = [](Step, const std::string&) {});
+
+  const OperationPlan& plan() const { return plan_; }
+  /// Views that still want a picture, in the plan's order.
+  std::vector<std::string> views_to_come() const;
+
+  /// Acquire: dates the picture by its arrival (monotonic seconds) and takes everything's pose for it.
+  /// Refuses as `poses_of_exposure`, and a picture that is another view's (views_too_close).
+  Expected<void> take(const std::string& view, const Arrival& arrival, double arrival_s);
+
+  /// Picks as in case.json, in place of the plan's.
+  void pick(Json picks) { plan_.picks = std::move(picks); }
+
+  /// Rectify, calibrate, locate; fails with what the case was refused for.
+  Expected<void> measure();
+  const Result& result() const { return *result_; }
+
+  /// Moves the tool a little to all sides and learns how marker, robot and tracker stand to each other. Asks
+  /// `confirm` for each move's token.
+  using Confirm = std::function<Expected<std::string>(const RobotOrder&)>;
+  Expected<void> register_robot(const Confirm& confirm);
+  const HandEye& hand_eye() const { return *hand_eye_; }
+
+  /// The order that brings the tool to the tunnel, and what it will look like. Nothing moves.
+  Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
+  Expected<PathPreview> preview(const RobotOrder& order) const;
+
+  /// Carries the confirmed order out, corrected by the tracker, and checks the result in the X-rays. Refuses
+  /// (uncertain) an end whose predicted error is over the plan's limit.
+  Expected<TunnelOutcome> go(const RobotOrder& order, const std::string& token);
+
+  /// Back along the tunnel's axis to the stand-off, and from there to where the tool was (`rest`).
+  Expected<void> withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm);
+
+ private:
+  struct View {
+    std::string name;
+    std::filesystem::path picture;
+    std::string digest;
+    Poses poses;
+  };
+
+  Operation(OperationPlan plan, std::filesystem::path folder, const PoseBoard& board, RobotLink& robot,
+            Tell tell)
+      : plan_(std::move(plan)),
+        folder_(std::move(folder)),
+        board_(board),
+        robot_(robot),
+        tell_(std::move(tell)) {}
+
+  const PlannedTunnel& tunnel_named(const std::string& name) const;
+  void record(const std::string& kind, Json content);
+  PoseWindow look(const char* why);
+  Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
+  TunnelOutcome check(const PlannedTunnel& tunnel);
+
+  OperationPlan plan_;
+  std::filesystem::path folder_;
+  const PoseBoard& board_;
+  RobotLink& robot_;
+  Tell tell_;
+  std::unique_ptr<SessionLog> log_;
+  std::vector<View> views_;
+  int measurements_ = 0;
+  std::optional<Result> result_;
+  std::optional<HandEye> hand_eye_;
+  std::map<std::string, RigidTransform> bone_from_target_;  ///< of each planned tunnel
+};
+
+}  // namespace helicarm

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/records.h"
+
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm {
+namespace {
+
+constexpr Range any_place{-1e6, 1e6};
+
+Json pose_json(const std::optional<RigidTransform>& pose) {
+  return pose ? json_rows(pose->matrix()) : Json();
+}
+
+RigidTransform exact_pose(JsonReader& reader, const char* key) {
+  const auto rows = reader.matrix(key, 4, 4, any_place);
+  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
+  return {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()};
+}
+
+}  // namespace
+
+Json to_json(const Poses& poses) {
+  return {{"tracker_from_calibrator", pose_json(poses.tracker_from_calibrator)},
+          {"tracker_from_femur", pose_json(poses.tracker_from_femur)},
+          {"tracker_from_tibia", pose_json(poses.tracker_from_tibia)},
+          {"tracker_from_tool", pose_json(poses.tracker_from_tool)}};
+}
+
+Json to_json(const HandEye& hand_eye) {
+  return {{"flange_from_marker", json_rows(hand_eye.flange_from_marker.matrix())},
+          {"tracker_from_base", json_rows(hand_eye.tracker_from_base.matrix())},
+          {"covariance", json_rows(hand_eye.covariance)},
+          {"rms_mm", hand_eye.rms_mm},
+          {"rms_deg", hand_eye.rms_deg}};
+}
+
+Json to_json(const std::vector<HandEyePair>& pairs) {
+  Json list = Json::array();
+  for (const HandEyePair& pair : pairs)
+    list.push_back({{"base_from_flange", json_rows(pair.base_from_flange.matrix())},
+                    {"tracker_from_marker", json_rows(pair.tracker_from_marker.matrix())}});
+  return list;
+}
+
+Expected<std::vector<HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    if (!json.is_array()) throw BadInput(Reason::bad_value, origin + ": pairs must be a list");
+    std::vector<HandEyePair> pairs;
+    for (const Json& entry : json) {
+      JsonReader reader(entry, origin);
+      pairs.push_back({exact_pose(reader, "base_from_flange"), exact_pose(reader, "tracker_from_marker")});
+      reader.finish();
+    }
+    return pairs;
+  });
+}
+
+Json to_json(const std::vector<Miss>& loop) {
+  Json misses = Json::array();
+  for (const Miss& miss : loop)
+    misses.push_back(
+        {{"distance_mm", miss.distance_mm}, {"turn_deg", miss.turn_deg}, {"sigma_mm", miss.sigma_mm}});
+  return misses;
+}
+
+Json to_json(const EndMiss& end) {
+  return {{"across_mm", json_list(end.across_mm)},
+          {"covariance_mm2", json_rows(end.covariance)},
+          {"distance_mm", end.distance_mm()},
+          {"predicted_mm", end.predicted_mm()}};
+}
+
+}  // namespace helicarm

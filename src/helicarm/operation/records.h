@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/core/json.h"
+#include "helicarm/devices/tracker/hand_eye.h"
+#include "helicarm/guidance/poses.h"
+#include "helicarm/operation/tool_line.h"
+
+/// How the session's record writes values: to the last bit.
+namespace helicarm {
+
+Json to_json(const Poses& poses);
+Json to_json(const HandEye& hand_eye);
+Json to_json(const std::vector<HandEyePair>& pairs);
+/// Fails as JsonReader.
+Expected<std::vector<HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin);
+Json to_json(const std::vector<Miss>& loop);
+Json to_json(const EndMiss& end);
+
+}  // namespace helicarm

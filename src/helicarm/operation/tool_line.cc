@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/tool_line.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// The second point of a tool's line lies so far behind its tip.
+constexpr double line_mm = 100;
+
+Eigen::Matrix3d cross_matrix(const Vector3d& v) {
+  return (Eigen::Matrix3d() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished();
+}
+
+/// What a pose's error (place, turn) does to something at `lever` from its origin.
+Matrix6d carried(const Vector3d& lever) {
+  Matrix6d effect = Matrix6d::Identity();
+  effect.topRightCorner<3, 3>() = -cross_matrix(lever);
+  return effect;
+}
+
+const RigidTransform& pose_of(const Poses& poses, Bone bone) {
+  const auto& pose = poses.tracker_from(bone);
+  if (!pose)
+    throw BadInput(Reason::no_pose,
+                   fmt::format("{}: its marker was not seen", bone == Bone::femur ? "femur" : "tibia"));
+  return *pose;
+}
+
+Vector3d located(const Result& result, const std::string& name, Bone bone) {
+  const auto point = std::ranges::find(result.points, name, &PointResult::name);
+  if (point != result.points.end() && point->place) {
+    const auto& in_bone = bone == Bone::femur ? point->place->in_femur : point->place->in_tibia;
+    if (in_bone) return *in_bone;
+  }
+  throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", name));
+}
+
+}  // namespace
+
+Expected<TunnelInBone> tunnel_in_bone(const Result& result, const PlannedTunnel& tunnel) {
+  return guarded([&] {
+    TunnelInBone in_bone{tunnel.bone, located(result, tunnel.start, tunnel.bone),
+                         located(result, tunnel.end, tunnel.bone)};
+    if (tunnel.enter_at == TunnelEnd::end) std::swap(in_bone.enter, in_bone.leave);
+    return in_bone;
+  });
+}
+
+TunnelAxis axis_in_base(const TunnelInBone& tunnel, const Poses& now, const HandEye& hand_eye) {
+  const RigidTransform base_from_bone = hand_eye.tracker_from_base.inverse() * pose_of(now, tunnel.bone);
+  return {base_from_bone * tunnel.enter, base_from_bone * tunnel.leave};
+}
+
+RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool) {
+  return hand_eye.flange_from_marker.inverse() * tool.flange_from_tcp;
+}
+
+Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, const HandEye& hand_eye,
+                         Bone bone, const RigidTransform& bone_from_target) {
+  return guarded([&] {
+    const std::string& bone_marker = bone == Bone::femur ? plan.tracker.femur : plan.tracker.tibia;
+    const SeenPose tool = value_or_throw(see_tool(window, plan.tracker, plan.tracker.tool));
+    const SeenPose target = value_or_throw(see_tool(window, plan.tracker, bone_marker));
+    const RigidTransform from_tcp = marker_from_tcp(hand_eye, plan.robot.tool);
+    Sighting sighting{tool.tracker_from_marker * from_tcp, target.tracker_from_marker * bone_from_target, {}};
+    const Matrix6d of_tool = carried(tool.tracker_from_marker.rotation * from_tcp.translation);
+    const Matrix6d of_target = carried(target.tracker_from_marker.rotation * bone_from_target.translation);
+    Matrix6d into_tool = Matrix6d::Zero();
+    into_tool.topLeftCorner<3, 3>() = into_tool.bottomRightCorner<3, 3>() =
+        sighting.tracker_from_tcp.rotation.transpose();
+    sighting.covariance =
+        into_tool *
+        (of_tool * tool.scatter * of_tool.transpose() + of_target * target.scatter * of_target.transpose()) *
+        into_tool.transpose();
+    return sighting;
+  });
+}
+
+Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& exposure, const Poses& now,
+                             const RigidTransform& marker_from_tip) {
+  return guarded([&] {
+    if (!exposure.tracker_from_calibrator || !now.tracker_from_tool)
+      throw BadInput(Reason::no_pose, "calibrator or tool: its marker was not seen");
+    const RigidTransform calibrator_from_tip = exposure.tracker_from_calibrator->inverse() *
+                                               pose_of(exposure, bone) * pose_of(now, bone).inverse() *
+                                               *now.tracker_from_tool * marker_from_tip;
+    return ToolLine{tunnel, tunnel, calibrator_from_tip * Vector3d(0, 0, -line_mm),
+                    calibrator_from_tip.translation};
+  });
+}
+
+EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance, const HandEye& hand_eye,
+                 const RobotTool& tool) {
+  const RigidTransform& flange_from_marker = hand_eye.flange_from_marker;
+  const Eigen::Matrix3d tcp_from_flange = tool.flange_from_tcp.rotation.transpose();
+  const Vector3d in_tcp = tool.flange_from_tcp.inverse() * (flange_from_marker * point_in_marker);
+  const Eigen::Matrix<double, 3, 6> effect =
+      carried(flange_from_marker.rotation * point_in_marker).topRows<3>();
+  const Eigen::Matrix3d in_flange =
+      flange_from_marker.rotation * covariance * flange_from_marker.rotation.transpose() +
+      effect * hand_eye.covariance.topLeftCorner<6, 6>() * effect.transpose();
+  return {in_tcp.head<2>(),
+          (tcp_from_flange * in_flange * tcp_from_flange.transpose()).topLeftCorner<2, 2>()};
+}
+
+}  // namespace helicarm
