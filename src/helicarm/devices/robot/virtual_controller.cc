@@ -85,7 +85,10 @@ void VirtualController::step() {
   if (script_) {
     const auto runs = script_->step(*this);
     if (!runs) script_error_ = runs.error().message;
-    if (!runs || !*runs) end_program();
+    if (!runs && runs.error().reason == Reason::out_of_reach)
+      stop(SafetyMode::protective_stop);
+    else if (!runs || !*runs)
+      end_program();
   }
   if (brake_at_s_ && time_s_ >= *brake_at_s_) {
     brake_at_s_.reset();
@@ -196,10 +199,7 @@ void VirtualController::start_motion(const std::string& command, const std::vect
   const auto going =
       arm_.move_linear(transform_from(six(arguments[0])), tool_.flange_from_tcp,
                        named_or(named, "v", 0.25) * mm_per_m, named_or(named, "a", 1.2) * mm_per_m);
-  if (!going) {
-    stop(SafetyMode::protective_stop);
-    throw BadInput(going.error());
-  }
+  value_or_throw(going);
 }
 
 UrValue VirtualController::call(const std::string& name, const std::vector<UrValue>& arguments) {
