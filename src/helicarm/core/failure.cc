@@ -97,6 +97,8 @@ std::string_view code(Reason reason) {
       return "off_target";
     case Reason::not_connected:
       return "not_connected";
+    case Reason::replay_differs:
+      return "replay_differs";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:

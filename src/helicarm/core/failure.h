@@ -62,6 +62,7 @@ enum class Reason {
   stale_state,
   off_target,
   not_connected,
+  replay_differs,
   // Only ever warnings.
   name_differs,
   bone_taken_as_fixed,

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "operate_command.h"
+
+#include <mutex>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/parallel.h"
+#include "helicarm/rehearsal/rehearsal_files.h"
+
+namespace helicarm::cli {
+namespace {
+
+/// Two at a time keep a small machine's robots on time.
+constexpr unsigned most_at_once = 2;
+
+void refuse_earlier_operation(const std::filesystem::path& folder) {
+  if (std::filesystem::exists(folder / "case-1"))
+    throw BadInput(Reason::cannot_write,
+                   fmt::format("{}: holds an earlier operation; give another folder", folder.string()));
+}
+
+}  // namespace
+
+CommandResult operate_command(const OperateArguments& arguments, Console& console) {
+  return guarded([&] {
+    refuse_earlier_operation(arguments.out);
+    std::mutex telling;
+    std::vector<Expected<Rehearsal>> done(static_cast<std::size_t>(arguments.cases),
+                                          fail(Reason::not_connected, "not begun"));
+    const unsigned crew = console.threads == 0 ? most_at_once : console.threads;
+    parallel_for(done.size(), crew, [&](std::size_t i) {
+      RehearsalOptions options;
+      options.picture_size = arguments.size;
+      options.tracker_rate_hz = arguments.rate_hz;
+      options.tell = [&](const std::string& what) {
+        if (console.quiet) return;
+        const std::lock_guard lock(telling);
+        console.progress << fmt::format("bones {}: {}\n", i + 1, what) << std::flush;
+      };
+      done[i] = rehearse(console.seed + i, arguments.out / fmt::format("case-{}", i + 1), options);
+    });
+    std::vector<Rehearsal> rehearsals;
+    for (Expected<Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));
+    const Json json = to_json(rehearsals);
+    value_or_throw(write_file(arguments.out / "operate.json", to_text(json)));
+    value_or_throw(write_file(arguments.out / "operate.csv", to_csv(rehearsals)));
+    if (console.json)
+      console.out << to_text(json) << '\n';
+    else
+      console.out << table_of(rehearsals);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/operation/replay.h"
+
+namespace helicarm::cli {
+
+CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
+  return guarded([&] {
+    const ReplayReport report = value_or_throw(replay(arguments.session));
+    if (console.json) {
+      console.out << to_text({{"records", report.records},
+                              {"torn", report.torn},
+                              {"exposures", report.exposures},
+                              {"results", report.results},
+                              {"hand_eyes", report.hand_eyes},
+                              {"differences", report.differences}})
+                  << '\n';
+    } else {
+      console.out << fmt::format("{} records{}: {} exposures, {} results, {} hand-eye calibrations\n",
+                                 report.records, report.torn ? " and a torn one" : "", report.exposures,
+                                 report.results, report.hand_eyes);
+      for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
+    }
+    if (!report.differences.empty())
+      throw BadInput(Reason::replay_differs,
+                     fmt::format("{} of the record's values come out otherwise", report.differences.size()));
+    if (!console.json) console.out << "all come out the same, to the last bit\n";
+  });
+}
+
+}  // namespace helicarm::cli
