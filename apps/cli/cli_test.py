@@ -310,5 +310,50 @@ class CommandLine(unittest.TestCase):
                 self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(b)))
 
 
+class Tracker(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.file = pathlib.Path(cls.folder.name) / "poses.mha"
+        lines = [f"Seq_Frame{i:04}_ToolToTrackerTransform = 1 0 0 {i % 7 / 100} 0 1 0 0 0 0 1 800 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_Timestamp = {i / 100}\n" for i in range(100)]
+        cls.file.write_text("".join(lines) + "ElementDataFile = LOCAL\n")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder.cleanup()
+
+    def replay(self):
+        server = subprocess.Popen([PROGRAM, "tracker", "replay", self.file, "--json"], text=True,
+                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(server.communicate)
+        self.addCleanup(server.kill)
+        return server, server.stderr.readline().split()[-1]
+
+    def test_replay_is_watched_and_recorded_and_ends_at_once(self):
+        server, port = self.replay()
+        done = run("tracker", "watch", f"127.0.0.1:{port}", "--seconds", 1, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        seen = json.loads(done.stdout)
+        self.assertEqual(seen["state"], "connected")
+        self.assertEqual([tool["name"] for tool in seen["tools"]], ["ToolToTracker"])
+        self.assertGreater(seen["tools"][0]["accepted"], 10)
+        copy = self.file.with_name("copy.mha")
+        done = run("tracker", "record", f"127.0.0.1:{port}", copy, "--seconds", 0.5, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("ToolToTrackerTransform", copy.read_text())
+        server.terminate()
+        self.assertEqual(server.wait(timeout=5), 0)
+
+    def test_port_that_is_taken_and_turnless_pivot_are_refused(self):
+        _, port = self.replay()
+        done = run("tracker", "replay", self.file, "--port", port)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("port_taken", done.stderr)
+        done = run("tracker", "pivot", self.file, "--tool", "ToolToTracker")
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("poses_too_alike", done.stderr)
+
+
 if __name__ == "__main__":
     unittest.main()

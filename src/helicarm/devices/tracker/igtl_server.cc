@@ -174,6 +174,7 @@ void IgtlServer::stop() {
   if (impl_->thread.joinable()) impl_->thread.join();
   asio::error_code ignored;
   impl_->acceptor.close(ignored);
+  const std::lock_guard lock(impl_->mutex);
   impl_->clients.clear();
 }
 

@@ -289,11 +289,13 @@ TEST(IgtlSockets, ServerSurvivesAStormOfConnections) {
     if (i % 3 == 0) peer.write(std::string(100, '\xff'));
     if (i % 3 == 1) peer.write(encode(sample_messages()[0]).substr(0, 70));
   }
-  ASSERT_TRUE(all_connected(*server, 0));
   Listener listener(server->port());
-  ASSERT_TRUE(all_connected(*server, 1));
-  server->send({"still here", 0, IgtlTransform{}});
-  ASSERT_TRUE(eventually([&] { return listener.last_device() == "still here"; }));
+  // Some of the storm may still wait to be accepted: the listener's turn comes after.
+  ASSERT_TRUE(eventually([&] {
+    server->send({"still here", 0, IgtlTransform{}});
+    return listener.last_device() == "still here";
+  }));
+  EXPECT_TRUE(all_connected(*server, 1));
 }
 
 TEST(IgtlSockets, ClientsOverTheLimitAreTurnedAway) {
