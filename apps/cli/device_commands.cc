@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
+#include "navigate_command.h"
+#include "operate_command.h"
 #include "receive_command.h"
+#include "replay_command.h"
 #include "tracker_command.h"
+#include "virtual_or_command.h"
 
 namespace helicarm::cli {
 namespace {
@@ -33,6 +37,14 @@ void add_receive(CLI::App& app, Action& action) {
   command->add_option("--watch", a.watch, "Take pictures from this folder instead; its files stay");
   command->add_option("--count", a.count, "End after so many pictures")->check(within(1, 1e9));
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
+}
+
+void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
+  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
+  command->add_option("--seconds", a.seconds, "End by itself; otherwise when interrupted")
+      ->check(within(0, 1e6));
+  command->add_flag("--ask", a.options.ask_for_tracking,
+                    "Ask for tracking (STT_TDATA), as some servers expect");
 }
 
 void add_tracker(CLI::App& app, Action& action) {
@@ -70,11 +82,79 @@ void add_tracker(CLI::App& app, Action& action) {
   pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
 }
 
+void add_virtual_or(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "virtual-or", "A virtual C-arm, tracker and robot that speak the real ones' protocols",
+                  "helicarm virtual-or --plan plan.json\n"
+                  "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
+  auto& a = arguments_of(command, action, virtual_or_command);
+  command->add_option("--plan", a.plan, "Write a plan for navigate, with a surgeon's clicks");
+  command->add_option("--size", a.room.picture_size, "Pixels a side: 512 or 1024")->capture_default_str();
+  command->add_option("--rate", a.room.tracker_rate_hz, "Of the tracker, Hz")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  command->add_option("--tracker-port", a.room.tracker_port, "OpenIGTLink; each port 0: any that is free")
+      ->capture_default_str();
+  command->add_option("--rtde-port", a.room.rtde_port, "of the robot")->capture_default_str();
+  command->add_option("--dashboard-port", a.room.dashboard_port, "of the robot")->capture_default_str();
+  command->add_option("--script-port", a.room.script_port, "of the robot")->capture_default_str();
+  command->add_option("--receiver-port", a.receiver.port, "Where the C-arm sends its pictures")
+      ->capture_default_str();
+  command->add_option("--receiver-title", a.receiver.title, "Its application entity title")
+      ->capture_default_str();
+  command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
+}
+
+void add_navigate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "navigate", "A whole operation by a plan: X-rays, measurement, robot, check",
+                  "helicarm virtual-or --plan plan.json        (in one terminal)\n"
+                  "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)");
+  auto& a = arguments_of(command, action, navigate_command);
+  command->add_option("PLAN", a.plan, "plan.json (docs/formats.md)")->required();
+  command->add_option("--out", a.out, "Folder of the session: pictures, cases, record")
+      ->capture_default_str();
+  command->add_option("--picks", a.picks,
+                      "JSON with \"picks\" as in case.json: waited for after the pictures");
+  command->add_option("--address", a.receiver.address, "Where to listen for pictures")->capture_default_str();
+  command->add_option("--port", a.receiver.port, "DICOM port; 0: any that is free")->capture_default_str();
+  command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
+      ->capture_default_str();
+  command->add_flag("--yes", a.yes, "Confirm every order without asking: only where nobody can be hurt");
+}
+
+void add_operate(CLI::App& app, Action& action) {
+  auto* command =
+      add_command(app, "operate", "Table 2's experiment in the virtual operating room, end to end",
+                  "helicarm operate --cases 4 --out operate");
+  auto& a = arguments_of(command, action, operate_command);
+  command->add_option("--cases", a.cases, "Pairs of bones, four points each")
+      ->check(within(1, 1000))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "Folder for operate.csv, operate.json and the sessions")
+      ->capture_default_str();
+  command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
+  command->add_option("--rate", a.rate_hz, "Of the tracker, Hz")
+      ->check(within(5, 1000))
+      ->capture_default_str();
+}
+
+void add_replay(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "replay", "Recompute an operation from its record, to the last bit",
+                              "helicarm replay operate/case-1");
+  auto& a = arguments_of(command, action, replay_command);
+  command->add_option("SESSION", a.session, "Folder that holds session.log")->required();
+}
+
 }  // namespace
 
 void add_device_commands(CLI::App& app, Action& action) {
   add_receive(app, action);
   add_tracker(app, action);
+  add_virtual_or(app, action);
+  add_navigate(app, action);
+  add_operate(app, action);
+  add_replay(app, action);
 }
 
 }  // namespace helicarm::cli

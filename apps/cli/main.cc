@@ -17,14 +17,6 @@ namespace {
 
 constexpr int internal_error = 1;
 
-void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
-  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
-  command->add_option("--seconds", a.seconds, "End by itself; otherwise when interrupted")
-      ->check(within(0, 1e6));
-  command->add_flag("--ask", a.options.ask_for_tracking,
-                    "Ask for tracking (STT_TDATA), as some servers expect");
-}
-
 int report(const Failure& failure, const Console& console) {
   const int exit = exit_code(failure.reason);
   const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";

@@ -71,7 +71,7 @@ Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments
   return options;
 }
 
-Json json_of(const LinkStatus& link, const std::vector<ToolState>& tools) {
+Json json_of(const TrackerLinkStatus& link, const std::vector<ToolState>& tools) {
   Json json;
   json["state"] = code(link.state);
   json["trouble"] = link.trouble;
@@ -89,7 +89,7 @@ Json json_of(const LinkStatus& link, const std::vector<ToolState>& tools) {
   return json;
 }
 
-std::string table_of(const LinkStatus& link, const std::vector<ToolState>& tools) {
+std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>& tools) {
   std::string table = fmt::format("{}  {}\n", code(link.state), link.trouble);
   for (const ToolState& tool : tools) {
     table +=
@@ -117,7 +117,7 @@ CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Conso
     if (!console.json && !console.quiet)
       console.progress << table_of((*client)->status(), tools()) << std::flush;
   });
-  const LinkStatus link = (*client)->status();
+  const TrackerLinkStatus link = (*client)->status();
   if (console.json)
     console.out << to_text(json_of(link, tools())) << '\n';
   else

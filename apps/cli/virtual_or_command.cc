@@ -35,7 +35,8 @@ operating_room::CArmFault c_arm_fault(const std::string& name) {
 }
 
 /// Does what one line says and answers with one; throws BadInput.
-std::string obey(const std::string& line, VirtualRoom& room, const operating_room::PictureReceiver& receiver) {
+std::string obey(const std::string& line, VirtualRoom& room,
+                 const operating_room::PictureReceiver& receiver) {
   std::istringstream said(line);
   std::string verb, what, how;
   said >> verb >> what;
@@ -94,15 +95,15 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     options.seed = console.seed;
     const auto room = value_or_throw(VirtualRoom::open(options));
     if (!arguments.plan.empty())
-      value_or_throw(
-          write_file(arguments.plan, to_text(to_json(plan_for(*room, room->tracker().port())))));
+      value_or_throw(write_file(arguments.plan, to_text(to_json(plan_for(*room, room->tracker().port())))));
     if (!console.quiet)
       console.progress << fmt::format(
                               "tracker (OpenIGTLink) port {}\nrobot (UR5): RTDE {}, dashboard {}, script {}\n"
                               "C-arm sends to {} {} port {}\nsay: {}\n",
-                              room->tracker().port(), room->robot().rtde_port(), room->robot().dashboard_port(),
-                              room->robot().script_port(), arguments.receiver.title,
-                              arguments.receiver.address, arguments.receiver.port, words)
+                              room->tracker().port(), room->robot().rtde_port(),
+                              room->robot().dashboard_port(), room->robot().script_port(),
+                              arguments.receiver.title, arguments.receiver.address, arguments.receiver.port,
+                              words)
                        << std::flush;
     const std::jthread listener(
         [&](const std::stop_token& stop) { listen(stop, *room, arguments, console, end); });

@@ -43,30 +43,22 @@ void need(const OFCondition& done, const char* what) {
     throw BadInput(Reason::not_connected, fmt::format("virtual C-arm: {}: {}", what, done.text()));
 }
 
-/// Breaks the connection off once a part of the picture is on its way.
-class Sender : public DcmSCU {
- public:
-  explicit Sender(bool breaks_off) : breaks_off_(breaks_off) {}
-  void notifySENDProgress(const unsigned long sent) override {
-    if (breaks_off_ && sent > 0) abortAssociation();
-  }
-
- private:
-  bool breaks_off_;
-};
-
 void send(const fs::path& file, const PictureReceiver& receiver, CArmFault fault) {
-  Sender sender(fault == CArmFault::breaks_off);
+  DcmSCU sender;
   sender.setAETitle("VIRTUAL_C_ARM");
   sender.setPeerHostName(receiver.address.c_str());
   sender.setPeerPort(receiver.port);
   sender.setPeerAETitle(fault == CArmFault::wrong_title ? "SOMEBODY" : receiver.title.c_str());
-  sender.setProgressNotificationMode(fault == CArmFault::breaks_off);
+  sender.setProgressNotificationMode(false);
   OFList<OFString> syntaxes;
   syntaxes.push_back(UID_LittleEndianExplicitTransferSyntax);
   need(sender.addPresentationContext(UID_XRayAngiographicImageStorage, syntaxes), "presentation context");
   need(sender.initNetwork(), "network");
   need(sender.negotiateAssociation(), "association");
+  if (fault == CArmFault::breaks_off) {
+    need(sender.abortAssociation(), "abort");
+    throw BadInput(Reason::not_connected, "virtual C-arm: broke the association off");
+  }
   Uint16 status = 0;
   need(sender.sendSTORERequest(0, file.c_str(), nullptr, status), "picture");
   if (status != 0)

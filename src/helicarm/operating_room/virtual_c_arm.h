@@ -17,7 +17,7 @@ struct PictureReceiver {
 enum class CArmFault {
   none,
   wrong_title,    ///< calls somebody else
-  breaks_off,     ///< hangs up within the picture
+  breaks_off,     ///< hangs up before the picture
   same_picture,   ///< sends the other view's picture
   other_patient,  ///< the picture belongs to another study
 };

@@ -1,4 +1,163 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operating_room/virtual_room.h"
 
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
 #include <gtest/gtest.h>
+
+#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/tracker/igtl_client.h"
+#include "helicarm/devices/tracker/pose_board.h"
+
+namespace helicarm::operating_room {
+namespace {
+
+constexpr int small = 512;
+
+VirtualRoomOptions any_ports() {
+  VirtualRoomOptions options;
+  options.picture_size = small;
+  options.tracker_rate_hz = 200;
+  options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
+  return options;
+}
+
+class Room : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { room_ = VirtualRoom::open(any_ports()).value(); }
+  static void TearDownTestSuite() { room_.reset(); }
+
+  static std::unique_ptr<VirtualRoom> room_;
+};
+std::unique_ptr<VirtualRoom> Room::room_;
+
+/// Follows the room's tracker until the tool's poses number so many.
+class Follower {
+ public:
+  explicit Follower(VirtualRoom& room) {
+    IgtlClientOptions options;
+    options.port = room.tracker().port();
+    options.ask_for_tracking = true;
+    client_ = IgtlClient::start(options, [this](const IgtlMessage& message, double arrival_s) {
+                board_.take(message, arrival_s);
+              }).value();
+  }
+  std::optional<RigidTransform> wait_for(const std::string& tool, std::uint64_t poses) {
+    for (int i = 0; i < 1000; ++i) {
+      for (const ToolState& state : board_.tools(monotonic_seconds()))
+        if (state.name == tool && state.accepted >= poses) return state.tracker_from_tool;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return std::nullopt;
+  }
+
+  bool knows(const std::string& tool) const {
+    for (const ToolState& state : board_.tools(monotonic_seconds()))
+      if (state.name == tool) return true;
+    return false;
+  }
+
+ private:
+  PoseBoard board_;
+  std::unique_ptr<IgtlClient> client_;
+};
+
+TEST_F(Room, TrackerTellsWhereBonesAreWithinItsNoise) {
+  Follower follower(*room_);
+  for (const char* bone : {"femur", "tibia"}) {
+    const auto seen = follower.wait_for(bone, 5);
+    ASSERT_TRUE(seen) << bone;
+    EXPECT_LT((seen->translation - room_->theatre().tracker_from(bone).translation).norm(), 1.5) << bone;
+  }
+}
+
+TEST_F(Room, TrackerSeesTheToolWhereTheRobotTrulyHoldsIt) {
+  Follower follower(*room_);
+  const auto seen = follower.wait_for(tool_marker, 5);
+  ASSERT_TRUE(seen);
+  const RigidTransform tip =
+      *seen * room_->theatre().flange_from_marker().inverse() * room_->theatre().tool().flange_from_tcp;
+  EXPECT_LT((tip.translation - room_->tracker_from_tip().translation).norm(), 3);
+}
+
+TEST_F(Room, SomeFacetOfTheCalibratorIsSeenAndTellsItsPose) {
+  Follower follower(*room_);
+  ASSERT_TRUE(follower.wait_for("femur", 20));
+  int seen = 0;
+  for (const TrackedFacet& facet : calibrator_facets()) {
+    if (!follower.knows(facet.name)) continue;
+    ++seen;
+    const RigidTransform calibrator =
+        *follower.wait_for(facet.name, 1) * facet.calibrator_from_facet.inverse();
+    EXPECT_LT((calibrator.translation - room_->theatre().tracker_from("calibrator").translation).norm(), 4);
+  }
+  EXPECT_GE(seen, 1);
+}
+
+TEST_F(Room, HiddenMarkerIsLeftOut) {
+  ASSERT_TRUE(room_->set_fault("hide:tibia", true));
+  Follower follower(*room_);
+  ASSERT_TRUE(follower.wait_for("femur", 20));
+  EXPECT_FALSE(follower.knows("tibia"));
+  ASSERT_TRUE(room_->set_fault("hide:tibia", false));
+  EXPECT_TRUE(follower.wait_for("tibia", 1));
+}
+
+TEST_F(Room, BoneThatMovesTakesItsBallsAlong) {
+  const Eigen::Vector3d before = room_->theatre().point_in_tracker("FS");
+  room_->theatre().move_bone("femur", {Eigen::Matrix3d::Identity(), {1, 2, 3}});
+  EXPECT_NEAR((room_->theatre().point_in_tracker("FS") - before - Eigen::Vector3d(1, 2, 3)).norm(), 0, 1e-9);
+  room_->theatre().move_bone("femur", {Eigen::Matrix3d::Identity(), {-1, -2, -3}});
+}
+
+TEST_F(Room, UnknownFaultAndViewAreRefused) {
+  EXPECT_EQ(room_->set_fault("gremlins", true).error().reason, Reason::bad_value);
+  EXPECT_EQ(shoot(room_->theatre(), "PA", {}).error().reason, Reason::bad_value);
+}
+
+class Shots : public Room {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "helicarm_shots_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    folder_ = name;
+    inbox_ = Inbox::open(folder_).value();
+    ReceiverOptions options;
+    options.port = 0;
+    receiver_ = DicomReceiver::open(options, *inbox_).value();
+  }
+  void TearDown() override {
+    receiver_.reset();
+    inbox_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+  Expected<void> shot(const char* view, CArmFault fault = CArmFault::none) {
+    return shoot(room_->theatre(), view, {"127.0.0.1", receiver_->port()}, fault);
+  }
+
+  std::filesystem::path folder_;
+  std::unique_ptr<Inbox> inbox_;
+  std::unique_ptr<DicomReceiver> receiver_;
+};
+
+TEST_F(Shots, PictureOfAnotherProgramsSenderArrives) {
+  ASSERT_TRUE(shot("AP"));
+  ASSERT_TRUE(shot("LAT"));
+  EXPECT_EQ(receiver_->counters().stored, 2u);
+}
+
+TEST_F(Shots, WrongTitleIsRejected) {
+  EXPECT_FALSE(shot("AP", CArmFault::wrong_title));
+  EXPECT_EQ(receiver_->counters().rejected, 1u);
+}
+
+TEST_F(Shots, AssociationThatBreaksOffLeavesNothing) {
+  EXPECT_FALSE(shot("AP", CArmFault::breaks_off));
+  ASSERT_TRUE(shot("AP"));
+  EXPECT_EQ(receiver_->counters().stored, 1u);
+}
+
+}  // namespace
+}  // namespace helicarm::operating_room

@@ -14,11 +14,15 @@ namespace {
 constexpr const char* plan_format = "helicarm-plan/1";
 constexpr Range millimetres{-100000, 100000};
 
+/// Made rigid where its digits are few; else as written, to the last bit, so that a record can be replayed.
 RigidTransform pose_from(JsonReader& reader, const char* key) {
   const auto numbers = reader.matrix(key, 4, 4, millimetres);
-  const Eigen::Matrix4d matrix =
+  const Eigen::Matrix4d given =
       Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
-  return value_or_throw(rigid_transform_from(matrix, reader.where() + ": " + key));
+  const RigidTransform mended = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
+  constexpr double rounding = 1e-9;
+  if ((mended.matrix() - given).cwiseAbs().maxCoeff() > rounding) return mended;
+  return {given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
 }
 
 std::uint16_t port_from(JsonReader& reader, const char* key) {

@@ -17,7 +17,7 @@ constexpr double now_s = 0.5;
 constexpr double settle_s = 0.1;
 
 constexpr Range any_time{0, 1e12};
-constexpr Range millimetres{-1e6, 1e6};
+constexpr Range sample_range{-1e6, 1e6};
 
 std::vector<std::string> tools_of(const TrackerPlan& plan) {
   std::vector<std::string> tools{plan.femur, plan.tibia, plan.tool};
@@ -80,7 +80,7 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
         JsonReader sample(entry, origin + ": " + tool);
         const double time = sample.number("time_s", any_time), device = sample.number("device_s", any_time);
         const double arrival = sample.number("arrival_s", any_time);
-        const auto rows = sample.matrix("tracker_from_tool", 4, 4, millimetres);
+        const auto rows = sample.matrix("tracker_from_tool", 4, 4, sample_range);
         const Eigen::Matrix4d matrix =
             Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
         sample.finish();
@@ -122,7 +122,7 @@ Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& p
     const auto pose = see_tool(window, plan, facet.name);
     if (pose)
       seen.push_back({facet.name, pose->tracker_from_marker, pose->covariance});
-    else if (!why_not || pose.error().reason == Reason::pose_spread)
+    else if (!why_not || why_not->reason == Reason::no_pose || pose.error().reason == Reason::pose_spread)
       why_not = pose.error();
   }
   if (why_not && (seen.empty() || why_not->reason == Reason::pose_spread))

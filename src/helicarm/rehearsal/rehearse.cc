@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
-#include <deque>
 #include <numbers>
 #include <thread>
 
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
-#include "helicarm/devices/receiver/receiver.h"
-#include "helicarm/devices/tracker/igtl_client.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/operation/connections.h"
 
 namespace helicarm {
 namespace {
@@ -21,6 +18,8 @@ namespace {
 using operating_room::VirtualRoom;
 
 constexpr std::chrono::seconds patience{20};
+constexpr double picture_patience_s = 20;
+constexpr int most_shots = 3;
 /// An exposure's poses are taken from the second and a half before it.
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
@@ -28,47 +27,6 @@ constexpr double chi2_95_of_two = 5.991;
 /// Of room_tracker: its drift, rms over the axes, and the turn that half a second's mean leaves.
 constexpr double kept_sigma_mm = 0.114;
 constexpr double kept_sigma_deg = 0.03;
-
-struct DatedArrival {
-  Arrival arrival;
-  double time_s;
-};
-
-/// Pictures as they come in, from the receiver's threads to ours.
-class Arrivals {
- public:
-  ReceiverHooks hooks() {
-    return {[this](const Arrival& arrival) {
-              const std::lock_guard lock(mutex_);
-              arrivals_.push_back({arrival, monotonic_seconds()});
-              news_.notify_all();
-            },
-            [](const Failure&) {}};
-  }
-  DatedArrival next() {
-    std::unique_lock lock(mutex_);
-    if (!news_.wait_for(lock, patience, [&] { return !arrivals_.empty(); }))
-      throw BadInput(Reason::not_connected, "no picture came");
-    DatedArrival arrival = std::move(arrivals_.front());
-    arrivals_.pop_front();
-    return arrival;
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable news_;
-  std::deque<DatedArrival> arrivals_;
-};
-
-RobotConfig config_of(const RobotPlan& plan) {
-  RobotConfig config;
-  config.model = value_or_throw(robot_model(plan.model));
-  config.address = plan.address;
-  config.rtde_port = plan.rtde_port;
-  config.dashboard_port = plan.dashboard_port;
-  config.script_port = plan.script_port;
-  return config;
-}
 
 Json clicks_of(const simulation::SimulatedCase& room) {
   Json picks = Json::array();
@@ -106,6 +64,21 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
           in_xrays ? in_xrays->combined_mm : 0};
 }
 
+/// Shoots, and again where the tracker did not see everything at rest: on a busy machine it may stutter.
+Expected<void> expose(const std::string& view, VirtualRoom& room, Connections& devices,
+                      Operation& operation) {
+  Expected<void> taken = fail(Reason::not_connected, "no picture came");
+  for (int attempt = 0; attempt < most_shots && !taken; ++attempt) {
+    std::this_thread::sleep_for(before_exposure);
+    if (auto shot = operating_room::shoot(room.theatre(), view, {"127.0.0.1", devices.receiver_port()});
+        !shot)
+      return shot;
+    const auto picture = devices.next_picture(picture_patience_s);
+    if (picture) taken = operation.take(view, picture->arrival, picture->time_s);
+  }
+  return taken;
+}
+
 }  // namespace
 
 OperationPlan plan_for(VirtualRoom& room, std::uint16_t tracker_port) {
@@ -137,30 +110,17 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     const auto room = value_or_throw(VirtualRoom::open(ports));
     const OperationPlan plan = plan_for(*room, room->tracker().port());
 
-    Arrivals arrivals;
-    const auto inbox = value_or_throw(Inbox::open(folder / "inbox"));
+    Connections devices(plan, value_or_throw(Inbox::open(folder / "inbox")));
     ReceiverOptions receiving;
     receiving.port = 0;
-    const auto receiver = value_or_throw(DicomReceiver::open(receiving, *inbox, arrivals.hooks()));
-    PoseBoard board;
-    IgtlClientOptions following;
-    following.port = plan.tracker.port;
-    following.ask_for_tracking = true;
-    const auto tracker = value_or_throw(IgtlClient::start(
-        following, [&](const IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
-        [&] { board.forget_time(); }));
-    RobotLink robot(config_of(plan.robot));
-    const auto operation =
-        value_or_throw(Operation::begin(plan, folder, board, robot, [&](Step step, const std::string& what) {
+    value_or_throw(devices.listen(receiving));
+    RobotLink& robot = devices.robot();
+    const auto operation = value_or_throw(
+        Operation::begin(plan, folder, devices.board(), robot, [&](Step step, const std::string& what) {
           options.tell(fmt::format("{}: {}", name_of(step), what));
         }));
 
-    for (const std::string& view : plan.views) {
-      std::this_thread::sleep_for(before_exposure);
-      value_or_throw(operating_room::shoot(room->theatre(), view, {"127.0.0.1", receiver->port()}));
-      const DatedArrival picture = arrivals.next();
-      value_or_throw(operation->take(view, picture.arrival, picture.time_s));
-    }
+    for (const std::string& view : plan.views) value_or_throw(expose(view, *room, devices, *operation));
     value_or_throw(operation->measure());
 
     const auto nod = [&](const RobotOrder& order) -> Expected<std::string> { return robot.confirm(order); };

@@ -83,9 +83,9 @@ void RobotLink::latch(Failure failure) {
 
 double RobotLink::age_s() const { return std::chrono::duration<double>(Clock::now() - heard_).count(); }
 
-LinkStatus RobotLink::status() const {
+RobotLinkStatus RobotLink::status() const {
   const std::lock_guard lock(guard_);
-  LinkStatus status{phase_, why_, state_, state_ ? age_s() : 0, version_, {}};
+  RobotLinkStatus status{phase_, why_, state_, state_ ? age_s() : 0, version_, {}};
   if (!state_) return status;
   const double mismatch = kinematic_mismatch_mm(config_.model, *state_);
   if (mismatch > config_.mismatch_mm)

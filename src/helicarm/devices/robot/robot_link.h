@@ -38,7 +38,7 @@ enum class LinkPhase {
 };
 std::string_view name(LinkPhase phase);
 
-struct LinkStatus {
+struct RobotLinkStatus {
   LinkPhase phase = LinkPhase::disconnected;
   std::optional<Failure> why;  ///< of the last stop or end of the connection
   std::optional<RobotState> state;
@@ -55,7 +55,7 @@ class RobotLink {
   explicit RobotLink(RobotConfig config);
   ~RobotLink();
 
-  LinkStatus status() const;
+  RobotLinkStatus status() const;
   /// Waits until it is connected and has a state; the reason why not after this time.
   Expected<RobotState> wait_connected(std::chrono::steady_clock::duration patience) const;
 

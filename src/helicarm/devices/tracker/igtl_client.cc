@@ -49,7 +49,7 @@ struct IgtlClient::Impl {
   double pause_s;
 
   mutable std::mutex mutex;  ///< of what follows
-  LinkStatus status;         ///< counters: of earlier connections, and of attempts
+  TrackerLinkStatus status;         ///< counters: of earlier connections, and of attempts
   std::shared_ptr<IgtlConnection> connection;
   std::jthread thread;
 };
@@ -136,9 +136,9 @@ Expected<std::unique_ptr<IgtlClient>> IgtlClient::start(const IgtlClientOptions&
   return std::unique_ptr<IgtlClient>(new IgtlClient(std::move(impl)));
 }
 
-LinkStatus IgtlClient::status() const {
+TrackerLinkStatus IgtlClient::status() const {
   const std::lock_guard lock(impl_->mutex);
-  LinkStatus status = impl_->status;
+  TrackerLinkStatus status = impl_->status;
   if (impl_->connection) add_counters(status.counters, impl_->connection->counters());
   return status;
 }

@@ -27,7 +27,7 @@ struct IgtlClientOptions {
 enum class LinkState { connecting, connected, waiting };
 std::string_view code(LinkState state);
 
-struct LinkStatus {
+struct TrackerLinkStatus {
   LinkState state = LinkState::connecting;
   std::string trouble;  ///< why the last connection ended or failed; empty where none did
   /// "attempts", "connections", "silences" and, over all connections, those of IgtlConnection
@@ -52,7 +52,7 @@ class IgtlClient {
                                                      std::function<void()> on_connect = {});
   ~IgtlClient();
 
-  LinkStatus status() const;  ///< from any thread
+  TrackerLinkStatus status() const;  ///< from any thread
   /// From any thread; lost while there is no connection.
   void send(const IgtlMessage& message);
   /// Returns at once, with the thread ended.

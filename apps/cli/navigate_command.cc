@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "navigate_command.h"
+
+#include <iostream>
+#include <thread>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/text.h"
+#include "helicarm/operation/connections.h"
+#include "helicarm/operation/operation.h"
+#include "stop_signal.h"
+
+namespace helicarm::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Asks the person at the terminal; nobody there means no.
+class Consent {
+ public:
+  Consent(RobotLink& robot, bool yes, Console& console) : robot_(robot), yes_(yes), console_(console) {}
+
+  Expected<std::string> operator()(const RobotOrder& order) {
+    if (!yes_ && !agreed(order))
+      return fail(Reason::order_not_confirmed, fmt::format("{}: nobody confirmed it", order.name));
+    return robot_.confirm(order);
+  }
+
+ private:
+  bool agreed(const RobotOrder& order) {
+    if (!::isatty(STDIN_FILENO)) return false;
+    const RigidTransform& last = order.waypoints.back().base_from_tcp;
+    console_.progress
+        << fmt::format(
+               "order \"{}\": {} moves, tip to {:.0f} {:.0f} {:.0f} mm in the robot's base; stand "
+               "clear. Type \"go\" to confirm: ",
+               without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
+               last.translation.y(), last.translation.z())
+        << std::flush;
+    std::string answer;
+    return std::getline(std::cin, answer) && answer == "go";
+  }
+
+  RobotLink& robot_;
+  bool yes_;
+  Console& console_;
+};
+
+Json picks_of(const fs::path& file) { return value_or_throw(read_json(file)).value("picks", Json::array()); }
+
+void tell_points(const Result& result, Console& console) {
+  for (const PointResult& point : result.points)
+    if (point.place) {
+      const Eigen::Vector3d& at = point.place->in_calibrator;
+      console.out << fmt::format("  {:<8} {:9.3f} {:9.3f} {:9.3f}  +- {:.3f} mm\n", point.name, at.x(),
+                                 at.y(), at.z(), std::sqrt(point.place->covariance_in_calibrator.trace()));
+    }
+}
+
+void tell_outcome(const TunnelOutcome& outcome, Console& console) {
+  console.out << fmt::format(
+      "{}: start {:.2f} mm off the tool's axis (expect {:.2f}), end {:.2f} (expect {:.2f}), after {} "
+      "corrections\n",
+      outcome.tunnel, outcome.start.distance_mm(), outcome.start.predicted_mm(), outcome.end.distance_mm(),
+      outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1);
+}
+
+}  // namespace
+
+CommandResult navigate_command(const NavigateArguments& arguments, Console& console) {
+  return guarded([&] {
+    const OperationPlan plan =
+        value_or_throw(plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
+    StopSignal stop;
+    Connections devices(plan, value_or_throw(Inbox::open(arguments.out / "inbox")));
+    value_or_throw(devices.listen(arguments.receiver));
+    const auto operation = value_or_throw(Operation::begin(
+        plan, arguments.out, devices.board(), devices.robot(), [&](Step step, const std::string& what) {
+          if (!console.quiet)
+            console.progress << fmt::format("{}: {}\n", name_of(step), without_control_characters(what))
+                             << std::flush;
+        }));
+    const auto wait = [&](double seconds) {
+      if (stop.wait(seconds)) throw BadInput(Reason::robot_stopped, "told to end");
+    };
+    while (!operation->views_to_come().empty()) {
+      const std::string view = operation->views_to_come().front();
+      if (!console.quiet)
+        console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
+                         << std::flush;
+      std::optional<DatedArrival> picture;
+      while (!(picture = devices.next_picture(0))) wait(0.1);
+      const auto taken = operation->take(view, picture->arrival, picture->time_s);
+      if (!taken)
+        console.progress << fmt::format("{}: {}: {}; expose again\n", view, code(taken.error().reason),
+                                        without_control_characters(taken.error().message))
+                         << std::flush;
+    }
+    if (!arguments.picks.empty()) {
+      while (!fs::exists(arguments.picks)) wait(0.2);
+      operation->pick(picks_of(arguments.picks));
+    }
+    value_or_throw(operation->measure());
+    tell_points(operation->result(), console);
+
+    Consent consent(devices.robot(), arguments.yes, console);
+    const Operation::Confirm confirm = [&](const RobotOrder& order) { return consent(order); };
+    value_or_throw(devices.robot().wait_connected(std::chrono::seconds(10)));
+    value_or_throw(devices.robot().unlock("the operator at the terminal"));
+    value_or_throw(operation->register_robot(confirm));
+    for (const PlannedTunnel& tunnel : plan.tunnels) {
+      const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
+      const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
+      value_or_throw(operation->preview(order));
+      tell_outcome(value_or_throw(operation->go(order, value_or_throw(consent(order)))), console);
+      value_or_throw(operation->withdraw(order, rest, confirm));
+    }
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "command.h"
+#include "helicarm/devices/receiver/receiver.h"
+
+namespace helicarm::cli {
+
+struct NavigateArguments {
+  std::filesystem::path plan;
+  std::filesystem::path out = "session";
+  std::filesystem::path picks;  ///< waited for once the pictures are in; empty: those of the plan
+  ReceiverOptions receiver;
+  bool yes = false;  ///< confirm every order without asking: for rehearsals
+};
+
+/// A whole operation from a plan: pictures, measurement, robot, check.
+CommandResult navigate_command(const NavigateArguments& arguments, Console& console);
+
+}  // namespace helicarm::cli

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/connections.h"
+
+#include <chrono>
+
+namespace helicarm {
+namespace {
+
+RobotConfig config_of(const RobotPlan& plan) {
+  RobotConfig config;
+  config.model = value_or_throw(robot_model(plan.model));
+  config.address = plan.address;
+  config.rtde_port = plan.rtde_port;
+  config.dashboard_port = plan.dashboard_port;
+  config.script_port = plan.script_port;
+  config.limits = plan.approach.limits;
+  return config;
+}
+
+}  // namespace
+
+Connections::Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox)
+    : inbox_(std::move(inbox)), robot_(config_of(plan.robot)) {
+  IgtlClientOptions options;
+  options.address = plan.tracker.address;
+  options.port = plan.tracker.port;
+  options.ask_for_tracking = true;
+  tracker_ = value_or_throw(IgtlClient::start(
+      options, [this](const IgtlMessage& message, double arrival_s) { board_.take(message, arrival_s); },
+      [this] { board_.forget_time(); }));
+}
+
+Expected<void> Connections::listen(const ReceiverOptions& options) {
+  ReceiverHooks hooks;
+  hooks.arrived = [this](const Arrival& arrival) {
+    const std::lock_guard lock(mutex_);
+    arrivals_.push_back({arrival, monotonic_seconds()});
+    news_.notify_all();
+  };
+  return DicomReceiver::open(options, *inbox_, std::move(hooks))
+      .map([this](std::unique_ptr<DicomReceiver> receiver) { receiver_ = std::move(receiver); });
+}
+
+std::optional<DatedArrival> Connections::next_picture(double patience_s) {
+  std::unique_lock lock(mutex_);
+  if (!news_.wait_for(lock, std::chrono::duration<double>(patience_s), [&] { return !arrivals_.empty(); }))
+    return std::nullopt;
+  DatedArrival arrival = std::move(arrivals_.front());
+  arrivals_.pop_front();
+  return arrival;
+}
+
+}  // namespace helicarm

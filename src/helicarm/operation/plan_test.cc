@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/plan.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm {
+namespace {
+
+OperationPlan plan() {
+  OperationPlan plan;
+  plan.tracker.facets = {{"calibrator/1", {Eigen::Matrix3d::Identity(), {85, 0, 10}}}};
+  plan.robot.tool = {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2};
+  plan.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
+  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end}};
+  plan.max_error_mm = 2;
+  return plan;
+}
+
+TEST(Plan, WhatIsWrittenIsRead) {
+  const Json json = to_json(plan());
+  const auto read = plan_from(json, "plan.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(to_json(*read), json);
+}
+
+TEST(Plan, UnknownKeyIsRefused) {
+  Json json = to_json(plan());
+  json["robot"]["speed"] = 1;
+  EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::unknown_key);
+}
+
+TEST(Plan, TunnelOrFacetGivenTwiceIsRefused) {
+  for (const char* list : {"tunnels", "facets"}) {
+    Json json = to_json(plan());
+    Json& entries = std::string(list) == "tunnels" ? json["tunnels"] : json["tracker"]["facets"];
+    entries.push_back(entries.front());
+    EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::name_clash) << list;
+  }
+}
+
+TEST(Plan, ViewThatIsAPathIsRefused) {
+  Json json = to_json(plan());
+  json["views"] = {"AP", "../LAT"};
+  EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::bad_value);
+}
+
+TEST(Plan, SpeedBeyondTheLimitIsRefusedNamingIt) {
+  Json json = to_json(plan());
+  json["robot"]["approach"]["travel_mm_s"] = 5000;
+  const auto read = plan_from(json, "plan.json");
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("travel_mm_s"), std::string::npos);
+  EXPECT_NE(read.error().message.find("250"), std::string::npos);
+}
+
+TEST(Plan, FacetThatIsNoRigidMotionIsRefused) {
+  Json json = to_json(plan());
+  json["tracker"]["facets"][0]["calibrator_from_facet"][0][0] = 2;
+  EXPECT_FALSE(plan_from(json, "plan.json"));
+}
+
+}  // namespace
+}  // namespace helicarm

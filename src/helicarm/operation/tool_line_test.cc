@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/tool_line.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/operation/hand_eye_tour.h"
+#include "helicarm/operation/outcome_table.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+HandEye hand_eye() {
+  HandEye hand_eye;
+  hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};
+  hand_eye.tracker_from_base = {rotation_from_euler(1, 0.3, -2), {300, 100, 1200}};
+  hand_eye.covariance.setZero();
+  return hand_eye;
+}
+
+RobotTool drill() { return {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
+
+TEST(ToolLine, OfAToolOnTheTunnelMissesNothing) {
+  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  const EndMiss miss =
+      end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), hand_eye(), drill());
+  EXPECT_NEAR(miss.distance_mm(), 0, 1e-9);
+  EXPECT_NEAR(miss.predicted_mm(), 0, 1e-9);
+}
+
+TEST(ToolLine, MissIsMeasuredAcrossTheAxisAlone) {
+  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  const EndMiss miss =
+      end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), hand_eye(), drill());
+  EXPECT_NEAR(miss.distance_mm(), 0.5, 1e-9);
+  EXPECT_TRUE(miss.across_mm.isApprox(Eigen::Vector2d(0.3, -0.4), 1e-9));
+}
+
+TEST(ToolLine, CovarianceOfAMissIsThatOfDrawnErrors) {
+  HandEye known = hand_eye();
+  const Vector3d point(20, -100, 60);
+  const Eigen::Matrix3d of_point = Vector3d(0.04, 0.01, 0.09).asDiagonal();
+  known.covariance.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
+  known.covariance.block<3, 3>(3, 3).diagonal().setConstant(1e-6);
+  const EndMiss expected = end_miss(point, of_point, known, drill());
+  RandomStream random(3, 1);
+  const auto normal = [&] { return Vector3d(random.normal(), random.normal(), random.normal()); };
+  Eigen::Matrix2d drawn = Eigen::Matrix2d::Zero();
+  constexpr int trials = 20000;
+  for (int i = 0; i < trials; ++i) {
+    HandEye off = known;
+    off.flange_from_marker.translation += 0.1 * normal();
+    off.flange_from_marker.rotation = rotation_from_vector(1e-3 * normal()) * off.flange_from_marker.rotation;
+    const Vector3d at = point + of_point.cwiseSqrt() * normal();
+    const Eigen::Vector2d error =
+        end_miss(at, Eigen::Matrix3d::Zero(), off, drill()).across_mm - expected.across_mm;
+    drawn += error * error.transpose() / trials;
+  }
+  EXPECT_LT((drawn - expected.covariance).norm(), 0.04 * expected.covariance.norm());
+}
+
+TEST(ToolLine, StandsInTheCalibratorAsItWouldHaveStoodAtTheExposure) {
+  const RigidTransform tracker_from_calibrator{rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
+  const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
+  const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
+  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  // A tip on a point of the bone, now.
+  const Vector3d on_bone(30, 5, -20);
+  Poses exposure, now;
+  exposure.tracker_from_calibrator = tracker_from_calibrator;
+  exposure.tracker_from_femur = femur_then;
+  now.tracker_from_femur = femur_now;
+  RigidTransform tip{rotation_from_euler(0.5, 0.5, 0.5), femur_now * on_bone};
+  now.tracker_from_tool = tip * marker_from_tip.inverse();
+  const ToolLine line = tool_line("femur", Bone::femur, exposure, now, marker_from_tip).value();
+  EXPECT_LT((line.p2_in_calibrator - tracker_from_calibrator.inverse() * (femur_then * on_bone)).norm(),
+            1e-9);
+  EXPECT_NEAR((line.p2_in_calibrator - line.p1_in_calibrator).norm(), 100, 1e-9);
+  EXPECT_EQ(tool_line("tibia", Bone::tibia, exposure, now, marker_from_tip).error().reason, Reason::no_pose);
+}
+
+TEST(HandEyeTour, TurnsAboutAllAxesAndEndsWhereItBegan) {
+  const RigidTransform begin{rotation_from_euler(3, 0.1, 0.2), {400, 100, 300}};
+  const auto tour = hand_eye_tour(begin);
+  EXPECT_TRUE(tour.back().matrix().isApprox(begin.matrix(), 1e-12));
+  std::vector<HandEyePair> pairs;
+  for (const RigidTransform& pose : tour) {
+    const RigidTransform base_from_flange = pose * drill().flange_from_tcp.inverse();
+    pairs.push_back(
+        {base_from_flange, hand_eye().tracker_from_base * base_from_flange * hand_eye().flange_from_marker});
+  }
+  const HandEye found = calibrate_hand_eye(pairs).value();
+  EXPECT_LT((found.flange_from_marker.translation - hand_eye().flange_from_marker.translation).norm(), 1e-6);
+}
+
+TEST(OutcomeTable, FiguresAreThoseOfTheErrors) {
+  const std::vector<double> errors{1, 2, 3, 6};
+  const ErrorFigures figures = figures_of(errors);
+  EXPECT_EQ(figures.max, 6);
+  EXPECT_EQ(figures.min, 1);
+  EXPECT_EQ(figures.mean, 3);
+  EXPECT_NEAR(figures.rms, std::sqrt(12.5), 1e-12);
+  EXPECT_NEAR(figures.sd, std::sqrt(14.0 / 3), 1e-12);
+}
+
+TEST(OutcomeTable, OfNothingIsMisuse) { EXPECT_THROW(figures_of({}), std::invalid_argument); }
+
+}  // namespace
+}  // namespace helicarm
