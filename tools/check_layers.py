@@ -32,12 +32,12 @@ ROOMS = {
     "session": "core",
     "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                   " verification volume simulation",
-    "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                 " verification devices session navigation",
-    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session navigation operation"
-                 " guidance verification",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification volume simulation navigation",
+    "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
+                 " verification devices session navigation report",
+    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session navigation operation"
+                 " guidance verification report",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
              " verification volume simulation navigation report",
 }

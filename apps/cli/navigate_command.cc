@@ -114,7 +114,9 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     for (const PlannedTunnel& tunnel : plan.tunnels) {
       const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
       const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
-      value_or_throw(operation->preview(order));
+      console.progress << fmt::format("look at {}\n",
+                                      (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())
+                       << std::flush;
       tell_outcome(value_or_throw(operation->go(order, value_or_throw(consent(order)))), console);
       value_or_throw(operation->withdraw(order, rest, confirm));
     }

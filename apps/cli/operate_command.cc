@@ -14,6 +14,13 @@ namespace {
 
 /// Two at a time keep a small machine's robots on time.
 constexpr unsigned most_at_once = 2;
+constexpr int most_attempts = 3;
+
+/// What a machine too busy to keep a robot's time leads to; nothing moved that should not have.
+bool came_late(const Failure& failure) {
+  return failure.reason == Reason::stale_state || failure.reason == Reason::stale_pose ||
+         failure.reason == Reason::robot_stopped;
+}
 
 void refuse_earlier_operation(const std::filesystem::path& folder) {
   if (std::filesystem::exists(folder / "case-1"))
@@ -39,7 +46,14 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
         const std::lock_guard lock(telling);
         console.progress << fmt::format("bones {}: {}\n", i + 1, what) << std::flush;
       };
-      done[i] = rehearse(console.seed + i, arguments.out / fmt::format("case-{}", i + 1), options);
+      for (int attempt = 1; attempt <= most_attempts; ++attempt) {
+        const std::string folder =
+            attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
+        done[i] = rehearse(console.seed + i, arguments.out / folder, options);
+        if (done[i] || !came_late(done[i].error())) break;
+        options.tell(
+            fmt::format("broken off ({}: {})", code(done[i].error().reason), done[i].error().message));
+      }
     });
     std::vector<Rehearsal> rehearsals;
     for (Expected<Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));

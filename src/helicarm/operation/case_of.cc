@@ -5,6 +5,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/navigation/run_case.h"
 #include "helicarm/operation/records.h"
+#include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
 
 namespace helicarm {
@@ -85,6 +86,7 @@ Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan
   return guarded([&] {
     CaseRun run = value_or_throw(recompute_case(folder, plan));
     value_or_throw(write_file(folder / "result.json", to_text(to_json(run.result))));
+    value_or_throw(write_report(run.result, folder));
     return run;
   });
 }

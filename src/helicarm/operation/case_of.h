@@ -27,7 +27,7 @@ struct CaseRun {
 };
 /// Reads the case and runs it; writes nothing.
 Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan);
-/// The same, and writes result.json.
+/// The same, and writes result.json and the report.
 Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan);
 
 }  // namespace helicarm

@@ -6,9 +6,11 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/files.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/records.h"
+#include "helicarm/report/overlay.h"
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -144,7 +146,38 @@ Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
     bone_from_target_[name] = now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
                               order.waypoints.back().base_from_tcp;
     record("order", to_json(order));
+    draw_preview(order);
     return order;
+  });
+}
+
+void Operation::draw_preview(const RobotOrder& order) const {
+  const PathPreview path = value_or_throw(preview(order));
+  for (std::size_t i = 0; i < views_.size(); ++i)
+    if (const auto shown = path.by_view.find(views_[i].name); shown != path.by_view.end())
+      value_or_throw(write_file(folder_ / fmt::format("preview-{}-{}.png", order.name, views_[i].name),
+                                overlay_png(*result_, i, shown->second)));
+}
+
+Expected<ToolOverlay> Operation::tool_now(Bone bone) const {
+  return guarded([&] {
+    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "nothing is measured or registered yet");
+    const double now_s = monotonic_seconds();
+    const std::string& bone_marker = bone == Bone::femur ? plan_.tracker.femur : plan_.tracker.tibia;
+    const PoseSample tool = value_or_throw(board_.latest(plan_.tracker.tool, now_s));
+    const PoseSample bone_now = value_or_throw(board_.latest(bone_marker, now_s));
+    Poses now;
+    now.tracker_from_tool = tool.tracker_from_tool;
+    (bone == Bone::femur ? now.tracker_from_femur : now.tracker_from_tibia) = bone_now.tracker_from_tool;
+    ToolOverlay overlay{{}, now_s - std::min(tool.time_s, bone_now.time_s)};
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const auto line =
+          tool_line("", bone, views_[i].poses, now, marker_from_tcp(*hand_eye_, plan_.robot.tool));
+      const auto& calibrated = result_->views[i].calibrated;
+      if (!line || !calibrated) continue;
+      if (const auto seen = line_in_xray(calibrated->view, *line)) overlay.by_view[views_[i].name] = *seen;
+    }
+    return overlay;
   });
 }
 

@@ -32,6 +32,12 @@ struct PathPreview {
   std::map<std::string, std::vector<Eigen::Vector2d>> by_view;
 };
 
+/// The tool in each X-ray, and how old its pose and the bone's are.
+struct ToolOverlay {
+  std::map<std::string, PictureLine> by_view;
+  double age_s = 0;
+};
+
 /// One operation from the first X-ray to the last check, over devices that are already connected. Every
 /// decision, with all that led to it, is in the session's record before anything follows from it; a record
 /// that cannot be written stops the operation. Members are called from one thread.
@@ -66,9 +72,14 @@ class Operation {
   Expected<void> register_robot(const Confirm& confirm);
   const HandEye& hand_eye() const { return *hand_eye_; }
 
-  /// The order that brings the tool to the tunnel, and what it will look like. Nothing moves.
+  /// The order that brings the tool to the tunnel, and what it will look like: also as
+  /// preview-TUNNEL-VIEW.png in the session's folder. Nothing moves.
   Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
   Expected<PathPreview> preview(const RobotOrder& order) const;
+
+  /// The tool's line in the X-rays as it is held now against this bone (Eq. 6), from the newest poses.
+  /// Refuses stale_pose for one older than 0.1 s.
+  Expected<ToolOverlay> tool_now(Bone bone) const;
 
   /// Carries the confirmed order out, corrected by the tracker, and checks the result in the X-rays. Refuses
   /// (uncertain) an end whose predicted error is over the plan's limit.
@@ -98,6 +109,7 @@ class Operation {
   PoseWindow look(const char* why);
   Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
   TunnelOutcome check(const PlannedTunnel& tunnel);
+  void draw_preview(const RobotOrder& order) const;
 
   OperationPlan plan_;
   std::filesystem::path folder_;

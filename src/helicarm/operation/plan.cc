@@ -29,6 +29,12 @@ std::uint16_t port_from(JsonReader& reader, const char* key) {
   return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
 }
 
+/// Views and tunnels give files their names.
+void check_file_name(const JsonReader& reader, const char* key, const std::string& name) {
+  if (name.empty() || name.starts_with('.') || name.find_first_of("/\\") != std::string::npos)
+    reader.refuse(Reason::bad_value, key, "holds a name that cannot be a file's");
+}
+
 void take_once(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
   if (name.empty()) reader.refuse(Reason::bad_value, "name", "is empty");
   if (!names.insert(name).second)
@@ -97,6 +103,7 @@ PlannedTunnel tunnel_from(JsonReader& reader) {
   PlannedTunnel tunnel{reader.text("name"), static_cast<Bone>(reader.choice("bone", {"femur", "tibia"})),
                        reader.text("start"), reader.text("end"),
                        static_cast<TunnelEnd>(reader.choice("enter_at", {"start", "end"}))};
+  check_file_name(reader, "name", tunnel.name);
   reader.finish();
   return tunnel;
 }
@@ -110,8 +117,7 @@ std::vector<std::string> views_from(JsonReader& reader) {
   for (const Json& name : names) {
     if (!name.is_string()) reader.refuse(Reason::bad_value, "views", "must hold names");
     views.push_back(name.get<std::string>());
-    if (views.back().empty() || views.back().find_first_of("/\\") != std::string::npos)
-      reader.refuse(Reason::bad_value, "views", "holds a name that cannot be a file's");
+    check_file_name(reader, "views", views.back());
     take_once(reader, once, views.back());
   }
   return views;

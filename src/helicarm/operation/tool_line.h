@@ -34,6 +34,15 @@ Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, co
 Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& exposure, const Poses& now,
                              const RigidTransform& marker_from_tcp);
 
+/// A line in a rectified picture.
+struct PictureLine {
+  Eigen::Vector2d back;
+  Eigen::Vector2d tip;
+};
+
+/// The tool's line in a calibrated X-ray (Eq. 6); nothing where it lies behind the source.
+std::optional<PictureLine> line_in_xray(const View& view, const ToolLine& line);
+
 /// How far a tunnel's end lies from the tool's axis, across it.
 struct EndMiss {
   Eigen::Vector2d across_mm;   ///< along x and y of the tool

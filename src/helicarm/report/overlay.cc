@@ -15,7 +15,7 @@ namespace helicarm {
 namespace {
 
 const cv::Scalar green(74, 222, 128), red(248, 113, 113), blue(147, 197, 253), violet(240, 171, 252),
-    yellow(250, 204, 21), crimson(239, 68, 68);
+    yellow(250, 204, 21), crimson(239, 68, 68), orange(251, 146, 60);
 
 /// OpenCV draws at fixed-point places: here sixteenths of a pixel.
 constexpr int shift = 4;
@@ -70,7 +70,7 @@ void draw_lines(Canvas& canvas, const Result& result, std::size_t index) {
 
 }  // namespace
 
-std::string overlay_png(const Result& result, std::size_t index) {
+std::string overlay_png(const Result& result, std::size_t index, std::span<const Eigen::Vector2d> path) {
   const ViewResult& view = result.views[index];
   Canvas canvas(rectified_picture(view));
   if (view.rectification) {
@@ -94,6 +94,7 @@ std::string overlay_png(const Result& result, std::size_t index) {
       canvas.text(seen->uv, point.name, violet);
     }
   if (view.calibrated) draw_lines(canvas, result, index);
+  for (std::size_t i = 1; i < path.size(); ++i) canvas.line(path[i - 1], path[i], orange);
   return canvas.png();
 }
 

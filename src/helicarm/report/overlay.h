@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "helicarm/navigation/result.h"
@@ -8,8 +9,8 @@
 namespace helicarm {
 
 /// The rectified picture of a view as PNG, with balls and labels, points, planned tunnels and tool lines
-/// drawn in.
-std::string overlay_png(const Result& result, std::size_t view);
+/// drawn in; `path`: where the tool's tip will go (rectified pixels).
+std::string overlay_png(const Result& result, std::size_t view, std::span<const Eigen::Vector2d> path = {});
 
 /// NAME_overlay.png; view3_overlay.png and the like where a name does not suit a file.
 std::string overlay_name(const std::string& view_name, std::size_t index);
