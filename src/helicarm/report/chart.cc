@@ -79,6 +79,7 @@ class ChartDrawing {
     legend();
     return std::move(text_);
   }
+  double legend_height() const { return legend_line * legend_lines_; }
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -180,7 +181,24 @@ class ChartDrawing {
         series.dashed ? " stroke-dasharray=\"6 4\"" : "", colour, marks);
   }
 
+  std::string hatch(std::size_t kind) const { return fmt::format("hatch{}-{}", number_, kind); }
+
+  void hatching(const ChartField& field, std::size_t kind) {
+    put(R"-(<pattern id="{}" patternUnits="userSpaceOnUse" width="7" height="7" patternTransform="rotate({})">)-"
+        R"-(<path d="M0 0V7" class="hatch"/></pattern>)-"
+        "\n",
+        hatch(kind), kind % 2 == 0 ? 45 : -45);
+    const auto x_of = [&](int column) { return px(field.x_first + field.step * (column - 0.5)); };
+    const auto y_of = [&](int row) { return py(field.y_first + field.step * (row - 0.5)); };
+    std::string path;
+    for (const auto& [row, begin, end] : lattice_runs(field.columns, field.hatchings[kind].points))
+      fmt::format_to(std::back_inserter(path), "M{0:.1f} {1:.1f}H{2:.1f}V{3:.1f}H{0:.1f}Z", x_of(begin),
+                     y_of(row), x_of(end), y_of(row + 1));
+    put("<path d=\"{}\" fill=\"url(#{})\"/>\n", path, hatch(kind));
+  }
+
   void field(const ChartField& field) {
+    for (std::size_t kind = 0; kind < field.hatchings.size(); ++kind) hatching(field, kind);
     const auto at = [&](int column, int row) {
       return field.values[std::size_t(row * field.columns + column)];
     };
@@ -212,16 +230,19 @@ class ChartDrawing {
   }
 
   void legend() {
-    int line = 0;
     const auto add = [&](const std::string& mark, const std::string& name) {
       put(R"-(<g transform="translate({} {})">{}<text x="{}" y="4">{}</text></g>)-"
           "\n",
-          x0_, top_margin + chart_height + bottom_margin + legend_line * (line++ + 0.3), mark,
+          x0_, top_margin + chart_height + bottom_margin + legend_line * (legend_lines_++ + 0.3), mark,
           legend_mark + 8, escaped(name));
     };
     if (chart_.band)
       add(fmt::format(R"(<rect y="-5" width="{}" height="10" class="band"/>)", legend_mark),
           chart_.band->name);
+    for (std::size_t kind = 0; chart_.field && kind < chart_.field->hatchings.size(); ++kind)
+      add(fmt::format(R"-(<rect y="-6" width="{}" height="12" fill="url(#{})" class="hatch"/>)-", legend_mark,
+                      hatch(kind)),
+          chart_.field->hatchings[kind].name);
     for (std::size_t i = 0; i < chart_.series.size(); ++i) {
       const ChartSeries& series = chart_.series[i];
       if (series.name.empty()) continue;
@@ -236,14 +257,9 @@ class ChartDrawing {
   std::size_t number_;  ///< in the document
   double x0_;
   Axis x_{}, y_{};
+  int legend_lines_ = 0;
   std::string text_;
 };
-
-double legend_height(const Chart& chart) {
-  const auto named = [](const ChartSeries& series) { return !series.name.empty(); };
-  const auto lines = std::ranges::count_if(chart.series, named) + (chart.band ? 1 : 0);
-  return legend_line * double(lines);
-}
 
 }  // namespace
 
@@ -257,8 +273,9 @@ std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
     for (std::size_t i = first; i < std::min(first + columns, charts.size()); ++i) {
       const Chart& chart = charts[i];
       title += (title.empty() ? "" : "; ") + chart.title;
-      legends = std::max(legends, legend_height(chart));
-      body += ChartDrawing(chart, i, x).svg();
+      ChartDrawing drawing(chart, i, x);
+      body += drawing.svg();
+      legends = std::max(legends, drawing.legend_height());
       x += chart_width + left_margin + right_margin;
     }
     body += "</g>\n";
@@ -270,6 +287,7 @@ std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
       R"(font-family="system-ui, sans-serif" font-size="12" role="img" aria-label="{2}">)"
       "\n<style>.grid{{stroke:#e4e4e0}} .frame{{fill:none;stroke:#333}} "
       ".band{{fill:#b9b9b0;fill-opacity:0.45}} "
+      ".hatch{{stroke:#8d8d85}} "
       ".line{{fill:none;stroke-width:1.8}} .middle{{text-anchor:middle}} .end{{text-anchor:end}} "
       ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
       ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"

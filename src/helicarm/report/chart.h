@@ -27,12 +27,19 @@ struct ChartBand {
   double high;
 };
 
+/// Lattice points whose surroundings are hatched; the first two kinds lean to different sides.
+struct ChartHatching {
+  std::string name;
+  std::vector<bool> points;  ///< as the field's values
+};
+
 /// Values on a lattice, x fastest, drawn as isolines that carry their level.
 struct ChartField {
   double x_first, y_first, step;
   int columns, rows;
   std::vector<double> values;
   std::vector<double> levels;
+  std::vector<ChartHatching> hatchings = {};
 };
 
 struct Chart {

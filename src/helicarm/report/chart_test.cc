@@ -59,6 +59,18 @@ TEST(Chart, FourStandInTwoRows) {
   EXPECT_THAT(chart_svg(four), HasSubstr("viewBox=\"0 0 1104 944\""));
 }
 
+TEST(Chart, HatchesARowOfPointsAsOneAndNamesIt) {
+  Chart chart{"t", "x", "y"};
+  chart.field = ChartField{0, 0, 1, 3, 2, {1, 1, 1, 1, 1, 1}, {}};
+  chart.field->hatchings = {{"not seen", {false, true, true, false, false, false}}};
+  const std::string svg = chart_svg(std::array{chart});
+  EXPECT_THAT(svg, HasSubstr("<pattern id=\"hatch0-0\""));
+  const auto path = svg.find("Z\" fill=\"url(#hatch0-0)\"");
+  ASSERT_NE(path, std::string::npos);
+  EXPECT_EQ(svg.substr(svg.rfind('"', path), path - svg.rfind('"', path)).find('Z'), std::string::npos);
+  EXPECT_THAT(svg, HasSubstr(">not seen</text>"));
+}
+
 TEST(Isoline, OfAConeIsACircle) {
   const auto height = [](int column, int row) { return std::hypot(column - 20.0, row - 20.0); };
   const auto pieces = isoline(41, 41, height, 12.5);

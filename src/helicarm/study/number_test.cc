@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/study/number.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -163,6 +164,14 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EXPECT_LT(middle.tre_exact, middle.tre_fresh);
   EXPECT_GT(corner.tre_fresh, 2 * middle.tre_fresh);
   EXPECT_GT(middle.se_fresh, 0);
+  EXPECT_EQ(middle.seen_in, SeenIn::both);
+  EXPECT_EQ(corner.seen_in, SeenIn::none);
+  const StudyFiles files = files_of(map, options);
+  const Json& seen = files.json["seen_in"];
+  EXPECT_EQ(int(seen["none"]) + int(seen["AP"]) + int(seen["LAT"]) + int(seen["both"]), 98);
+  EXPECT_EQ(seen["both"], std::ranges::count(map.points, SeenIn::both, &LocationPoint::seen_in));
+  EXPECT_THAT(files.csv, ::testing::HasSubstr(",seen_in\n"));
+  EXPECT_THAT(files.svg, ::testing::HasSubstr("outside the lateral picture"));
   options.balls = {{0, 0, 0}};
   EXPECT_EQ(study_location(options, one, alone).error().reason, Reason::bad_value);
 }
