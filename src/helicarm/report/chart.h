@@ -50,6 +50,7 @@ struct Chart {
   std::optional<ChartBand> band = {};
   std::optional<ChartField> field = {};
   std::vector<std::string> x_names = {};  ///< of x = 0, 1, ...: instead of numbers
+  std::vector<std::string> y_names = {};  ///< of y = 0, 1, ... downwards, likewise
   bool y_from_zero = false;
   bool picture = false;                               ///< y down, and the same scale both ways
   std::optional<double> y_most = {};                  ///< what lies higher is cut off

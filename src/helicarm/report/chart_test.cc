@@ -54,6 +54,18 @@ TEST(Chart, LineBreaksWhereAPointIsMissing) {
   EXPECT_EQ(std::ranges::count(path.substr(0, path.find("class")), 'M'), 2);
 }
 
+TEST(Chart, NamesOfYStandBesideTheFrameFromAbove) {
+  Chart chart{"t", "x", "", {{"", {{1, 0}, {2, 1}}, true}}};
+  chart.y_names = {"the first of two situations", "the second"};
+  const std::string svg = chart_svg(std::array{chart});
+  const auto first = svg.find(">the first of two situations</text>"), second = svg.find(">the second</text>");
+  EXPECT_LT(first, second);
+  EXPECT_LT(second, std::string::npos);
+  EXPECT_THAT(svg, HasSubstr("cy=\"146.0\""));
+  EXPECT_THAT(svg, HasSubstr("cy=\"326.0\""));
+  EXPECT_THAT(svg, Not(HasSubstr("viewBox=\"0 0 552 ")));
+}
+
 TEST(Chart, FourStandInTwoRows) {
   const std::vector<Chart> four(4, Chart{"t", "x", "y"});
   EXPECT_THAT(chart_svg(four), HasSubstr("viewBox=\"0 0 1104 944\""));

@@ -51,13 +51,4 @@ inline std::vector<LatticeRun> lattice_runs(int columns, const std::vector<bool>
   return runs;
 }
 
-/// A round step that divides a range into about `count` parts.
-inline double round_step(double range, int count) {
-  const double rough = range / count;
-  const double decade = std::pow(10, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * decade >= rough) return factor * decade;
-  return 10 * decade;
-}
-
 }  // namespace helicarm
