@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/study/records.h"
+
 namespace helicarm {
 namespace {
 
@@ -23,7 +25,7 @@ struct LocationTrials {
   struct Sums {
     double fresh, fresh_squares, exact, exact_squares;
   };
-  static constexpr std::size_t sums_of_point = sizeof(Sums) / sizeof(double);
+  static constexpr std::size_t sums_of_point = numbers_in<Sums>;
 
   /// Sums over the draws of a block; the last one's may be fewer.
   void run(std::size_t block, std::span<double> values) const {
@@ -131,24 +133,21 @@ Expected<LocationMap> study_location(const LocationOptions& options, const Engin
                   options.half_mm, options.step_mm);
   for (const Eigen::Vector3d& ball : map.balls)
     identity += fmt::format(" {} {} {}", ball.x(), ball.y(), ball.z());
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  if (kept->empty()) {
-    map.points.clear();
-    return map;
-  }
   const auto n = double(options.groups);
   const auto mean_and_se = [&](double sum, double squares) {
     const double mean = sum / n;
     return std::pair{mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1))};
   };
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
-    const double* sums = kept->front().data() + i * stride;
-    LocationPoint& point = map.points[i];
-    std::tie(point.tre_fresh, point.se_fresh) = mean_and_se(sums[0], sums[1]);
-    std::tie(point.tre_exact, point.se_exact) = mean_and_se(sums[2], sums[3]);
-  }
-  return map;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    if (kept.empty()) map.points.clear();
+    for (std::size_t i = 0; i < map.points.size(); ++i) {
+      const double* sums = kept.front().data() + i * stride;
+      LocationPoint& point = map.points[i];
+      std::tie(point.tre_fresh, point.se_fresh) = mean_and_se(sums[0], sums[1]);
+      std::tie(point.tre_exact, point.se_exact) = mean_and_se(sums[2], sums[3]);
+    }
+    return map;
+  });
 }
 
 }  // namespace helicarm

@@ -116,24 +116,17 @@ StudyFiles files_of(const LocationMap& map, const LocationOptions& options) {
   for (const Eigen::Vector3d& ball : map.balls) balls.push_back({ball.x(), ball.y(), ball.z()});
   Json seen_in;
   for (const SeenIn kind : kinds_of_seen) seen_in[std::string(name_of_seen(kind))] = seen[std::size_t(kind)];
-  files.json = {{"format", "helicarm-study/1"},
-                {"study", "location"},
-                {"groups", options.groups},
-                {"seed", options.seed},
-                {"version", HELICARM_VERSION},
-                {"sigma", name_of(options.sigma)},
-                {"sigma_px", sigma_px(options.sigma, options.fle)},
-                {"origin", name_of(options.origin)},
-                {"balls_mm", std::move(balls)},
-                {"centre_mm", {map.centre.x(), map.centre.y(), map.centre.z()}},
-                {"step_mm", options.step_mm},
-                {"side", map.side},
-                {"printed", {{"text", "TRE increased with the increase of distance"}}},
-                {"summary", files.summary},
-                {"seen_in", std::move(seen_in)},
-                {"spearman_with_distance", rise},
-                {"spearman_with_distance_seen", rise_seen},
-                {"by_distance", std::move(by_distance)}};
+  files.json = study_json("location", options);
+  files.json.update({{"balls_mm", std::move(balls)},
+                     {"centre_mm", {map.centre.x(), map.centre.y(), map.centre.z()}},
+                     {"step_mm", options.step_mm},
+                     {"side", map.side},
+                     {"printed", {{"text", "TRE increased with the increase of distance"}}},
+                     {"summary", files.summary},
+                     {"seen_in", std::move(seen_in)},
+                     {"spearman_with_distance", rise},
+                     {"spearman_with_distance_seen", rise_seen},
+                     {"by_distance", std::move(by_distance)}});
   files.svg = chart_svg(
       std::array{chart_of(map, options, TargetPlane::xoy), chart_of(map, options, TargetPlane::xoz)});
   return files;

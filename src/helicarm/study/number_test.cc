@@ -223,12 +223,16 @@ TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
 
 TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
   CalibrationStudyOptions options;
-  options.groups = 1;
+  options.groups = 2;
   options.size_px = 512;
   options.folder = std::filesystem::path(::testing::TempDir()) / "study_calibration";
-  EngineOptions engine;
+  EngineOptions engine, by_two;
+  engine.threads = 1;
+  by_two.threads = 2;
   const auto tests = study_calibration(options, engine, alone).value();
-  ASSERT_EQ(tests.size(), 1u);
+  ASSERT_EQ(tests.size(), 2u);
+  EXPECT_EQ(files_of(tests, options).csv,
+            files_of(study_calibration(options, by_two, alone).value(), options).csv);
   EXPECT_EQ(tests[0].best.refused, 0);
   EXPECT_GE(tests[0].best.balls, 10);
   for (const double error : tests[0].best.targets) EXPECT_LT(error, 0.3);
