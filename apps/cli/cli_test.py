@@ -119,18 +119,20 @@ class CommandLine(unittest.TestCase):
         surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                         "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
                         "OMPI_MCA_plm_rsh_agent": "false"}  # all on this machine: no remote shell is needed
-        study = ("study", "number", "--groups", "3001", "--balls", "6,12", "--seed", "4", "--out")
-        self.assertEqual(run(*study, self.root / "alone", "--quiet").returncode, 0)
-        for ranks in ("1", "2", "3"):
-            folder = self.root / f"ranks{ranks}"
-            done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", ranks, PROGRAM, *study, str(folder)],
-                                  capture_output=True, text=True, env=surroundings)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual(done.stdout.count("written to"), 1)
-            self.assertEqual(f"{ranks} ranks" in done.stderr, ranks != "1")
-            for ending in ("csv", "json", "svg"):
-                self.assertEqual((folder / f"number.{ending}").read_bytes(),
-                                 (self.root / f"alone/number.{ending}").read_bytes())
+        for name, *more in (("number", "--groups", "3001", "--balls", "6,12"), ("limit", "--groups", "51"),
+                            ("biplane", "--groups", "200"), ("location", "--groups", "300")):
+            study = ("study", name, *more, "--seed", "4", "--out")
+            self.assertEqual(run(*study, self.root / f"{name}0", "--quiet").returncode, 0)
+            for ranks in ("1", "2", "3") if name == "number" else ("2",):
+                folder = self.root / f"{name}{ranks}"
+                done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", ranks, PROGRAM, *study, str(folder)],
+                                      capture_output=True, text=True, env=surroundings)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual(done.stdout.count("written to"), 1)
+                self.assertEqual(f"{ranks} ranks" in done.stderr, ranks != "1")
+                for ending in ("csv", "json", "svg"):
+                    self.assertEqual((folder / f"{name}.{ending}").read_bytes(),
+                                     (self.root / f"{name}0/{name}.{ending}").read_bytes())
         done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", "2", PROGRAM, "study", "number", "--fle", "no"],
                               capture_output=True, text=True, env=surroundings)
         self.assertEqual(done.returncode, 2, done.stderr)

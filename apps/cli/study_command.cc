@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <functional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -58,7 +57,7 @@ void choose(std::vector<Value>& chosen, const char* option, const std::vector<st
 }
 
 /// An option this study does not know is an error, not a silence.
-void only(const StudyArguments& a, std::initializer_list<std::string_view> known) {
+void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
   const std::array<std::pair<const char*, bool>, 8> given{{{"--balls", !a.balls.empty()},
                                                            {"--sigma", !a.sigmas.empty()},
                                                            {"--reading", !a.readings.empty()},
@@ -70,17 +69,18 @@ void only(const StudyArguments& a, std::initializer_list<std::string_view> known
   for (const auto& [option, is_given] : given)
     if (is_given && std::ranges::count(known, option) == 0)
       refuse(fmt::format("{} has no {}; its options are: {}", a.name, option,
-                         known.size() > 0 ? fmt::format("{}", fmt::join(known, ", ")) : "none"));
+                         known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
 }
 
-/// What the paper's experiments share.
+/// A study's defaults, and what is given in place of them.
 template <class Options>
-Options common_options(const StudyRun& run) {
+Options options_of(const StudyRun& run) {
   Options options;
   const StudyArguments& a = run.arguments;
   if (a.groups) options.groups = *a.groups;
   options.seed = run.console.seed;
-  if (a.fle) options.fle = *a.fle;
+  if constexpr (requires { options.fle; })
+    if (a.fle) options.fle = *a.fle;
   if constexpr (requires { options.origin; })
     if (!a.origin.empty())
       options.origin = named("--origin", a.origin, std::array{WorldOrigin::base, WorldOrigin::centre});
@@ -88,112 +88,81 @@ Options common_options(const StudyRun& run) {
     if (a.sigmas.size() > 1) refuse(fmt::format("{} takes one --sigma", a.name));
     if (!a.sigmas.empty()) options.sigma = named("--sigma", a.sigmas[0], sigma_readings);
   }
+  if constexpr (requires { options.balls = 12; }) {
+    if (a.balls.size() > 1) refuse(fmt::format("{} takes one number of --balls", a.name));
+    if (!a.balls.empty()) options.balls = a.balls[0];
+  }
   return options;
 }
 
-StudyFiles run_number(const StudyRun& run) {
-  only(run.arguments, {"--balls", "--sigma", "--reading", "--fle", "--origin"});
-  auto options = common_options<NumberOptions>(run);
-  if (!run.arguments.balls.empty()) options.balls = run.arguments.balls;
-  choose(options.sigmas, "--sigma", run.arguments.sigmas, sigma_readings);
-  choose(options.readings, "--reading", run.arguments.readings, pixel_readings);
-  return files_of(value_or_throw(study_number(options, run.engine, run.ranks)), options);
-}
-
-StudyFiles run_uniformity(const StudyRun& run) {
-  only(run.arguments, {"--balls", "--sigma", "--fle", "--origin", "--draws"});
-  auto options = common_options<UniformityOptions>(run);
-  if (run.arguments.balls.size() > 1) refuse("uniformity takes one number of --balls");
-  if (!run.arguments.balls.empty()) options.balls = run.arguments.balls[0];
-  if (run.arguments.draws) options.draws = *run.arguments.draws;
-  const auto groups = value_or_throw(study_uniformity(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(groups, options) : StudyFiles{};
-}
-
-StudyFiles run_location(const StudyRun& run) {
-  only(run.arguments, {"--calibrator", "--sigma", "--fle", "--origin"});
-  auto options = common_options<LocationOptions>(run);
-  if (!run.arguments.calibrator.empty())
-    for (const CalibratorBall& ball : value_or_throw(calibrator_named(run.arguments.calibrator, ".")).balls)
-      options.balls.push_back(ball.centre_in_calibrator);
-  const auto map = value_or_throw(study_location(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(map, options) : StudyFiles{};
-}
-
-StudyFiles run_biplane(const StudyRun& run) {
-  only(run.arguments, {"--sigma", "--fle"});
-  const auto options = common_options<BiplaneOptions>(run);
-  const auto rows = value_or_throw(study_biplane(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(rows, options) : StudyFiles{};
-}
-
-StudyFiles run_calibration(const StudyRun& run) {
-  only(run.arguments, {});
-  CalibrationStudyOptions options;
-  if (run.arguments.groups) options.groups = *run.arguments.groups;
-  options.seed = run.console.seed;
-  options.folder = run.arguments.out;
-  const auto tests = value_or_throw(study_calibration(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(tests, options) : StudyFiles{};
-}
-
-StudyFiles run_rectification(const StudyRun& run) {
-  only(run.arguments, {});
-  RectificationStudyOptions options;
-  if (run.arguments.groups) options.groups = *run.arguments.groups;
-  options.seed = run.console.seed;
-  const auto intensifiers = value_or_throw(study_rectification(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(intensifiers, options) : StudyFiles{};
-}
-
-StudyFiles run_design(const StudyRun& run) {
-  only(run.arguments, {"--balls", "--surface", "--sigma", "--fle"});
-  auto options = common_options<DesignOptions>(run);
-  if (run.arguments.balls.size() > 1) refuse("design takes one number of --balls");
-  if (!run.arguments.balls.empty()) options.balls = run.arguments.balls[0];
-  if (!run.arguments.surface.empty())
-    options.surface = named("--surface", run.arguments.surface, design_surfaces);
-  const auto answer = value_or_throw(study_design(options, run.engine, run.ranks));
+template <auto study, class Options>
+StudyFiles files_by(const StudyRun& run, const Options& options) {
+  const auto answer = value_or_throw(study(options, run.engine, run.ranks));
   return run.ranks.leads() ? files_of(answer, options) : StudyFiles{};
 }
 
-StudyFiles run_limit(const StudyRun& run) {
-  only(run.arguments, {});
-  LimitOptions options;
-  if (run.arguments.groups) options.trials = int(*run.arguments.groups);
-  options.seed = run.console.seed;
-  options.threads = run.console.threads;
-  if (!run.ranks.leads()) return {};
-  const auto rows = study_limit(options, run.engine.progress);
-  return files_of(rows, options);
+/// A study whose options are all shared ones.
+template <class Options, auto study>
+StudyFiles run_plain(const StudyRun& run) {
+  return files_by<study>(run, options_of<Options>(run));
 }
 
-StudyFiles run_centres(const StudyRun& run) {
-  only(run.arguments, {});
-  CentreOptions options;
-  if (run.arguments.groups) options.balls = int(*run.arguments.groups);
-  options.seed = run.console.seed;
-  options.threads = run.console.threads;
-  if (!run.ranks.leads()) return {};
-  return files_of(study_centres(options, run.engine.progress), options);
+StudyFiles run_number(const StudyRun& run) {
+  auto options = options_of<NumberOptions>(run);
+  if (!run.arguments.balls.empty()) options.balls = run.arguments.balls;
+  choose(options.sigmas, "--sigma", run.arguments.sigmas, sigma_readings);
+  choose(options.readings, "--reading", run.arguments.readings, pixel_readings);
+  return files_by<study_number>(run, options);
 }
 
-using Study = StudyFiles (*)(const StudyRun&);
-constexpr std::array<std::pair<std::string_view, Study>, 9> studies{{{"number", run_number},
-                                                                     {"uniformity", run_uniformity},
-                                                                     {"location", run_location},
-                                                                     {"biplane", run_biplane},
-                                                                     {"calibration", run_calibration},
-                                                                     {"rectification", run_rectification},
-                                                                     {"design", run_design},
-                                                                     {"limit", run_limit},
-                                                                     {"centres", run_centres}}};
+StudyFiles run_uniformity(const StudyRun& run) {
+  auto options = options_of<UniformityOptions>(run);
+  if (run.arguments.draws) options.draws = *run.arguments.draws;
+  return files_by<study_uniformity>(run, options);
+}
 
-Study study_named(const std::string& name) {
+StudyFiles run_location(const StudyRun& run) {
+  auto options = options_of<LocationOptions>(run);
+  if (!run.arguments.calibrator.empty())
+    for (const CalibratorBall& ball : value_or_throw(calibrator_named(run.arguments.calibrator, ".")).balls)
+      options.balls.push_back(ball.centre_in_calibrator);
+  return files_by<study_location>(run, options);
+}
+
+StudyFiles run_calibration(const StudyRun& run) {
+  auto options = options_of<CalibrationStudyOptions>(run);
+  options.folder = run.arguments.out;
+  return files_by<study_calibration>(run, options);
+}
+
+StudyFiles run_design(const StudyRun& run) {
+  auto options = options_of<DesignOptions>(run);
+  if (!run.arguments.surface.empty())
+    options.surface = named("--surface", run.arguments.surface, design_surfaces);
+  return files_by<study_design>(run, options);
+}
+
+struct KnownStudy {
+  std::string_view name;
+  StudyFiles (*run)(const StudyRun&);
+  std::vector<std::string_view> options = {};  ///< beside those that all have
+};
+const std::array<KnownStudy, 9> studies{
+    {{"number", run_number, {"--balls", "--sigma", "--reading", "--fle", "--origin"}},
+     {"uniformity", run_uniformity, {"--balls", "--sigma", "--fle", "--origin", "--draws"}},
+     {"location", run_location, {"--calibrator", "--sigma", "--fle", "--origin"}},
+     {"biplane", run_plain<BiplaneOptions, study_biplane>, {"--sigma", "--fle"}},
+     {"calibration", run_calibration},
+     {"rectification", run_plain<RectificationStudyOptions, study_rectification>},
+     {"design", run_design, {"--balls", "--surface", "--sigma", "--fle"}},
+     {"limit", run_plain<LimitOptions, study_limit>},
+     {"centres", run_plain<CentreOptions, study_centres>}}};
+
+const KnownStudy& study_named(const std::string& name) {
   std::vector<std::string_view> names;
-  for (const auto& [known, study] : studies) {
-    if (known == name) return study;
-    names.push_back(known);
+  for (const KnownStudy& known : studies) {
+    if (known.name == name) return known;
+    names.push_back(known.name);
   }
   refuse(fmt::format("\"{}\" is none of: {}", name, fmt::join(names, ", ")));
 }
@@ -202,7 +171,8 @@ Study study_named(const std::string& name) {
 
 CommandResult study_command(const StudyArguments& arguments, Console& console) {
   return guarded([&] {
-    const Study study = study_named(arguments.name);
+    const KnownStudy& study = study_named(arguments.name);
+    only(arguments, study.options);
     const std::filesystem::path& out = arguments.out;
     std::error_code error;
     if (std::filesystem::create_directories(out, error); error)
@@ -218,7 +188,7 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     {
       ProgressLine line(console);
       run.engine.progress = [&](double share) { line.tell(share); };
-      files = study(run);
+      files = study.run(run);
     }
     if (!ranks.leads()) return;
     const auto write = [&](const char* ending, const std::string& text) {

@@ -27,7 +27,7 @@ struct StudyArguments {
   std::string surface;
 };
 
-/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg (centres: no SVG). The
+/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg. The
 /// same seed gives the same bytes, whatever the number of threads and ranks.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/report/axis.h"
+#include "helicarm/report/chart_style.h"
 #include "helicarm/report/isoline.h"
 #include "helicarm/report/markup.h"
 
@@ -18,22 +20,12 @@ constexpr double chart_width = 460, chart_height = 360;  // of the frame
 constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
 constexpr double column_width = left_margin + chart_width + right_margin;
 constexpr double legend_line = 17, legend_mark = 26;
-constexpr int about_ticks = 7;
+constexpr double letter_width = 6.5;  // of a name beside the frame, at most and on average
 constexpr std::size_t few_dots = 50;  // more are drawn smaller, and let others show through
 
 /// Okabe and Ito's colours, told apart by the colour-blind too.
 constexpr std::array series_colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                     "#e69f00", "#56b4e9", "#000000"};
-
-struct Axis {
-  double low, high, step;
-  static Axis over(double least, double most) {
-    if (!(most > least)) least -= 0.5, most += 0.5;
-    const double step = round_step(most - least, about_ticks);
-    return {std::floor(least / step + 1e-9) * step, std::ceil(most / step - 1e-9) * step, step};
-  }
-  double share(double value) const { return (value - low) / (high - low); }
-};
 
 class ChartDrawing {
  public:
@@ -59,12 +51,14 @@ class ChartDrawing {
     if (chart.y_from_zero) y_low = std::min(0.0, y_low);
     if (chart.y_most) y_high = std::min(y_high, *chart.y_most);
     if (chart.y_range) y_low = chart.y_range->front(), y_high = chart.y_range->back();
-    x_ =
-        chart.x_names.empty() ? Axis::over(x_low, x_high) : Axis{-0.5, double(chart.x_names.size()) - 0.5, 1};
-    y_ = Axis::over(y_low, y_high);
+    const auto axis = [](const std::vector<std::string>& names, double low, double high) {
+      return names.empty() ? Axis::over(low, high) : Axis{-0.5, double(names.size()) - 0.5, 1};
+    };
+    x_ = axis(chart.x_names, x_low, x_high);
+    y_ = axis(chart.y_names, y_low, y_high);
     if (chart.picture) share_scale();
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
-    if (chart.field) x_.step = y_.step = round_step(x_high - x_low, about_ticks);
+    if (chart.field) x_.step = y_.step = round_step(x_high - x_low, Axis::about_ticks);
   }
 
   std::string svg() {
@@ -79,6 +73,7 @@ class ChartDrawing {
     legend();
     return std::move(text_);
   }
+  double legend_height() const { return legend_line * legend_lines_; }
 
  private:
   static constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -86,7 +81,8 @@ class ChartDrawing {
   static const char* colour(std::size_t i) { return series_colours[i % series_colours.size()]; }
   double px(double x) const { return x0_ + chart_width * x_.share(x); }
   double py(double y) const {
-    return top_margin + chart_height * (chart_.picture ? y_.share(y) : 1 - y_.share(y));
+    const bool down = chart_.picture || !chart_.y_names.empty();
+    return top_margin + chart_height * (down ? y_.share(y) : 1 - y_.share(y));
   }
 
   /// Widens the axis that has more room.
@@ -106,25 +102,14 @@ class ChartDrawing {
 
   void frame() {
     const double bottom = top_margin + chart_height;
-    const auto ticks = [](const Axis& axis) {
-      std::vector<double> places;
-      for (double at = std::ceil(axis.low / axis.step - 1e-9) * axis.step; at <= axis.high + 1e-9 * axis.step;
-           at += axis.step)
-        places.push_back(std::abs(at) < 1e-9 * axis.step ? 0 : at);
-      return places;
-    };
-    for (std::size_t i = 0; i < chart_.x_names.size(); ++i)
-      put(R"(<text x="{:.1f}" y="{}" class="middle">{}</text>)"
+    for (const auto& [x, name] : ticks(x_, chart_.x_names))
+      put(R"(<path d="M{0:.1f} {1}V{2}" class="grid"/><text x="{0:.1f}" y="{3}" class="middle">{4}</text>)"
           "\n",
-          px(double(i)), bottom + 18, escaped(chart_.x_names[i]));
-    for (const double x : chart_.x_names.empty() ? ticks(x_) : std::vector<double>{})
-      put(R"(<path d="M{0:.1f} {1}V{2}" class="grid"/><text x="{0:.1f}" y="{3}" class="middle">{4:.6g}</text>)"
+          px(x), top_margin, bottom, bottom + 18, escaped(name));
+    for (const auto& [y, name] : ticks(y_, chart_.y_names))
+      put(R"(<path d="M{0} {1:.1f}H{2}" class="grid"/><text x="{3}" y="{4:.1f}" class="end">{5}</text>)"
           "\n",
-          px(x), top_margin, bottom, bottom + 18, x);
-    for (const double y : ticks(y_))
-      put(R"(<path d="M{0} {1:.1f}H{2}" class="grid"/><text x="{3}" y="{4:.1f}" class="end">{5:.6g}</text>)"
-          "\n",
-          x0_, py(y), x0_ + chart_width, x0_ - 7, py(y) + 4, y);
+          x0_, py(y), x0_ + chart_width, x0_ - 7, py(y) + 4, escaped(name));
     put(R"(<rect x="{}" y="{}" width="{}" height="{}" class="frame"/>)"
         "\n",
         x0_, top_margin, chart_width, chart_height);
@@ -180,7 +165,24 @@ class ChartDrawing {
         series.dashed ? " stroke-dasharray=\"6 4\"" : "", colour, marks);
   }
 
+  std::string hatch(std::size_t kind) const { return fmt::format("hatch{}-{}", number_, kind); }
+
+  void hatching(const ChartField& field, std::size_t kind) {
+    put(R"-(<pattern id="{}" patternUnits="userSpaceOnUse" width="7" height="7" patternTransform="rotate({})">)-"
+        R"-(<path d="M0 0V7" class="hatch"/></pattern>)-"
+        "\n",
+        hatch(kind), kind % 2 == 0 ? 45 : -45);
+    const auto x_of = [&](int column) { return px(field.x_first + field.step * (column - 0.5)); };
+    const auto y_of = [&](int row) { return py(field.y_first + field.step * (row - 0.5)); };
+    std::string path;
+    for (const auto& [row, begin, end] : lattice_runs(field.columns, field.hatchings[kind].points))
+      fmt::format_to(std::back_inserter(path), "M{0:.1f} {1:.1f}H{2:.1f}V{3:.1f}H{0:.1f}Z", x_of(begin),
+                     y_of(row), x_of(end), y_of(row + 1));
+    put("<path d=\"{}\" fill=\"url(#{})\"/>\n", path, hatch(kind));
+  }
+
   void field(const ChartField& field) {
+    for (std::size_t kind = 0; kind < field.hatchings.size(); ++kind) hatching(field, kind);
     const auto at = [&](int column, int row) {
       return field.values[std::size_t(row * field.columns + column)];
     };
@@ -212,16 +214,19 @@ class ChartDrawing {
   }
 
   void legend() {
-    int line = 0;
     const auto add = [&](const std::string& mark, const std::string& name) {
       put(R"-(<g transform="translate({} {})">{}<text x="{}" y="4">{}</text></g>)-"
           "\n",
-          x0_, top_margin + chart_height + bottom_margin + legend_line * (line++ + 0.3), mark,
+          x0_, top_margin + chart_height + bottom_margin + legend_line * (legend_lines_++ + 0.3), mark,
           legend_mark + 8, escaped(name));
     };
     if (chart_.band)
       add(fmt::format(R"(<rect y="-5" width="{}" height="10" class="band"/>)", legend_mark),
           chart_.band->name);
+    for (std::size_t kind = 0; chart_.field && kind < chart_.field->hatchings.size(); ++kind)
+      add(fmt::format(R"-(<rect y="-6" width="{}" height="12" fill="url(#{})" class="hatch"/>)-", legend_mark,
+                      hatch(kind)),
+          chart_.field->hatchings[kind].name);
     for (std::size_t i = 0; i < chart_.series.size(); ++i) {
       const ChartSeries& series = chart_.series[i];
       if (series.name.empty()) continue;
@@ -236,14 +241,9 @@ class ChartDrawing {
   std::size_t number_;  ///< in the document
   double x0_;
   Axis x_{}, y_{};
+  int legend_lines_ = 0;
   std::string text_;
 };
-
-double legend_height(const Chart& chart) {
-  const auto named = [](const ChartSeries& series) { return !series.name.empty(); };
-  const auto lines = std::ranges::count_if(chart.series, named) + (chart.band ? 1 : 0);
-  return legend_line * double(lines);
-}
 
 }  // namespace
 
@@ -256,9 +256,14 @@ std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
     body += fmt::format("<g transform=\"translate(0 {})\">\n", height);
     for (std::size_t i = first; i < std::min(first + columns, charts.size()); ++i) {
       const Chart& chart = charts[i];
+      double names = 0;
       title += (title.empty() ? "" : "; ") + chart.title;
-      legends = std::max(legends, legend_height(chart));
-      body += ChartDrawing(chart, i, x).svg();
+      for (const std::string& name : chart.y_names)
+        names = std::max(names, letter_width * double(name.size()));
+      x += std::max(0.0, names - left_margin);
+      ChartDrawing drawing(chart, i, x);
+      body += drawing.svg();
+      legends = std::max(legends, drawing.legend_height());
       x += chart_width + left_margin + right_margin;
     }
     body += "</g>\n";
@@ -268,13 +273,8 @@ std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
   return fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" )"
       R"(font-family="system-ui, sans-serif" font-size="12" role="img" aria-label="{2}">)"
-      "\n<style>.grid{{stroke:#e4e4e0}} .frame{{fill:none;stroke:#333}} "
-      ".band{{fill:#b9b9b0;fill-opacity:0.45}} "
-      ".line{{fill:none;stroke-width:1.8}} .middle{{text-anchor:middle}} .end{{text-anchor:end}} "
-      ".title{{font-size:14px;font-weight:600}} .note{{fill:#555}} "
-      ".level{{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}}</style>\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{3}</svg>\n",
-      width, height, escaped(title), body);
+      "\n<style>{3}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n{4}</svg>\n",
+      width, height, escaped(title), chart_style, body);
 }
 
 }  // namespace helicarm

@@ -27,12 +27,19 @@ struct ChartBand {
   double high;
 };
 
+/// Lattice points whose surroundings are hatched; the first two kinds lean to different sides.
+struct ChartHatching {
+  std::string name;
+  std::vector<bool> points;  ///< as the field's values
+};
+
 /// Values on a lattice, x fastest, drawn as isolines that carry their level.
 struct ChartField {
   double x_first, y_first, step;
   int columns, rows;
   std::vector<double> values;
   std::vector<double> levels;
+  std::vector<ChartHatching> hatchings = {};
 };
 
 struct Chart {
@@ -43,6 +50,7 @@ struct Chart {
   std::optional<ChartBand> band = {};
   std::optional<ChartField> field = {};
   std::vector<std::string> x_names = {};  ///< of x = 0, 1, ...: instead of numbers
+  std::vector<std::string> y_names = {};  ///< of y = 0, 1, ... downwards, likewise
   bool y_from_zero = false;
   bool picture = false;                               ///< y down, and the same scale both ways
   std::optional<double> y_most = {};                  ///< what lies higher is cut off

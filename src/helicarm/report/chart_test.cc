@@ -54,9 +54,33 @@ TEST(Chart, LineBreaksWhereAPointIsMissing) {
   EXPECT_EQ(std::ranges::count(path.substr(0, path.find("class")), 'M'), 2);
 }
 
+TEST(Chart, NamesOfYStandBesideTheFrameFromAbove) {
+  Chart chart{"t", "x", "", {{"", {{1, 0}, {2, 1}}, true}}};
+  chart.y_names = {"the first of two situations", "the second"};
+  const std::string svg = chart_svg(std::array{chart});
+  const auto first = svg.find(">the first of two situations</text>"), second = svg.find(">the second</text>");
+  EXPECT_LT(first, second);
+  EXPECT_LT(second, std::string::npos);
+  EXPECT_THAT(svg, HasSubstr("cy=\"146.0\""));
+  EXPECT_THAT(svg, HasSubstr("cy=\"326.0\""));
+  EXPECT_THAT(svg, Not(HasSubstr("viewBox=\"0 0 552 ")));
+}
+
 TEST(Chart, FourStandInTwoRows) {
   const std::vector<Chart> four(4, Chart{"t", "x", "y"});
   EXPECT_THAT(chart_svg(four), HasSubstr("viewBox=\"0 0 1104 944\""));
+}
+
+TEST(Chart, HatchesARowOfPointsAsOneAndNamesIt) {
+  Chart chart{"t", "x", "y"};
+  chart.field = ChartField{0, 0, 1, 3, 2, {1, 1, 1, 1, 1, 1}, {}};
+  chart.field->hatchings = {{"not seen", {false, true, true, false, false, false}}};
+  const std::string svg = chart_svg(std::array{chart});
+  EXPECT_THAT(svg, HasSubstr("<pattern id=\"hatch0-0\""));
+  const auto path = svg.find("Z\" fill=\"url(#hatch0-0)\"");
+  ASSERT_NE(path, std::string::npos);
+  EXPECT_EQ(svg.substr(svg.rfind('"', path), path - svg.rfind('"', path)).find('Z'), std::string::npos);
+  EXPECT_THAT(svg, HasSubstr(">not seen</text>"));
 }
 
 TEST(Isoline, OfAConeIsACircle) {

@@ -34,13 +34,21 @@ std::vector<IsolinePiece> isoline(int columns, int rows, At at, double level) {
   return pieces;
 }
 
-/// A round step that divides a range into about `count` parts.
-inline double round_step(double range, int count) {
-  const double rough = range / count;
-  const double decade = std::pow(10, std::floor(std::log10(rough)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * decade >= rough) return factor * decade;
-  return 10 * decade;
+/// Marked points of a lattice that stand side by side: columns begin .. end - 1 of a row.
+struct LatticeRun {
+  int row, begin, end;
+};
+
+inline std::vector<LatticeRun> lattice_runs(int columns, const std::vector<bool>& marked) {
+  std::vector<LatticeRun> runs;
+  for (int i = 0; i < int(marked.size()); ++i) {
+    if (!marked[std::size_t(i)]) continue;
+    const int row = i / columns, column = i % columns;
+    if (runs.empty() || runs.back().row != row || runs.back().end != column)
+      runs.push_back({row, column, column});
+    ++runs.back().end;
+  }
+  return runs;
 }
 
 }  // namespace helicarm

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/report/axis.h"
 #include "helicarm/report/isoline.h"
 
 namespace helicarm {

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/study/biplane.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include <fmt/format.h>
 
 #include "helicarm/phantom/calibrator.h"
-#include "helicarm/report/chart.h"
+#include "helicarm/study/records.h"
 #include "helicarm/study/statistics.h"
 
 namespace helicarm {
@@ -20,24 +18,21 @@ constexpr std::size_t experiments_of_block = 64;
 constexpr int tests_of_experiment = 10;  // 3.2
 constexpr double focal_length_mm = 900;
 
+constexpr std::size_t cells_of_table = 10;
+
 /// The table's cells in order, each with what the paper prints for it. The plates of the two views are in
 /// different places, so that their own balls have no two rays: their error is that of one.
-struct Cell {
-  std::string_view calibrator, points, measure;
-  std::optional<ErrorFigures> printed;
-};
-constexpr std::array<Cell, 10> table_cells{
-    {{"udcsc", "fre", "intersection", ErrorFigures{0.70, 0.05, 0.36, 0.43}},
-     {"udcsc", "on_biplane", "intersection", ErrorFigures{7.53, 3.30, 4.50, 4.68}},
+const std::array<BiplaneRow, cells_of_table> table_1{
+    {{"udcsc", "fre", "intersection", {}, ErrorFigures{0.70, 0.05, 0.36, 0.43}},
+     {"udcsc", "on_biplane", "intersection", {}, ErrorFigures{7.53, 3.30, 4.50, 4.68}},
      {"udcsc", "on_biplane", "ray", {}},
-     {"udcsc", "centre", "intersection", ErrorFigures{0.42, 0.18, 0.30, 0.42}},
-     {"udcsc", "on_udcsc", "intersection", ErrorFigures{1.15, 0.16, 0.54, 0.62}},
-     {"biplane", "fre", "ray", ErrorFigures{0.58, 0.03, 0.25, 0.32}},
-     {"biplane", "on_biplane", "ray", ErrorFigures{0.89, 0.20, 0.58, 0.65}},
+     {"udcsc", "centre", "intersection", {}, ErrorFigures{0.42, 0.18, 0.30, 0.42}},
+     {"udcsc", "on_udcsc", "intersection", {}, ErrorFigures{1.15, 0.16, 0.54, 0.62}},
+     {"biplane", "fre", "ray", {}, ErrorFigures{0.58, 0.03, 0.25, 0.32}},
+     {"biplane", "on_biplane", "ray", {}, ErrorFigures{0.89, 0.20, 0.58, 0.65}},
      {"biplane", "on_biplane", "intersection", {}},
-     {"biplane", "centre", "intersection", ErrorFigures{3.08, 1.75, 2.65, 2.77}},
-     {"biplane", "on_udcsc", "intersection", ErrorFigures{3.33, 1.43, 2.04, 2.16}}}};
-constexpr std::size_t figures_of_cell = sizeof(ErrorFigures) / sizeof(double);
+     {"biplane", "centre", "intersection", {}, ErrorFigures{3.08, 1.75, 2.65, 2.77}},
+     {"biplane", "on_udcsc", "intersection", {}, ErrorFigures{3.33, 1.43, 2.04, 2.16}}}};
 
 /// Errors of one cell over an experiment.
 struct Gathered {
@@ -81,16 +76,13 @@ class BiplaneTrials {
     for (const auto& target : surface_targets()) on_cone_.push_back(target);
   }
 
-  /// Experiments first .. first + 3: table_cells.size() times four figures each.
-  void run(std::uint64_t first, double* out) const {
-    std::array<Gathered, table_cells.size()> cells;
+  /// Experiments first .. first + 3: the table's cells, four figures each.
+  void run(std::uint64_t first, std::span<double> out) const {
+    std::array<Gathered, cells_of_table> cells;
     for (int test = 0; test < tests_of_experiment; ++test)
       run_test(LaneRandom(options_.seed, biplane_stream + std::uint32_t(test), first), cells);
     for (int lane = 0; lane < lane_count; ++lane)
-      for (const Gathered& cell : cells) {
-        const ErrorFigures figures = cell.figures(lane);
-        for (const double figure : {figures.max, figures.min, figures.mean, figures.rms}) *out++ = figure;
-      }
+      for (const Gathered& cell : cells) put_record(cell.figures(lane), out);
   }
 
  private:
@@ -151,7 +143,7 @@ class BiplaneTrials {
     return moved;
   }
 
-  void run_test(const LaneRandom& random, std::array<Gathered, table_cells.size()>& cells) const {
+  void run_test(const LaneRandom& random, std::array<Gathered, cells_of_table>& cells) const {
     std::uint32_t at = 0;
     const Seen cone = seen(cone_, random, at);
     const Seen plates[2] = {seen(plates_[0], random, at), seen(plates_[1], random, at)};
@@ -203,87 +195,20 @@ Expected<void> check(const BiplaneOptions& o) {
   return {};
 }
 
-const Cell& cell_of(const BiplaneRow& row) {
-  return *std::ranges::find_if(table_cells, [&](const Cell& cell) {
-    return cell.calibrator == row.calibrator && cell.points == row.points && cell.measure == row.measure;
-  });
-}
-
-const ErrorFigures& printed_or_nothing(const Cell& cell) {
-  static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  static constexpr ErrorFigures nothing{nan, nan, nan, nan};
-  return cell.printed ? *cell.printed : nothing;
-}
-
-std::array<double, figures_of_cell> listed(const ErrorFigures& f) { return {f.max, f.min, f.mean, f.rms}; }
-
-std::string biplane_summary(const std::vector<BiplaneRow>& rows) {
-  const auto mean = [&](std::string_view calibrator, std::string_view points, std::string_view measure) {
-    for (const BiplaneRow& row : rows)
-      if (row.calibrator == calibrator && row.points == points && row.measure == measure)
-        return row.figures.mean;
-    return 0.0;
-  };
-  const double cone_far = mean("udcsc", "on_biplane", "intersection"),
-               cone_centre = mean("udcsc", "centre", "intersection"),
-               cone_near = mean("udcsc", "on_udcsc", "intersection"),
-               plates_own = mean("biplane", "on_biplane", "ray"),
-               plates_centre = mean("biplane", "centre", "intersection"),
-               plates_cone = mean("biplane", "on_udcsc", "intersection");
-  const bool same_order = cone_centre < plates_centre && cone_near < plates_cone && plates_own < cone_far;
-  return fmt::format(
-      "Printed (Table 1), mean errors in mm by UDCSC and by biplane: points on the biplane 4.50 and 0.58, "
-      "centre of UDCSC "
-      "0.30 and 2.65, points on UDCSC 0.54 and 2.04. Here: {:.2f} and {:.2f}, {:.2f} and {:.2f}, {:.2f} and "
-      "{:.2f}{}. Each "
-      "calibrator is good where its balls are. The print gives neither the lengths nor the tracker's noise, "
-      "and the "
-      "plates turn with the C-arm: the balls of one view are elsewhere in the other, so the error on their "
-      "own points "
-      "is taken as the distance from one view's ray; as the intersection of two it is {:.2f} mm.",
-      cone_far, plates_own, cone_centre, plates_centre, cone_near, plates_cone,
-      same_order ? ": the same order" : ": not the same order",
-      mean("biplane", "on_biplane", "intersection"));
-}
-
-std::string biplane_svg(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options) {
-  Chart chart{"Table 1: UDCSC and biplane", "Points", "Error, mm: mean, largest and least of ten tests"};
-  chart.x_names = {"FRE", "TRE on biplane", "TRE at the centre", "TRE on UDCSC"};
-  chart.y_from_zero = true;
-  chart.note = fmt::format("medians of {} simulated experiments beside the print", options.groups);
-  const std::array places{"fre", "on_biplane", "centre", "on_udcsc"};
-  for (const char* calibrator : {"udcsc", "biplane"})
-    for (const bool print : {false, true}) {
-      ChartSeries series{fmt::format("{}, {}", calibrator == std::string_view("udcsc") ? "UDCSC" : "biplane",
-                                     print ? "printed" : "here")};
-      series.dashed = print;
-      for (const BiplaneRow& row : rows) {
-        const Cell& cell = cell_of(row);
-        if (row.calibrator != calibrator || !cell.printed) continue;
-        const ErrorFigures& figures = print ? *cell.printed : row.figures;
-        const auto place = double(std::ranges::find(places, row.points) - places.begin());
-        series.points.push_back({place + 0.14 * (double(chart.series.size()) - 1.5), figures.mean});
-        series.ranges.push_back({figures.min, figures.max});
-      }
-      chart.series.push_back(std::move(series));
-    }
-  return chart_svg(std::array{chart});
-}
-
 }  // namespace
 
 Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, const EngineOptions& engine,
                                                 const Ranks& ranks) {
   if (const auto good = check(options); !good) return tl::unexpected<Failure>(good.error());
   const BiplaneTrials trials(options);
-  constexpr std::size_t stride = table_cells.size() * figures_of_cell;
+  constexpr std::size_t stride = cells_of_table * numbers_in<ErrorFigures>;
   StudySetting setting;
   setting.blocks = (options.groups + experiments_of_block - 1) / experiments_of_block;
   setting.values_per_block = experiments_of_block * stride;
   setting.work = [&](std::size_t block, std::span<double> values) {
     for (std::size_t i = 0; i < experiments_of_block; i += lane_count)
       if (const std::size_t first = block * experiments_of_block + i; first < options.groups)
-        trials.run(first, values.data() + i * stride);
+        trials.run(first, values.subspan(i * stride));
   };
   setting.settle = [&](std::span<const double> values) {
     std::vector<double> medians;
@@ -299,55 +224,13 @@ Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, c
                   HELICARM_VERSION, options.groups, options.seed, name_of(options.sigma), options.fle,
                   options.cone_mm, options.near_plate_mm, options.far_plate_mm, options.half_plate_mm,
                   options.balls_a_side, options.tracker_sigma_mm, options.tracker_sigma_deg);
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  std::vector<BiplaneRow> rows;
-  if (kept->empty()) return rows;
-  for (std::size_t i = 0; i < table_cells.size(); ++i) {
-    const double* f = kept->front().data() + i * figures_of_cell;
-    const Cell& cell = table_cells[i];
-    rows.push_back({cell.calibrator, cell.points, cell.measure, {f[0], f[1], f[2], f[3]}});
-  }
-  return rows;
-}
-
-StudyFiles files_of(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options) {
-  StudyFiles files;
-  files.summary = biplane_summary(rows);
-  files.svg = biplane_svg(rows, options);
-  files.csv = "calibrator,points,measure,max,min,mean,rms,printed_max,printed_min,printed_mean,printed_rms\n";
-  Json table = Json::array();
-  for (const BiplaneRow& row : rows) {
-    const Cell& cell = cell_of(row);
-    files.csv += fmt::format("{},{},{}", row.calibrator, row.points, row.measure);
-    for (const double value : listed(row.figures)) files.csv += fmt::format(",{}", value);
-    for (const double value : listed(printed_or_nothing(cell)))
-      files.csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
-    files.csv += '\n';
-    const auto json_of = [](const ErrorFigures& f) {
-      return Json{{"max", f.max}, {"min", f.min}, {"mean", f.mean}, {"rms", f.rms}};
-    };
-    table.push_back({{"calibrator", row.calibrator},
-                     {"points", row.points},
-                     {"measure", row.measure},
-                     {"mm", json_of(row.figures)},
-                     {"printed_mm", cell.printed ? json_of(*cell.printed) : Json(nullptr)}});
-  }
-  files.json = {{"format", "helicarm-study/1"},
-                {"study", "biplane"},
-                {"groups", options.groups},
-                {"seed", options.seed},
-                {"version", HELICARM_VERSION},
-                {"sigma", name_of(options.sigma)},
-                {"sigma_px", sigma_px(options.sigma, options.fle)},
-                {"cone_mm", options.cone_mm},
-                {"plates_mm", {options.near_plate_mm, options.far_plate_mm}},
-                {"balls_of_biplane", 2 * options.balls_a_side * options.balls_a_side},
-                {"tracker_sigma_mm", options.tracker_sigma_mm},
-                {"tracker_sigma_deg", options.tracker_sigma_deg},
-                {"summary", files.summary},
-                {"rows", std::move(table)}};
-  return files;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    if (kept.empty()) return std::vector<BiplaneRow>{};
+    std::vector<BiplaneRow> rows(table_1.begin(), table_1.end());
+    std::span<const double> values = kept.front();
+    for (BiplaneRow& row : rows) row.figures = take_record<ErrorFigures>(values);
+    return rows;
+  });
 }
 
 }  // namespace helicarm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct BiplaneRow {
   std::string_view points;      ///< fre, on_biplane, centre, on_udcsc
   std::string_view measure;     ///< intersection: of two views' rays; ray: distance from one view's ray
   ErrorFigures figures;
+  std::optional<ErrorFigures> printed = {};
 };
 
 /// Empty at ranks that do not lead.

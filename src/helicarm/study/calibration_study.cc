@@ -2,7 +2,6 @@
 #include "helicarm/study/calibration_study.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -15,13 +14,12 @@
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/study/paper_scene.h"
+#include "helicarm/study/records.h"
 
 namespace helicarm {
 namespace {
 
 constexpr double unmeasured = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t figures_of_test = sizeof(CalibrationTest) / sizeof(double);
-using TestFigures = std::array<double, figures_of_test>;
 
 std::uint32_t seed_of_case(const CalibrationStudyOptions& options, std::size_t test) {
   return RandomStream(options.seed, calibration_stream, test).bits();
@@ -54,10 +52,7 @@ void run_calibration_test(const CalibrationStudyOptions& options, std::size_t nu
   const auto folder = options.folder / fmt::format("calibration-case-{}", number);
   value_or_throw(simulation::write_case(folder, value_or_throw(simulation::simulate_case(simulated))));
   const Case given = value_or_throw(read_case(folder));
-  for (const Method method : {Method::paper, Method::best}) {
-    std::ranges::copy(std::bit_cast<TestFigures>(measured(given, method)), out.begin());
-    out = out.subspan(figures_of_test);
-  }
+  for (const Method method : {Method::paper, Method::best}) put_record(measured(given, method), out);
   std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);
 }
@@ -126,28 +121,22 @@ Expected<std::vector<CalibrationTests>> study_calibration(const CalibrationStudy
   if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
   StudySetting setting;
   setting.blocks = options.groups;
-  setting.values_per_block = 2 * figures_of_test;
+  setting.values_per_block = 2 * numbers_in<CalibrationTest>;
   setting.work = [&](std::size_t block, std::span<double> values) {
     run_calibration_test(options, block, values);
   };
-  setting.settle = [](std::span<const double> values) {
-    return std::vector<double>(values.begin(), values.end());
-  };
   const std::string identity = fmt::format("calibration {} groups {} seed {} size {}", HELICARM_VERSION,
                                            options.groups, options.seed, options.size_px);
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  std::vector<CalibrationTests> tests;
-  if (kept->empty()) return tests;
-  for (std::size_t i = 0; i < options.groups; ++i) {
-    TestFigures paper, best;
-    const auto from = kept->front().begin() + std::ptrdiff_t(2 * i * figures_of_test);
-    std::copy_n(from, figures_of_test, paper.begin());
-    std::copy_n(from + figures_of_test, figures_of_test, best.begin());
-    tests.push_back({seed_of_case(options, i), std::bit_cast<CalibrationTest>(paper),
-                     std::bit_cast<CalibrationTest>(best)});
-  }
-  return tests;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    std::vector<CalibrationTests> tests;
+    if (kept.empty()) return tests;
+    std::span<const double> values = kept.front();
+    while (tests.size() < options.groups) {
+      const auto paper = take_record<CalibrationTest>(values), best = take_record<CalibrationTest>(values);
+      tests.push_back({seed_of_case(options, tests.size()), paper, best});
+    }
+    return tests;
+  });
 }
 
 StudyFiles files_of(const std::vector<CalibrationTests>& tests, const CalibrationStudyOptions& options) {
@@ -158,10 +147,8 @@ StudyFiles files_of(const std::vector<CalibrationTests>& tests, const Calibratio
     for (const auto* test : {&tests[i].paper, &tests[i].best}) {
       const bool by_paper = test == &tests[i].paper;
       (by_paper ? refused_paper : refused_best) += test->refused > 0;
-      files.csv += fmt::format("{},{},{}", i + 1, tests[i].case_seed, by_paper ? "paper" : "best");
-      for (const double value : std::bit_cast<TestFigures>(*test))
-        files.csv += std::isfinite(value) ? fmt::format(",{}", value) : ",";
-      files.csv += '\n';
+      files.csv += fmt::format("{},{},{}{}\n", i + 1, tests[i].case_seed, by_paper ? "paper" : "best",
+                               csv_cells(numbers_of(*test)));
     }
   const auto rows = rows_of(tests);
   const auto json_of = [](const std::array<double, 4>& f) {
@@ -185,15 +172,11 @@ StudyFiles files_of(const std::vector<CalibrationTests>& tests, const Calibratio
       "distortion, "
       "noise and calibrator's tolerance are not known.",
       tests.size(), means, refused_paper, refused_best);
-  files.json = {{"format", "helicarm-study/1"},
-                {"study", "calibration"},
-                {"groups", options.groups},
-                {"seed", options.seed},
-                {"version", HELICARM_VERSION},
-                {"size_px", options.size_px},
-                {"refused", {{"paper", refused_paper}, {"best", refused_best}}},
-                {"summary", files.summary},
-                {"rows", std::move(table)}};
+  files.json = study_json("calibration", options);
+  files.json.update({{"size_px", options.size_px},
+                     {"refused", {{"paper", refused_paper}, {"best", refused_best}}},
+                     {"summary", files.summary},
+                     {"rows", std::move(table)}});
   files.svg = chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) the printed recipe"),
                                    chart_of(tests, &CalibrationTests::best, "(b) the best one")});
   return files;

@@ -2,18 +2,18 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "helicarm/core/failure.h"
+#include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
 namespace helicarm {
 
 struct CentreOptions {
-  int balls = 1000;  ///< of each situation, filled up to whole pictures
+  std::size_t groups = 1000;  ///< balls of each situation, filled up to whole pictures
   std::uint64_t seed = 1;
-  unsigned threads = 0;                ///< 0: all cores; the answer does not depend on it
   std::vector<std::string> only = {};  ///< groups of situations; empty: all
   int squares = 10;                    ///< across a picture, a ball in each
 };
@@ -37,11 +37,11 @@ struct CentreRow {
 
 /// Fits the centres of balls that the simulator has drawn over a sloping, scattering background, with right
 /// and wrong assumptions. All situations have the same balls, places and noise. The simulator traces rays
-/// through solids and knows nothing of the fit's model. `progress` is told the share done, in order.
-std::vector<CentreRow> study_centres(const CentreOptions& options,
-                                     const std::function<void(double share)>& progress);
+/// through solids and knows nothing of the fit's model. Empty at ranks that do not lead.
+Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, const EngineOptions& engine,
+                                               const Ranks& ranks);
 
-/// centres.csv, centres.json and one line for each situation.
+/// centres.csv, centres.json, centres.svg and one line for each situation.
 StudyFiles files_of(const std::vector<CentreRow>& rows, const CentreOptions& options);
 
 }  // namespace helicarm

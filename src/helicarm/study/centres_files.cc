@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 
 #include <fmt/format.h>
 
+#include "helicarm/report/chart.h"
 #include "helicarm/study/centres.h"
 
 namespace helicarm {
 namespace {
 
 Json centres_json(const std::vector<CentreRow>& rows, const CentreOptions& options) {
-  Json json{{"format", "helicarm-study/1"}, {"study", "centres"},          {"groups", options.balls},
-            {"seed", options.seed},         {"version", HELICARM_VERSION}, {"rows", Json::array()}};
+  Json json = study_json("centres", options);
+  json["rows"] = Json::array();
   for (const CentreRow& row : rows)
     json["rows"].push_back({{"group", row.group},
                             {"situation", row.situation},
@@ -30,13 +34,10 @@ Json centres_json(const std::vector<CentreRow>& rows, const CentreOptions& optio
 std::string centres_csv(const std::vector<CentreRow>& rows) {
   std::string text =
       "group,situation,balls,refused,rms_px,bias_px,sigma_px,z,coverage,radius_bias,bound_px,ratio\n";
-  for (const CentreRow& row : rows) {
-    text += fmt::format("{},{},{},{}", row.group, row.situation, row.balls, row.refused);
-    for (const double value : {row.rms_px, row.bias_px, row.sigma_px, row.z, row.coverage, row.radius_bias,
-                               row.bound_px, row.ratio()})
-      text += std::isfinite(value) ? fmt::format(",{}", value) : ",";
-    text += '\n';
-  }
+  for (const CentreRow& row : rows)
+    text += fmt::format("{},{},{},{}{}\n", row.group, row.situation, row.balls, row.refused,
+                        csv_cells(std::array{row.rms_px, row.bias_px, row.sigma_px, row.z, row.coverage,
+                                             row.radius_bias, row.bound_px, row.ratio()}));
   return text;
 }
 
@@ -56,10 +57,46 @@ std::string centres_table(const std::vector<CentreRow>& rows) {
   return text;
 }
 
+/// A mark for each situation, from above; values beyond `most` stand at the edge.
+ChartSeries marks_of(const char* name, const std::vector<CentreRow>& rows, double most,
+                     const std::function<double(const CentreRow&)>& value) {
+  ChartSeries series{name, {}, true};
+  for (const CentreRow& row : rows) {
+    const double x = value(row);
+    series.points.push_back({std::isfinite(x) ? std::min(x, most) : x, double(series.points.size())});
+  }
+  return series;
+}
+
+ChartSeries line_at(const char* name, double x, std::size_t rows) {
+  ChartSeries series{name, {{x, -0.5}, {x, double(rows) - 0.5}}};
+  series.dashed = true;
+  return series;
+}
+
+std::string centres_svg(const std::vector<CentreRow>& rows) {
+  constexpr double most = 4;
+  Chart ratio{"(a) error over the statistical limit", "rms over the Cramer-Rao bound", ""};
+  for (const CentreRow& row : rows) {
+    const std::string name = row.group + (row.situation == row.group ? "" : ": " + row.situation);
+    ratio.y_names.push_back(name);
+  }
+  Chart coverage{"(b) coverage", "truth inside the 95 % ellipse, % of balls", ""};
+  coverage.y_names.resize(rows.size());
+  ratio.series = {marks_of("error", rows, most, [](const CentreRow& row) { return row.ratio(); }),
+                  marks_of("what the fit predicts", rows, most,
+                           [](const CentreRow& row) { return row.sigma_px / row.bound_px; }),
+                  line_at("the bound", 1, rows.size())};
+  ratio.note = fmt::format("marks at {:g}: that or more; no bound is computed where there is no mark", most);
+  coverage.series = {marks_of("", rows, 100, [](const CentreRow& row) { return 100 * row.coverage; }),
+                     line_at("95 %", 95, rows.size())};
+  return chart_svg(std::array{ratio, coverage});
+}
+
 }  // namespace
 
 StudyFiles files_of(const std::vector<CentreRow>& rows, const CentreOptions& options) {
-  return {centres_csv(rows), centres_json(rows, options), {}, centres_table(rows)};
+  return {centres_csv(rows), centres_json(rows, options), centres_svg(rows), centres_table(rows)};
 }
 
 }  // namespace helicarm

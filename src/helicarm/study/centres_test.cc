@@ -30,17 +30,33 @@ TEST(CentreBound, IsWorseBesideAnotherBall) {
   EXPECT_GT(bound_of(Companion::ball, 1000), 1.05 * bound_of(Companion::none, 1000));
 }
 
-CentreOptions few_balls(unsigned threads) { return {10, 5, threads, {"as it is"}, 3}; }
-
 TEST(StudyCentres, BytesDoNotDependOnThreads) {
-  const auto quiet = [](double) {};
-  const std::vector<CentreRow> rows = study_centres(few_balls(1), quiet);
-  EXPECT_EQ(files_of(rows, few_balls(1)).csv, files_of(study_centres(few_balls(2), quiet), few_balls(1)).csv);
+  const CentreOptions options{10, 5, {"as it is"}, 3};
+  const auto rows_by = [&](unsigned threads) {
+    EngineOptions engine;
+    engine.threads = threads;
+    return study_centres(options, engine, Ranks()).value();
+  };
+  const std::vector<CentreRow> rows = rows_by(1);
+  const StudyFiles files = files_of(rows, options), by_two = files_of(rows_by(2), options);
+  EXPECT_EQ(files.csv, by_two.csv);
+  EXPECT_EQ(files.svg, by_two.svg);
+  EXPECT_EQ(files.svg.find("nan"), std::string::npos);
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].balls, 14);
   EXPECT_EQ(rows[0].refused, 0);
   EXPECT_LT(rows[0].ratio(), 2);
   EXPECT_LT(rows[0].z, 2);
+}
+
+TEST(StudyCentres, WholeViewsAreMeasuredToo) {
+  const CentreOptions options{1, 5, {"cone before a knee"}, 2};
+  const std::vector<CentreRow> rows = study_centres(options, {}, Ranks()).value();
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_GT(rows[0].balls + rows[1].balls, 20);
+  EXPECT_GT(rows[1].balls, 0);
+  EXPECT_LT(rows[0].rms_px, 0.1);
+  EXPECT_TRUE(std::isnan(rows[0].bound_px));
 }
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include "helicarm/core/random.h"
 #include "helicarm/phantom/conical_helix.h"
 #include "helicarm/phantom/rules.h"
-#include "helicarm/report/chart.h"
 #include "helicarm/study/statistics.h"
 
 namespace helicarm {
@@ -20,9 +19,8 @@ namespace {
 
 constexpr std::size_t sets_of_block = 64;
 constexpr std::uint64_t search_draws = 256, report_draws = 8192;
-constexpr double least_spacing_mm = 5;          // two 4 mm balls and a wall between them
-constexpr double design_ball_mm = 4;            // 2.3.4
-constexpr std::size_t tried_random_sets = 500;  // of the best ones, for the rules
+constexpr double least_spacing_mm = 5;  // two 4 mm balls and a wall between them
+constexpr double design_ball_mm = 4;    // 2.3.4
 
 /// Two shares of (0, 1) for each ball: along the surface's axis or the spiral, and around.
 using Shares = std::vector<double>;
@@ -167,17 +165,6 @@ std::vector<double> search(const DesignOptions& options, const Judge& judge, std
   return answer;
 }
 
-Json json_of_set(const DesignedSet& set) {
-  return {{"tre_mm", set.tre_mm}, {"keeps_rules", set.keeps_rules}, {"balls", set.calibrator.balls.size()}};
-}
-
-ChartSeries drawn_set(const char* name, const Calibrator& calibrator, int up) {
-  ChartSeries series{name, {}, true};
-  for (const CalibratorBall& ball : calibrator.balls)
-    series.points.push_back({ball.centre_in_calibrator.x(), ball.centre_in_calibrator(up)});
-  return series;
-}
-
 }  // namespace
 
 std::string_view name_of(DesignSurface surface) {
@@ -201,9 +188,6 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
     for (std::size_t i = 0; i < values.size() && block * sets_of_block + i < options.groups; ++i)
       values[i] = judge.tre_mm(
           places_of(options.surface, random_shares(options, design_stream + 1, block * sets_of_block + i)));
-  };
-  random.settle = [&](std::span<const double> values) {
-    return std::vector<double>(values.begin(), values.begin() + std::ptrdiff_t(options.groups));
   };
   random.cost = double(options.groups);
 
@@ -244,7 +228,7 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
   answer.design =
       judged(calibrator_of("design", places_of(options.surface, Shares(found.begin() + 1, found.end()))));
   answer.udcsc = judged(udcsc());
-  const std::vector<double>& tre = kept->front();
+  const std::span<const double> tre = std::span(kept->front()).first(options.groups);
   answer.median_random_mm = column_statistics(tre).median;
   std::vector<std::size_t> order(tre.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -259,58 +243,6 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
       break;
     }
   return answer;
-}
-
-StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
-  StudyFiles files;
-  files.csv = "label,x_mm,y_mm,z_mm\n";
-  for (const CalibratorBall& ball : answer.design.calibrator.balls) {
-    const Eigen::Vector3d& p = ball.centre_in_calibrator;
-    files.csv += fmt::format("{},{},{},{}\n", ball.label, p.x(), p.y(), p.z());
-  }
-  const auto gain = [&](const DesignedSet& other) { return 100 * (1 - answer.design.tre_mm / other.tre_mm); };
-  const bool ruled = !answer.best_random_ruled.calibrator.balls.empty();
-  files.summary = fmt::format(
-      "{} balls on the {}, TRE in the cone (rms, exact target pixels): {:.3f} mm by design, {:.3f} mm with "
-      "udcsc ({:.0f} % "
-      "less), {:.3f} mm with the best of {} random sets ({:.0f} % less; {}), {:.3f} mm in the middle of "
-      "them. The design "
-      "{} every rule that does not go by label.",
-      options.balls, name_of(options.surface), answer.design.tre_mm, answer.udcsc.tre_mm, gain(answer.udcsc),
-      answer.best_random.tre_mm, options.groups, gain(answer.best_random),
-      answer.best_random.keeps_rules ? "it keeps the rules"
-      : ruled                        ? fmt::format("it breaks rules, the best that keeps them has {:.3f} mm",
-                                                   answer.best_random_ruled.tre_mm)
-              : fmt::format("it breaks rules, as do all of the best {}", tried_random_sets),
-      answer.median_random_mm, answer.design.keeps_rules ? "keeps" : "breaks");
-  files.json = {
-      {"format", "helicarm-study/1"},
-      {"study", "design"},
-      {"groups", options.groups},
-      {"seed", options.seed},
-      {"version", HELICARM_VERSION},
-      {"balls", options.balls},
-      {"surface", name_of(options.surface)},
-      {"sigma", name_of(options.sigma)},
-      {"sigma_px", sigma_px(options.sigma, options.fle)},
-      {"summary", files.summary},
-      {"design", json_of_set(answer.design)},
-      {"udcsc", json_of_set(answer.udcsc)},
-      {"best_random", json_of_set(answer.best_random)},
-      {"best_random_that_keeps_rules", ruled ? json_of_set(answer.best_random_ruled) : Json(nullptr)},
-      {"median_random_mm", answer.median_random_mm},
-      {"calibrator", to_json(answer.design.calibrator)}};
-  std::vector<Chart> charts;
-  for (const int up : {1, 2}) {
-    Chart chart{up == 1 ? "(a) from above" : "(b) from the side", "X, mm", up == 1 ? "Y, mm" : "Z, mm"};
-    chart.series = {drawn_set("design", answer.design.calibrator, up),
-                    drawn_set("udcsc", answer.udcsc.calibrator, up)};
-    chart.note = fmt::format("TRE in the cone: {:.3f} mm by design, {:.3f} mm with udcsc",
-                             answer.design.tre_mm, answer.udcsc.tre_mm);
-    charts.push_back(std::move(chart));
-  }
-  files.svg = chart_svg(charts);
-  return files;
 }
 
 }  // namespace helicarm

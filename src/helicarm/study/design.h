@@ -33,6 +33,8 @@ struct DesignOptions {
   int steps = 2000;  ///< of each restart: one ball moved, kept if better
 };
 
+inline constexpr std::size_t tried_random_sets = 500;  // of the best ones, for the rules
+
 struct DesignedSet {
   Calibrator calibrator;
   double tre_mm = 0;  ///< rms over noise and the cone's targets with exact pixels, from draws of its own

@@ -39,7 +39,7 @@ class Run {
         keep(setting, block.number, block.values, false);
       share_done();
       run(setting);
-      settled.push_back(ranks_.leads() ? setting.settle(values_) : std::vector<double>{});
+      settled.push_back(setting.settle && ranks_.leads() ? setting.settle(values_) : values_);
       past_cost_ += setting.cost;
       if (journal_ && journal_begun_) value_or_throw(journal_->write({settled, {}}));
     }

@@ -19,9 +19,9 @@ struct StudySetting {
   std::size_t blocks;
   std::size_t values_per_block;
   double cost = 1;  ///< of the whole setting, in any unit: for the time left
-  std::function<void(std::size_t block, std::span<double> values)> work;
-  /// What is kept of the setting: is given the values of all blocks in order.
-  std::function<std::vector<double>(std::span<const double> values)> settle;
+  std::function<void(std::size_t block, std::span<double> values)> work = {};
+  /// What is kept of the setting: is given the values of all blocks in order. None: all of them.
+  std::function<std::vector<double>(std::span<const double> values)> settle = {};
 };
 
 struct EngineOptions {

@@ -106,21 +106,22 @@ LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
     mean.v += share * pixels[i].v;
   }
   const auto cleared = [&](const Row& row) { return Row{inverse_ * row.y, share * row.one}; };
-  Weighted by_u, by_v;
-  Reduced reduced{};
+  LanePixel at[most];  // scaled, about the mean
+  for (std::size_t i = 0; i < count_; ++i)
+    at[i] = {(pixels[i].u - mean.u) / pixel_scale_px, (pixels[i].v - mean.v) / pixel_scale_px};
+  // Sum by sum, for the registers hold the terms of one only.
+  Weighted by_u, by_v, by_both;
+  Lanes corner{};
+  for (std::size_t i = 0; i < count_; ++i) by_u.add(scaled_[i], at[i].u);
+  for (std::size_t i = 0; i < count_; ++i) by_v.add(scaled_[i], at[i].v);
   for (std::size_t i = 0; i < count_; ++i) {
-    const LanePoint& y = scaled_[i];
-    const Lanes u = (pixels[i].u - mean.u) / pixel_scale_px;
-    const Lanes v = (pixels[i].v - mean.v) / pixel_scale_px;
-    by_u.add(y, u);
-    by_v.add(y, v);
-    const Lanes weight = u * u + v * v;
-    const LanePoint weighted{weight * y.x, weight * y.y, weight * y.z};
-    reduced.inner.add(y, weighted);
-    reduced.border = {reduced.border.x + weighted.x, reduced.border.y + weighted.y,
-                      reduced.border.z + weighted.z};
-    reduced.corner += weight;
+    const Lanes weight = at[i].u * at[i].u + at[i].v * at[i].v;
+    by_both.add(scaled_[i], weight);
+    corner += weight;
   }
+  Reduced reduced{by_both.second, by_both.first, corner};
+  // The gradient of the first step, which begins at the row (0, 1): its residuals are the pixels.
+  Row g_u{by_u.first, {}}, g_v{by_v.first, {}}, g_w{reduced.border, reduced.corner};
   reduced.subtract(by_u, inverse_, share);
   reduced.subtract(by_v, inverse_, share);
 
@@ -130,16 +131,16 @@ LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
   Row of_u{}, of_v{}, of_w{{}, lanes(1)};
   // The second round takes back what the normal equations lose: residuals are computed anew.
   for (int round = 0; round < 2; ++round) {
-    Row g_u{}, g_v{}, g_w{};
-    for (std::size_t i = 0; i < count_; ++i) {
-      const LanePoint& y = scaled_[i];
-      const Lanes u = (pixels[i].u - mean.u) / pixel_scale_px;
-      const Lanes v = (pixels[i].v - mean.v) / pixel_scale_px;
-      const Lanes w = of_w.at(y);
-      const Lanes r_u = u * w - of_u.at(y), r_v = v * w - of_v.at(y);
-      g_u.add(y, r_u);
-      g_v.add(y, r_v);
-      g_w.add(y, u * r_u + v * r_v);
+    if (round > 0) {
+      g_u = g_v = g_w = Row{};
+      for (std::size_t i = 0; i < count_; ++i) {
+        const LanePoint& y = scaled_[i];
+        const Lanes w = of_w.at(y);
+        const Lanes r_u = at[i].u * w - of_u.at(y), r_v = at[i].v * w - of_v.at(y);
+        g_u.add(y, r_u);
+        g_v.add(y, r_v);
+        g_w.add(y, at[i].u * r_u + at[i].v * r_v);
+      }
     }
     const Row s_u = by_u.times(cleared(g_u)), s_v = by_v.times(cleared(g_v));
     const Lanes h = s_u.one + s_v.one - g_w.one;

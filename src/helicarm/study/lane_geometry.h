@@ -43,19 +43,15 @@ struct LaneSymmetric {
   LanePoint operator*(const LanePoint& a) const {
     return {xx * a.x + xy * a.y + xz * a.z, xy * a.x + yy * a.y + yz * a.z, xz * a.x + yz * a.y + zz * a.z};
   }
-  [[gnu::always_inline]] LaneSymmetric inverse() const {
-    LaneSymmetric adjugate{yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy,
-                           xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy};
+  /// The x of which this matrix times x is `right`, by Cramer's rule.
+  [[gnu::always_inline]] LanePoint solve(const LanePoint& right) const {
+    const LaneSymmetric adjugate{yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy,
+                                 xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy};
     const Lanes scale = 1.0 / (xx * adjugate.xx + xy * adjugate.xy + xz * adjugate.xz);
-    adjugate.xx *= scale;
-    adjugate.xy *= scale;
-    adjugate.xz *= scale;
-    adjugate.yy *= scale;
-    adjugate.yz *= scale;
-    adjugate.zz *= scale;
-    return adjugate;
+    const LanePoint x = adjugate * right;
+    return {x.x * scale, x.y * scale, x.z * scale};
   }
-  /// The same of a positive definite matrix that may be near singular, by its triangular factors (L D L').
+  /// Of a positive definite matrix that may be near singular, by its triangular factors (L D L').
   LaneSymmetric careful_inverse() const {
     const Lanes a = 1.0 / xx;
     const Lanes l1 = xy * a, l2 = xz * a;
@@ -105,7 +101,7 @@ class LaneBalls {
   add(a, a.v, in_a.v);
   add(b, b.u, in_b.u);
   add(b, b.v, in_b.v);
-  return normal.inverse() * right;
+  return normal.solve(right);
 }
 
 /// Distance of a point from the ray through a pixel.

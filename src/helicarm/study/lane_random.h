@@ -53,8 +53,8 @@ class LaneRandom {
   }
 
   /// Two standard normal deviates (Box and Muller 1958).
-  Pair normals(std::uint32_t block) const {
-    const Pair u = uniforms(block);
+  Pair normals(std::uint32_t block) const { return normals_of(uniforms(block)); }
+  static Pair normals_of(const Pair& u) {
     const Lanes radius = square_root(-2.0 * logarithm(u.first));
     const SineCosine direction = sine_cosine_of_turns(u.second);
     return {radius * direction.cosine, radius * direction.sine};

@@ -2,18 +2,19 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "helicarm/core/failure.h"
+#include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
 namespace helicarm {
 
 struct LimitOptions {
-  int trials = 1000;  ///< of each setting
+  std::size_t groups = 1000;  ///< trials of each setting
   std::uint64_t seed = 1;
-  unsigned threads = 0;  ///< 0: all cores; the answer does not depend on it
+  std::vector<int> balls = {8, 12, 20};  ///< some of these
 };
 
 /// One setting of the experiment: balls, noise, what is known of the intrinsics, and where the point is.
@@ -33,9 +34,9 @@ struct LimitRow {
 };
 
 /// The estimators against the statistical limit, in the geometry of 2.3.3 (f 900 mm, 0.15 mm pixels, AP and
-/// lateral at 800 mm). `progress` is told the share done, in order.
-std::vector<LimitRow> study_limit(const LimitOptions& options,
-                                  const std::function<void(double share)>& progress);
+/// lateral at 800 mm). Empty at ranks that do not lead.
+Expected<std::vector<LimitRow>> study_limit(const LimitOptions& options, const EngineOptions& engine,
+                                            const Ranks& ranks);
 
 /// limit.csv, limit.json, limit.svg (12 balls, exact pixels) and one line for each model.
 StudyFiles files_of(const std::vector<LimitRow>& rows, const LimitOptions& options);

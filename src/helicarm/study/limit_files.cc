@@ -41,9 +41,8 @@ std::string limit_csv(const std::vector<LimitRow>& rows) {
 }
 
 Json limit_json(const std::vector<LimitRow>& rows, const LimitOptions& options) {
-  Json json{{"format", "helicarm-study/1"}, {"study", "limit"},
-            {"groups", options.trials},     {"seed", options.seed},
-            {"version", HELICARM_VERSION},  {"rows", Json::array()}};
+  Json json = study_json("limit", options);
+  json["rows"] = Json::array();
   for (const LimitRow& row : rows)
     json["rows"].push_back({{"balls", row.balls},
                             {"sigma_px", row.sigma_px},

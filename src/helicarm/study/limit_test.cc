@@ -50,14 +50,16 @@ TEST(LeastCovariance, KnowledgeNeverHurts) {
   EXPECT_LT(bound(0.5, 1e-3, known()), bound(0.5, 1e-3, wide));
 }
 
-StudyFiles few_trials(int trials, std::uint64_t seed, unsigned threads) {
-  const LimitOptions options{trials, seed, threads};
-  return files_of(study_limit(options, [](double) {}), options);
+StudyFiles few_trials(std::size_t trials, std::uint64_t seed, unsigned threads) {
+  const LimitOptions options{trials, seed, {8}};
+  EngineOptions engine;
+  engine.threads = threads;
+  return files_of(study_limit(options, engine, Ranks()).value(), options);
 }
 
 TEST(StudyLimit, BytesDoNotDependOnThreads) {
-  const StudyFiles one = few_trials(2, 7, 1);
-  const StudyFiles three = few_trials(2, 7, 3);
+  const StudyFiles one = few_trials(52, 7, 1);
+  const StudyFiles three = few_trials(52, 7, 3);
   EXPECT_EQ(one.csv, three.csv);
   EXPECT_EQ(one.svg, three.svg);
   EXPECT_EQ(one.summary, three.summary);

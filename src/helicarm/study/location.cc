@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <tuple>
 
 #include <fmt/format.h>
 
-#include "helicarm/report/chart.h"
-#include "helicarm/study/statistics.h"
+#include "helicarm/study/records.h"
 
 namespace helicarm {
 namespace {
@@ -26,7 +25,7 @@ struct LocationTrials {
   struct Sums {
     double fresh, fresh_squares, exact, exact_squares;
   };
-  static constexpr std::size_t sums_of_point = sizeof(Sums) / sizeof(double);
+  static constexpr std::size_t sums_of_point = numbers_in<Sums>;
 
   /// Sums over the draws of a block; the last one's may be fewer.
   void run(std::size_t block, std::span<double> values) const {
@@ -80,7 +79,16 @@ std::vector<Eigen::Vector3d> balls_of(const LocationOptions& options) {
   return balls;
 }
 
+SeenIn seen_in(const std::array<View, 2>& views, const Eigen::Vector3d& place) {
+  const auto holds = [&](const View& view) {
+    const Eigen::Array2d pixel = view.project(place);
+    return view.depth(place) > 0 && (pixel >= -0.5).all() && (pixel < picture_px - 0.5).all();
+  };
+  return SeenIn((holds(views[0]) ? 1 : 0) + (holds(views[1]) ? 2 : 0));
+}
+
 LocationMap empty_map(const LocationOptions& options) {
+  const std::array<View, 2> views = paper_views(options.origin);
   LocationMap map;
   map.balls = balls_of(options);
   map.centre = Eigen::Vector3d::Zero();
@@ -92,54 +100,10 @@ LocationMap empty_map(const LocationOptions& options) {
       for (int column = -reach; column <= reach; ++column) {
         const Eigen::Vector3d out =
             plane == TargetPlane::xoy ? Eigen::Vector3d(column, row, 0) : Eigen::Vector3d(column, 0, row);
-        map.points.push_back({plane, map.centre + options.step_mm * out, 0, 0, 0, 0});
+        const Eigen::Vector3d place = map.centre + options.step_mm * out;
+        map.points.push_back({plane, place, seen_in(views, place), 0, 0, 0, 0});
       }
   return map;
-}
-
-std::string_view name_of_plane(TargetPlane plane) { return plane == TargetPlane::xoy ? "xoy" : "xoz"; }
-
-/// Mean TRE of the points about so far from the centre.
-double tre_at(const LocationMap& map, double distance_mm, double step_mm, double LocationPoint::*tre) {
-  double sum = 0;
-  int count = 0;
-  for (const LocationPoint& point : map.points)
-    if (std::abs((point.place - map.centre).norm() - distance_mm) <= step_mm / 2) sum += point.*tre, ++count;
-  return sum / count;
-}
-
-ChartField field_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
-  const std::size_t cells = map.points.size() / 2;
-  const std::size_t first = plane == TargetPlane::xoy ? 0 : cells;
-  const double reach = options.step_mm * (map.side - 1) / 2;
-  ChartField field{-reach, -reach, options.step_mm, map.side, map.side, {}, {}};
-  double most = 0;
-  for (std::size_t i = 0; i < cells; ++i) {
-    field.values.push_back(map.points[first + i].tre_fresh);
-    if (std::isfinite(field.values.back())) most = std::max(most, field.values.back());
-  }
-  // Lines so near that they would touch are left out.
-  double interval = options.interval_mm;
-  while (most / interval > 24) interval *= 2;
-  for (double level = interval; level < most; level += interval) field.levels.push_back(level);
-  return field;
-}
-
-Chart chart_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
-  const bool flat = plane == TargetPlane::xoy;
-  Chart chart{flat ? "(a) TRE on the plane along XOY" : "(b) TRE on the plane along XOZ",
-              "X from the balls' centre, mm",
-              flat ? "Y from the balls' centre, mm" : "Z from the balls' centre, mm"};
-  chart.field = field_of(map, options, plane);
-  ChartSeries none, balls{"balls, projected", {}, true};
-  for (const Eigen::Vector3d& ball : map.balls) {
-    const Eigen::Vector3d out = ball - map.centre;
-    balls.points.push_back({out.x(), flat ? out.y() : out.z()});
-  }
-  chart.series = {none, balls};
-  chart.note = fmt::format("isolines of the mean TRE in mm, every {:g} mm",
-                           chart.field->levels.empty() ? options.interval_mm : chart.field->levels.front());
-  return chart;
 }
 
 }  // namespace
@@ -169,76 +133,21 @@ Expected<LocationMap> study_location(const LocationOptions& options, const Engin
                   options.half_mm, options.step_mm);
   for (const Eigen::Vector3d& ball : map.balls)
     identity += fmt::format(" {} {} {}", ball.x(), ball.y(), ball.z());
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  if (kept->empty()) {
-    map.points.clear();
-    return map;
-  }
   const auto n = double(options.groups);
   const auto mean_and_se = [&](double sum, double squares) {
     const double mean = sum / n;
     return std::pair{mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1))};
   };
-  for (std::size_t i = 0; i < map.points.size(); ++i) {
-    const double* sums = kept->front().data() + i * stride;
-    LocationPoint& point = map.points[i];
-    std::tie(point.tre_fresh, point.se_fresh) = mean_and_se(sums[0], sums[1]);
-    std::tie(point.tre_exact, point.se_exact) = mean_and_se(sums[2], sums[3]);
-  }
-  return map;
-}
-
-StudyFiles files_of(const LocationMap& map, const LocationOptions& options) {
-  StudyFiles files;
-  files.csv = "plane,x_mm,y_mm,z_mm,tre_fresh_noise,se_fresh_noise,tre_exact,se_exact\n";
-  std::vector<double> distance, tre;
-  for (const LocationPoint& p : map.points) {
-    files.csv += fmt::format("{},{},{},{},{},{},{},{}\n", name_of_plane(p.plane), p.place.x(), p.place.y(),
-                             p.place.z(), p.tre_fresh, p.se_fresh, p.tre_exact, p.se_exact);
-    distance.push_back((p.place - map.centre).norm());
-    tre.push_back(p.tre_fresh);
-  }
-  const double rho = spearman(distance, tre);
-  std::string steps;
-  Json by_distance = Json::array();
-  for (double at = 0; at <= options.half_mm + 1e-9; at += options.half_mm / 3) {
-    const double fresh = tre_at(map, at, options.step_mm, &LocationPoint::tre_fresh);
-    const double exact = tre_at(map, at, options.step_mm, &LocationPoint::tre_exact);
-    steps += fmt::format("{}{:.2f} mm at {:g}", steps.empty() ? "" : ", ", fresh, at);
-    by_distance.push_back({{"distance_mm", at}, {"fresh_noise", fresh}, {"exact", exact}});
-  }
-  files.summary = fmt::format(
-      "Printed (Fig. 7): TRE rises with the distance between target and balls (isolines every 0.5 mm). Here, "
-      "over {} "
-      "noise draws, the mean TRE on both planes is {} mm from the balls' centre; Spearman's correlation with "
-      "the "
-      "distance is {:.3f}{}. The print gives neither the balls nor whether the target's own pixels carry "
-      "noise: with "
-      "exact ones the centre has {:.2f} mm.",
-      options.groups, steps, rho, rho > 0.5 ? ", as printed" : ": the print is not confirmed",
-      tre_at(map, 0, options.step_mm, &LocationPoint::tre_exact));
-  Json balls = Json::array();
-  for (const Eigen::Vector3d& ball : map.balls) balls.push_back({ball.x(), ball.y(), ball.z()});
-  files.json = {{"format", "helicarm-study/1"},
-                {"study", "location"},
-                {"groups", options.groups},
-                {"seed", options.seed},
-                {"version", HELICARM_VERSION},
-                {"sigma", name_of(options.sigma)},
-                {"sigma_px", sigma_px(options.sigma, options.fle)},
-                {"origin", name_of(options.origin)},
-                {"balls_mm", std::move(balls)},
-                {"centre_mm", {map.centre.x(), map.centre.y(), map.centre.z()}},
-                {"step_mm", options.step_mm},
-                {"side", map.side},
-                {"printed", {{"text", "TRE increased with the increase of distance"}}},
-                {"summary", files.summary},
-                {"spearman_with_distance", rho},
-                {"by_distance", std::move(by_distance)}};
-  files.svg = chart_svg(
-      std::array{chart_of(map, options, TargetPlane::xoy), chart_of(map, options, TargetPlane::xoz)});
-  return files;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    if (kept.empty()) map.points.clear();
+    for (std::size_t i = 0; i < map.points.size(); ++i) {
+      const double* sums = kept.front().data() + i * stride;
+      LocationPoint& point = map.points[i];
+      std::tie(point.tre_fresh, point.se_fresh) = mean_and_se(sums[0], sums[1]);
+      std::tie(point.tre_exact, point.se_exact) = mean_and_se(sums[2], sums[3]);
+    }
+    return map;
+  });
 }
 
 }  // namespace helicarm

@@ -28,12 +28,17 @@ struct LocationOptions {
 
 enum class TargetPlane { xoy, xoz };
 
+/// Which of the two pictures of 1024 x 1024 pixels hold a target: its bits are AP and LAT. One that is not in
+/// both cannot be located in reality; the map shows what rays beyond the picture would give.
+enum class SeenIn { none, ap, lat, both };
+
 struct LocationPoint {
   TargetPlane plane;
   Eigen::Vector3d place;  ///< mm, calibrator frame
-  double tre_fresh;       ///< mean distance (Eq. 12) over the draws, mm; the target's pixels carry noise
-  double se_fresh;        ///< its standard error
-  double tre_exact;       ///< likewise; only the calibration is noisy
+  SeenIn seen_in;
+  double tre_fresh;  ///< mean distance (Eq. 12) over the draws, mm; the target's pixels carry noise
+  double se_fresh;   ///< its standard error
+  double tre_exact;  ///< likewise; only the calibration is noisy
   double se_exact;
 };
 

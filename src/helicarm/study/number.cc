@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/study/records.h"
 
 namespace helicarm {
 namespace {
@@ -144,8 +145,6 @@ std::vector<double> column_of(std::span<const double> values, std::size_t column
   return whole;
 }
 
-constexpr std::size_t numbers_kept = sizeof(ColumnStatistics) / sizeof(double);
-
 StudySetting setting_of(const NumberTrials& trials, std::size_t balls, std::size_t groups, unsigned threads) {
   StudySetting setting;
   setting.blocks = (groups + groups_per_block - 1) / groups_per_block;
@@ -157,12 +156,10 @@ StudySetting setting_of(const NumberTrials& trials, std::size_t balls, std::size
       trials.run(balls, first + i, values.data() + i, groups_per_block);
   };
   setting.settle = [&trials, groups, threads](std::span<const double> values) {
-    std::vector<double> kept(trials.columns() * numbers_kept);
+    std::vector<double> kept(trials.columns() * numbers_in<ColumnStatistics>);
     parallel_for(trials.columns(), threads, [&](std::size_t column) {
-      const ColumnStatistics s = column_statistics(column_of(values, trials.columns(), column, groups));
-      const std::array<double, numbers_kept> figures{s.mean, s.median,    s.trimmed, s.p99,
-                                                     s.se,   s.median_se, s.left_out};
-      std::ranges::copy(figures, kept.begin() + std::ptrdiff_t(column * numbers_kept));
+      std::span<double> to = std::span(kept).subspan(column * numbers_in<ColumnStatistics>);
+      put_record(column_statistics(column_of(values, trials.columns(), column, groups)), to);
     });
     return kept;
   };
@@ -204,15 +201,15 @@ Expected<std::vector<NumberRow>> study_number(const NumberOptions& options, cons
   std::vector<StudySetting> settings;
   for (const int balls : options.balls)
     settings.push_back(setting_of(trials, std::size_t(balls), options.groups, engine.threads));
-  const auto kept = run_study(settings, identity_of(options), engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  std::vector<NumberRow> rows;
-  for (std::size_t i = 0; i < kept->size(); ++i)
-    for (std::size_t column = 0; column < trials.columns(); ++column) {
-      const double* s = &(*kept)[i][column * numbers_kept];
-      rows.push_back(trials.row(options.balls[i], column, {s[0], s[1], s[2], s[3], s[4], s[5], s[6]}));
+  return run_study(settings, identity_of(options), engine, ranks).map([&](const auto& kept) {
+    std::vector<NumberRow> rows;
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      std::span<const double> values = kept[i];
+      for (std::size_t column = 0; column < trials.columns(); ++column)
+        rows.push_back(trials.row(options.balls[i], column, take_record<ColumnStatistics>(values)));
     }
-  return rows;
+    return rows;
+  });
 }
 
 }  // namespace helicarm

@@ -77,11 +77,8 @@ std::string number_csv(const std::vector<NumberRow>& rows) {
   std::string text = "n,sigma,reading,error,mean,median,trimmed,p99,se\n";
   for (const NumberRow& row : rows) {
     const ColumnStatistics& s = row.of_groups;
-    text +=
-        fmt::format("{},{},{},{}", row.balls, name_of(row.sigma), name_of(row.reading), name_of(row.error));
-    for (const double value : {s.mean, s.median, s.trimmed, s.p99, s.se})
-      text += std::isfinite(value) ? fmt::format(",{}", value) : ",";
-    text += '\n';
+    text += fmt::format("{},{},{},{}{}\n", row.balls, name_of(row.sigma), name_of(row.reading),
+                        name_of(row.error), csv_cells(std::array{s.mean, s.median, s.trimmed, s.p99, s.se}));
   }
   return text;
 }
@@ -129,16 +126,11 @@ std::string number_summary(const std::vector<NumberCurve>& curves) {
 
 Json number_json(const std::vector<NumberRow>& rows, const std::vector<NumberCurve>& curves,
                  const NumberOptions& options, const std::string& summary) {
-  Json json{{"format", "helicarm-study/1"},
-            {"study", "number"},
-            {"groups", options.groups},
-            {"seed", options.seed},
-            {"version", HELICARM_VERSION},
-            {"fle", options.fle},
-            {"origin", name_of(options.origin)},
-            {"unit", "mm"},
-            {"printed", {{"fre_mm", {printed_fre_low, printed_fre_high}}, {"least_at", printed_dip}}},
-            {"summary", summary}};
+  Json json = study_json("number", options);
+  json.update({{"fle", options.fle},
+               {"unit", "mm"},
+               {"printed", {{"fre_mm", {printed_fre_low, printed_fre_high}}, {"least_at", printed_dip}}},
+               {"summary", summary}});
   if (const NumberCurve* nearest = nearest_to_print(curves))
     json["nearest_to_print"] = {{"sigma", name_of(nearest->sigma)},
                                 {"reading", name_of(nearest->reading)},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/study/number.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -163,6 +164,14 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EXPECT_LT(middle.tre_exact, middle.tre_fresh);
   EXPECT_GT(corner.tre_fresh, 2 * middle.tre_fresh);
   EXPECT_GT(middle.se_fresh, 0);
+  EXPECT_EQ(middle.seen_in, SeenIn::both);
+  EXPECT_EQ(corner.seen_in, SeenIn::none);
+  const StudyFiles files = files_of(map, options);
+  const Json& seen = files.json["seen_in"];
+  EXPECT_EQ(int(seen["none"]) + int(seen["AP"]) + int(seen["LAT"]) + int(seen["both"]), 98);
+  EXPECT_EQ(seen["both"], std::ranges::count(map.points, SeenIn::both, &LocationPoint::seen_in));
+  EXPECT_THAT(files.csv, ::testing::HasSubstr(",seen_in\n"));
+  EXPECT_THAT(files.svg, ::testing::HasSubstr("outside the lateral picture"));
   options.balls = {{0, 0, 0}};
   EXPECT_EQ(study_location(options, one, alone).error().reason, Reason::bad_value);
 }
@@ -214,12 +223,16 @@ TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
 
 TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
   CalibrationStudyOptions options;
-  options.groups = 1;
+  options.groups = 2;
   options.size_px = 512;
   options.folder = std::filesystem::path(::testing::TempDir()) / "study_calibration";
-  EngineOptions engine;
+  EngineOptions engine, by_two;
+  engine.threads = 1;
+  by_two.threads = 2;
   const auto tests = study_calibration(options, engine, alone).value();
-  ASSERT_EQ(tests.size(), 1u);
+  ASSERT_EQ(tests.size(), 2u);
+  EXPECT_EQ(files_of(tests, options).csv,
+            files_of(study_calibration(options, by_two, alone).value(), options).csv);
   EXPECT_EQ(tests[0].best.refused, 0);
   EXPECT_GE(tests[0].best.balls, 10);
   for (const double error : tests[0].best.targets) EXPECT_LT(error, 0.3);

@@ -117,11 +117,18 @@ std::vector<LanePoint> balls_on_spiral(const LaneRandom& random, std::size_t cou
 }
 
 void draw_noise(const LaneRandom& random, std::uint32_t from, std::size_t count, LanePixels& noise) {
-  for (std::uint32_t view = 0; view < 2; ++view)
+  // In two passes: each is short enough for the processor to work on several pixels at once.
+  for (std::uint32_t view = 0; view < 2; ++view) {
+    LanePixel(&pixels)[LaneBalls::most] = noise.of_view[view];
     for (std::uint32_t i = 0; i < count; ++i) {
-      const auto [u, v] = random.normals(from + view * std::uint32_t(LaneBalls::most) + i);
-      noise.of_view[view][i] = {u, v};
+      const auto [u, v] = random.uniforms(from + view * std::uint32_t(LaneBalls::most) + i);
+      pixels[i] = {u, v};
     }
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto [u, v] = LaneRandom::normals_of({pixels[i].u, pixels[i].v});
+      pixels[i] = {u, v};
+    }
+  }
 }
 
 void add_noise(const LanePixels& exact, double sigma, const LanePixels& noise, std::size_t count,

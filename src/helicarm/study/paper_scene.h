@@ -41,6 +41,7 @@ inline constexpr double cone_base_mm = 60;      // radii
 inline constexpr double cone_top_mm = 30;
 inline constexpr double space_radius_mm = 100;  // C of 2.3.3
 inline constexpr double printed_fle = 2.34;
+inline constexpr double picture_px = 1024;  // each way
 
 /// The AP and the lateral view of 2.3.3: f 900 mm, 0.15 mm pixels, 512, 800 mm. World: the calibrator's
 /// frame.

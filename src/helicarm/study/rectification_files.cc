@@ -144,7 +144,6 @@ Chart figure_11(const Results& results, const RectificationStudyOptions& options
 }
 
 std::string csv_of(const std::vector<Intensifier>& intensifiers, const RectificationStudyOptions& options) {
-  const auto number = [](double value) { return std::isfinite(value) ? fmt::format(",{}", value) : ","; };
   std::string csv =
       "intensifier,case_seed,distance_mm,crosses,finder_rms_px,similarity,picture,mean_px,max_px\n";
   for (std::size_t i = 0; i < intensifiers.size(); ++i)
@@ -153,10 +152,10 @@ std::string csv_of(const std::vector<Intensifier>& intensifiers, const Rectifica
         for (const GridCurve& curve : curves) {
           const GridPicture& picture = intensifiers[i].pictures[k];
           const GridErrors& errors = picture.*reading.errors;
-          csv += fmt::format("{},{},{},{}", i + 1, intensifiers[i].case_seed, options.distances_mm[k],
-                             picture.crosses);
-          csv += number(picture.finder_rms) + fmt::format(",{},{}", reading.name, curve.picture) +
-                 number(errors.*curve.mean) + number(errors.*curve.max) + '\n';
+          csv += fmt::format("{},{},{},{}{},{},{}{}\n", i + 1, intensifiers[i].case_seed,
+                             options.distances_mm[k], picture.crosses,
+                             csv_cells(std::array{picture.finder_rms}), reading.name, curve.picture,
+                             csv_cells(std::array{errors.*curve.mean, errors.*curve.max}));
         }
   return csv;
 }
@@ -258,19 +257,15 @@ StudyFiles files_of(const std::vector<Intensifier>& intensifiers, const Rectific
                        {"paper_error_px", cross.paper_error},
                        {"best_error_px", cross.best_error}});
   }
-  files.json = {
-      {"format", "helicarm-study/1"},
-      {"study", "rectification"},
-      {"groups", options.groups},
-      {"seed", options.seed},
-      {"version", HELICARM_VERSION},
-      {"size_px", options.size_px},
-      {"distances_mm", options.distances_mm},
-      {"case_seeds", std::move(seeds)},
-      {"summary", files.summary},
-      {"rows", rows_of(results, options)},
-      {"ratios", ratios_of(results)},
-      {"first_intensifier", {{"distance_mm", options.figure_distance_mm}, {"crosses", std::move(crosses)}}}};
+  files.json = study_json("rectification", options);
+  files.json.update({{"size_px", options.size_px},
+                     {"distances_mm", options.distances_mm},
+                     {"case_seeds", std::move(seeds)},
+                     {"summary", files.summary},
+                     {"rows", rows_of(results, options)},
+                     {"ratios", ratios_of(results)},
+                     {"first_intensifier",
+                      {{"distance_mm", options.figure_distance_mm}, {"crosses", std::move(crosses)}}}});
   const Intensifier& first = intensifiers.front();
   files.svg = chart_svg(std::array{figure_9(first, options.figure_distance_mm),
                                    figure_10(first, options.figure_distance_mm),

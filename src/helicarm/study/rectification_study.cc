@@ -13,24 +13,17 @@
 #include "helicarm/rectification/test_grid.h"
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/study/paper_scene.h"
+#include "helicarm/study/records.h"
 
 namespace helicarm {
 namespace {
 
 constexpr double no_figure = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t figures_of_picture = sizeof(GridPicture) / sizeof(double);
-constexpr std::size_t figures_of_cross = sizeof(GridCross) / sizeof(double);
-
-template <class Figures>
-std::array<double, sizeof(Figures) / sizeof(double)> flat(const Figures& figures) {
-  return std::bit_cast<std::array<double, sizeof(Figures) / sizeof(double)>>(figures);
-}
-
-template <class Figures>
-Figures all_missing() {
-  std::array<double, sizeof(Figures) / sizeof(double)> missing;
+template <class Record>
+Record all_missing() {
+  NumbersOf<Record> missing;
   missing.fill(no_figure);
-  return std::bit_cast<Figures>(missing);
+  return std::bit_cast<Record>(missing);
 }
 
 std::uint32_t seed_of_intensifier(const RectificationStudyOptions& options, std::size_t number) {
@@ -124,21 +117,9 @@ void run_intensifier(const RectificationStudyOptions& options, std::size_t numbe
     const bool keep = options.distances_mm[i] == options.figure_distance_mm;
     const auto picture =
         measure_picture(given.views[i + 1], maps, keep ? std::span(crosses) : std::span<GridCross>());
-    std::ranges::copy(flat(picture), out.begin());
-    out = out.subspan(figures_of_picture);
+    put_record(picture, out);
   }
-  for (const GridCross& cross : crosses) {
-    std::ranges::copy(flat(cross), out.begin());
-    out = out.subspan(figures_of_cross);
-  }
-}
-
-template <class Figures>
-Figures taken(std::span<const double>& from) {
-  std::array<double, sizeof(Figures) / sizeof(double)> figures;
-  std::copy_n(from.begin(), figures.size(), figures.begin());
-  from = from.subspan(figures.size());
-  return std::bit_cast<Figures>(figures);
+  for (const GridCross& cross : crosses) put_record(cross, out);
 }
 
 }  // namespace
@@ -153,29 +134,26 @@ Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyO
   StudySetting setting;
   setting.blocks = options.groups;
   setting.values_per_block =
-      options.distances_mm.size() * figures_of_picture + crosses_of_grid * figures_of_cross;
+      options.distances_mm.size() * numbers_in<GridPicture> + crosses_of_grid * numbers_in<GridCross>;
   setting.work = [&](std::size_t block, std::span<double> values) {
     run_intensifier(options, block, values);
-  };
-  setting.settle = [](std::span<const double> values) {
-    return std::vector<double>(values.begin(), values.end());
   };
   const std::string identity = fmt::format(
       "rectification {} groups {} seed {} size {} distances {} figure {}", HELICARM_VERSION, options.groups,
       options.seed, options.size_px, fmt::join(options.distances_mm, ","), options.figure_distance_mm);
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  std::vector<Intensifier> intensifiers;
-  if (kept->empty()) return intensifiers;
-  std::span<const double> values = kept->front();
-  for (std::size_t i = 0; i < options.groups; ++i) {
-    Intensifier intensifier{seed_of_intensifier(options, i), {}, {}};
-    for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
-      intensifier.pictures.push_back(taken<GridPicture>(values));
-    for (GridCross& cross : intensifier.crosses) cross = taken<GridCross>(values);
-    intensifiers.push_back(std::move(intensifier));
-  }
-  return intensifiers;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    std::vector<Intensifier> intensifiers;
+    if (kept.empty()) return intensifiers;
+    std::span<const double> values = kept.front();
+    for (std::size_t i = 0; i < options.groups; ++i) {
+      Intensifier intensifier{seed_of_intensifier(options, i), {}, {}};
+      for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
+        intensifier.pictures.push_back(take_record<GridPicture>(values));
+      for (GridCross& cross : intensifier.crosses) cross = take_record<GridCross>(values);
+      intensifiers.push_back(std::move(intensifier));
+    }
+    return intensifiers;
+  });
 }
 
 }  // namespace helicarm

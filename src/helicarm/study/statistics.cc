@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <vector>
 
@@ -15,11 +16,11 @@ namespace {
 
 constexpr double trimmed_share = 0.01;
 
-/// Values at chosen ranks without sorting all: counts by the leading bits of the numbers (256 bins an
-/// octave), then sorts only the bins that are asked for.
+/// Values at chosen ranks without sorting all: dealt into bins by the leading bits of the numbers (256 bins
+/// an octave), of which only those that are asked for are sorted.
 class RankedValues {
  public:
-  explicit RankedValues(std::span<const double> values) : values_(values) {
+  explicit RankedValues(std::span<const double> values) : dealt_(values.size()) {
     const auto [low, high] = std::ranges::minmax(values);
     first_ = key(low);
     const std::uint64_t bins = key(high) - first_ + 1;
@@ -27,24 +28,22 @@ class RankedValues {
     begins_.resize((bins >> shift_more_) + 2);
     for (const double value : values) ++begins_[bin(value) + 1];
     std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+    std::vector<std::uint32_t> next = begins_;
+    for (const double value : values) dealt_[next[bin(value)]++] = value;
   }
 
   double at(std::size_t rank) {
     const auto above = std::ranges::upper_bound(begins_, static_cast<std::uint32_t>(rank));
-    const auto wanted = std::size_t(above - begins_.begin()) - 1;
-    if (wanted != sorted_bin_ || content_.empty()) {
-      content_.clear();
-      for (const double value : values_)
-        if (bin(value) == wanted) content_.push_back(value);
-      std::ranges::sort(content_);
-      sorted_bin_ = wanted;
-    }
-    return content_[rank - begins_[wanted]];
+    sorted(std::size_t(above - begins_.begin()) - 1);
+    return dealt_[rank];
   }
+  /// How many values are less than this one of them, and how many are not more.
+  std::size_t less_than(double value) { return counted(std::ranges::lower_bound(sorted(bin(value)), value)); }
+  std::size_t up_to(double value) { return counted(std::ranges::upper_bound(sorted(bin(value)), value)); }
 
   /// Linear between the two nearest ranks.
   double quantile(double share) {
-    const double at_rank = share * double(values_.size() - 1);
+    const double at_rank = share * double(dealt_.size() - 1);
     const auto below = static_cast<std::size_t>(at_rank);
     const double low = at(below);
     return at_rank > double(below) ? low + (at_rank - double(below)) * (at(below + 1) - low) : low;
@@ -54,13 +53,22 @@ class RankedValues {
   static constexpr std::uint64_t most_bins = 1 << 14;
   static std::uint64_t key(double value) { return std::bit_cast<std::uint64_t>(value) >> 44; }
   std::size_t bin(double value) const { return (key(value) - first_) >> shift_more_; }
+  std::size_t counted(std::span<double>::iterator end) const {
+    return std::size_t(std::to_address(end) - dealt_.data());
+  }
 
-  std::span<const double> values_;
+  std::span<double> sorted(std::size_t bin) {
+    const auto content = std::span(dealt_).subspan(begins_[bin], begins_[bin + 1] - begins_[bin]);
+    if (bin != last_sorted_) std::ranges::sort(content);
+    last_sorted_ = bin;
+    return content;
+  }
+
   std::uint64_t first_ = 0;
   int shift_more_ = 0;
   std::vector<std::uint32_t> begins_;
-  std::vector<double> content_;
-  std::size_t sorted_bin_ = 0;
+  std::vector<double> dealt_;
+  std::size_t last_sorted_ = most_bins + 2;
 };
 
 /// In a fixed order, in four strands: the sum is the same everywhere, yet not one long chain.
@@ -81,9 +89,8 @@ double trimmed_mean(std::span<const double> values, RankedValues& ranked) {
   if (!(low < high)) return low;
   const double inside = sum_of(values, [&](double x) { return x > low && x < high ? x : 0; });
   // Of values equal to a limit, as many count as have their rank inside.
-  const auto below = std::ranges::count_if(values, [&](double x) { return x <= low; });
-  const auto above = std::ranges::count_if(values, [&](double x) { return x >= high; });
-  const double kept_low = double(below) - double(cut), kept_high = double(above) - double(cut);
+  const double kept_low = double(ranked.up_to(low)) - double(cut);
+  const double kept_high = double(n - ranked.less_than(high)) - double(cut);
   return (inside + kept_low * low + kept_high * high) / double(n - 2 * cut);
 }
 

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 
 #include <fmt/format.h>
 
 #include "helicarm/phantom/uniformity.h"
 #include "helicarm/report/chart.h"
+#include "helicarm/study/records.h"
 #include "helicarm/study/statistics.h"
 
 namespace helicarm {
@@ -16,9 +16,7 @@ namespace {
 
 constexpr std::size_t groups_of_turn = 32;  // a block: E(A) takes long
 constexpr double printed_pearson = 0.4224;
-constexpr std::size_t figures_of_group = sizeof(UniformityGroup) / sizeof(double);
-
-using GroupFigures = std::array<double, figures_of_group>;
+constexpr std::size_t figures_of_group = numbers_in<UniformityGroup>;
 
 constexpr std::array<const char*, figures_of_group> figure_names{"uniformity",
                                                                  "tre_ball_fresh_noise",
@@ -86,7 +84,7 @@ struct UniformityTrials {
 
 std::vector<double> figure_of(const std::vector<UniformityGroup>& groups, std::size_t figure) {
   std::vector<double> column;
-  for (const UniformityGroup& group : groups) column.push_back(std::bit_cast<GroupFigures>(group)[figure]);
+  for (const UniformityGroup& group : groups) column.push_back(numbers_of(group)[figure]);
   return column;
 }
 
@@ -109,25 +107,14 @@ Expected<std::vector<UniformityGroup>> study_uniformity(const UniformityOptions&
       if (const std::size_t group = block * groups_of_turn + i; group < options.groups)
         trials.run(group, values.data() + i * figures_of_group);
   };
-  setting.settle = [&](std::span<const double> values) {
-    return std::vector<double>(values.begin(),
-                               values.begin() + std::ptrdiff_t(options.groups * figures_of_group));
-  };
   const std::string identity =
       fmt::format("uniformity {} groups {} seed {} balls {} draws {} sigma {} fle {} origin {}",
                   HELICARM_VERSION, options.groups, options.seed, options.balls, options.draws,
                   name_of(options.sigma), options.fle, name_of(options.origin));
-  const auto kept = run_study({setting}, identity, engine, ranks);
-  if (!kept) return tl::unexpected<Failure>(kept.error());
-  std::vector<UniformityGroup> groups;
-  if (kept->empty()) return groups;
-  for (std::size_t i = 0; i < options.groups; ++i) {
-    GroupFigures figures;
-    std::copy_n(kept->front().begin() + std::ptrdiff_t(i * figures_of_group), figures_of_group,
-                figures.begin());
-    groups.push_back(std::bit_cast<UniformityGroup>(figures));
-  }
-  return groups;
+  return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
+    return kept.empty() ? std::vector<UniformityGroup>{}
+                        : records_of<UniformityGroup>(kept.front(), options.groups);
+  });
 }
 
 StudyFiles files_of(const std::vector<UniformityGroup>& groups, const UniformityOptions& options) {
@@ -135,11 +122,8 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
   files.csv = "group";
   for (const char* name : figure_names) files.csv += fmt::format(",{}", name);
   files.csv += '\n';
-  for (std::size_t i = 0; i < groups.size(); ++i) {
-    files.csv += fmt::format("{}", i);
-    for (const double value : std::bit_cast<GroupFigures>(groups[i])) files.csv += fmt::format(",{}", value);
-    files.csv += '\n';
-  }
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    files.csv += fmt::format("{}{}\n", i, csv_cells(numbers_of(groups[i])));
 
   const std::vector<double> evenness = figure_of(groups, 0);
   Json correlations = Json::array();
@@ -168,19 +152,12 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
   if (least <= 0)
     files.summary =
         files.summary.substr(0, files.summary.find(": evenly")) + ": not positive in every reading.";
-  files.json = {{"format", "helicarm-study/1"},
-                {"study", "uniformity"},
-                {"groups", groups.size()},
-                {"seed", options.seed},
-                {"version", HELICARM_VERSION},
-                {"balls", options.balls},
-                {"draws", options.draws},
-                {"sigma", name_of(options.sigma)},
-                {"sigma_px", sigma_px(options.sigma, options.fle)},
-                {"origin", name_of(options.origin)},
-                {"printed", {{"pearson", printed_pearson}}},
-                {"summary", files.summary},
-                {"correlations", std::move(correlations)}};
+  files.json = study_json("uniformity", options);
+  files.json.update({{"balls", options.balls},
+                     {"draws", options.draws},
+                     {"printed", {{"pearson", printed_pearson}}},
+                     {"summary", files.summary},
+                     {"correlations", std::move(correlations)}});
 
   std::vector<Chart> charts;
   for (const std::size_t figure : {std::size_t{1}, std::size_t{7}}) {
