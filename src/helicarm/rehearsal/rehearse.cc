@@ -24,7 +24,7 @@ constexpr int most_shots = 3;
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
 
-/// Of room_tracker: its drift, rms over the axes, and the turn that half a second's mean leaves.
+/// Of room_tracker: its drift, rms over the axes, and the turn that a second's mean leaves.
 constexpr double kept_sigma_mm = 0.114;
 constexpr double kept_sigma_deg = 0.03;
 
@@ -93,8 +93,8 @@ OperationPlan plan_for(VirtualRoom& room, std::uint16_t tracker_port) {
   plan.robot.script_port = room.robot().script_port();
   plan.robot.tool = room.theatre().tool();
   plan.robot.approach.corrections.most = 8;
-  plan.robot.approach.corrections.tolerance_mm = 0.2;
-  plan.robot.approach.corrections.tolerance_deg = 0.2;
+  plan.robot.approach.corrections.tolerance_mm = 0.25;
+  plan.robot.approach.corrections.tolerance_deg = 0.25;
   // Both are drilled from without.
   plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end},
                   {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
