@@ -78,7 +78,7 @@ def drill_motion(program, folder):
     for fault, reason, limit_s in (("hide:tool", "stale_pose", 0.25), ("silent", "stale_pose", 0.25),
                                    ("cut_cable", "stale_state", 0.2), ("emergency_stop", "robot_stopped", 0.6),
                                    ("protective_stop", "robot_stopped", 0.6),
-                                   ("frozen", "stale_pose", 0.8)):
+                                   ("frozen", "stale_pose", 0.4)):
         with Theatre(program, folder / fault.replace(":", "_")) as theatre:
             theatre.expose()
             theatre.navigation.wait_for("register: pose 1")
@@ -203,10 +203,11 @@ def drill_soak(program, folder, minutes):
                 looks[name].append(footprint(each.process.pid))
             print(f"{time.monotonic() - begun:6.0f} s, {shots} shots  " + "  ".join(
                 f"{name}: {look[-1][0]:.1f} MB, {look[-1][1]} files" for name, look in looks.items()), flush=True)
-    for name, look in looks.items():
-        (first_mb, first_files), (last_mb, last_files) = look[0], look[-1]
-        check(f"{name}: {first_mb:.1f} to {last_mb:.1f} MB, {first_files} to {last_files} files",
-              last_mb < 1.05 * first_mb + 2 and last_files <= first_files + 2)
+    for name, look in looks.items():  # allocators take some minutes to have what they need
+        half = max(1, len(look) // 2)
+        (early_mb, early_files), (late_mb, late_files) = (tuple(map(max, zip(*part))) for part in (look[:half], look[-half:]))
+        check(f"{name}: at most {early_mb:.1f} MB and {early_files} files in the first half, {late_mb:.1f} MB and "
+              f"{late_files} files in the second", late_mb < 1.02 * early_mb + 1 and late_files <= early_files)
     for name, each in programs.items():
         code, seconds = each.end()
         check(f"SIGTERM ends {name} in {seconds * 1000:.0f} ms with {code}", code == 0 and seconds <= 1)

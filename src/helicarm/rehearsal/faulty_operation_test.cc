@@ -135,7 +135,7 @@ TEST_F(FaultyOperation, TrackerWhoseClockLeapsDuringTheExposureIsRefused) {
 
 TEST_F(FaultyOperation, FrozenTrackerIsRefused) {
   ASSERT_TRUE(room_->set_fault("frozen", true));
-  std::this_thread::sleep_for(window);
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
   EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
   ASSERT_TRUE(room_->set_fault("frozen", false));
   std::this_thread::sleep_for(window);

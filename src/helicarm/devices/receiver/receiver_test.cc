@@ -215,6 +215,18 @@ TEST_F(Receiver, PictureBeyondTheLimitAbortsTheAssociation) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
+TEST_F(Receiver, LargestPduOfNoughtIsUnlimitedAndOfOneByteIsRejected) {
+  peer::Request request;
+  request.most_pdu_bytes = 0;
+  RawClient unlimited(receiver_->port());
+  unlimited.send(request.bytes());
+  ASSERT_EQ(unlimited.receive_type(), accepted);
+  unlimited.send(peer::echo());
+  EXPECT_EQ(unlimited.receive_status(), 0);
+  request.most_pdu_bytes = 1;
+  EXPECT_EQ(answer_to(request.bytes()), rejected);
+}
+
 TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
