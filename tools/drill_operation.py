@@ -75,7 +75,7 @@ def drill_pictures(program, folder):
 
 def drill_motion(program, folder):
     """Faults while the arm moves; the tracker's newest pose may be 0.1 s old before they count."""
-    for fault, reason, limit_s in (("hide:tool", "stale_pose", 0.25), ("silent", "stale_pose", 0.25),
+    for fault, reason, limit_s in (("hide:tool", "stale_pose", 0.3), ("silent", "stale_pose", 0.3),
                                    ("cut_cable", "stale_state", 0.2), ("emergency_stop", "robot_stopped", 0.6),
                                    ("protective_stop", "robot_stopped", 0.6),
                                    ("frozen", "stale_pose", 0.4)):
@@ -96,7 +96,7 @@ def drill_motion(program, folder):
         begun = time.monotonic()
         theatre.say("fault hide:femur on", "hide:femur on")
         stop_s = theatre.stop_s(begun)
-        check(f"bone lost on the way to its tunnel: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.25)
+        check(f"bone lost on the way to its tunnel: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.3)
         theatre.expect_end("bone lost", "stale_pose")
     with Theatre(program, folder / "full") as theatre:
         theatre.expose()
