@@ -4,8 +4,9 @@
 
     tools/drill_receiver.py [--build build] [--kills 200]
 
-Plain and TLS, wrong titles, strangers' certificates, twenty senders at once, an abort, SIGTERM, and SIGKILL at random
-instants: after each restart every acknowledged picture must be there, whole. Exits 1 when anything differs.
+Plain and TLS, wrong titles, strangers' and expired certificates, old versions of TLS, twenty senders at once, an abort,
+SIGTERM, and SIGKILL at random instants: after each restart every acknowledged picture must be there, whole. Exits 1
+when anything differs.
 """
 
 import argparse
@@ -87,11 +88,12 @@ def certificates(folder):
     for authority in ("ca", "other"):
         openssl("req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{authority}.key", "-out",
                 f"{authority}.pem", "-days", "2", "-subj", f"/CN={authority}")
-    for name, authority in (("server", "ca"), ("client", "ca"), ("stranger", "other")):
+    for name, authority, days in (("server", "ca", "2"), ("client", "ca", "2"), ("stranger", "other", "2"),
+                                  ("expired", "ca", "-1")):
         openssl("req", "-newkey", "rsa:2048", "-nodes", "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj",
                 f"/CN={name}")
         openssl("x509", "-req", "-in", f"{name}.csr", "-CA", f"{authority}.pem", "-CAkey", f"{authority}.key",
-                "-CAcreateserial", "-out", f"{name}.pem", "-days", "2")
+                "-CAcreateserial", "-out", f"{name}.pem", "-days", days)
 
 
 def drill_plain(program, folder, pictures):
@@ -122,6 +124,12 @@ def drill_tls(program, folder, picture):
         check("TLS echo", echo(receiver.port, *tls("client")))
         check("TLS store", store(receiver.port, picture, *tls("client")))
         check("certificate of another authority is refused", not echo(receiver.port, *tls("stranger")))
+        check("expired certificate is refused", not echo(receiver.port, *tls("expired")))
+        for version, spoken in (("-tls1", False), ("-tls1_1", False), ("-tls1_2", True)):
+            shaken = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{receiver.port}", version, "-cipher",
+                                     "ALL:@SECLEVEL=0", "-cert", folder / "client.pem", "-key", folder / "client.key"],
+                                    stdin=subprocess.DEVNULL, capture_output=True, text=True).stdout
+            check(f"s_client {version} is {'heard' if spoken else 'refused'}", ("Cipher is (NONE)" not in shaken) == spoken)
         check("no certificate is refused", not echo(receiver.port, "+tla", "+cf", str(folder / "ca.pem")))
         check("plain talk is refused", not echo(receiver.port))
         check("TLS still answers", echo(receiver.port, *tls("client")))

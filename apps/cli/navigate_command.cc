@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "navigate_command.h"
 
+#include <atomic>
+#include <chrono>
 #include <iostream>
 #include <thread>
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
@@ -18,12 +21,43 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::chrono::seconds robot_patience{10};
+
+/// Stops the robot when the program is told to end, whatever it does just then.
+class Ending {
+ public:
+  Ending(StopSignal& signal, RobotLink& robot)
+      : thread_([this, &signal, &robot](const std::stop_token& over) {
+          while (!over.stop_requested())
+            if (signal.wait(glance_s)) {
+              told_ = true;
+              return robot.stop();
+            }
+        }) {}
+
+  void check() const {
+    if (told_) throw BadInput(Reason::robot_stopped, "told to end");
+  }
+  /// Until this holds, looking again and again.
+  template <class Holds>
+  void wait_until(const Holds& holds) const {
+    for (check(); !holds(); check()) std::this_thread::sleep_for(std::chrono::duration<double>(glance_s));
+  }
+
+ private:
+  static constexpr double glance_s = 0.05;
+  std::atomic<bool> told_{false};
+  std::jthread thread_;
+};
+
 /// Asks the person at the terminal; nobody there means no.
 class Consent {
  public:
-  Consent(RobotLink& robot, bool yes, Console& console) : robot_(robot), yes_(yes), console_(console) {}
+  Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
+      : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
 
   Expected<std::string> operator()(const RobotOrder& order) {
+    ending_.check();
     if (!yes_ && !agreed(order))
       return fail(Reason::order_not_confirmed, fmt::format("{}: nobody confirmed it", order.name));
     return robot_.confirm(order);
@@ -40,11 +74,16 @@ class Consent {
                without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
                last.translation.y(), last.translation.z())
         << std::flush;
+    ending_.wait_until([] {
+      pollfd input{STDIN_FILENO, POLLIN, 0};
+      return ::poll(&input, 1, 0) > 0;
+    });
     std::string answer;
     return std::getline(std::cin, answer) && answer == "go";
   }
 
   RobotLink& robot_;
+  const Ending& ending_;
   bool yes_;
   Console& console_;
 };
@@ -83,16 +122,14 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
             console.progress << fmt::format("{}: {}\n", name_of(step), without_control_characters(what))
                              << std::flush;
         }));
-    const auto wait = [&](double seconds) {
-      if (stop.wait(seconds)) throw BadInput(Reason::robot_stopped, "told to end");
-    };
+    const Ending ending(stop, devices.robot());
     while (!operation->views_to_come().empty()) {
       const std::string view = operation->views_to_come().front();
       if (!console.quiet)
         console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
                          << std::flush;
       std::optional<DatedArrival> picture;
-      while (!(picture = devices.next_picture(0))) wait(0.1);
+      ending.wait_until([&] { return (picture = devices.next_picture(0)).has_value(); });
       const auto taken = operation->take(view, picture->arrival, picture->time_s);
       if (!taken)
         console.progress << fmt::format("{}: {}: {}; expose again\n", view, code(taken.error().reason),
@@ -100,15 +137,17 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
                          << std::flush;
     }
     if (!arguments.picks.empty()) {
-      while (!fs::exists(arguments.picks)) wait(0.2);
+      ending.wait_until([&] { return fs::exists(arguments.picks); });
       operation->pick(picks_of(arguments.picks));
     }
     value_or_throw(operation->measure());
     tell_points(operation->result(), console);
 
-    Consent consent(devices.robot(), arguments.yes, console);
+    Consent consent(devices.robot(), ending, arguments.yes, console);
     const Operation::Confirm confirm = [&](const RobotOrder& order) { return consent(order); };
-    value_or_throw(devices.robot().wait_connected(std::chrono::seconds(10)));
+    const auto until = std::chrono::steady_clock::now() + robot_patience;
+    ending.wait_until(
+        [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
     value_or_throw(devices.robot().unlock("the operator at the terminal"));
     value_or_throw(operation->register_robot(confirm));
     for (const PlannedTunnel& tunnel : plan.tunnels) {

@@ -60,7 +60,12 @@ std::string obey(const std::string& line, VirtualRoom& room,
   }
   if (verb == "where") {
     const Eigen::Vector3d tip = room.tracker_from_tip().translation;
-    return fmt::format("tip {:.3f} {:.3f} {:.3f}", tip.x(), tip.y(), tip.z());
+    const VirtualTruth robot = room.robot().truth();
+    const std::string motion =
+        robot.moving         ? "moving"
+        : robot.rest_since_s ? fmt::format("at rest for {:.3f} s", robot.state.time_s - *robot.rest_since_s)
+                             : "never moved";
+    return fmt::format("tip {:.3f} {:.3f} {:.3f}, {}", tip.x(), tip.y(), tip.z(), motion);
   }
   throw BadInput(Reason::usage, std::string("words are: ") + words);
 }

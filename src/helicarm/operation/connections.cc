@@ -17,10 +17,17 @@ RobotConfig config_of(const RobotPlan& plan) {
   return config;
 }
 
+/// A repeated pose is as old as when it first came, and none older than 0.1 s may guide a robot.
+PoseBoardOptions board_options() {
+  PoseBoardOptions options;
+  options.gate.frozen_s = 0.1;
+  return options;
+}
+
 }  // namespace
 
 Connections::Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox)
-    : inbox_(std::move(inbox)), robot_(config_of(plan.robot)) {
+    : inbox_(std::move(inbox)), board_(board_options()), robot_(config_of(plan.robot)) {
   IgtlClientOptions options;
   options.address = plan.tracker.address;
   options.port = plan.tracker.port;

@@ -11,6 +11,7 @@
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/report/overlay.h"
+#include "helicarm/xray/read_exposure.h"
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -20,6 +21,9 @@ namespace {
 constexpr std::chrono::seconds robot_patience{5};
 /// The tip is drawn into the X-rays every so many mm.
 constexpr double preview_step_mm = 5;
+
+/// Of keys that may be empty.
+bool differ(const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; }
 
 }  // namespace
 
@@ -60,14 +64,43 @@ PoseWindow Operation::look(const char* why) {
   return window;
 }
 
+Acquisition Operation::acquisition_of(const std::string& view, const Arrival& arrival) const {
+  if (arrival.repeated)
+    throw BadInput(Reason::stale_pose, fmt::format("{}: this picture came before; expose anew", view));
+  const Acquisition shown = value_or_throw(read_exposure(arrival.path, view, 1)).acquisition;
+  for (const View& other : views_) {
+    if (other.name == view) continue;
+    if (shown.instance_key == other.acquisition.instance_key)
+      throw BadInput(Reason::views_too_close, fmt::format("{}: is the picture of {}", view, other.name));
+    if (differ(shown.patient_key, other.acquisition.patient_key) ||
+        differ(shown.study_key, other.acquisition.study_key))
+      throw BadInput(Reason::patient_mismatch,
+                     fmt::format("{} and {} are of different patients or studies", view, other.name));
+  }
+  return shown;
+}
+
+/// The robot moves only while the tracker sees these.
+Watch Operation::sees(std::vector<std::string> markers) const {
+  return [this, markers = std::move(markers)]() -> Expected<void> {
+    for (const std::string& marker : markers)
+      if (const auto seen = board_.latest(marker, monotonic_seconds()); !seen)
+        return tl::unexpected<Failure>(seen.error());
+    return {};
+  };
+}
+
 Expected<void> Operation::take(const std::string& view, const Arrival& arrival, double arrival_s) {
   return guarded([&] {
     if (std::ranges::find(plan_.views, view) == plan_.views.end())
       throw BadInput(Reason::bad_value, fmt::format("{}: is no view of the plan", view));
     tell_(Step::acquire, view);
-    const auto twice = std::ranges::find(views_, arrival.digest, &View::digest);
-    if (twice != views_.end() && twice->name != view)
-      throw BadInput(Reason::views_too_close, fmt::format("{}: is the picture of {}", view, twice->name));
+    const auto acquisition = guarded([&] { return acquisition_of(view, arrival); });
+    if (!acquisition) {
+      record("refused",
+             {{"view", view}, {"picture", arrival.digest}, {"why", code(acquisition.error().reason)}});
+      throw BadInput(acquisition.error());
+    }
     const PoseWindow window = window_of_exposure(board_, plan_.tracker, arrival_s);
     const auto seen = poses_of_exposure(window, plan_.tracker);
     record("exposure", {{"view", view},
@@ -75,8 +108,13 @@ Expected<void> Operation::take(const std::string& view, const Arrival& arrival, 
                         {"window", to_json(window)},
                         {"poses", seen ? to_json(*seen) : Json()}});
     const Poses poses = value_or_throw(seen);
+    for (const PlannedTunnel& tunnel : plan_.tunnels)
+      if (!poses.tracker_from(tunnel.bone))
+        throw BadInput(Reason::no_pose,
+                       fmt::format("{}: the marker of the {} was not seen during the exposure", view,
+                                   plan_.tracker.marker_of(tunnel.bone)));
     std::erase_if(views_, [&](const View& other) { return other.name == view; });
-    views_.push_back({view, arrival.path, arrival.digest, poses});
+    views_.push_back({view, arrival.path, *acquisition, poses});
     std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
     result_.reset();
   });
@@ -112,7 +150,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
       const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
       const RobotOrder order = tour_order(plan_.robot, present, pose);
       record("order", to_json(order));
-      value_or_throw(robot_.execute(order, value_or_throw(confirm(order))));
+      value_or_throw(robot_.execute(order, value_or_throw(confirm(order)), {}, sees({plan_.tracker.tool})));
       const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
       const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
@@ -214,11 +252,13 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
       throw BadInput(Reason::usage, fmt::format("{}: was not planned in this operation", order.name));
     tell_(Step::navigate, order.name);
     record("confirmed", {{"order", order.name}});
-    const std::vector<Miss> loop = value_or_throw(robot_.execute(order, token, [&] {
+    const Measure measure = [&] {
       return guarded([&] {
         return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, target->second));
       });
-    }));
+    };
+    const std::vector<Miss> loop = value_or_throw(robot_.execute(
+        order, token, measure, sees({plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool})));
     record("navigated", {{"tunnel", order.name}, {"loop", to_json(loop)}});
     tell_(Step::verify, order.name);
     TunnelOutcome outcome = check(tunnel);
@@ -230,6 +270,7 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
 Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
   return guarded([&] {
     tell_(Step::navigate, order.name + ": withdraw");
+    const std::string& bone_marker = plan_.tracker.marker_of(tunnel_named(order.name).bone);
     RobotOrder back = order;
     back.start = value_or_throw(robot_.wait_connected(robot_patience)).joints;
     Waypoint stand_off = order.waypoints.front(), home = stand_off;
@@ -238,7 +279,8 @@ Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& re
     back.waypoints = {stand_off, home};
     back.corrections.most = 0;
     record("order", to_json(back));
-    value_or_throw(robot_.execute(back, value_or_throw(confirm(back))));
+    value_or_throw(
+        robot_.execute(back, value_or_throw(confirm(back)), {}, sees({bone_marker, plan_.tracker.tool})));
   });
 }
 

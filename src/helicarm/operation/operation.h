@@ -11,6 +11,7 @@
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/tool_line.h"
 #include "helicarm/session/session_log.h"
+#include "helicarm/xray/exposure.h"
 
 namespace helicarm {
 
@@ -56,7 +57,9 @@ class Operation {
   std::vector<std::string> views_to_come() const;
 
   /// Acquire: dates the picture by its arrival (monotonic seconds) and takes everything's pose for it.
-  /// Refuses as `poses_of_exposure`, and a picture that is another view's (views_too_close).
+  /// Refuses as `poses_of_exposure`, a tunnel's bone that was not seen (no_pose), a picture that came before
+  /// (stale_pose: nobody knows when it was shot), that is another view's (views_too_close), or another
+  /// patient's (patient_mismatch).
   Expected<void> take(const std::string& view, const Arrival& arrival, double arrival_s);
 
   /// Picks as in case.json, in place of the plan's.
@@ -92,7 +95,7 @@ class Operation {
   struct View {
     std::string name;
     std::filesystem::path picture;
-    std::string digest;
+    Acquisition acquisition;
     Poses poses;
   };
 
@@ -107,6 +110,8 @@ class Operation {
   const PlannedTunnel& tunnel_named(const std::string& name) const;
   void record(const std::string& kind, Json content);
   PoseWindow look(const char* why);
+  Acquisition acquisition_of(const std::string& view, const Arrival& arrival) const;
+  Watch sees(std::vector<std::string> markers) const;
   Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
   TunnelOutcome check(const PlannedTunnel& tunnel);
   void draw_preview(const RobotOrder& order) const;

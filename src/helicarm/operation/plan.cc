@@ -175,7 +175,7 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
       take_once(entry, names, plan.tunnels.back().name);
     }
     if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
-    plan.max_error_mm = reader.optional_number("max_error_mm", {1e-6, 1000});
+    plan.max_error_mm = reader.optional_number("max_error_mm", {1e-6, 1000}).value_or(plan.max_error_mm);
     reader.finish();
     return plan;
   });
@@ -197,7 +197,7 @@ Json to_json(const OperationPlan& plan) {
           {"robot", to_json(plan.robot)},
           {"tunnels", std::move(tunnels)},
           {"picks", plan.picks},
-          {"max_error_mm", plan.max_error_mm ? Json(*plan.max_error_mm) : Json()}};
+          {"max_error_mm", plan.max_error_mm}};
 }
 
 }  // namespace helicarm

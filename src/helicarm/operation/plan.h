@@ -23,6 +23,8 @@ struct TrackerPlan {
   std::vector<Facet> facets;  ///< of the calibrator; a single marker is one facet
   double sigma_mm = 0.12;     ///< of a reading, per axis: what no averaging over a second takes away
   double sigma_deg = 0.05;
+
+  const std::string& marker_of(Bone bone) const { return bone == Bone::femur ? femur : tibia; }
 };
 
 struct RobotPlan {
@@ -54,7 +56,7 @@ struct OperationPlan {
   RobotPlan robot;
   std::vector<PlannedTunnel> tunnels;
   Json picks = Json::array();  ///< as in case.json; may come later, once the pictures are seen
-  std::optional<double> max_error_mm;
+  double max_error_mm = 2;     ///< at 95 %: the robot goes by no point that may be further off
 };
 
 /// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when

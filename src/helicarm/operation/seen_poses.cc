@@ -4,6 +4,9 @@
 #include <chrono>
 #include <numbers>
 #include <thread>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "helicarm/geometry/view_json.h"
 
@@ -15,6 +18,8 @@ constexpr double longest_way_s = 1.5;
 constexpr double now_s = 1;
 /// The last samples of a window that ends now are still on their way.
 constexpr double settle_s = 0.1;
+/// Nobody moves a leg and brings it back within so short a time.
+constexpr double longest_gap_s = 0.25;
 
 constexpr Range any_time{0, 1e12};
 constexpr Range sample_range{-1e6, 1e6};
@@ -45,6 +50,14 @@ Expected<std::optional<RigidTransform>> bone_if_seen(const Expected<SeenPose>& s
   if (seen) return seen->tracker_from_marker;
   if (seen.error().reason == Reason::pose_spread) return tl::unexpected<Failure>(seen.error());
   return std::nullopt;
+}
+
+/// The longest time within the window that no sample tells of.
+double longest_gap(const PoseWindow& window, const std::vector<PoseSample>& samples) {
+  double last = window.middle_s - window.half_s, gap = 0;
+  for (const PoseSample& sample : samples)
+    gap = std::max(gap, sample.time_s - std::exchange(last, sample.time_s));
+  return std::max(gap, window.middle_s + window.half_s - last);
 }
 
 Failure named(Failure failure, const std::string& tool) {
@@ -106,6 +119,11 @@ PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan) {
 Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, const std::string& tool) {
   const auto samples = window.samples.find(tool);
   if (samples == window.samples.end()) return fail(Reason::no_pose, tool + ": the tracker never showed it");
+  if (const double gap = longest_gap(window, samples->second);
+      !samples->second.empty() && gap > longest_gap_s)
+    return fail(Reason::stale_pose,
+                fmt::format("{}: was not seen for {:.3g} s, limit {:g} s", tool, gap, longest_gap_s),
+                {{"gap_s", gap}});
   ExposurePoseOptions options;
   options.window_s = window.half_s;
   return exposure_pose(samples->second, window.middle_s, options)

@@ -65,7 +65,7 @@ RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool) {
 Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, const HandEye& hand_eye,
                          Bone bone, const RigidTransform& bone_from_target) {
   return guarded([&] {
-    const std::string& bone_marker = bone == Bone::femur ? plan.tracker.femur : plan.tracker.tibia;
+    const std::string& bone_marker = plan.tracker.marker_of(bone);
     const SeenPose tool = value_or_throw(see_tool(window, plan.tracker, plan.tracker.tool));
     const SeenPose target = value_or_throw(see_tool(window, plan.tracker, bone_marker));
     const RigidTransform from_tcp = marker_from_tcp(hand_eye, plan.robot.tool);

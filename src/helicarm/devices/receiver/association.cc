@@ -71,6 +71,11 @@ class Association {
       : stream_(std::move(stream)), shared_(shared), share_(shared) {
     allow(shared.options.request_limit_s);
   }
+  ~Association() {
+    if (counted_) --shared_.associated;
+  }
+  Association(const Association&) = delete;
+  Association& operator=(const Association&) = delete;
 
   awaitable<void> run() {
     using namespace asio::experimental::awaitable_operators;
@@ -135,7 +140,11 @@ class Association {
     const dicom::AssociationRequest request = or_breach(dicom::read_association_request(pdu.body));
     constexpr dicom::Rejection local_limit_exceeded{2, 3, 2};
     auto answers = dicom::negotiate(request, shared_.options.negotiation);
-    if (shared_.open > shared_.options.most_associations) answers = tl::unexpected(local_limit_exceeded);
+    counted_ = answers && ++shared_.associated <= shared_.options.most_associations;
+    if (answers && !counted_) {
+      --shared_.associated;
+      answers = tl::unexpected(local_limit_exceeded);
+    }
     if (!answers) {
       ++shared_.counters.rejected;
       co_await send(dicom::associate_reject(answers.error()));
@@ -245,6 +254,7 @@ class Association {
   Stream stream_;
   ReceiverShared& shared_;
   Share share_;
+  bool counted_ = false;  ///< among the associations
   Clock::time_point deadline_;
   std::string peer_;
   std::map<std::uint8_t, dicom::ContextAnswer> contexts_;

@@ -21,6 +21,7 @@ struct ReceiverShared {
   ReceiverHooks hooks;
   ReceiverCounters counters;
   std::atomic<unsigned> open{0};            ///< connections
+  std::atomic<unsigned> associated{0};      ///< those that were accepted
   std::atomic<std::size_t> bytes_taken{0};  ///< of pictures on the way
 };
 

@@ -49,7 +49,7 @@ struct DicomReceiver::Engine {
   tcp::acceptor acceptor{pool};
 
   Engine(const ReceiverOptions& options, Inbox& inbox, ReceiverHooks hooks)
-      : shared{options, inbox, std::move(hooks), {}, {}, {}} {}
+      : shared{options, inbox, std::move(hooks), {}, {}, {}, {}} {}
   ~Engine() {
     pool.stop();
     pool.join();

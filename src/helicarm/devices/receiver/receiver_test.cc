@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/receiver/receiver.h"
 
+#include <chrono>
+#include <map>
+#include <thread>
+
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
@@ -211,6 +215,18 @@ TEST_F(Receiver, PictureBeyondTheLimitAbortsTheAssociation) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
+TEST_F(Receiver, LargestPduOfNoughtIsUnlimitedAndOfOneByteIsRejected) {
+  peer::Request request;
+  request.most_pdu_bytes = 0;
+  RawClient unlimited(receiver_->port());
+  unlimited.send(request.bytes());
+  ASSERT_EQ(unlimited.receive_type(), accepted);
+  unlimited.send(peer::echo());
+  EXPECT_EQ(unlimited.receive_status(), 0);
+  request.most_pdu_bytes = 1;
+  EXPECT_EQ(answer_to(request.bytes()), rejected);
+}
+
 TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
@@ -221,6 +237,50 @@ TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
   EXPECT_EQ(half.receive_type(), closed);
   EXPECT_EQ(idle.receive_type(), closed);
   expect_alive();
+}
+
+TEST_F(Receiver, PeerThatSendsAByteAtATimeIsDropped) {
+  options_.request_limit_s = options_.idle_limit_s = 0.3;
+  open();
+  RawClient request = client(), picture = associated();
+  const auto begun = std::chrono::steady_clock::now();
+  for (int i = 0; i < 25; ++i) {
+    request.send(peer::Request().bytes().substr(static_cast<std::size_t>(i), 1));
+    picture.send(peer::store(DicomBuilder()).substr(static_cast<std::size_t>(i), 1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_EQ(request.receive_type(), closed);
+  EXPECT_EQ(picture.receive_type(), closed);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
+  expect_alive();
+}
+
+TEST_F(Receiver, TwoHundredPeersAtOnceAreServedUpToTheLimitAndTheOthersSentAway) {
+  std::vector<RawClient> peers;
+  for (int i = 0; i < 200; ++i) {
+    peers.push_back(client());
+    peers.back().send(peer::Request().bytes());
+  }
+  std::map<int, unsigned> answers;
+  for (RawClient& peer : peers) ++answers[peer.receive_type()];
+  EXPECT_EQ(answers[accepted], options_.most_associations);
+  EXPECT_EQ(answers[accepted] + answers[rejected] + answers[closed], 200u);
+  EXPECT_GT(answers[rejected], 0u);
+  peers.clear();
+  for (int i = 0; i < 1000 && answer_to(peer::Request().bytes()) != accepted; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  expect_alive();
+}
+
+TEST_F(Receiver, FloodOfEchoesIsAnsweredAndHoldsUpNobody) {
+  constexpr int flood = 2000;
+  RawClient flooding = associated();
+  std::string echoes;
+  for (int i = 0; i < flood; ++i) echoes += peer::echo();
+  std::jthread sender([&] { flooding.send(echoes); });
+  expect_alive();
+  for (int i = 0; i < flood; ++i) ASSERT_EQ(flooding.receive_status(), 0) << i;
+  EXPECT_EQ(receiver_->counters().echoed, flood + 1u);
 }
 
 TEST_F(Receiver, TooManyAssociationsAreRejectedForNow) {

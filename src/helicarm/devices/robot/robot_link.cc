@@ -74,7 +74,10 @@ void RobotLink::lose(const Failure& failure) {
 
 /// The first reason stays: what follows is its consequence. To be called under the guard.
 void RobotLink::latch(Failure failure) {
-  client_.beat_for({});
+  if (phase_ == LinkPhase::moving)
+    client_.halt();
+  else
+    client_.beat_for({});
   confirmations_.forget_all();
   if (phase_ != LinkPhase::stopped) why_ = std::move(failure);
   phase_ = LinkPhase::stopped;
@@ -158,8 +161,9 @@ Expected<void> RobotLink::refuse_unless_ready() const {
   return {};
 }
 
-Expected<RobotState> RobotLink::run(const RobotOrder& order) {
+Expected<RobotState> RobotLink::run(const RobotOrder& order, const Watch& watch) {
   if (auto remote = refuse_local_mode(); !remote) return tl::unexpected<Failure>(remote.error());
+  if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
   std::int32_t number = 0;
   {
     const std::lock_guard lock(guard_);
@@ -170,7 +174,7 @@ Expected<RobotState> RobotLink::run(const RobotOrder& order) {
     phase_ = LinkPhase::moving;
     client_.beat_for(duration_of(config_.program_silence_s));
   }
-  auto ended = supervise(order, number);
+  auto ended = supervise(order, number, watch);
   const std::lock_guard lock(guard_);
   client_.beat_for({});
   if (phase_ == LinkPhase::moving) {
@@ -182,7 +186,7 @@ Expected<RobotState> RobotLink::run(const RobotOrder& order) {
   return ended;
 }
 
-Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t number) {
+Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t number, const Watch& watch) {
   auto socket = TimedSocket::connect(config_.address, config_.script_port, Milliseconds(1000));
   if (!socket) return tl::unexpected<Failure>(socket.error());
   if (auto sent = socket->send(script_of(order, config_.model, number), Milliseconds(1000)); !sent)
@@ -203,6 +207,7 @@ Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t 
     if (age_s() > config_.stale_s)
       return fail(Reason::stale_state, "the robot's states have stopped coming: where it is now is unknown",
                   {{"age_s", age_s()}});
+    if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
     client_.beat_for(duration_of(config_.program_silence_s));
     const bool plays = state_->runtime == RuntimeState::playing;
     begun = begun || at_least(ScriptStage::begun);
@@ -219,19 +224,20 @@ Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t 
   }
 }
 
-Expected<void> RobotLink::correct(const RobotOrder& order, const RigidTransform& tcp_from_new) {
+Expected<void> RobotLink::correct(const RobotOrder& order, const RigidTransform& tcp_from_new,
+                                  const Watch& watch) {
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
   RobotOrder small = order;
   small.start = present->joints;
   small.waypoints = {{present->base_from_tcp * tcp_from_new, correction_mm_s, correction_mm_s2}};
-  const auto ended = run(small);
+  const auto ended = run(small, watch);
   if (!ended) return tl::unexpected<Failure>(ended.error());
   return {};
 }
 
 Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const std::string& token,
-                                               const Measure& measure) {
+                                               const Measure& measure, const Watch& watch) {
   const std::unique_lock one_at_a_time(executing_, std::try_to_lock);
   if (!one_at_a_time) return fail(Reason::robot_locked, "another order is being carried out");
   if (auto confirmed = confirmations_.redeem(token, order); !confirmed)
@@ -241,14 +247,15 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
                 "the order is for a " + order.model + ", the robot is a " + config_.model.name);
   if (order.corrections.most > 0 && !measure)
     return fail(Reason::bad_value, "an order with corrections needs a tracker that measures");
-  const auto ended = run(order);
+  const Watch watched = watch ? watch : [] { return Expected<void>(); };
+  const auto ended = run(order, watched);
   if (!ended) return tl::unexpected<Failure>(ended.error());
   const auto by_robot = [&]() -> Expected<Sighting> {
     return Sighting{ended->base_from_tcp, order.waypoints.back().base_from_tcp};
   };
-  auto misses =
-      follow_target(order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),
-                    [&](const RigidTransform& tcp_from_new) { return correct(order, tcp_from_new); });
+  auto misses = follow_target(
+      order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),
+      [&](const RigidTransform& tcp_from_new) { return correct(order, tcp_from_new, watched); });
   if (!misses) {
     const std::lock_guard lock(guard_);
     latch(misses.error());

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -38,6 +39,9 @@ enum class LinkPhase {
 };
 std::string_view name(LinkPhase phase);
 
+/// Whether a motion may go on. Asked with each state, and must not ask the link itself.
+using Watch = std::function<Expected<void>()>;
+
 struct RobotLinkStatus {
   LinkPhase phase = LinkPhase::disconnected;
   std::optional<Failure> why;  ///< of the last stop or end of the connection
@@ -70,9 +74,9 @@ class RobotLink {
   /// Carries a confirmed order out and returns when the tool is where it should be. With corrections it then
   /// follows the target by `measure`, and gives every miss; without, by the robot's own pose. Refuses,
   /// without any motion, as `check_order`, `order_not_confirmed` and `robot_locked`. What goes wrong on the
-  /// way stops the robot and is latched.
+  /// way, or `watch` has against it, stops the robot and is latched.
   Expected<std::vector<Miss>> execute(const RobotOrder& order, const std::string& token,
-                                      const Measure& measure = {});
+                                      const Measure& measure = {}, const Watch& watch = {});
 
   /// Stops the robot at once, from any thread.
   void stop();
@@ -84,9 +88,9 @@ class RobotLink {
   void lose(const Failure& failure);
   void latch(Failure failure);
   Expected<void> refuse_unless_ready() const;
-  Expected<RobotState> run(const RobotOrder& order);
-  Expected<RobotState> supervise(const RobotOrder& order, std::int32_t number);
-  Expected<void> correct(const RobotOrder& order, const RigidTransform& tcp_from_new);
+  Expected<RobotState> run(const RobotOrder& order, const Watch& watch);
+  Expected<RobotState> supervise(const RobotOrder& order, std::int32_t number, const Watch& watch);
+  Expected<void> correct(const RobotOrder& order, const RigidTransform& tcp_from_new, const Watch& watch);
   Expected<void> refuse_local_mode() const;
   double age_s() const;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/robot_link.h"
 
+#include <atomic>
 #include <future>
 
 #include <gmock/gmock.h>
@@ -60,7 +61,7 @@ struct Drill {
     EXPECT_TRUE(link.unlock("tester"));
     const RobotOrder order = slow_order();
     const std::string token = link.confirm(order);
-    auto done = std::async(std::launch::async, [&] { return link.execute(order, token); });
+    auto done = std::async(std::launch::async, [&] { return link.execute(order, token, {}, watch); });
     while (!robot->truth().moving && done.wait_for(0s) != std::future_status::ready)
       std::this_thread::yield();
     EXPECT_TRUE(robot->truth().moving);
@@ -95,8 +96,15 @@ struct Drill {
     EXPECT_FALSE(robot->truth().moving);
   }
 
+  /// How long it still moved on its own clock, from this time on, while the link keeps talking to it.
+  double stop_s_from(double begun_s) {
+    for (int i = 0; i < 2000 && robot->truth().moving; ++i) std::this_thread::sleep_for(1ms);
+    return robot->truth().rest_since_s.value_or(1e9) - begun_s;
+  }
+
   std::unique_ptr<VirtualUr> robot;
   RobotLink link;
+  Watch watch;
 };
 
 TEST(RobotDrill, ConfirmedOrderIsCarriedOutOnce) {
@@ -222,9 +230,43 @@ TEST(RobotDrill, ClockThatLeapsIsAnotherController) {
 
 TEST(RobotDrill, StopByTheProgramStopsTheRobot) {
   Drill drill;
-  EXPECT_EQ(drill.fault_on_the_way([&] { drill.link.stop(); }).reason, Reason::robot_stopped);
-  for (int i = 0; i < 2000 && drill.robot->truth().moving; ++i) std::this_thread::sleep_for(1ms);
+  double told_s = 0;
+  const Failure failure = drill.fault_on_the_way([&] {
+    told_s = drill.robot->truth().state.time_s;
+    drill.link.stop();
+  });
+  EXPECT_EQ(failure.reason, Reason::robot_stopped);
+  EXPECT_LT(drill.stop_s_from(told_s), 0.1);
   EXPECT_FALSE(drill.robot->truth().moving);
+}
+
+TEST(RobotDrill, TrackerLostOnTheWayStopsTheRobotAndIsLatched) {
+  Drill drill;
+  std::atomic<bool> seen{true};
+  drill.watch = [&]() -> Expected<void> {
+    if (!seen) return fail(Reason::stale_pose, "the tool is not seen");
+    return {};
+  };
+  double lost_s = 0;
+  const Failure failure = drill.fault_on_the_way([&] {
+    lost_s = drill.robot->truth().state.time_s;
+    seen = false;
+  });
+  EXPECT_EQ(failure.reason, Reason::stale_pose);
+  EXPECT_LT(drill.stop_s_from(lost_s), 0.1);
+  EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
+  drill.expect_locked();
+}
+
+TEST(RobotDrill, NothingMovesWhileTheTrackerSeesNothing) {
+  Drill drill;
+  ASSERT_TRUE(drill.link.unlock("tester"));
+  const RobotOrder order = planned();
+  const auto refused = drill.link.execute(order, drill.link.confirm(order), {}, [] {
+    return Expected<void>(fail(Reason::no_pose, "the tool was never seen"));
+  });
+  EXPECT_EQ(refused.error().reason, Reason::no_pose);
+  EXPECT_FALSE(drill.robot->truth().rest_since_s);
 }
 
 TEST(RobotDrill, ArmMovedByHandOrOtherToolIsPlannedAnew) {

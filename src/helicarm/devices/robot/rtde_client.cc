@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
 namespace helicarm {
@@ -17,6 +18,8 @@ Clock::duration seconds(double s) {
 
 /// How long a wait lasts before it looks whether it should end.
 constexpr auto glance = std::chrono::milliseconds(20);
+/// Two may fall into one of the robot's periods; the next order must not find one.
+constexpr int halt_messages = 4;
 
 /// A connection that gives whole messages.
 struct Line {
@@ -55,6 +58,11 @@ RtdeClient::RtdeClient(RtdeOptions options, RtdeListener listener)
 RtdeClient::~RtdeClient() = default;
 
 void RtdeClient::beat_for(Clock::duration time) { beat_until_ = Clock::now() + time; }
+
+void RtdeClient::halt() {
+  beat_for({});
+  halts_ = halt_messages;
+}
 
 void RtdeClient::run(const std::stop_token& stop) {
   std::mutex guard;
@@ -102,8 +110,10 @@ Expected<void> RtdeClient::serve(const std::stop_token& stop) {
         listener_.state(value_or_throw(read_state(*message, states)));
         heard = Clock::now();
         if (heard < beat_until_.load()) beat = (beat + 1) & 0x7FFFFFFF;
+        const bool halting = halts_ > 0 && halts_-- > 0;
         if (options_.commands)
-          value_or_throw(line.socket.send(heartbeat_message(heartbeats, beat), patience));
+          value_or_throw(
+              line.socket.send(heartbeat_message(heartbeats, halting ? stop_beat : beat), patience));
       } else if (Clock::now() - heard > seconds(options_.silence_s)) {
         throw BadInput(Reason::stale_state, "RTDE: the robot's states have stopped coming");
       }

@@ -39,6 +39,8 @@ class RtdeClient {
 
   /// From now on; zero stops the beat at once.
   void beat_for(std::chrono::steady_clock::duration time);
+  /// Ends the beat and tells the script to stop now, rather than when it misses the beat.
+  void halt();
 
  private:
   void run(const std::stop_token& stop);
@@ -47,6 +49,7 @@ class RtdeClient {
   RtdeOptions options_;
   RtdeListener listener_;
   std::atomic<std::chrono::steady_clock::time_point> beat_until_{};
+  std::atomic<int> halts_{0};  ///< messages that will still say so
   std::jthread thread_;
 };
 

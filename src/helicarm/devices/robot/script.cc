@@ -46,6 +46,9 @@ std::string script_of(const RobotOrder& order, const RobotModel& model, std::int
       beat = heard
       silent = 0
     end
+    if heard < 0:
+      silent = {patience}
+    end
     if silent >= {patience}:
       kill mover
       stopj({deceleration:.6f})

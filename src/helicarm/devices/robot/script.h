@@ -12,6 +12,8 @@ namespace helicarm {
 /// the fastest speed an order may have, and a period each for sending and reading, it rests within 200 ms.
 inline constexpr double silence_s = 0.08;
 inline constexpr double stop_rad_s2 = 8;
+/// A heartbeat that means: stop now. All others are positive.
+inline constexpr std::int32_t stop_beat = -1;
 
 /// What the script writes into output register 0: `number` * 100 plus how far it is.
 enum class ScriptStage : std::int32_t { begun = 0, silent = 98, done = 99 };

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <csignal>
+#include <thread>
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/operation/connections.h"
+#include "helicarm/operation/replay.h"
+#include "helicarm/rehearsal/rehearse.h"
+
+namespace helicarm {
+namespace {
+
+namespace fs = std::filesystem;
+using operating_room::CArmFault;
+using operating_room::VirtualRoom;
+
+/// Longer than the window that an exposure's poses are taken from.
+constexpr std::chrono::milliseconds window{1800};
+constexpr int most_shots = 5;
+
+/// One virtual room for all, and an operation of its own for each test.
+class FaultyOperation : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    operating_room::VirtualRoomOptions options;
+    options.picture_size = 512;
+    options.tracker_rate_hz = 100;
+    options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
+    room_ = VirtualRoom::open(options).value();
+    std::string name = (fs::temp_directory_path() / "helicarm_operation_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    folder_ = name;
+    plan_ = plan_for(*room_, room_->tracker().port());
+    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_ / "inbox").value());
+    ReceiverOptions receiving;
+    receiving.port = 0;
+    ASSERT_TRUE(devices_->listen(receiving));
+    std::this_thread::sleep_for(window);
+  }
+  static void TearDownTestSuite() {
+    devices_.reset();
+    room_.reset();
+    fs::remove_all(folder_);
+  }
+  void SetUp() override {
+    session_ = folder_ / testing::UnitTest::GetInstance()->current_test_info()->name();
+    operation_ = begin().value();
+  }
+  void TearDown() override { operation_.reset(); }
+
+  Expected<std::unique_ptr<Operation>> begin() {
+    return Operation::begin(plan_, session_, devices_->board(), devices_->robot());
+  }
+  DatedArrival shot(const std::string& view, CArmFault fault = CArmFault::none) {
+    EXPECT_TRUE(
+        operating_room::shoot(room_->theatre(), view, {"127.0.0.1", devices_->receiver_port()}, fault));
+    return devices_->next_picture(20).value();
+  }
+  Expected<void> take(const std::string& view, CArmFault fault = CArmFault::none) {
+    const DatedArrival picture = shot(view, fault);
+    return operation_->take(view, picture.arrival, picture.time_s);
+  }
+  /// Again where a busy machine made the tracker stutter.
+  void expose(const std::string& view, CArmFault fault = CArmFault::none) {
+    Expected<void> taken = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_shots && !taken; ++i) taken = take(view, fault);
+    ASSERT_TRUE(taken) << taken.error().message;
+  }
+  static void shift(const char* body, double mm) {
+    room_->theatre().move_bone(body, {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
+    std::this_thread::sleep_for(window);
+  }
+  std::string log() const { return read_file(session_ / "session.log", 1 << 24).value(); }
+
+  static std::unique_ptr<VirtualRoom> room_;
+  static std::unique_ptr<Connections> devices_;
+  static OperationPlan plan_;
+  static fs::path folder_;
+  fs::path session_;
+  std::unique_ptr<Operation> operation_;
+};
+std::unique_ptr<VirtualRoom> FaultyOperation::room_;
+std::unique_ptr<Connections> FaultyOperation::devices_;
+OperationPlan FaultyOperation::plan_;
+fs::path FaultyOperation::folder_;
+
+TEST_F(FaultyOperation, SamePictureForBothViewsIsRefusedAndTheNextOneTaken) {
+  expose("AP");
+  EXPECT_EQ(take("LAT", CArmFault::same_picture).error().reason, Reason::views_too_close);
+  EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"LAT"});
+  EXPECT_NE(log().find(R"("why":"views_too_close")"), std::string::npos);
+  expose("LAT");
+  EXPECT_TRUE(operation_->measure());
+}
+
+TEST_F(FaultyOperation, PictureOfAnotherPatientIsRefused) {
+  expose("AP");
+  EXPECT_EQ(take("LAT", CArmFault::other_patient).error().reason, Reason::patient_mismatch);
+  EXPECT_EQ(operation_->measure().error().reason, Reason::usage);
+}
+
+TEST_F(FaultyOperation, LateralPictureTakenAsApLeavesItsTunnelsUnmeasured) {
+  expose("AP", CArmFault::same_picture);
+  expose("LAT", CArmFault::same_picture);
+  ASSERT_TRUE(operation_->measure());
+  for (const PlannedTunnel& tunnel : plan_.tunnels)
+    EXPECT_EQ(tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
+}
+
+TEST_F(FaultyOperation, PictureThatCameBeforeIsRefused) {
+  DatedArrival again = shot("AP");
+  again.arrival.repeated = true;
+  EXPECT_EQ(operation_->take("AP", again.arrival, again.time_s).error().reason, Reason::stale_pose);
+}
+
+TEST_F(FaultyOperation, PictureOfATimeWithoutPosesIsRefused) {
+  const DatedArrival picture = shot("AP");
+  for (const double off_s : {-3600.0, 3600.0})
+    EXPECT_EQ(operation_->take("AP", picture.arrival, picture.time_s + off_s).error().reason,
+              Reason::no_pose);
+  EXPECT_EQ(operation_->views_to_come().size(), 2u);
+}
+
+TEST_F(FaultyOperation, TrackerWhoseClockLeapsDuringTheExposureIsRefused) {
+  ASSERT_TRUE(room_->set_fault("time_jump", true));
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
+  ASSERT_TRUE(room_->set_fault("time_jump", false));
+  std::this_thread::sleep_for(2 * window);
+  expose("AP");
+}
+
+TEST_F(FaultyOperation, FrozenTrackerIsRefused) {
+  ASSERT_TRUE(room_->set_fault("frozen", true));
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
+  ASSERT_TRUE(room_->set_fault("frozen", false));
+  std::this_thread::sleep_for(window);
+  expose("AP");
+}
+
+TEST_F(FaultyOperation, CalibratorWhoseMarkersMovedBetweenTheViewsIsRefused) {
+  expose("AP");
+  shift("calibrator", 5);
+  expose("LAT");
+  const auto measured = operation_->measure();
+  shift("calibrator", -5);
+  ASSERT_FALSE(measured);
+  EXPECT_EQ(measured.error().reason, Reason::uncertain);
+}
+
+TEST_F(FaultyOperation, BoneHiddenDuringTheExposureIsRefused) {
+  ASSERT_TRUE(room_->set_fault("hide:femur", true));
+  std::this_thread::sleep_for(window);
+  EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
+  ASSERT_TRUE(room_->set_fault("hide:femur", false));
+  std::this_thread::sleep_for(window);
+  expose("AP");
+}
+
+TEST_F(FaultyOperation, BoneHiddenInAPartOfTheExposureIsRefused) {
+  ASSERT_TRUE(room_->set_fault("hide:femur", true));
+  std::this_thread::sleep_for(std::chrono::milliseconds(400));
+  EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
+  ASSERT_TRUE(room_->set_fault("hide:femur", false));
+  std::this_thread::sleep_for(window);
+}
+
+TEST_F(FaultyOperation, SessionFolderIsOneOperations) {
+  EXPECT_EQ(begin().error().reason, Reason::cannot_write);
+  operation_.reset();
+  EXPECT_EQ(begin().error().reason, Reason::cannot_write);
+}
+
+/// A disk that is full behind so many bytes of a file.
+class FullDisk {
+ public:
+  explicit FullDisk(std::uintmax_t bytes) : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit tight{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &tight);
+  }
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_);
+  }
+
+ private:
+  void (*signal_)(int);
+  rlimit before_{};
+};
+
+TEST_F(FaultyOperation, FullDiskAtAnyWriteIsToldAndLeavesTheRecordWhole) {
+  expose("AP");
+  const DatedArrival lateral = shot("LAT");
+  {
+    const FullDisk full(fs::file_size(session_ / "session.log") + 10);
+    const auto taken = operation_->take("LAT", lateral.arrival, lateral.time_s);
+    ASSERT_FALSE(taken);
+    EXPECT_EQ(taken.error().reason, Reason::cannot_write);
+  }
+  EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"LAT"});
+  expose("LAT");
+  const std::uintmax_t log_bytes = fs::file_size(session_ / "session.log");
+  for (const std::uintmax_t bytes : {std::uintmax_t{0}, std::uintmax_t{3000}, log_bytes + 10}) {
+    const FullDisk full(bytes);
+    const auto measured = operation_->measure();
+    ASSERT_FALSE(measured) << bytes;
+    EXPECT_EQ(measured.error().reason, Reason::cannot_write) << measured.error().message;
+  }
+  ASSERT_TRUE(operation_->measure());
+  operation_.reset();
+  const auto replayed = replay(session_);
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_TRUE(replayed->differences.empty());
+}
+
+}  // namespace
+}  // namespace helicarm

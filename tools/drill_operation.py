@@ -1,0 +1,243 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Operates in the virtual room with two programs and breaks things in mid-work.
+
+    tools/drill_operation.py [--build build] [--only NAME]
+    tools/drill_operation.py --soak 30        minutes; prints memory and descriptors of each program
+
+`helicarm virtual-or` and `helicarm navigate` talk over sockets; after each fault the robot must rest in time, navigate
+must say why and end, and its record must be whole: `helicarm replay` recomputes it. Needs dcmtk. Exits 1 when anything
+differs.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from drill_theatre import EXPOSURE_S, Program, Theatre, check, failures, free_port
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+CANARY = "CANARYKNEE"
+
+
+def drill_whole(program, folder):
+    """From the first X-ray to the last check, with pictures that bear a name that must not leave them."""
+    case = folder / "canary"
+    subprocess.run([program, "simulate", case, "--kind", "tunnels", "--size", "512", "--seed", "1", "--quiet"], check=True)
+    with Theatre(program, folder / "whole") as theatre:
+        check("other program on the same session is refused", theatre.navigate().process.wait(10) == 2)
+        theatre.say("shoot AP wrong_title", "not_connected")
+        theatre.say("shoot AP breaks_off", "not_connected")
+        for view, then in (("AP", "waiting for LAT"), ("LAT", "^measure: ")):
+            picture = case / f"{view}.dcm"
+            subprocess.run(["dcmodify", "-nb", "-m", f"PatientName={CANARY}^A", "-m", f"PatientID={CANARY}", picture],
+                           check=True)
+            subprocess.run(["storescu", "-aec", "HELICARM", "127.0.0.1", theatre.port, picture], check=True)
+            theatre.navigation.wait_for(then)
+        theatre.navigation.wait_for("tibia: withdraw", 300)
+        check("whole operation ends with 0", theatre.navigation.process.wait(60) == 0)
+        theatre.expect_replay("whole operation")
+        told = theatre.navigation.said()
+        holding = [file.name for file in theatre.session.rglob("*")
+                   if file.is_file() and file.suffix != ".dcm" and CANARY.encode() in file.read_bytes()]
+        check("the patient's name is in the pictures alone", CANARY not in told and not holding, " ".join(holding))
+
+
+def drill_pictures(program, folder):
+    with Theatre(program, folder / "pictures") as theatre:
+        theatre.say("fault frozen on", "frozen on")
+        time.sleep(EXPOSURE_S)
+        theatre.say("shoot AP", "shot AP")
+        theatre.navigation.wait_for("(no|stale)_pose.*expose again")
+        theatre.say("fault frozen off", "frozen off")
+        time.sleep(EXPOSURE_S)
+        theatre.shoot("AP", "waiting for LAT")
+        for fault, reason in (("same_picture", "views_too_close"), ("other_patient", "patient_mismatch")):
+            theatre.say(f"shoot LAT {fault}", "shot LAT")
+            check(f"{fault}: expose again", bool(theatre.navigation.wait_for(f"{reason}.*expose again")))
+        theatre.shoot("LAT", "^measure: ")
+        theatre.navigation.end(signal.SIGKILL)
+        theatre.expect_replay("wrong pictures")
+    with Theatre(program, folder / "hidden") as theatre:
+        theatre.say("fault hide:femur on", "hide:femur on")
+        time.sleep(EXPOSURE_S)
+        theatre.say("shoot AP", "shot AP")
+        check("femur hidden during the exposure: expose again",
+              bool(theatre.navigation.wait_for("no_pose: AP: the marker of the femur.*expose again")))
+
+
+def drill_motion(program, folder):
+    """Faults while the arm moves; the tracker's newest pose may be 0.1 s old before they count."""
+    for fault, reason, limit_s in (("hide:tool", "stale_pose", 0.3), ("silent", "stale_pose", 0.3),
+                                   ("cut_cable", "stale_state", 0.2), ("emergency_stop", "robot_stopped", 0.6),
+                                   ("protective_stop", "robot_stopped", 0.6),
+                                   ("frozen", "stale_pose", 0.4)):
+        with Theatre(program, folder / fault.replace(":", "_")) as theatre:
+            theatre.expose()
+            theatre.navigation.wait_for("register: pose 1")
+            theatre.wait_moving()
+            begun = time.monotonic()
+            theatre.say(f"fault {fault} on", f"{fault} on")
+            stop_s = theatre.stop_s(begun)
+            check(f"{fault} while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= limit_s)
+            theatre.expect_end(fault, reason)
+            theatre.expect_replay(fault)
+    with Theatre(program, folder / "bone") as theatre:
+        theatre.expose()
+        theatre.navigation.wait_for("navigate: femur", 120)
+        theatre.wait_moving()
+        begun = time.monotonic()
+        theatre.say("fault hide:femur on", "hide:femur on")
+        stop_s = theatre.stop_s(begun)
+        check(f"bone lost on the way to its tunnel: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.3)
+        theatre.expect_end("bone lost", "stale_pose")
+    with Theatre(program, folder / "full") as theatre:
+        theatre.expose()
+        theatre.navigation.wait_for("register: pose 1")
+        full = (theatre.session / "session.log").stat().st_size + 100
+        resource.prlimit(theatre.navigation.process.pid, resource.RLIMIT_FSIZE, (full, full))
+        theatre.expect_end("disk full while the robot is at work", "cannot_write", 2)
+        time.sleep(0.2)
+        check("     the robot is at rest", "moving" not in theatre.say("where", "^tip "))
+        theatre.expect_replay("disk full")
+
+
+def drill_ends(program, folder):
+    """SIGTERM in each step, SIGKILL while the arm moves."""
+    steps = {"waiting for AP": None, "waiting for LAT": "AP", "^measure: ": "both", "^register: pose 2": "both",
+             "^plan: ": "both", "^navigate: femur": "both", "^verify: ": "both"}
+    for number, (step, shots) in enumerate(steps.items()):
+        with Theatre(program, folder / f"term{number}") as theatre:
+            if shots == "both":
+                theatre.expose()
+            elif shots:
+                theatre.shoot(shots, "waiting for LAT")
+            if shots == "both" and not step.startswith("^measure"):
+                theatre.navigation.wait_for(step, 120)
+            code, seconds = theatre.navigation.end()
+            check(f"SIGTERM at \"{step.strip('^: ')}\" ends it in {seconds * 1000:.0f} ms with {code}",
+                  seconds <= 1 and code == 3)
+            time.sleep(0.2)
+            check("     the robot is at rest", "moving" not in theatre.say("where", "^tip "))
+            theatre.expect_replay("     SIGTERM")
+    for number, step in enumerate(("^register: pose 1", "^register: pose 4", "^navigate: femur$")):
+        with Theatre(program, folder / f"kill{number}") as theatre:
+            theatre.expose()
+            theatre.navigation.wait_for(step, 120)
+            theatre.wait_moving()
+            begun = time.monotonic()
+            theatre.navigation.end(signal.SIGKILL)
+            stop_s = theatre.stop_s(begun)
+            check(f"SIGKILL while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.2)
+            theatre.expect_replay("SIGKILL")
+    with Theatre(program, folder / "room") as theatre:
+        code, seconds = theatre.room.end()
+        check(f"SIGTERM ends virtual-or in {seconds * 1000:.0f} ms with {code}", seconds <= 1 and code == 0)
+
+
+def drill_system(program, folder):
+    with Theatre(program, folder / "ports") as theatre:
+        ports = json.loads(theatre.plan.read_text())
+        taken = {"--tracker-port": ports["tracker"]["port"], "--rtde-port": ports["robot"]["rtde_port"]}
+        for option, port in taken.items():
+            others = [word for name in ("--tracker-port", "--rtde-port", "--dashboard-port", "--script-port")
+                      if name != option for word in (name, "0")]
+            done = subprocess.run([program, "virtual-or", option, str(port), *others], capture_output=True, text=True,
+                                  stdin=subprocess.DEVNULL)
+            check(f"{option} that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
+        done = subprocess.run([program, "navigate", theatre.plan, "--out", folder / "second", "--port", theatre.port],
+                              capture_output=True, text=True)
+        check("navigate's port that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
+        for name, out in (("folder that nobody can write", "/proc/session"), ("path too long", folder / ("x" * 300))):
+            done = subprocess.run([program, "navigate", theatre.plan, "--out", out, "--port", "0"], capture_output=True,
+                                  text=True)
+            check(name, done.returncode == 2 and "cannot_write" in done.stderr, done.stderr.strip()[-80:])
+    case, not_loaded = folder / "memory", 127
+    subprocess.run([program, "simulate", case, "--size", "512", "--quiet"], check=True)
+    for megabytes in range(70, 150, 5):
+        limit = megabytes << 20
+        done = subprocess.run([program, "run", case, "--out", folder / f"memory{megabytes}", "--threads", "1"],
+                              capture_output=True, text=True,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)))
+        whole = (folder / f"memory{megabytes}" / "result.json").exists()
+        check(f"{megabytes} MB of memory: ends with {done.returncode}",
+              (done.returncode == 0) == whole and done.returncode in (0, 1, not_loaded), done.stderr.strip()[-80:])
+
+
+def drill_soak(program, folder, minutes):
+    """Room, tracker watch and receive at work; says whether memory and descriptors stayed flat."""
+    port = free_port()
+    inbox = folder / "inbox"
+    receive = Program(program, "receive", "--out", inbox, "--port", port)
+    receive.wait_for("listens")
+    room = Program(program, "virtual-or", "--size", 512, "--receiver-port", port, "--tracker-port", 0, "--rtde-port", 0,
+                   "--dashboard-port", 0, "--script-port", 0)
+    tracker = room.wait_for("^tracker").split()[-1]
+    room.wait_for("^say:")
+    watch = Program(program, "tracker", "watch", f"127.0.0.1:{tracker}", "--ask")
+    programs = {"virtual-or": room, "tracker watch": watch, "receive": receive}
+    looks, begun, shots = {name: [] for name in programs}, time.monotonic(), 0
+    next_look = begun + min(30, 6 * minutes)  # once everything is warm
+    while time.monotonic() < begun + 60 * minutes:
+        room.process.stdin.write(f"shoot {('AP', 'LAT')[shots % 2]}\n")
+        room.process.stdin.flush()
+        room.wait_for("^shot", 30)
+        shots += 1
+        time.sleep(0.1)
+        for picture in inbox.glob("*.dcm"):
+            picture.unlink()
+        for each in programs.values():
+            while not each.lines.empty():
+                each.lines.get()
+            each.heard.clear()
+        if time.monotonic() >= next_look:
+            next_look += 30
+            for name, each in programs.items():
+                looks[name].append(footprint(each.process.pid))
+            print(f"{time.monotonic() - begun:6.0f} s, {shots} shots  " + "  ".join(
+                f"{name}: {look[-1][0]:.1f} MB, {look[-1][1]} files" for name, look in looks.items()), flush=True)
+    for name, look in looks.items():  # allocators take some minutes to have what they need
+        half = max(1, len(look) // 2)
+        (early_mb, early_files), (late_mb, late_files) = (tuple(map(max, zip(*part))) for part in (look[:half], look[-half:]))
+        check(f"{name}: at most {early_mb:.1f} MB and {early_files} files in the first half, {late_mb:.1f} MB and "
+              f"{late_files} files in the second", late_mb < 1.02 * early_mb + 1 and late_files <= early_files)
+    for name, each in programs.items():
+        code, seconds = each.end()
+        check(f"SIGTERM ends {name} in {seconds * 1000:.0f} ms with {code}", code == 0 and seconds <= 1)
+
+
+def footprint(process):
+    pages = int(pathlib.Path(f"/proc/{process}/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6, len(os.listdir(f"/proc/{process}/fd"))
+
+
+def main():
+    drills = {"whole": drill_whole, "pictures": drill_pictures, "motion": drill_motion, "ends": drill_ends,
+              "system": drill_system}
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
+    parser.add_argument("--only", choices=drills)
+    parser.add_argument("--soak", metavar="MINUTES", type=float)
+    arguments = parser.parse_args()
+    program = arguments.build / "bin" / "helicarm"
+    with tempfile.TemporaryDirectory() as name:
+        if arguments.soak:
+            drill_soak(program, pathlib.Path(name), arguments.soak)
+        for drill in [] if arguments.soak else [arguments.only] if arguments.only else drills:
+            try:
+                drills[drill](program, pathlib.Path(name))
+            except TimeoutError as error:
+                check(f"{drill}: {error}", False)
+    print(f"{len(failures)} failures")
+    sys.exit(1 if failures else 0)
+
+
+if __name__ == "__main__":
+    main()
