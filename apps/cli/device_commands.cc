@@ -43,8 +43,9 @@ void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
   command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
   command->add_option("--seconds", a.seconds, "End by itself; otherwise when interrupted")
       ->check(within(0, 1e6));
-  command->add_flag("--ask", a.options.ask_for_tracking,
-                    "Ask for tracking (STT_TDATA), as some servers expect");
+  a.options.ask_for_tracking = true;
+  command->add_flag("--ask,!--no-ask", a.options.ask_for_tracking,
+                    "Ask for tracking (STT_TDATA), as some servers expect (default)");
 }
 
 void add_tracker(CLI::App& app, Action& action) {

@@ -49,6 +49,10 @@ int run(int argc, char** argv) {
   add_rehearsal_commands(app, action);
   add_device_commands(app, action);
   try {
+    if (argc > 1 && argv[1][0] != '-' && !app.get_subcommand_no_throw(argv[1]))
+      throw CLI::ParseError(fmt::format("\"{}\" is no command; helicarm --help lists them",
+                                        without_control_characters(argv[1])),
+                            CLI::ExitCodes::ExtrasError);
     app.parse(argc, argv);
   } catch (const CLI::Success& wish) {
     return app.exit(wish, console.out, console.progress);

@@ -36,7 +36,7 @@ class Ending {
         }) {}
 
   void check() const {
-    if (told_) throw BadInput(Reason::robot_stopped, "told to end");
+    if (told_) throw BadInput(Reason::interrupted, "told to end");
   }
   /// Until this holds, looking again and again.
   template <class Holds>

@@ -89,6 +89,8 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
       if (!std::filesystem::is_directory(arguments.watch))
         throw BadInput(Reason::missing_file,
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
+      if (std::filesystem::equivalent(arguments.watch, arguments.out))
+        throw BadInput(Reason::usage, "--watch: is the folder of --out itself");
       watched.emplace(arguments.watch, *inbox, tale.hooks());
     }
     stop.wait(arguments.seconds);

@@ -55,7 +55,8 @@ void add_simulate(CLI::App& app, Action& action) {
           "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 looks up from below, "
           "LAT:90,0 from the side (default: these two, roughly)")
       ->allow_extra_args(false);
-  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm itself (default: the seed)");
+  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm itself (default: the seed)")
+      ->check(within(0, 1e19));
   command->add_option("--ct", a.ct,
                       "A CT in place of the drawn knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
   command

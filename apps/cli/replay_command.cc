@@ -14,14 +14,18 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
     if (console.json) {
       console.out << to_text({{"records", report.records},
                               {"torn", report.torn},
+                              {"finished", report.finished},
                               {"exposures", report.exposures},
+                              {"pictures", report.pictures},
                               {"results", report.results},
                               {"hand_eyes", report.hand_eyes},
                               {"differences", report.differences}})
                   << '\n';
     } else {
-      console.out << fmt::format("{} records{}: {} exposures, {} results, {} hand-eye calibrations\n",
-                                 report.records, report.torn ? " and a torn one" : "", report.exposures,
+      console.out << fmt::format("{} records{}{}: {} exposures, {} pictures of cases, {} results, {} hand-eye calibrations\n",
+                                 report.records, report.torn ? " and a torn one" : "",
+                                 report.finished ? "" : ", without the operation's end", report.exposures,
+                                 report.pictures,
                                  report.results, report.hand_eyes);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }

@@ -99,6 +99,8 @@ std::string_view code(Reason reason) {
       return "not_connected";
     case Reason::replay_differs:
       return "replay_differs";
+    case Reason::interrupted:
+      return "interrupted";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:

@@ -63,6 +63,7 @@ enum class Reason {
   off_target,
   not_connected,
   replay_differs,
+  interrupted,
   // Only ever warnings.
   name_differs,
   bone_taken_as_fixed,

@@ -11,6 +11,7 @@
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/report/overlay.h"
+#include "helicarm/xray/digest.h"
 #include "helicarm/xray/read_exposure.h"
 
 namespace helicarm {
@@ -37,6 +38,8 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
   return guarded([&] {
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(tell)));
+    std::error_code ec;
+    if (fs::create_directories(folder, ec)) fs::permissions(folder, fs::perms::owner_all, ec);
     operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
     if (operation->log_->history().records.size() > 1)
       throw BadInput(Reason::cannot_write,
@@ -88,6 +91,16 @@ Watch Operation::sees(std::vector<std::string> markers) const {
         return tl::unexpected<Failure>(seen.error());
     return {};
   };
+}
+
+std::vector<Miss> Operation::carry_out(const RobotOrder& order, const std::string& token,
+                                       const Measure& measure, std::vector<std::string> markers) {
+  record("confirmed", {{"order", order.name}, {"digest", digest(to_text(to_json(order)))}, {"by", who_}});
+  return value_or_throw(robot_.execute(order, token, measure, sees(std::move(markers))));
+}
+
+Expected<void> Operation::finish() {
+  return guarded([&] { record("end", Json::object()); });
 }
 
 Expected<void> Operation::take(const std::string& view, const Arrival& arrival, double arrival_s) {
@@ -150,7 +163,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
       const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
       const RobotOrder order = tour_order(plan_.robot, present, pose);
       record("order", to_json(order));
-      value_or_throw(robot_.execute(order, value_or_throw(confirm(order)), {}, sees({plan_.tracker.tool})));
+      carry_out(order, value_or_throw(confirm(order)), {}, {plan_.tracker.tool});
       const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
       const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
@@ -251,14 +264,12 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
     if (target == bone_from_target_.end())
       throw BadInput(Reason::usage, fmt::format("{}: was not planned in this operation", order.name));
     tell_(Step::navigate, order.name);
-    record("confirmed", {{"order", order.name}});
     const Measure measure = [&] {
       return guarded([&] {
         return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, target->second));
       });
     };
-    const std::vector<Miss> loop = value_or_throw(robot_.execute(
-        order, token, measure, sees({plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool})));
+    const std::vector<Miss> loop = carry_out(order, token, measure, {plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool});
     record("navigated", {{"tunnel", order.name}, {"loop", to_json(loop)}});
     tell_(Step::verify, order.name);
     TunnelOutcome outcome = check(tunnel);
@@ -279,8 +290,7 @@ Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& re
     back.waypoints = {stand_off, home};
     back.corrections.most = 0;
     record("order", to_json(back));
-    value_or_throw(
-        robot_.execute(back, value_or_throw(confirm(back)), {}, sees({bone_marker, plan_.tracker.tool})));
+    carry_out(back, value_or_throw(confirm(back)), {}, {bone_marker, plan_.tracker.tool});
   });
 }
 

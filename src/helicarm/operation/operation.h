@@ -53,6 +53,10 @@ class Operation {
       Tell tell = [](Step, const std::string&) {});
 
   const OperationPlan& plan() const { return plan_; }
+  /// Who confirms orders from now on, for the record.
+  void confirmed_by(std::string who) { who_ = std::move(who); }
+  /// Says in the record that the operation came to its end.
+  Expected<void> finish();
   /// Views that still want a picture, in the plan's order.
   std::vector<std::string> views_to_come() const;
 
@@ -113,6 +117,8 @@ class Operation {
   Acquisition acquisition_of(const std::string& view, const Arrival& arrival) const;
   Watch sees(std::vector<std::string> markers) const;
   Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
+  std::vector<Miss> carry_out(const RobotOrder& order, const std::string& token, const Measure& measure,
+                              std::vector<std::string> markers);
   TunnelOutcome check(const PlannedTunnel& tunnel);
   void draw_preview(const RobotOrder& order) const;
 
@@ -122,6 +128,7 @@ class Operation {
   RobotLink& robot_;
   Tell tell_;
   std::unique_ptr<SessionLog> log_;
+  std::string who_ = "unknown";
   std::vector<View> views_;
   int measurements_ = 0;
   std::optional<Result> result_;

@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/replay.h"
 
+#include <map>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/session/session_log.h"
+#include "helicarm/xray/digest.h"
 
 namespace helicarm {
 namespace {
+
+constexpr std::uintmax_t most_picture_bytes = std::uintmax_t{256} << 20;
 
 class Replay {
  public:
@@ -19,6 +24,8 @@ class Replay {
     const std::string origin = fmt::format("record {}", record.number);
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
     if (record.kind == "exposure") exposure(record, origin);
+    if (record.kind == "case") pictures(record, origin);
+    if (record.kind == "end") report.finished = true;
     if (record.kind == "result") result(record, origin);
     if (record.kind == "hand_eye") hand_eye(record, origin);
   }
@@ -26,23 +33,43 @@ class Replay {
   ReplayReport report;
 
  private:
+  void differ(const std::string& origin, const std::string& how) {
+    report.differences.push_back(origin + ": " + how);
+  }
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
-    if (then != now)
-      report.differences.push_back(fmt::format("{}: the {} comes out otherwise", origin, what));
+    if (then != now) differ(origin, fmt::format("the {} comes out otherwise", what));
   }
 
   void exposure(const SessionRecord& record, const std::string& origin) {
     ++report.exposures;
+    picture_digests_[record.content.at("view").get<std::string>()] = record.content.at("picture");
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto poses = poses_of_exposure(window, plan_.tracker);
     compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
+  }
+
+  /// The case's pictures must be those that came.
+  void pictures(const SessionRecord& record, const std::string& origin) {
+    const std::string folder = record.content.at("folder").get<std::string>();
+    for (const auto& [view, recorded] : picture_digests_) {
+      ++report.pictures;
+      const std::string name = folder + "/" + view + ".dcm";
+      const auto file = read_file(value_or_throw(path_inside(session_, name)), most_picture_bytes);
+      if (!file)
+        differ(origin, file.error().message);
+      else if (digest(*file) != recorded)
+        differ(origin, name + " is not the picture that came");
+    }
   }
 
   void result(const SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
     const auto run = recompute_case(value_or_throw(path_inside(session_, folder)), plan_);
-    compare(record.content.at("digest"), run ? Json(run->digest) : Json(), origin, "result");
+    if (!run)
+      differ(origin, run.error().message);
+    else
+      compare(record.content.at("digest"), run->digest, origin + ": " + folder, "result");
   }
 
   void hand_eye(const SessionRecord& record, const std::string& origin) {
@@ -54,6 +81,7 @@ class Replay {
 
   std::filesystem::path session_;
   OperationPlan plan_;
+  std::map<std::string, std::string> picture_digests_;
 };
 
 }  // namespace
@@ -61,6 +89,8 @@ class Replay {
 Expected<ReplayReport> replay(const std::filesystem::path& session) {
   return guarded([&] {
     const SessionHistory history = value_or_throw(read_session(session / "session.log"));
+    if (history.records.empty())
+      throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
     Replay replay(session);
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;

@@ -11,16 +11,18 @@ namespace helicarm {
 
 struct ReplayReport {
   std::size_t records = 0;
-  bool torn = false;  ///< the program was killed while it wrote the last record
+  bool torn = false;      ///< the program was killed while it wrote the last record
+  bool finished = false;  ///< the operation came to its end
   std::size_t exposures = 0;
+  std::size_t pictures = 0;
   std::size_t results = 0;
   std::size_t hand_eyes = 0;
   std::vector<std::string> differences;  ///< what came out otherwise than recorded
 };
 
 /// Recomputes an operation from its record: poses of the exposures from the tracker's samples, every case
-/// from its pictures, the hand-eye calibration from its pairs; all must come out to the last bit. Refuses as
-/// `read_session`.
+/// from its pictures (which must be those recorded), the hand-eye calibration from its pairs; all must come
+/// out to the last bit. Refuses as `read_session`, and a record that holds nothing (bad_value).
 Expected<ReplayReport> replay(const std::filesystem::path& session);
 
 }  // namespace helicarm

@@ -125,6 +125,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
 
     const auto nod = [&](const RobotOrder& order) -> Expected<std::string> { return robot.confirm(order); };
     value_or_throw(robot.wait_connected(patience));
+    operation->confirmed_by("the rehearsal");
     value_or_throw(robot.unlock("the rehearsal"));
     value_or_throw(operation->register_robot(nod));
     if (options.move_bones) stir(room->theatre());
@@ -145,6 +146,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
       done.corrections += static_cast<int>(outcome.loop.size()) - 1;
       value_or_throw(operation->withdraw(order, rest, nod));
     }
+    value_or_throw(operation->finish());
     return done;
   });
 }

@@ -90,6 +90,8 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
                          origin)});
     }
     value_or_throw(write_file(arrival.path, file));
+    std::error_code ec;
+    fs::permissions(arrival.path, fs::perms::owner_read | fs::perms::owner_write, ec);
     return arrival;
   });
 }
