@@ -49,7 +49,9 @@ int run(int argc, char** argv) {
   add_rehearsal_commands(app, action);
   add_device_commands(app, action);
   try {
-    if (argc > 1 && argv[1][0] != '-' && !app.get_subcommand_no_throw(argv[1]))
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    if (argc > 1 && argv[1][0] != '-' &&
+        std::ranges::none_of(commands, [&](const CLI::App* c) { return c->get_name() == argv[1]; }))
       throw CLI::ParseError(fmt::format("\"{}\" is no command; helicarm --help lists them",
                                         without_control_characters(argv[1])),
                             CLI::ExitCodes::ExtrasError);

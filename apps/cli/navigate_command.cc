@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "navigate_command.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <iostream>
@@ -14,6 +15,8 @@
 #include "helicarm/core/text.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/operation.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom/plate.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
@@ -88,6 +91,64 @@ class Consent {
   Console& console_;
 };
 
+/// What can be known to be wrong before anybody is irradiated.
+void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
+  const auto refuse = [&](Reason reason, const std::string& problem) {
+    throw BadInput(reason, fmt::format("{}: {}", arguments.plan.string(), problem));
+  };
+  if (!arguments.yes && !::isatty(STDIN_FILENO))
+    throw BadInput(Reason::order_not_confirmed,
+                   "no terminal to confirm orders at; --yes confirms all, where nobody can be hurt");
+  if (plan.tunnels.empty()) refuse(Reason::bad_value, "\"tunnels\" is empty");
+  if (plan.calibrator != udcsc().name && !fs::exists(plan.calibrator))
+    refuse(Reason::missing_file, fmt::format("\"calibrator\": {}: no such file", plan.calibrator));
+  if (plan.plate && *plan.plate != plate48().name && !fs::exists(*plan.plate))
+    refuse(Reason::missing_file, fmt::format("\"plate\": {}: no such file", *plan.plate));
+  if (!arguments.picks.empty()) return;
+  for (const PlannedTunnel& tunnel : plan.tunnels)
+    for (const std::string& end : {tunnel.start, tunnel.end})
+      if (std::ranges::none_of(plan.picks, [&](const Json& pick) {
+            return pick.is_object() && pick.value("name", Json()) == Json(end);
+          }))
+        refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is no pick", tunnel.name, end));
+}
+
+/// Markers of the plan that the tracker does not show now; of the facets one is enough.
+std::string not_seen(const OperationPlan& plan, const PoseBoard& board) {
+  const auto seen = [&](const std::string& tool) {
+    return board.latest(tool, monotonic_seconds()).has_value();
+  };
+  std::string missing;
+  for (const std::string& tool : {plan.tracker.femur, plan.tracker.tibia, plan.tracker.tool})
+    if (!seen(tool)) missing += " " + tool;
+  if (std::ranges::none_of(plan.tracker.facets, [&](const Facet& facet) { return seen(facet.name); }))
+    missing += " calibrator";
+  return missing;
+}
+
+/// Waits until tracker and robot are there, and says what it waits for.
+void wait_for_devices(const OperationPlan& plan, Connections& devices, const Ending& ending,
+                      Console& console) {
+  std::string told;
+  ending.wait_until([&] {
+    std::string wants;
+    if (const std::string missing = not_seen(plan, devices.board()); !missing.empty())
+      wants =
+          fmt::format("tracker {} port {}: not seen:{}", plan.tracker.address, plan.tracker.port, missing);
+    else if (const auto state = devices.robot().wait_connected({}); !state)
+      wants = fmt::format("robot {}: {}", plan.robot.address, state.error().message);
+    else if (const auto why = why_stopped(*state))
+      wants = fmt::format("robot {}: {}", plan.robot.address, why->message);
+    if (!wants.empty() && wants != told && !console.quiet)
+      console.progress << "waiting: " << without_control_characters(wants) << std::endl;
+    told = wants;
+    return wants.empty();
+  });
+  // An exposure's poses are taken from the second and a half before it.
+  const auto full = std::chrono::steady_clock::now() + std::chrono::milliseconds(1600);
+  ending.wait_until([&] { return std::chrono::steady_clock::now() > full; });
+}
+
 Json picks_of(const fs::path& file) { return value_or_throw(read_json(file)).value("picks", Json::array()); }
 
 void tell_points(const Result& result, Console& console) {
@@ -113,6 +174,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
   return guarded([&] {
     const OperationPlan plan =
         value_or_throw(plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
+    check_plan(plan, arguments);
     StopSignal stop;
     Connections devices(plan, value_or_throw(Inbox::open(arguments.out / "inbox")));
     value_or_throw(devices.listen(arguments.receiver));
@@ -123,6 +185,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
                              << std::flush;
         }));
     const Ending ending(stop, devices.robot());
+    operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
+    wait_for_devices(plan, devices, ending, console);
     while (!operation->views_to_come().empty()) {
       const std::string view = operation->views_to_come().front();
       if (!console.quiet)
@@ -159,6 +223,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       tell_outcome(value_or_throw(operation->go(order, value_or_throw(consent(order)))), console);
       value_or_throw(operation->withdraw(order, rest, confirm));
     }
+    value_or_throw(operation->finish());
   });
 }
 

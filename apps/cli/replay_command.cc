@@ -22,11 +22,11 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"differences", report.differences}})
                   << '\n';
     } else {
-      console.out << fmt::format("{} records{}{}: {} exposures, {} pictures of cases, {} results, {} hand-eye calibrations\n",
-                                 report.records, report.torn ? " and a torn one" : "",
-                                 report.finished ? "" : ", without the operation's end", report.exposures,
-                                 report.pictures,
-                                 report.results, report.hand_eyes);
+      console.out << fmt::format(
+          "{} records{}{}: {} exposures, {} pictures of cases, {} results, {} hand-eye calibrations\n",
+          report.records, report.torn ? " and a torn one" : "",
+          report.finished ? "" : ", without the operation's end", report.exposures, report.pictures,
+          report.results, report.hand_eyes);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())

@@ -269,7 +269,8 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
         return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, target->second));
       });
     };
-    const std::vector<Miss> loop = carry_out(order, token, measure, {plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool});
+    const std::vector<Miss> loop =
+        carry_out(order, token, measure, {plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool});
     record("navigated", {{"tunnel", order.name}, {"loop", to_json(loop)}});
     tell_(Step::verify, order.name);
     TunnelOutcome outcome = check(tunnel);

@@ -147,10 +147,10 @@ class Association {
     }
     if (!answers) {
       ++shared_.counters.rejected;
-      shared_.hooks.refused({Reason::bad_value, fmt::format("association of \"{}\" with \"{}\" rejected ({} {} {})",
-                                                            request.calling, request.called,
-                                                            answers.error().result, answers.error().source,
-                                                            answers.error().reason)});
+      shared_.hooks.refused(
+          {Reason::bad_value, fmt::format("association of \"{}\" with \"{}\" rejected ({} {} {})",
+                                          request.calling, request.called, answers.error().result,
+                                          answers.error().source, answers.error().reason)});
       co_await send(dicom::associate_reject(answers.error()));
       co_return false;
     }
