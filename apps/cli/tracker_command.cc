@@ -139,6 +139,11 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
   if (!client) return tl::unexpected(client.error());
   wait_telling(interrupt, arguments.seconds, [] {});
   (*client)->stop();
+  if (frames.empty()) {
+    const std::string trouble = (*client)->status().trouble;
+    return fail(Reason::no_pose, fmt::format("{}: no pose came, nothing is written{}{}", arguments.peer,
+                                             trouble.empty() ? "" : ": ", trouble));
+  }
   if (auto written = write_sequence(arguments.file, frames); !written) return written;
   if (console.json)
     console.out << to_text({{"frames", frames.size()}}) << '\n';

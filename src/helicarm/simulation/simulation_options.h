@@ -75,7 +75,7 @@ struct SimulationOptions {
   std::optional<Response> response = {};       ///< not given: logarithmic with the knee, else linear
   std::vector<ViewAngles> views;               ///< 2 to 20; none: AP and LAT, as the hand finds them
   std::optional<std::uint64_t> arm_seed = {};  ///< of the C-arm itself; not given: the seed
-  std::shared_ptr<const CtOptions> ct = {};  ///< instead of the drawn knee
+  std::shared_ptr<const CtOptions> ct = {};    ///< instead of the drawn knee
   std::vector<Fault> faults;
   std::vector<double> grid_distances_mm = {
       45};                              ///< kind grid: from the receiver to the wires' axes; up to 20

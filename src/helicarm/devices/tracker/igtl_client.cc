@@ -49,7 +49,7 @@ struct IgtlClient::Impl {
   double pause_s;
 
   mutable std::mutex mutex;  ///< of what follows
-  TrackerLinkStatus status;         ///< counters: of earlier connections, and of attempts
+  TrackerLinkStatus status;  ///< counters: of earlier connections, and of attempts
   std::shared_ptr<IgtlConnection> connection;
   std::jthread thread;
 };
