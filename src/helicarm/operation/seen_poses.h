@@ -23,7 +23,7 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
 
 /// The second and a half before a picture came: the shot lies somewhere in it.
 PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s);
-/// The second from now on; waits until it is over.
+/// The three quarters of a second from now on; waits until they are over.
 PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan);
 
 /// A marker at rest over a window.
