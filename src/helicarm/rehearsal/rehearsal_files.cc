@@ -40,7 +40,7 @@ Json to_json(std::span<const Rehearsal> rehearsals) {
                       {"measured_mm", end.measured_mm},
                       {"predicted_mm", end.predicted_mm},
                       {"covered", end.covered},
-                      {"in_xrays_mm", end.in_xrays_mm}});
+                      {"in_xrays_mm", end.in_xrays_mm ? Json(*end.in_xrays_mm) : Json()}});
   const auto figures = [&](char end, double EndError::*value) {
     return to_json(figures_of(collected(rehearsals, end, value)));
   };
@@ -59,7 +59,8 @@ std::string to_csv(std::span<const Rehearsal> rehearsals) {
   for (const Rehearsal& rehearsal : rehearsals)
     for (const EndError& end : rehearsal.ends)
       csv += fmt::format("{},{},{},{},{},{},{}\n", rehearsal.seed, end.name, end.true_mm, end.measured_mm,
-                         end.predicted_mm, int(end.covered), end.in_xrays_mm);
+                         end.predicted_mm, int(end.covered),
+                         end.in_xrays_mm ? fmt::format("{}", *end.in_xrays_mm) : "");
   return csv;
 }
 

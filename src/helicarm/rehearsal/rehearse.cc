@@ -61,7 +61,7 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
           miss.distance_mm(),
           miss.predicted_mm(),
           off.dot(miss.covariance.inverse() * off) <= chi2_95_of_two,
-          in_xrays ? in_xrays->combined_mm : 0};
+          in_xrays ? std::optional(in_xrays->combined_mm) : std::nullopt};
 }
 
 /// Shoots, and again where the tracker did not see everything at rest: on a busy machine it may stutter.

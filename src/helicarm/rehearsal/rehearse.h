@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,7 @@ struct EndError {
   double measured_mm;   ///< the same by tracker and X-rays
   double predicted_mm;  ///< root mean square to be expected
   bool covered;         ///< whether the 95 % ellipse about the measured place holds the true one
-  double in_xrays_mm;   ///< Eq. 17 at the point's depth
+  std::optional<double> in_xrays_mm;  ///< Eq. 17 at the point's depth; nothing where not computed
 };
 
 struct Rehearsal {

@@ -68,7 +68,7 @@ struct ContextAnswer {
 };
 
 struct Rejection {
-  std::uint8_t result;  ///< 1 for good, 2 for now
+  std::uint8_t result;  ///< 1 permanent, 2 transient
   std::uint8_t source;  ///< 1 user, 2 association control, 3 presentation
   std::uint8_t reason;
 };

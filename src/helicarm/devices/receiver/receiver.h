@@ -26,7 +26,7 @@ struct ReceiverOptions {
   std::uint16_t port = 11112;         ///< 0: any that is free
   dicom::NegotiationOptions negotiation;
   std::optional<TlsFiles> tls;
-  unsigned most_associations = 32;                         ///< at once; more are rejected for now
+  unsigned most_associations = 32;                         ///< at once; more are rejected as transient
   std::size_t most_object_bytes = std::size_t{128} << 20;  ///< of one picture
   std::size_t most_bytes = std::size_t{512} << 20;         ///< of all that are on the way
   double request_limit_s = 10;                             ///< from connection to association
