@@ -2,8 +2,6 @@
 #include "tracker_command.h"
 
 #include <charconv>
-#include <csignal>
-#include <ctime>
 #include <limits>
 #include <mutex>
 #include <thread>
@@ -15,43 +13,18 @@
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 #include "helicarm/geometry/view_json.h"
+#include "stop_signal.h"
 
 namespace helicarm::cli {
 namespace {
 
-/// Blocks the signals that end a program, for this thread and those it starts, so that they can be waited
-/// for.
-class Interrupt {
- public:
-  Interrupt() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
-  }
-  ~Interrupt() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  Interrupt(const Interrupt&) = delete;
-  Interrupt& operator=(const Interrupt&) = delete;
-
-  /// Whether one came within so many seconds.
-  bool within(double seconds) const {
-    const auto whole = static_cast<std::time_t>(seconds);
-    const timespec wait{whole, static_cast<long>((seconds - static_cast<double>(whole)) * 1e9)};
-    return sigtimedwait(&signals_, nullptr, &wait) >= 0;
-  }
-
- private:
-  sigset_t signals_;
-  sigset_t before_;
-};
-
 /// Calls `tell` each second until the time is over or the user interrupts.
 template <class Tell>
-void wait_telling(const Interrupt& interrupt, std::optional<double> seconds, Tell tell) {
+void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Tell tell) {
   const double until = seconds ? monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
   while (true) {
     const double left = until - monotonic_seconds();
-    if (left <= 0 || interrupt.within(std::min(left, 1.0))) return;
+    if (left <= 0 || interrupt.wait(std::min(left, 1.0))) return;
     tell();
   }
 }
@@ -106,7 +79,7 @@ std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console) {
   const auto options = client_options(arguments);
   if (!options) return tl::unexpected(options.error());
-  const Interrupt interrupt;
+  StopSignal interrupt;
   PoseBoard board;
   const auto client = IgtlClient::start(
       *options, [&](const IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
@@ -128,7 +101,7 @@ CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Conso
 CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Console& console) {
   const auto options = client_options(arguments);
   if (!options) return tl::unexpected(options.error());
-  const Interrupt interrupt;
+  StopSignal interrupt;
   std::mutex mutex;
   std::vector<SequenceFrame> frames;
   const auto client = IgtlClient::start(*options, [&](const IgtlMessage& message, double arrival_s) {
@@ -155,7 +128,7 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
 CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Console& console) {
   const auto frames = read_sequence(arguments.file);
   if (!frames) return tl::unexpected(frames.error());
-  const Interrupt interrupt;
+  StopSignal interrupt;
   const auto server = IgtlServer::start(arguments.options);
   if (!server) return tl::unexpected(server.error());
   if (!console.quiet)
