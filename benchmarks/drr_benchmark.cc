@@ -33,7 +33,7 @@ void drr_of_256(benchmark::State& state) {
   for (auto _ : state)
     benchmark::DoNotOptimize(drr(absorber, view, 1024, 1024, static_cast<unsigned>(state.range(1))));
 }
-BENCHMARK(drr_of_256)->ArgsProduct({{0, 1, 2}, {1, 2}})->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(drr_of_256)->ArgsProduct({{0, 1, 2}, {0, 20}, {1, 2}})->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void prepare_256(benchmark::State& state) {
   const Volume volume = full_volume();

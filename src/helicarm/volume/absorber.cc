@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
+
+#include <sys/mman.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/volume/march.h"
@@ -53,6 +56,12 @@ Extent extent_of_slice(const Volume& volume, const Ramp& ramp, int z) {
   return extent;
 }
 
+/// A ray meets a new small page in every slab or two: a wish that the system need not grant.
+void ask_for_large_pages(void* start, std::size_t size) {
+  constexpr std::size_t page = 4096;
+  if (std::align(page, page, start, size) != nullptr) madvise(start, size / page * page, MADV_HUGEPAGE);
+}
+
 /// A block with room for a margin of zeros, and for what is read, times 0, beyond the margin's last voxel.
 Absorber::Block empty_block(const Vector3i& size, int along) {
   Absorber::Block block;
@@ -61,8 +70,11 @@ Absorber::Block empty_block(const Vector3i& size, int along) {
   block.stride[other] = size[along] + 2;
   block.stride.z() = block.stride[other] * (size[other] + 2);
   const auto slice = static_cast<std::size_t>(block.stride.z());
-  block.values.resize(slice * static_cast<std::size_t>(size.z() + 3) +
-                      static_cast<std::size_t>(block.stride[other]) + 8);
+  const std::size_t count =
+      slice * static_cast<std::size_t>(size.z() + 3) + static_cast<std::size_t>(block.stride[other]) + 8;
+  block.values.reserve(count);
+  ask_for_large_pages(block.values.data(), count * sizeof(std::int16_t));
+  block.values.resize(count);
   return block;
 }
 

@@ -17,44 +17,57 @@ using Ints = int __attribute__((vector_size(4 * march_lanes)));
 
 HELICARM_INLINE void load(Floats& lanes, const float* from) { std::memcpy(&lanes, from, sizeof lanes); }
 
-/// The four voxels that a slab's rays may touch: lower and upper in p (first digit) and q.
-struct Corners {
-  Floats v00, v10, v01, v11;
-};
+HELICARM_INLINE Floats real(const Ints& lanes) { return __builtin_convertvector(lanes, Floats); }
 
-HELICARM_INLINE void gather_pairs(Floats& low, Floats& high, const std::int16_t* values, const Ints& index) {
+/// Two voxels side by side along p in each lane, the first in the lower half.
+HELICARM_INLINE Ints gather_pairs(const std::int16_t* values, const Ints& index) {
   Ints pairs;
   for (int lane = 0; lane < march_lanes; ++lane) {
     int pair;
     std::memcpy(&pair, values + index[lane], sizeof pair);
     pairs[lane] = pair;
   }
-  low = __builtin_convertvector((pairs << 16) >> 16, Floats);
-  high = __builtin_convertvector(pairs >> 16, Floats);
+  return pairs;
 }
 
 #ifdef __AVX2__
-/// As above, where all indices are 0 .. 6: eight values side by side are read once and dealt out.
-HELICARM_INLINE void deal_pairs(Floats& low, Floats& high, const std::int16_t* values, const Ints& index) {
+HELICARM_INLINE Ints deal_pairs(const std::int16_t* values, __m256i bytes) {
   const __m128i eight = _mm_loadu_si128(reinterpret_cast<const __m128i*>(values));
-  const __m256 row = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(eight));
-  low = Floats(_mm256_permutevar8x32_ps(row, __m256i(index)));
-  high = Floats(_mm256_permutevar8x32_ps(row, __m256i(index + 1)));
+  return Ints(_mm256_shuffle_epi8(_mm256_broadcastsi128_si256(eight), bytes));
 }
 #endif
 
-HELICARM_INLINE void read_corners(Corners& v, const std::int16_t* values, int row, const Ints& index) {
+/// The pairs at `index` and a row further. `least` is the lane (in every lane) whose index is the least, as
+/// a rule: where all are then 0 .. 6 further on, eight voxels side by side are read once and dealt out.
+HELICARM_INLINE void read_pairs(Ints& lower, Ints& upper, const std::int16_t* values, int row,
+                                const Ints& index, [[maybe_unused]] const Ints& least) {
 #ifdef __AVX2__
-  const int base = index[0] < index[march_lanes - 1] ? index[0] : index[march_lanes - 1];
-  const Ints offset = index - base;
+  const __m256i base = _mm256_permutevar8x32_epi32(__m256i(index), __m256i(least));
+  const Ints offset = index - Ints(base);
   if (_mm256_testz_si256(__m256i(offset | (offset + 1)), _mm256_set1_epi32(~7))) {
-    deal_pairs(v.v00, v.v10, values + base, offset);
-    deal_pairs(v.v01, v.v11, values + base + row, offset);
+    const std::int16_t* from = values + _mm256_cvtsi256_si32(base);
+    const __m256i lowest_bytes =
+        _mm256_broadcastsi128_si256(_mm_set_epi32(0x0c0c0c0c, 0x08080808, 0x04040404, 0x00000000));
+    const __m256i times = _mm256_shuffle_epi8(__m256i(offset), lowest_bytes);
+    const __m256i bytes = _mm256_add_epi8(_mm256_add_epi8(times, times), _mm256_set1_epi32(0x03020100));
+    lower = deal_pairs(from, bytes);
+    upper = deal_pairs(from + row, bytes);
     return;
   }
 #endif
-  gather_pairs(v.v00, v.v10, values, index);
-  gather_pairs(v.v01, v.v11, values + row, index);
+  lower = gather_pairs(values, index);
+  upper = gather_pairs(values + row, index);
+}
+
+HELICARM_INLINE Ints second(const Ints& pairs) { return pairs >> 16; }
+
+HELICARM_INLINE Ints first_less_second(const Ints& pairs) {
+#ifdef __AVX2__
+  constexpr int plus_minus = static_cast<int>(0xffff0001);
+  return Ints(_mm256_madd_epi16(__m256i(pairs), _mm256_set1_epi32(plus_minus)));
+#else
+  return ((pairs << 16) >> 16) - second(pairs);
+#endif
 }
 
 /// Where along p (or q) the slab is entered, and the part of the slab before the next voxel begins.
@@ -63,7 +76,7 @@ HELICARM_INLINE void enter(Ints& index, Floats& share, const Floats& start, cons
   Floats place = start < 0 ? Floats{} : start;
   place = place > end ? end - Floats{} : place;
   index = __builtin_convertvector(place, Ints);
-  share = (1 - (place - __builtin_convertvector(index, Floats))) * per_step;
+  share = per_step - (place - real(index)) * per_step;
   share = share > 1 ? 1 - Floats{} : share;
 }
 
@@ -74,6 +87,11 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   load(p, rays.p), load(dp, rays.dp), load(per_dp, rays.per_dp);
   load(q, rays.q), load(dq, rays.dq), load(per_dq, rays.per_dq), load(alike, rays.alike);
   const Ints rising = alike > 0;
+  // Rays from one source keep their order, so one look in mid-way tells which end's index is the least.
+  const auto middle = static_cast<float>((first + last) / 2);
+  const Floats place = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
+  const Ints least = Ints{} + (place[0] <= place[march_lanes - 1] ? 0 : march_lanes - 1);
+#pragma GCC unroll 2
   for (int k = first; k < last; ++k) {
     const auto slab = static_cast<float>(k);
     const std::int16_t* values = block.values + k * block.slab;
@@ -81,14 +99,18 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
     Floats a, b;
     enter(i, a, p + slab * dp, per_dp, block.p_end);
     enter(j, b, q + slab * dq, per_dq, block.q_end);
-    Corners v;
-    read_corners(v, values, block.row, i + j * block.row);
+    Ints lower, upper;
+    read_pairs(lower, upper, values, block.row, i + j * block.row, least);
     // a and b are the parts in the lower voxel of p and of q, `both` that in the lower of both.
     const Floats together = a < b ? a : b;
     const Floats excess = a + b - 1;
     const Floats apart = excess > 0 ? excess : Floats{};
     const Floats both = rising ? together : apart;
-    sum += v.v11 + both * (v.v00 - v.v10 - v.v01 + v.v11) + b * (v.v10 - v.v11) + a * (v.v01 - v.v11);
+    const Ints along_lower = first_less_second(lower);
+    const Ints along_upper = first_less_second(upper);
+    const Ints corner = second(upper);
+    sum += real(corner) + both * real(along_lower - along_upper) + b * real(second(lower) - corner) +
+           a * real(along_upper);
   }
   std::memcpy(sums, &sum, sizeof sum);
 }
