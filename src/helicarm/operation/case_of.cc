@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/case_of.h"
 
+#include <algorithm>
+
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/navigation/run_case.h"
@@ -31,6 +33,11 @@ Json tool_line_json(const ToolLine& line) {
           {"tunnel", line.tunnel},
           {"p1_in_calibrator", json_list(line.p1_in_calibrator)},
           {"p2_in_calibrator", json_list(line.p2_in_calibrator)}};
+}
+
+bool is_picked(const Json& picks, const std::string& name) {
+  return std::ranges::any_of(
+      picks, [&](const Json& pick) { return pick.is_object() && pick.value("name", Json()) == Json(name); });
 }
 
 /// A built-in's name stays; a file is copied into the case.
@@ -65,7 +72,8 @@ Expected<void> write_operation_case(const fs::path& folder, const OperationPlan&
       json["views"].push_back(picture_json(picture));
     }
     for (const PlannedTunnel& tunnel : plan.tunnels)
-      json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
+      if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))
+        json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
     for (const ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
     value_or_throw(write_file(folder / "case.json", to_text(json)));
   });

@@ -14,8 +14,8 @@ struct CasePicture {
   Poses poses;
 };
 
-/// Makes `folder` a case of its own (docs/formats.md): pictures, calibrator, plate, case.json. Refuses
-/// cannot_write, missing_file.
+/// Makes `folder` a case of its own (docs/formats.md): pictures, calibrator, plate, case.json; tunnels whose
+/// ends nobody picked yet are left out. Refuses cannot_write, missing_file.
 Expected<void> write_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
                                     const std::vector<CasePicture>& pictures, const Poses& now,
                                     const std::vector<ToolLine>& tool_lines);

@@ -210,26 +210,15 @@ void Operation::draw_preview(const RobotOrder& order) const {
                                 overlay_png(*result_, i, shown->second)));
 }
 
-Expected<ToolOverlay> Operation::tool_now(Bone bone) const {
-  return guarded([&] {
-    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "nothing is measured or registered yet");
-    const double now_s = monotonic_seconds();
-    const std::string& bone_marker = bone == Bone::femur ? plan_.tracker.femur : plan_.tracker.tibia;
-    const PoseSample tool = value_or_throw(board_.latest(plan_.tracker.tool, now_s));
-    const PoseSample bone_now = value_or_throw(board_.latest(bone_marker, now_s));
-    Poses now;
-    now.tracker_from_tool = tool.tracker_from_tool;
-    (bone == Bone::femur ? now.tracker_from_femur : now.tracker_from_tibia) = bone_now.tracker_from_tool;
-    ToolOverlay overlay{{}, now_s - std::min(tool.time_s, bone_now.time_s)};
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      const auto line =
-          tool_line("", bone, views_[i].poses, now, marker_from_tcp(*hand_eye_, plan_.robot.tool));
-      const auto& calibrated = result_->views[i].calibrated;
-      if (!line || !calibrated) continue;
-      if (const auto seen = line_in_xray(calibrated->view, *line)) overlay.by_view[views_[i].name] = *seen;
-    }
-    return overlay;
-  });
+std::vector<Poses> Operation::exposures() const {
+  std::vector<Poses> poses;
+  for (const View& view : views_) poses.push_back(view.poses);
+  return poses;
+}
+
+Expected<LiveTool> Operation::live_tool() const {
+  if (!result_ || !hand_eye_) return fail(Reason::usage, "nothing is measured or registered yet");
+  return LiveTool(plan_, *result_, exposures(), *hand_eye_);
 }
 
 Expected<PathPreview> Operation::preview(const RobotOrder& order) const {

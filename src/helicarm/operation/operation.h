@@ -9,7 +9,7 @@
 
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
-#include "helicarm/operation/tool_line.h"
+#include "helicarm/operation/live_tool.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/exposure.h"
 
@@ -31,12 +31,6 @@ struct TunnelOutcome {
 /// The tip's way as it will be seen in each X-ray, rectified pixels (Eq. 6).
 struct PathPreview {
   std::map<std::string, std::vector<Eigen::Vector2d>> by_view;
-};
-
-/// The tool in each X-ray, and how old its pose and the bone's are.
-struct ToolOverlay {
-  std::map<std::string, PictureLine> by_view;
-  double age_s = 0;
 };
 
 /// One operation from the first X-ray to the last check, over devices that are already connected. Every
@@ -72,6 +66,8 @@ class Operation {
   /// Rectify, calibrate, locate; fails with what the case was refused for.
   Expected<void> measure();
   const Result& result() const { return *result_; }
+  /// What the tracker said at each view's exposure, in the plan's order.
+  std::vector<Poses> exposures() const;
 
   /// Moves the tool a little to all sides and learns how marker, robot and tracker stand to each other. Asks
   /// `confirm` for each move's token.
@@ -84,9 +80,8 @@ class Operation {
   Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
   Expected<PathPreview> preview(const RobotOrder& order) const;
 
-  /// The tool's line in the X-rays as it is held now against this bone (Eq. 6), from the newest poses.
-  /// Refuses stale_pose for one older than 0.1 s.
-  Expected<ToolOverlay> tool_now(Bone bone) const;
+  /// What follows the tool from now on, in any thread. Refuses (usage) before measuring and registering.
+  Expected<LiveTool> live_tool() const;
 
   /// Carries the confirmed order out, corrected by the tracker, and checks the result in the X-rays. Refuses
   /// (uncertain) an end whose predicted error is over the plan's limit.

@@ -135,7 +135,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     for (const PlannedTunnel& tunnel : plan.tunnels) {
       const RobotState rest = value_or_throw(robot.wait_connected(patience));
       const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
-      value_or_throw(operation->tool_now(tunnel.bone));
+      value_or_throw(value_or_throw(operation->live_tool()).overlay(devices.board(), tunnel.bone));
       const TunnelOutcome outcome = value_or_throw(operation->go(order, robot.confirm(order)));
       const auto in_xrays =
           [&](const std::optional<LineError> Verification::*end) -> std::optional<LineError> {

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/live_tool.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+namespace helicarm {
+
+LiveTool::LiveTool(const OperationPlan& plan, const Result& result, const std::vector<Poses>& exposures,
+                   const HandEye& hand_eye)
+    : tracker_(plan.tracker), marker_from_tip_(marker_from_tcp(hand_eye, plan.robot.tool)) {
+  for (std::size_t i = 0; i < exposures.size(); ++i) {
+    const auto& calibrated = result.views[i].calibrated;
+    views_.push_back(
+        {result.views[i].name, calibrated ? std::optional(calibrated->view) : std::nullopt, exposures[i]});
+  }
+  for (const PlannedTunnel& tunnel : plan.tunnels)
+    if (const auto in_bone = tunnel_in_bone(result, tunnel)) tunnels_.emplace(tunnel.name, *in_bone);
+}
+
+LiveTool::Now LiveTool::newest(const PoseBoard& board, Bone bone) const {
+  const double now_s = monotonic_seconds();
+  const PoseSample tool = value_or_throw(board.latest(tracker_.tool, now_s));
+  const PoseSample marker = value_or_throw(board.latest(tracker_.marker_of(bone), now_s));
+  Now now{{}, now_s - std::min(tool.time_s, marker.time_s)};
+  now.poses.tracker_from_tool = tool.tracker_from_tool;
+  (bone == Bone::femur ? now.poses.tracker_from_femur : now.poses.tracker_from_tibia) =
+      marker.tracker_from_tool;
+  return now;
+}
+
+Expected<ToolOverlay> LiveTool::overlay(const PoseBoard& board, Bone bone) const {
+  return guarded([&] {
+    const Now now = newest(board, bone);
+    const RigidTransform bone_from_tip =
+        now.poses.tracker_from(bone)->inverse() * *now.poses.tracker_from_tool * marker_from_tip_;
+    ToolOverlay overlay{{}, now.age_s};
+    if (!views_.empty())
+      if (const auto placed = calibrator_from(bone, views_.front().poses))
+        overlay.calibrator_from_tip = *placed * bone_from_tip;
+    for (const Shown& shown : views_) {
+      const auto line = tool_line("", bone, shown.poses, now.poses, marker_from_tip_);
+      if (!line || !shown.view) continue;
+      if (const auto seen = line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
+    }
+    return overlay;
+  });
+}
+
+Expected<TunnelAim> LiveTool::aim(const PoseBoard& board, const std::string& name) const {
+  return guarded([&] {
+    const auto tunnel = tunnels_.find(name);
+    if (tunnel == tunnels_.end())
+      throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located", name));
+    const auto& [bone, enter, leave] = tunnel->second;
+    const Now now = newest(board, bone);
+    const RigidTransform bone_from_tip =
+        now.poses.tracker_from(bone)->inverse() * *now.poses.tracker_from_tool * marker_from_tip_;
+    const Eigen::Vector3d axis = (leave - enter).normalized();
+    const Eigen::Vector3d from_entry = bone_from_tip.translation - enter;
+    const Eigen::Vector3d tool = bone_from_tip.rotation.col(2);
+    const double angle = std::atan2(tool.cross(axis).norm(), tool.dot(axis));
+    return TunnelAim{from_entry.cross(axis).norm(), angle * 180 / std::numbers::pi, from_entry.dot(axis),
+                     (leave - enter).norm()};
+  });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/live_tool.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+HandEye hand_eye() {
+  HandEye hand_eye;
+  hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};
+  hand_eye.tracker_from_base = {rotation_from_euler(1, 0.3, -2), {300, 100, 1200}};
+  hand_eye.covariance.setZero();
+  return hand_eye;
+}
+
+const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
+const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
+/// In the femur's marker: the drill comes in at `entry` and goes along z.
+const Vector3d entry(30, 5, -20);
+
+OperationPlan plan() {
+  OperationPlan plan;
+  plan.robot.tool = {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2};
+  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::start},
+                  {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
+  return plan;
+}
+
+Result measured() {
+  Result result;
+  for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
+    PointResult point{name, PointSource::pick, Bone::femur, {}, GuidedPoint{}, 0, {}};
+    point.place->in_femur = at;
+    result.points.push_back(point);
+  }
+  ViewResult view;
+  view.name = "AP";
+  view.calibrated = CalibratedView{.name = "AP", .view = {{4000, 4000, 500, 500}, {}}, .dlt = {}};
+  view.calibrated->view.camera_from_world.translation = {0, 0, 900};
+  result.views.push_back(view);
+  return result;
+}
+
+Poses exposure() {
+  Poses poses;
+  poses.tracker_from_calibrator = {rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
+  poses.tracker_from_femur = femur_then;
+  return poses;
+}
+
+IgtlMessage message(const RigidTransform& femur, const RigidTransform& tool, double now_s) {
+  return {"tracker", stamp_from_seconds(1.7e9 + now_s),
+          IgtlTracking{{{"femur", 1, femur.matrix()}, {"tool", 1, tool.matrix()}}}};
+}
+
+TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
+  const OperationPlan planned = plan();
+  const LiveTool live(planned, measured(), {exposure()}, hand_eye());
+  // The tip 3 mm beside the axis and 12 mm in, tilted by 0.2 rad, on a femur that has moved.
+  const RigidTransform femur_from_tip{rotation_from_vector(Vector3d(0.2, 0, 0)), entry + Vector3d(3, 0, 12)};
+  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), planned.robot.tool);
+  PoseBoard board;
+  const double now_s = monotonic_seconds();
+  board.take(message(femur_now, femur_now * femur_from_tip * marker_from_tip.inverse(), now_s), now_s);
+  const TunnelAim aim = live.aim(board, "femur").value();
+  EXPECT_NEAR(aim.distance_mm, 3, 1e-6);
+  EXPECT_NEAR(aim.depth_mm, 12, 1e-6);
+  EXPECT_NEAR(aim.angle_deg, 0.2 * 180 / EIGEN_PI, 1e-6);
+  EXPECT_NEAR(aim.length_mm, 40, 1e-9);
+
+  const ToolOverlay overlay = live.overlay(board, Bone::femur).value();
+  const Vector3d tip =
+      exposure().tracker_from_calibrator->inverse() * (femur_then * femur_from_tip.translation);
+  EXPECT_LT((overlay.calibrator_from_tip.value().translation - tip).norm(), 1e-6);
+  EXPECT_LT((overlay.by_view.at("AP").tip - measured().views[0].calibrated->view.project(tip)).norm(), 0.01);
+}
+
+TEST(LiveTool, OfATunnelThatIsNotLocatedSaysSo) {
+  const LiveTool live(plan(), measured(), {exposure()}, hand_eye());
+  EXPECT_EQ(live.aim(PoseBoard(), "tibia").error().reason, Reason::not_seen);
+}
+
+TEST(LiveTool, WithoutAPoseGivesNoPlace) {
+  const LiveTool live(plan(), measured(), {exposure()}, hand_eye());
+  EXPECT_EQ(live.aim(PoseBoard(), "femur").error().reason, Reason::no_pose);
+  EXPECT_EQ(live.overlay(PoseBoard(), Bone::femur).error().reason, Reason::no_pose);
+}
+
+}  // namespace
+}  // namespace helicarm
