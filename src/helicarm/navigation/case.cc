@@ -9,6 +9,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
 
 namespace helicarm {
 namespace {
@@ -100,15 +101,16 @@ Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
   return pick;
 }
 
-std::vector<Pick> picks_from(JsonReader& reader, const Case& known) {
+std::vector<Pick> picks_of(JsonReader& reader, const std::vector<CaseView>& views,
+                           const std::vector<CalibratorTarget>& targets) {
   std::vector<Pick> picks;
   std::set<std::pair<std::string, std::string>> clicks;
   for (JsonReader& entry : reader.objects("picks", false, most_picks)) {
-    Pick pick = pick_from(entry, known.views);
+    Pick pick = pick_from(entry, views);
     if (!clicks.emplace(pick.name, pick.view).second)
       entry.refuse(Reason::name_clash, "name",
                    fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
-    if (find_named(known.calibrator.targets, pick.name, &CalibratorTarget::name))
+    if (find_named(targets, pick.name, &CalibratorTarget::name))
       entry.refuse(Reason::name_clash, "name",
                    fmt::format("\"{}\" is a target of the calibrator", pick.name));
     const Pick* other = find_named(picks, pick.name, &Pick::name);
@@ -200,7 +202,7 @@ Case case_from(const fs::path& folder) {
   read.views = views_from(reader, read);
   if (!reader.raw("poses_now").is_null()) read.poses_now = poses_from(reader.object("poses_now"), true);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
-  read.picks = picks_from(reader, read);
+  read.picks = picks_of(reader, read.views, read.calibrator.targets);
   read.tunnels = tunnels_from(reader, read.picks);
   read.tool_lines = tool_lines_from(reader, read.tunnels);
   reader.finish();
@@ -209,6 +211,23 @@ Case case_from(const fs::path& folder) {
 }
 
 }  // namespace
+
+Json to_json(const Pick& pick) {
+  Json json = {{"name", pick.name}, {"view", pick.view}, {"uv", json_list(pick.uv_raw)}};
+  if (pick.snap == Snap::ball) json["snap"] = "ball", json["diameter_mm"] = pick.diameter_mm;
+  if (pick.sigma_px) json["sigma_px"] = *pick.sigma_px;
+  if (pick.moves_with) json["moves_with"] = *pick.moves_with == Bone::femur ? "femur" : "tibia";
+  return json;
+}
+
+Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& origin,
+                                       const std::vector<CaseView>& views) {
+  return guarded([&] {
+    const Json json = {{"picks", picks}};
+    JsonReader reader(json, origin);
+    return picks_of(reader, views, {});
+  });
+}
 
 Expected<Case> read_case(const fs::path& folder) {
   return guarded([&] { return case_from(folder); });

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
 #include "helicarm/guidance/poses.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
@@ -38,6 +39,12 @@ struct Pick {
   std::optional<double> sigma_px;  ///< per axis; 0: exact
   std::optional<Bone> moves_with;
 };
+
+/// As an entry of case.json's "picks".
+Json to_json(const Pick& pick);
+/// Strictly; fails as `read_case`. `origin` begins each message.
+Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& origin,
+                                       const std::vector<CaseView>& views);
 
 /// A tunnel runs from the pick `start` to the pick `end`.
 struct TunnelPlan {

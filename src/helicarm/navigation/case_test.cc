@@ -207,5 +207,19 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
+TEST(Case, PicksComeBackAsTheyWereWritten) {
+  std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, Bone::femur},
+                          {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, Bone::femur}};
+  Json json = Json::array();
+  for (const Pick& pick : picks) json.push_back(to_json(pick));
+  std::vector<CaseView> views(2);
+  views[0].name = "AP", views[1].name = "LAT";
+  const auto again = picks_from(json, "plan", views).value();
+  ASSERT_EQ(again.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(to_json(again[i]), to_json(picks[i]));
+  views.pop_back();
+  EXPECT_EQ(picks_from(json, "plan", views).error().reason, Reason::bad_value);
+}
+
 }  // namespace
 }  // namespace helicarm

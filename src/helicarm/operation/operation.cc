@@ -133,8 +133,11 @@ Expected<void> Operation::take(const std::string& view, const Arrival& arrival, 
   });
 }
 
+fs::path Operation::newest_case() const { return folder_ / fmt::format("case-{}", measurements_); }
+
 Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
-  const std::string name = fmt::format("case-{}", ++measurements_);
+  ++measurements_;
+  const std::string name = newest_case().filename();
   std::vector<CasePicture> pictures;
   for (const View& view : views_) pictures.push_back({view.name, view.picture, view.poses});
   value_or_throw(write_operation_case(folder_ / name, plan_, pictures, now, tool_lines));

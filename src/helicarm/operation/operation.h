@@ -66,6 +66,8 @@ class Operation {
   /// Rectify, calibrate, locate; fails with what the case was refused for.
   Expected<void> measure();
   const Result& result() const { return *result_; }
+  /// The folder of the last measurement, also of one that was refused.
+  std::filesystem::path newest_case() const;
   /// What the tracker said at each view's exposure, in the plan's order.
   std::vector<Poses> exposures() const;
 

@@ -1,0 +1,380 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/desk/desk.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "gui/desk/room.h"
+#include "gui/desk/steps.h"
+#include "helicarm/core/files.h"
+#include "helicarm/rehearsal/rehearse.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int look_for_pictures_ms = 100;
+constexpr std::chrono::seconds robot_patience{5};
+
+std::shared_ptr<const Result> with_picture(const DeskState& state, const std::string& view,
+                                           Exposure exposure) {
+  auto result = std::make_shared<Result>();
+  for (const std::string& name : state.views) {
+    ViewResult shown;
+    shown.name = name;
+    if (name == view)
+      shown.exposure = std::move(exposure);
+    else if (state.result)
+      for (const ViewResult& old : state.result->views)
+        if (old.name == name) shown.exposure = old.exposure;
+    result->views.push_back(std::move(shown));
+  }
+  return result;
+}
+
+std::string first_missing(const DeskState& state) {
+  for (const ViewResult& view : state.result->views)
+    if (!view.exposure) return view.name;
+  return state.views.empty() ? "" : state.views.front();
+}
+
+void forget_measurement(DeskState& state) {
+  state.measured = false;
+  state.order.reset();
+  state.path = {};
+  state.outcomes.clear();
+  state.refusals.clear();
+}
+
+/// Names and bones of a case's tunnels; without any, the two of an ACL operation.
+std::vector<PlannedTunnel> tunnels_of(const Case& given) {
+  std::vector<PlannedTunnel> tunnels;
+  for (const TunnelPlan& tunnel : given.tunnels) {
+    const auto pick = std::ranges::find(given.picks, tunnel.start, &Pick::name);
+    const Bone bone = pick == given.picks.end() ? Bone::femur : pick->moves_with.value_or(Bone::femur);
+    tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
+  }
+  if (given.picks.empty() && tunnels.empty())
+    tunnels = {{"femur", Bone::femur, "FS", "FE"}, {"tibia", Bone::tibia, "TS", "TE"}};
+  return tunnels;
+}
+
+}  // namespace
+
+Desk::Desk(QObject* parent) : QObject(parent) {
+  connect(&pictures_, &QTimer::timeout, this, &Desk::take_waiting_picture);
+  pictures_.start(look_for_pictures_ms);
+}
+
+Desk::~Desk() { stop(); }
+
+void Desk::begin(Stage stage, std::string doing, std::function<Change()> work) {
+  if (state_.busy) return;
+  state_.busy = stage;
+  state_.doing = std::move(doing);
+  state_.refusals.erase(stage);
+  if (room_) room_->stopped = false;
+  emit changed();
+  worker_.post([this, stage, work = std::move(work)] {
+    const auto done = guarded([&]() -> Change {
+      try {
+        return work();
+      } catch (const BadInput&) {
+        throw;
+      } catch (const std::exception& problem) {
+        throw BadInput(Reason::unsupported, fmt::format("unexpected: {}", problem.what()));
+      }
+    });
+    QMetaObject::invokeMethod(
+        this,
+        [this, stage, done] {
+          state_.busy.reset();
+          state_.doing.clear();
+          if (done)
+            (*done)(state_);
+          else
+            state_.refusals.insert_or_assign(stage, done.error());
+          emit changed();
+          if (!done) emit refused(stage, sentence_of(done.error()));
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+void Desk::tell(std::string what) {
+  QMetaObject::invokeMethod(
+      this,
+      [this, what = std::move(what)] {
+        state_.doing = what;
+        emit changed();
+      },
+      Qt::QueuedConnection);
+}
+
+void Desk::open(Source source, const fs::path& folder, std::string doing, std::function<Change(Room&)> work) {
+  if (state_.busy) return;
+  auto old = std::exchange(room_, nullptr);
+  live_tool_.reset();
+  state_ = DeskState{};
+  begin(Stage::acquire, std::move(doing), [=, this, old = std::move(old)]() mutable -> Change {
+    old.reset();
+    auto room = std::make_shared<Room>();
+    Change change = work(*room);
+    return [this, source, folder, room, change](DeskState& state) {
+      room_ = room;
+      state.source = source;
+      state.folder = folder;
+      change(state);
+    };
+  });
+}
+
+void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folder) {
+  room.operation =
+      value_or_throw(Operation::begin(std::move(plan), folder, room.devices->board(), room.devices->robot(),
+                                      [this](Step, const std::string& what) { tell(what); }));
+  room.operation->confirmed_by("the person at the screen");
+}
+
+void Desk::open_room(const operating_room::VirtualRoomOptions& options, const fs::path& folder) {
+  open(Source::virtual_room, folder, "opening the virtual operating room", [=, this](Room& room) -> Change {
+    room.virtual_room = value_or_throw(operating_room::VirtualRoom::open(options));
+    OperationPlan plan = plan_for(*room.virtual_room, room.virtual_room->tracker().port());
+    const Json offered = std::exchange(plan.picks, Json::array());
+    room.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
+    ReceiverOptions receiver;
+    receiver.port = 0;
+    value_or_throw(room.devices->listen(receiver));
+    start_operation(room, plan, folder);
+    return with_plan(plan, offered);
+  });
+}
+
+void Desk::open_devices(const fs::path& file, const ReceiverOptions& receiver, const fs::path& folder) {
+  open(Source::devices, folder, "connecting", [=, this](Room& room) -> Change {
+    OperationPlan plan = value_or_throw(plan_from(value_or_throw(read_json(file)), file.string()));
+    const Json offered = std::exchange(plan.picks, Json::array());
+    room.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
+    value_or_throw(room.devices->listen(receiver));
+    start_operation(room, plan, folder);
+    return with_plan(plan, offered);
+  });
+}
+
+Desk::Change Desk::with_plan(const OperationPlan& plan, const Json& offered) {
+  std::vector<CaseView> views(plan.views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
+  const Calibrator calibrator = value_or_throw(calibrator_named(plan.calibrator, "."));
+  const std::vector<Pick> picks = value_or_throw(picks_from(offered, "plan", views));
+  return [=](DeskState& state) {
+    state.views = plan.views;
+    state.calibrator = calibrator;
+    state.tunnels = plan.tunnels;
+    state.offered_picks = picks;
+    state.result = with_picture(state, "", {});
+    state.next_view = first_missing(state);
+  };
+}
+
+void Desk::open_case(const fs::path& folder) {
+  open(Source::files, folder, "reading " + folder.filename().string(),
+       [=, this](Room& room) { return with_case(value_or_throw(read_case(folder)), room); });
+}
+
+void Desk::open_pictures(const std::vector<fs::path>& pictures) {
+  const fs::path folder = pictures.empty() ? fs::path() : pictures.front().parent_path();
+  open(Source::files, folder, "reading the pictures",
+       [=, this](Room& room) { return with_case(value_or_throw(case_of_pictures(pictures)), room); });
+}
+
+Desk::Change Desk::with_case(Case given, Room& room) {
+  room.given = given;
+  const Change found = measured(room, given.picks);
+  return [given = std::move(given), found](DeskState& state) {
+    for (const CaseView& view : given.views) state.views.push_back(view.name);
+    state.calibrator = given.calibrator;
+    state.tunnels = tunnels_of(given);
+    state.picks = given.picks;
+    found(state);
+  };
+}
+
+void Desk::expect(const std::string& view) {
+  state_.next_view = view;
+  emit changed();
+}
+
+void Desk::shoot(const std::string& view) {
+  if (!room_ || !room_->virtual_room) return;
+  begin(Stage::acquire, "shooting " + view, [this, view, room = room_]() -> Change {
+    return came(view, value_or_throw(shoot_and_take(*room, view)));
+  });
+}
+
+void Desk::take_waiting_picture() {
+  if (state_.busy || !room_ || !room_->operation) return;
+  const auto picture = room_->devices->next_picture(0);
+  if (!picture) return;
+  begin(Stage::acquire, "a picture came", [this, view = state_.next_view, room = room_, picture]() -> Change {
+    return came(view, value_or_throw(take(*room, view, *picture)));
+  });
+}
+
+Desk::Change Desk::came(const std::string& view, Exposure exposure) {
+  return [this, view, exposure = std::move(exposure)](DeskState& state) {
+    forget_measurement(state);
+    state.result = with_picture(state, view, exposure);
+    state.next_view = first_missing(state);
+    if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.exposure.has_value(); }))
+      QMetaObject::invokeMethod(this, &Desk::measure, Qt::QueuedConnection);
+  };
+}
+
+Desk::Change Desk::measured(Room& room, const std::vector<Pick>& picks) {
+  auto result = std::make_shared<const Result>(value_or_throw(gui::measure(room, picks)));
+  std::optional<LiveTool> live;
+  if (room.operation && !result->failure)
+    if (auto follows = room.operation->live_tool()) live = *std::move(follows);
+  return [this, result, live](DeskState& state) {
+    forget_measurement(state);
+    state.result = result;
+    ++state.measurements;
+    state.measured = !result->failure;
+    if (result->failure) state.refusals.insert_or_assign(stage_of(*result->failure), *result->failure);
+    live_tool_ = live;
+  };
+}
+
+void Desk::measure() {
+  if (!room_) return;
+  begin(Stage::calibrate, "measuring",
+        [this, room = room_, picks = state_.picks] { return measured(*room, picks); });
+}
+
+void Desk::picks_changed() {
+  state_.order.reset();
+  emit changed();
+  if (!next_pick(state_)) measure();
+}
+
+void Desk::pick(Pick pick) {
+  if (state_.busy) return;
+  std::erase_if(state_.picks,
+                [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
+  state_.picks.push_back(std::move(pick));
+  picks_changed();
+}
+
+void Desk::take_offered_picks() {
+  if (state_.busy) return;
+  state_.picks = state_.offered_picks;
+  picks_changed();
+}
+
+void Desk::clear_picks() {
+  if (state_.busy) return;
+  state_.picks.clear();
+  picks_changed();
+}
+
+void Desk::unlock(const std::string& who) {
+  if (!room_ || !room_->devices) return;
+  begin(Stage::navigate, "unlocking the robot", [room = room_, who]() -> Change {
+    value_or_throw(room->devices->robot().wait_connected(robot_patience));
+    value_or_throw(room->devices->robot().unlock(who));
+    return [](DeskState&) {};
+  });
+}
+
+void Desk::register_robot() {
+  if (!room_ || !room_->operation) return;
+  begin(Stage::navigate, "registering the robot", [this, room = room_]() -> Change {
+    RobotLink& robot = room->devices->robot();
+    value_or_throw(room->operation->register_robot([&](const RobotOrder& order) -> Expected<std::string> {
+      if (room->stopped) return fail(Reason::interrupted, "stopped by a person");
+      return robot.confirm(order);
+    }));
+    auto live = value_or_throw(room->operation->live_tool());
+    return [this, live, rms = room->operation->hand_eye().rms_mm](DeskState& state) {
+      live_tool_ = live;
+      state.hand_eye_rms_mm = rms;
+    };
+  });
+}
+
+void Desk::plan_tunnel(const std::string& tunnel) {
+  if (!room_ || !room_->operation) return;
+  follow(tunnel);
+  begin(Stage::navigate, "planning the way to " + tunnel, [room = room_, tunnel]() -> Change {
+    const RobotOrder order = value_or_throw(room->operation->plan_tunnel(tunnel));
+    const PathPreview path = value_or_throw(room->operation->preview(order));
+    return [order, path](DeskState& state) {
+      state.order = order;
+      state.path = path;
+    };
+  });
+}
+
+void Desk::go() {
+  if (!room_ || !room_->operation || !state_.order) return;
+  const RobotOrder order = *state_.order;
+  begin(Stage::navigate, "going to " + order.name, [room = room_, order]() -> Change {
+    RobotLink& robot = room->devices->robot();
+    const std::string token = robot.confirm(order);
+    room->rest = value_or_throw(robot.wait_connected(robot_patience));
+    room->last_order = order;
+    const TunnelOutcome outcome = value_or_throw(room->operation->go(order, token));
+    return [outcome](DeskState& state) {
+      state.outcomes.insert_or_assign(outcome.tunnel, outcome);
+      state.order.reset();
+      state.path = {};
+      state.at_target = true;
+    };
+  });
+}
+
+void Desk::withdraw() {
+  if (!room_ || !room_->operation || !room_->last_order) return;
+  begin(Stage::navigate, "withdrawing", [room = room_]() -> Change {
+    RobotLink& robot = room->devices->robot();
+    value_or_throw(room->operation->withdraw(*room->last_order, room->rest, [&](const RobotOrder& order) {
+      return Expected<std::string>(robot.confirm(order));
+    }));
+    return [](DeskState& state) { state.at_target = false; };
+  });
+}
+
+void Desk::stop() {
+  if (!room_ || !room_->devices) return;
+  room_->stopped = true;
+  errands_.start([room = room_] { room->devices->robot().stop(); });
+}
+
+void Desk::set_fault(const std::string& name, bool on) {
+  if (!room_ || !room_->virtual_room) return;
+  errands_.start([room = room_, name, on] { static_cast<void>(room->virtual_room->set_fault(name, on)); });
+}
+
+void Desk::move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm) {
+  if (room_ && room_->virtual_room)
+    room_->virtual_room->theatre().move_bone(bone, {Eigen::Matrix3d::Identity(), shift_mm});
+}
+
+LiveState Desk::live() const {
+  LiveState now;
+  if (!room_ || !room_->operation) return now;
+  const PoseBoard& board = room_->devices->board();
+  now.lamps = tracker_lamps(room_->operation->plan().tracker, board.tools(monotonic_seconds()));
+  now.robot = room_->devices->robot().status();
+  now.lamps.push_back(robot_lamp(now.robot));
+  if (!live_tool_) return now;
+  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
+  const Bone bone = tunnel == state_.tunnels.end() ? Bone::femur : tunnel->bone;
+  now.tool = live_tool_->overlay(board, bone);
+  if (tunnel != state_.tunnels.end()) now.aim = live_tool_->aim(board, followed_);
+  return now;
+}
+
+}  // namespace helicarm::gui

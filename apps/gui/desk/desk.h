@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QObject>
+#include <QThreadPool>
+#include <QTimer>
+#include <functional>
+
+#include "gui/desk/desk_state.h"
+#include "gui/desk/live.h"
+#include "gui/desk/worker.h"
+#include "helicarm/operating_room/virtual_room.h"
+#include "helicarm/operation/connections.h"
+
+namespace helicarm::gui {
+
+struct Room;
+
+/// The live part of the window at one moment.
+struct LiveState {
+  std::vector<Lamp> lamps;
+  RobotLinkStatus robot;
+  std::optional<Expected<ToolOverlay>> tool;  ///< nothing before the robot is registered
+  std::optional<Expected<TunnelAim>> aim;     ///< nothing before a tunnel is followed
+};
+
+/// Everything the window can ask for. Work goes on in a thread of its own; what came of it arrives as
+/// `changed`. Lives in the interface's thread; no member waits.
+class Desk : public QObject {
+  Q_OBJECT
+
+ public:
+  explicit Desk(QObject* parent = nullptr);
+  ~Desk() override;
+
+  const DeskState& state() const { return state_; }
+
+  /// A virtual operating room in this program, over its real protocols through sockets.
+  void open_room(const operating_room::VirtualRoomOptions& options, const std::filesystem::path& folder);
+  /// The devices of a plan.
+  void open_devices(const std::filesystem::path& plan, const ReceiverOptions& receiver,
+                    const std::filesystem::path& folder);
+  /// A case folder, or X-rays without tracker and robot.
+  void open_case(const std::filesystem::path& folder);
+  void open_pictures(const std::vector<std::filesystem::path>& pictures);
+
+  void expect(const std::string& view);  ///< the next picture is this view's
+  void shoot(const std::string& view);   ///< in the virtual room
+  void pick(Pick pick);
+  void take_offered_picks();
+  void clear_picks();
+  void measure();
+
+  void unlock(const std::string& who);
+  void register_robot();
+  void plan_tunnel(const std::string& tunnel);
+  void go();
+  void withdraw();
+  /// Stops the robot, at once and whatever else goes on.
+  void stop();
+
+  void set_fault(const std::string& name, bool on);
+  void move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm);
+
+  /// Cheap: the newest poses, not what is measured.
+  LiveState live() const;
+  void follow(const std::string& tunnel) { followed_ = tunnel; }
+
+ signals:
+  void changed();
+  void refused(helicarm::gui::Stage stage, const QString& why);
+
+ private:
+  using Change = std::function<void(DeskState&)>;
+
+  void begin(Stage stage, std::string doing, std::function<Change()> work);
+  void open(Source source, const std::filesystem::path& folder, std::string doing,
+            std::function<Change(Room&)> work);
+  void start_operation(Room& room, OperationPlan plan, const std::filesystem::path& folder);
+  void tell(std::string what);
+  void take_waiting_picture();
+  void picks_changed();
+  Change measured(Room& room, const std::vector<Pick>& picks);
+  static Change with_plan(const OperationPlan& plan, const Json& offered);
+  Change with_case(Case given, Room& room);
+  Change came(const std::string& view, Exposure exposure);
+
+  DeskState state_;
+  std::shared_ptr<Room> room_;
+  std::optional<LiveTool> live_tool_;
+  std::string followed_;
+  QTimer pictures_;
+  QThreadPool errands_;  ///< what must not wait for the worker: the stop above all
+  Worker worker_;        ///< last: its jobs use all the others
+};
+
+}  // namespace helicarm::gui

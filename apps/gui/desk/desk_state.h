@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/navigation/case.h"
+#include "helicarm/operation/operation.h"
+
+namespace helicarm::gui {
+
+/// Where pictures come from.
+enum class Source { none, virtual_room, devices, files };
+
+/// The strip of steps, in the order in which they are taken.
+enum class Stage { acquire, rectify, calibrate, plan, navigate, verify };
+inline constexpr std::array stages{Stage::acquire, Stage::rectify,  Stage::calibrate,
+                                   Stage::plan,    Stage::navigate, Stage::verify};
+
+/// All that the window shows but for what is live. A value: the window only ever sees whole ones.
+struct DeskState {
+  Source source = Source::none;
+  std::filesystem::path folder;    ///< of the session or the case
+  std::vector<std::string> views;  ///< wanted, in order
+  std::string next_view;           ///< the next picture will be this one's
+  Calibrator calibrator;
+
+  /// Pictures that came and, once measured, all that was found in them. Never null once there is a source.
+  std::shared_ptr<const Result> result;
+  bool measured = false;
+  int measurements = 0;
+
+  std::vector<PlannedTunnel> tunnels;
+  std::vector<Pick> picks;
+  std::vector<Pick> offered_picks;  ///< those that came with the plan
+
+  std::optional<double> hand_eye_rms_mm;
+  std::optional<RobotOrder> order;  ///< previewed, not yet carried out
+  PathPreview path;
+  bool at_target = false;  ///< the tool stands in a tunnel and can be withdrawn
+  std::map<std::string, TunnelOutcome> outcomes;
+
+  std::optional<Stage> busy;  ///< what is being done
+  std::string doing;          ///< in words
+  std::map<Stage, Failure> refusals;
+};
+
+/// Picks of this point in this view, or nothing.
+const Pick* pick_of(const DeskState& state, const std::string& point, const std::string& view);
+
+/// The end and the view that still want a click, in order; nothing where all are picked.
+struct WantedPick {
+  std::string point;
+  std::string view;
+  Bone bone;
+};
+std::optional<WantedPick> next_pick(const DeskState& state);
+
+}  // namespace helicarm::gui

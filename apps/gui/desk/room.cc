@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/desk/room.h"
+
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/operation/case_of.h"
+#include "helicarm/phantom/plate.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int most_shots = 3;
+constexpr double picture_patience_s = 20;
+/// An exposure's poses are taken from the second and a half before it.
+constexpr std::chrono::milliseconds before_exposure{1800};
+
+}  // namespace
+
+Expected<Exposure> take(Room& room, const std::string& view, const DatedArrival& picture) {
+  return guarded([&] {
+    value_or_throw(room.operation->take(view, picture.arrival, picture.time_s));
+    return value_or_throw(read_exposure(picture.arrival.path, view, 1));
+  });
+}
+
+Expected<Exposure> shoot_and_take(Room& room, const std::string& view) {
+  const operating_room::PictureReceiver receiver{"127.0.0.1", room.devices->receiver_port()};
+  Expected<Exposure> taken = fail(Reason::not_connected, "no picture came");
+  for (int shot = 0; shot < most_shots && !taken && !room.stopped; ++shot) {
+    std::this_thread::sleep_for(before_exposure);
+    const auto sent = operating_room::shoot(room.virtual_room->theatre(), view, receiver);
+    if (!sent) return tl::unexpected<Failure>(sent.error());
+    if (const auto picture = room.devices->next_picture(picture_patience_s))
+      taken = take(room, view, *picture);
+  }
+  return taken;
+}
+
+Expected<Result> measure(Room& room, const std::vector<Pick>& picks) {
+  if (room.given) {
+    room.given->picks = picks;
+    return run_case(*room.given, room.options);
+  }
+  Json json = Json::array();
+  for (const Pick& pick : picks) json.push_back(helicarm::to_json(pick));
+  room.operation->pick(std::move(json));
+  if (const auto done = room.operation->measure(); done)
+    return room.operation->result();
+  else if (exit_code(done.error().reason) == 2)
+    return tl::unexpected<Failure>(done.error());
+  return recompute_case(room.operation->newest_case(), room.operation->plan()).map([](CaseRun run) {
+    return std::move(run.result);
+  });
+}
+
+Expected<Case> case_of_pictures(const std::vector<std::filesystem::path>& pictures) {
+  Case given;
+  given.calibrator = udcsc();
+  given.plate = plate48();
+  for (const std::filesystem::path& picture : pictures) {
+    CaseView view;
+    view.name = picture.stem().string();
+    view.image = std::filesystem::absolute(picture);
+    for (const CaseView& other : given.views)
+      if (other.name == view.name)
+        return fail(Reason::name_clash, fmt::format("{}: two pictures of this name", view.name));
+    given.views.push_back(std::move(view));
+  }
+  if (given.views.size() < 2)
+    return fail(Reason::usage, "one X-ray alone places nothing: drop two or more at once, or a case folder");
+  return given;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+
+#include "gui/desk/desk_state.h"
+#include "helicarm/operating_room/virtual_room.h"
+#include "helicarm/operation/connections.h"
+
+namespace helicarm::gui {
+
+/// What a source needs to live. The operation and the case belong to the worker; devices and the virtual room
+/// may be used from any thread.
+struct Room {
+  std::unique_ptr<operating_room::VirtualRoom> virtual_room;
+  std::unique_ptr<Connections> devices;
+  std::unique_ptr<Operation> operation;
+  std::optional<Case> given;
+  RunOptions options;
+  std::optional<RobotOrder> last_order;
+  RobotState rest;                    ///< where the robot was before it
+  std::atomic<bool> stopped = false;  ///< no move of a tour may follow
+};
+
+/// Shoots until the tracker has seen everything at rest; gives the picture that was taken.
+Expected<Exposure> shoot_and_take(Room& room, const std::string& view);
+/// Takes a picture that came by itself.
+Expected<Exposure> take(Room& room, const std::string& view, const DatedArrival& picture);
+
+/// A refused measurement still holds all that was found until then.
+Expected<Result> measure(Room& room, const std::vector<Pick>& picks);
+
+/// X-rays without tracker and robot, with the usual calibrator and plate; named as their files.
+Expected<Case> case_of_pictures(const std::vector<std::filesystem::path>& pictures);
+
+}  // namespace helicarm::gui
