@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int look_for_pictures_ms = 100;
+constexpr double bone_step_mm = 3;
 constexpr std::chrono::seconds robot_patience{5};
 
 std::shared_ptr<const Result> with_picture(const DeskState& state, const std::string& view,
@@ -70,14 +71,14 @@ Desk::Desk(QObject* parent) : QObject(parent) {
 
 Desk::~Desk() { stop(); }
 
-void Desk::begin(Stage stage, std::string doing, std::function<Change()> work) {
+void Desk::begin(Phase phase, std::string doing, std::function<Change()> work) {
   if (state_.busy) return;
-  state_.busy = stage;
+  state_.busy = phase;
   state_.doing = std::move(doing);
-  state_.refusals.erase(stage);
+  state_.refusals.erase(phase);
   if (room_) room_->stopped = false;
   emit changed();
-  worker_.post([this, stage, work = std::move(work)] {
+  worker_.post([this, phase, work = std::move(work)] {
     const auto done = guarded([&]() -> Change {
       try {
         return work();
@@ -89,15 +90,15 @@ void Desk::begin(Stage stage, std::string doing, std::function<Change()> work) {
     });
     QMetaObject::invokeMethod(
         this,
-        [this, stage, done] {
+        [this, phase, done] {
           state_.busy.reset();
           state_.doing.clear();
           if (done)
             (*done)(state_);
           else
-            state_.refusals.insert_or_assign(stage, done.error());
+            state_.refusals.insert_or_assign(phase, done.error());
           emit changed();
-          if (!done) emit refused(stage, sentence_of(done.error()));
+          if (!done) emit refused(phase, sentence_of(done.error()));
         },
         Qt::QueuedConnection);
   });
@@ -118,17 +119,19 @@ void Desk::open(Source source, const fs::path& folder, std::string doing, std::f
   auto old = std::exchange(room_, nullptr);
   live_tool_.reset();
   state_ = DeskState{};
-  begin(Stage::acquire, std::move(doing), [=, this, old = std::move(old)]() mutable -> Change {
-    old.reset();
-    auto room = std::make_shared<Room>();
-    Change change = work(*room);
-    return [this, source, folder, room, change](DeskState& state) {
-      room_ = room;
-      state.source = source;
-      state.folder = folder;
-      change(state);
-    };
-  });
+  begin(Phase::acquire, std::move(doing),
+        [=, this, old = std::move(old), options = options_]() mutable -> Change {
+          old.reset();
+          auto room = std::make_shared<Room>();
+          room->options = options;
+          Change change = work(*room);
+          return [this, source, folder, room, change](DeskState& state) {
+            room_ = room;
+            state.source = source;
+            state.folder = folder;
+            change(state);
+          };
+        });
 }
 
 void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folder) {
@@ -148,7 +151,13 @@ void Desk::open_room(const operating_room::VirtualRoomOptions& options, const fs
     receiver.port = 0;
     value_or_throw(room.devices->listen(receiver));
     start_operation(room, plan, folder);
-    return with_plan(plan, offered);
+    const auto bones = std::make_shared<const simulation::BoneMeshes>(
+        simulation::moved(simulation::bone_meshes(bone_step_mm),
+                          room.virtual_room->theatre().room().calibrator_from_knee.value()));
+    return [change = with_plan(plan, offered), bones](DeskState& state) {
+      change(state);
+      state.bones = bones;
+    };
   });
 }
 
@@ -201,6 +210,8 @@ Desk::Change Desk::with_case(Case given, Room& room) {
   };
 }
 
+void Desk::set_options(const RunOptions& options) { options_ = options; }
+
 void Desk::expect(const std::string& view) {
   state_.next_view = view;
   emit changed();
@@ -208,7 +219,7 @@ void Desk::expect(const std::string& view) {
 
 void Desk::shoot(const std::string& view) {
   if (!room_ || !room_->virtual_room) return;
-  begin(Stage::acquire, "shooting " + view, [this, view, room = room_]() -> Change {
+  begin(Phase::acquire, "shooting " + view, [this, view, room = room_]() -> Change {
     return came(view, value_or_throw(shoot_and_take(*room, view)));
   });
 }
@@ -217,7 +228,7 @@ void Desk::take_waiting_picture() {
   if (state_.busy || !room_ || !room_->operation) return;
   const auto picture = room_->devices->next_picture(0);
   if (!picture) return;
-  begin(Stage::acquire, "a picture came", [this, view = state_.next_view, room = room_, picture]() -> Change {
+  begin(Phase::acquire, "a picture came", [this, view = state_.next_view, room = room_, picture]() -> Change {
     return came(view, value_or_throw(take(*room, view, *picture)));
   });
 }
@@ -242,15 +253,17 @@ Desk::Change Desk::measured(Room& room, const std::vector<Pick>& picks) {
     state.result = result;
     ++state.measurements;
     state.measured = !result->failure;
-    if (result->failure) state.refusals.insert_or_assign(stage_of(*result->failure), *result->failure);
+    if (result->failure) state.refusals.insert_or_assign(phase_of(*result->failure), *result->failure);
     live_tool_ = live;
   };
 }
 
 void Desk::measure() {
   if (!room_) return;
-  begin(Stage::calibrate, "measuring",
-        [this, room = room_, picks = state_.picks] { return measured(*room, picks); });
+  begin(Phase::calibrate, "measuring", [this, room = room_, picks = state_.picks, options = options_] {
+    room->options = options;
+    return measured(*room, picks);
+  });
 }
 
 void Desk::picks_changed() {
@@ -281,7 +294,7 @@ void Desk::clear_picks() {
 
 void Desk::unlock(const std::string& who) {
   if (!room_ || !room_->devices) return;
-  begin(Stage::navigate, "unlocking the robot", [room = room_, who]() -> Change {
+  begin(Phase::navigate, "unlocking the robot", [room = room_, who]() -> Change {
     value_or_throw(room->devices->robot().wait_connected(robot_patience));
     value_or_throw(room->devices->robot().unlock(who));
     return [](DeskState&) {};
@@ -290,7 +303,7 @@ void Desk::unlock(const std::string& who) {
 
 void Desk::register_robot() {
   if (!room_ || !room_->operation) return;
-  begin(Stage::navigate, "registering the robot", [this, room = room_]() -> Change {
+  begin(Phase::navigate, "registering the robot", [this, room = room_]() -> Change {
     RobotLink& robot = room->devices->robot();
     value_or_throw(room->operation->register_robot([&](const RobotOrder& order) -> Expected<std::string> {
       if (room->stopped) return fail(Reason::interrupted, "stopped by a person");
@@ -307,7 +320,7 @@ void Desk::register_robot() {
 void Desk::plan_tunnel(const std::string& tunnel) {
   if (!room_ || !room_->operation) return;
   follow(tunnel);
-  begin(Stage::navigate, "planning the way to " + tunnel, [room = room_, tunnel]() -> Change {
+  begin(Phase::navigate, "planning the way to " + tunnel, [room = room_, tunnel]() -> Change {
     const RobotOrder order = value_or_throw(room->operation->plan_tunnel(tunnel));
     const PathPreview path = value_or_throw(room->operation->preview(order));
     return [order, path](DeskState& state) {
@@ -320,7 +333,7 @@ void Desk::plan_tunnel(const std::string& tunnel) {
 void Desk::go() {
   if (!room_ || !room_->operation || !state_.order) return;
   const RobotOrder order = *state_.order;
-  begin(Stage::navigate, "going to " + order.name, [room = room_, order]() -> Change {
+  begin(Phase::navigate, "going to " + order.name, [room = room_, order]() -> Change {
     RobotLink& robot = room->devices->robot();
     const std::string token = robot.confirm(order);
     room->rest = value_or_throw(robot.wait_connected(robot_patience));
@@ -337,7 +350,7 @@ void Desk::go() {
 
 void Desk::withdraw() {
   if (!room_ || !room_->operation || !room_->last_order) return;
-  begin(Stage::navigate, "withdrawing", [room = room_]() -> Change {
+  begin(Phase::navigate, "withdrawing", [room = room_]() -> Change {
     RobotLink& robot = room->devices->robot();
     value_or_throw(room->operation->withdraw(*room->last_order, room->rest, [&](const RobotOrder& order) {
       return Expected<std::string>(robot.confirm(order));

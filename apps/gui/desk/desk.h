@@ -44,6 +44,8 @@ class Desk : public QObject {
   void open_case(const std::filesystem::path& folder);
   void open_pictures(const std::vector<std::filesystem::path>& pictures);
 
+  /// For the next measurement.
+  void set_options(const RunOptions& options);
   void expect(const std::string& view);  ///< the next picture is this view's
   void shoot(const std::string& view);   ///< in the virtual room
   void pick(Pick pick);
@@ -68,12 +70,12 @@ class Desk : public QObject {
 
  signals:
   void changed();
-  void refused(helicarm::gui::Stage stage, const QString& why);
+  void refused(helicarm::gui::Phase phase, const QString& why);
 
  private:
   using Change = std::function<void(DeskState&)>;
 
-  void begin(Stage stage, std::string doing, std::function<Change()> work);
+  void begin(Phase phase, std::string doing, std::function<Change()> work);
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Room&)> work);
   void start_operation(Room& room, OperationPlan plan, const std::filesystem::path& folder);
@@ -89,6 +91,7 @@ class Desk : public QObject {
   std::shared_ptr<Room> room_;
   std::optional<LiveTool> live_tool_;
   std::string followed_;
+  RunOptions options_;
   QTimer pictures_;
   QThreadPool errands_;  ///< what must not wait for the worker: the stop above all
   Worker worker_;        ///< last: its jobs use all the others

@@ -10,6 +10,7 @@
 
 #include "helicarm/navigation/case.h"
 #include "helicarm/operation/operation.h"
+#include "helicarm/simulation/bone_meshes.h"
 
 namespace helicarm::gui {
 
@@ -17,9 +18,9 @@ namespace helicarm::gui {
 enum class Source { none, virtual_room, devices, files };
 
 /// The strip of steps, in the order in which they are taken.
-enum class Stage { acquire, rectify, calibrate, plan, navigate, verify };
-inline constexpr std::array stages{Stage::acquire, Stage::rectify,  Stage::calibrate,
-                                   Stage::plan,    Stage::navigate, Stage::verify};
+enum class Phase { acquire, rectify, calibrate, plan, navigate, verify };
+inline constexpr std::array phases{Phase::acquire, Phase::rectify,  Phase::calibrate,
+                                   Phase::plan,    Phase::navigate, Phase::verify};
 
 /// All that the window shows but for what is live. A value: the window only ever sees whole ones.
 struct DeskState {
@@ -28,6 +29,7 @@ struct DeskState {
   std::vector<std::string> views;  ///< wanted, in order
   std::string next_view;           ///< the next picture will be this one's
   Calibrator calibrator;
+  std::shared_ptr<const simulation::BoneMeshes> bones;  ///< as they lay; known of a virtual room alone
 
   /// Pictures that came and, once measured, all that was found in them. Never null once there is a source.
   std::shared_ptr<const Result> result;
@@ -44,9 +46,9 @@ struct DeskState {
   bool at_target = false;  ///< the tool stands in a tunnel and can be withdrawn
   std::map<std::string, TunnelOutcome> outcomes;
 
-  std::optional<Stage> busy;  ///< what is being done
+  std::optional<Phase> busy;  ///< what is being done
   std::string doing;          ///< in words
-  std::map<Stage, Failure> refusals;
+  std::map<Phase, Failure> refusals;
 };
 
 /// Picks of this point in this view, or nothing.

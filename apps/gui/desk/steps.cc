@@ -13,7 +13,7 @@ QString tr(const char* text) { return QCoreApplication::translate("Steps", text)
 
 QString text(const std::string& words) { return QString::fromStdString(words); }
 
-/// What the answer gives to doubt, of this view and stage or of all.
+/// What the answer gives to doubt, of this view and phase or of all.
 QString doubts(const std::vector<Warning>& warnings) {
   if (warnings.empty()) return {};
   const QString first = sentence_of(warnings.front());
@@ -113,23 +113,23 @@ void verify(StepCard& card, const DeskState& state) {
 
 }  // namespace
 
-Stage stage_of(const Failure& failure) {
+Phase phase_of(const Failure& failure) {
   switch (failure.reason) {
     case Reason::blank_image:
     case Reason::saturated:
     case Reason::plate_not_found:
     case Reason::plate_mismatch:
-      return Stage::rectify;
+      return Phase::rectify;
     case Reason::patient_mismatch:
-      return Stage::acquire;
+      return Phase::acquire;
     case Reason::bad_tunnel:
     case Reason::not_seen:
     case Reason::target_not_found:
     case Reason::parallel_rays:
     case Reason::uncertain:
-      return Stage::plan;
+      return Phase::plan;
     default:
-      return Stage::calibrate;
+      return Phase::calibrate;
   }
 }
 
@@ -142,23 +142,23 @@ QString sentence_of(const Failure& failure) {
            QString::fromUtf8(code_of.data(), static_cast<qsizetype>(code_of.size())));
 }
 
-std::array<StepCard, stages.size()> steps_of(const DeskState& state) {
-  std::array<StepCard, stages.size()> cards;
+std::array<StepCard, phases.size()> steps_of(const DeskState& state) {
+  std::array<StepCard, phases.size()> cards;
   const std::array names{tr("Acquire"), tr("Rectify"),  tr("Calibrate"),
                          tr("Plan"),    tr("Navigate"), tr("Verify")};
   using Judge = void (*)(StepCard&, const DeskState&);
-  constexpr std::array<Judge, stages.size()> judges{acquire, rectify, calibrate, plan, navigate, verify};
+  constexpr std::array<Judge, phases.size()> judges{acquire, rectify, calibrate, plan, navigate, verify};
   for (std::size_t i = 0; i < cards.size(); ++i) {
     StepCard& card = cards[i];
-    card.stage = stages[i];
+    card.phase = phases[i];
     card.name = names[i];
     const bool possible = i < 3 || state.measured;
     if (state.result && possible) judges[i](card, state);
-    if (const auto refusal = state.refusals.find(card.stage); refusal != state.refusals.end()) {
+    if (const auto refusal = state.refusals.find(card.phase); refusal != state.refusals.end()) {
       card.mood = StepMood::refused;
       card.why = sentence_of(refusal->second);
     }
-    if (state.busy == card.stage) {
+    if (state.busy == card.phase) {
       card.mood = StepMood::running;
       card.why = text(state.doing);
     }

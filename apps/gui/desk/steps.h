@@ -11,17 +11,17 @@ enum class StepMood { waiting, running, good, warning, refused };
 
 /// A step as the strip shows it: its mood, the figure that decided it, and why or what to do next.
 struct StepCard {
-  Stage stage = Stage::acquire;
+  Phase phase = Phase::acquire;
   QString name;
   StepMood mood = StepMood::waiting;
   QString figure;
   QString why;
 };
 
-std::array<StepCard, stages.size()> steps_of(const DeskState& state);
+std::array<StepCard, phases.size()> steps_of(const DeskState& state);
 
 /// The step that a refused measurement concerns.
-Stage stage_of(const Failure& failure);
+Phase phase_of(const Failure& failure);
 
 /// In words, with its code.
 QString sentence_of(const Failure& failure);

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QElapsedTimer>
+#include <QPushButton>
+#include <QTimer>
+
+namespace helicarm::gui {
+
+/// What moves a robot cannot be clicked by accident: the button (or Enter) must be held until it is full.
+class HoldButton : public QPushButton {
+  Q_OBJECT
+
+ public:
+  static constexpr int hold_ms = 1200;
+
+  explicit HoldButton(const QString& text, QWidget* parent = nullptr);
+
+ signals:
+  void held();
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+  void keyReleaseEvent(QKeyEvent* event) override;
+  void focusOutEvent(QFocusEvent* event) override;
+  void changeEvent(QEvent* event) override;
+
+ private:
+  void begin();
+  void let_go();
+  void tick();
+
+  QTimer timer_;
+  QElapsedTimer since_;
+};
+
+}  // namespace helicarm::gui

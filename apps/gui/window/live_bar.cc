@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/window/live_bar.h"
+
+#include <QHelpEvent>
+#include <QPainter>
+#include <QToolTip>
+
+#include "gui/desk/steps.h"
+#include "gui/window/style.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int lamp_width = 118;
+/// The depth bar shows so much before the tunnel's entry.
+constexpr double before_entry_mm = 60;
+
+QColor colour_of(Light light) {
+  switch (light) {
+    case Light::off:
+      return style::line;
+    case Light::red:
+      return style::red;
+    case Light::amber:
+      return style::amber;
+    case Light::green:
+      return style::green;
+  }
+  return {};
+}
+
+void paint_lamp(QPainter& painter, const QRectF& box, const Lamp& lamp) {
+  painter.setPen(Qt::NoPen);
+  painter.setBrush(colour_of(lamp.light));
+  const QRectF disc(box.left() + 4, box.center().y() - 9, 18, 18);
+  if (lamp.light == Light::red)
+    painter.drawRect(disc);  // a shape of its own, for eyes that do not tell the colours apart
+  else
+    painter.drawEllipse(disc);
+  painter.setPen(style::quiet);
+  painter.drawText(box.adjusted(30, 6, 0, 0), Qt::AlignLeft | Qt::AlignTop, lamp.name);
+  painter.setPen(style::text);
+  painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, lamp.text);
+}
+
+QString aim_words(const TunnelAim& aim) {
+  return LiveBar::tr("%1 mm off the axis   %2°   %3 mm %4")
+      .arg(aim.distance_mm, 0, 'f', 1)
+      .arg(aim.angle_deg, 0, 'f', 1)
+      .arg(std::abs(aim.depth_mm), 0, 'f', 1)
+      .arg(aim.depth_mm < 0 ? LiveBar::tr("before the entry") : LiveBar::tr("deep"));
+}
+
+void paint_depth(QPainter& painter, const QRectF& box, const TunnelAim& aim) {
+  const double span = before_entry_mm + aim.length_mm;
+  const auto at = [&](double depth) {
+    return box.left() + box.width() * std::clamp((depth + before_entry_mm) / span, 0.0, 1.0);
+  };
+  painter.fillRect(box, style::panel);
+  painter.fillRect(QRectF(QPointF(at(0), box.top()), QPointF(at(aim.length_mm), box.bottom())),
+                   style::raised);
+  painter.fillRect(QRectF(QPointF(box.left(), box.top() + 4), QPointF(at(aim.depth_mm), box.bottom() - 4)),
+                   aim.depth_mm > aim.length_mm ? style::red : style::blue);
+  painter.setPen(style::text);
+  painter.drawLine(QPointF(at(0), box.top()), QPointF(at(0), box.bottom()));
+}
+
+}  // namespace
+
+LiveBar::LiveBar(QWidget* parent) : QWidget(parent) {
+  setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed);
+  setAccessibleName(tr("Devices and tool"));
+}
+
+void LiveBar::show_live(const LiveState& live) {
+  live_ = live;
+  setAccessibleDescription(words());
+  update();
+}
+
+QString LiveBar::words() const {
+  QStringList all;
+  for (const Lamp& lamp : live_.lamps) all << QString("%1: %2").arg(lamp.name, lamp.text);
+  if (live_.aim) all << (*live_.aim ? aim_words(**live_.aim) : sentence_of(live_.aim->error()));
+  return all.join("; ");
+}
+
+void LiveBar::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.setRenderHint(QPainter::Antialiasing);
+  painter.fillRect(rect(), style::panel);
+  double left = 8;
+  for (const Lamp& lamp : live_.lamps) {
+    paint_lamp(painter, {left, 0, lamp_width, double(height())}, lamp);
+    left += lamp_width + (lamp.text.size() > 10 ? 40 : 0);
+  }
+  if (live_.lamps.empty()) {
+    painter.setPen(style::quiet);
+    painter.drawText(rect().adjusted(12, 0, 0, 0), Qt::AlignVCenter, tr("no tracker, no robot"));
+  }
+  if (!live_.aim) return;
+  const QRectF box(left + 10, 0, width() - left - 22, height());
+  QFont font = painter.font();
+  font.setPixelSize(18);
+  painter.setFont(font);
+  if (!*live_.aim) {
+    painter.setPen(style::amber);
+    painter.drawText(box, Qt::AlignVCenter | Qt::TextWordWrap, sentence_of(live_.aim->error()));
+    return;
+  }
+  painter.setPen(style::text);
+  painter.drawText(box.adjusted(0, 4, 0, -26), Qt::AlignLeft | Qt::AlignVCenter, aim_words(**live_.aim));
+  paint_depth(painter, box.adjusted(0, 36, 0, -6), **live_.aim);
+}
+
+bool LiveBar::event(QEvent* event) {
+  if (event->type() == QEvent::ToolTip) {
+    QStringList all;
+    for (const Lamp& lamp : live_.lamps)
+      if (!lamp.why.isEmpty()) all << QString("%1: %2").arg(lamp.name, lamp.why);
+    QToolTip::showText(static_cast<QHelpEvent*>(event)->globalPos(), all.join("\n"), this);
+    return true;
+  }
+  return QWidget::event(event);
+}
+
+}  // namespace helicarm::gui

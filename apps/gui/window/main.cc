@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QApplication>
+#include <QCommandLineParser>
+#include <QStandardPaths>
+#include <QTimer>
+#include <csignal>
+
+#include "gui/window/main_window.h"
+#include "gui/window/style.h"
+
+namespace {
+volatile std::sig_atomic_t told_to_end = 0;
+}
+
+int main(int argc, char** argv) {
+  using namespace helicarm::gui;
+  QSurfaceFormat::setDefaultFormat(SceneView::default_format());
+  QApplication app(argc, argv);
+  QApplication::setOrganizationName("helicarm");
+  QApplication::setApplicationName("helicarm-gui");
+  QApplication::setApplicationVersion(HELICARM_VERSION);
+  app.setStyleSheet(style::sheet());
+
+  QCommandLineParser words;
+  words.setApplicationDescription(
+      "The desktop application of helicarm. Without arguments it opens a virtual operating room, so that a "
+      "whole "
+      "operation can be rehearsed with no device. Research instrument, not a medical device.");
+  words.addHelpOption();
+  words.addVersionOption();
+  const QCommandLineOption plan("plan", "Connect the devices of this plan instead (docs/formats.md).",
+                                "FILE");
+  const QCommandLineOption sessions("sessions", "Keep the records of operations below this folder.", "DIR");
+  words.addOptions({plan, sessions});
+  words.addPositionalArgument("paths", "A case folder, a session's folder, or X-rays to open.", "[PATH...]");
+  words.process(app);
+
+  const QString place =
+      words.isSet(sessions)
+          ? words.value(sessions)
+          : QStandardPaths::writableLocation(QStandardPaths::AppLocalDataLocation) + "/sessions";
+  MainWindow window(place.toStdString());
+  window.resize(1280, 800);
+  window.show();
+  std::vector<std::filesystem::path> paths;
+  for (const QString& path : words.positionalArguments()) paths.push_back(path.toStdString());
+  if (!paths.empty())
+    window.open_paths(paths);
+  else if (words.isSet(plan))
+    window.open_plan(words.value(plan).toStdString());
+  else
+    window.open_rehearsal();
+  for (const int signal : {SIGTERM, SIGINT}) std::signal(signal, [](int) { told_to_end = 1; });
+  QTimer listener;
+  QObject::connect(&listener, &QTimer::timeout, [] {
+    if (told_to_end) QApplication::quit();
+  });
+  constexpr int glance_ms = 50;
+  listener.start(glance_ms);
+  return QApplication::exec();
+}

@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/window/main_window.h"
+
+#include <QApplication>
+#include <QDockWidget>
+#include <QHBoxLayout>
+#include <QKeyEvent>
+#include <QSplitter>
+#include <QStatusBar>
+#include <QVBoxLayout>
+#include <algorithm>
+
+#include "gui/desk/steps.h"
+#include "gui/window/style.h"
+#include "helicarm/geometry/epipolar.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int live_ms = 16;
+/// The scene is drawn by software as a rule, and needs less haste than the pictures.
+constexpr unsigned scene_every = 4;
+/// Of the calibrator's middle: where an end may lie along its ray.
+constexpr double epipolar_reach_mm = 150;
+
+QString text(const std::string& words) { return QString::fromStdString(words); }
+
+/// The first step that is not done.
+Phase open_phase(const std::array<StepCard, phases.size()>& cards) {
+  for (const StepCard& card : cards)
+    if (card.mood != StepMood::good && card.mood != StepMood::warning) return card.phase;
+  return Phase::verify;
+}
+
+}  // namespace
+
+MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
+    : QMainWindow(parent), sessions_(std::move(sessions)) {
+  setWindowTitle(tr("helicarm"));
+  setAcceptDrops(true);
+  build();
+  build_menus();
+  connect(&desk_, &Desk::changed, this, &MainWindow::show_state);
+  connect(&desk_, &Desk::refused, this, [this](Phase phase, const QString& why) {
+    moved_on_ = false;
+    show_phase(phase);
+    statusBar()->showMessage(why);
+  });
+  connect(&timer_, &QTimer::timeout, this, &MainWindow::show_live);
+  timer_.start(live_ms);
+  qApp->installEventFilter(this);
+  show_state();
+}
+
+MainWindow::~MainWindow() { qApp->removeEventFilter(this); }
+
+void MainWindow::build() {
+  auto* middle = new QWidget;
+  auto* column = new QVBoxLayout(middle);
+  column->setContentsMargins(6, 6, 6, 6);
+  column->setSpacing(6);
+
+  auto* top = new QHBoxLayout;
+  strip_ = new StepStrip;
+  top->addWidget(strip_, 1);
+  auto* stop = new QPushButton(tr("STOP"));
+  stop->setObjectName("stop");
+  stop->setProperty("class", "stop");
+  stop->setToolTip(tr("Stops the robot at once (space bar)"));
+  stop->setFocusPolicy(Qt::NoFocus);
+  connect(stop, &QPushButton::pressed, &desk_, &Desk::stop);
+  top->addWidget(stop);
+  column->addLayout(top);
+  connect(strip_, &StepStrip::chosen, this, [this](Phase phase) {
+    moved_on_ = true;
+    show_phase(phase);
+  });
+
+  auto* sides = new QSplitter(Qt::Horizontal);
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    auto* box = new QWidget;
+    auto* stack = new QVBoxLayout(box);
+    stack->setContentsMargins(0, 0, 0, 0);
+    titles_[i] = new QLabel;
+    stack->addWidget(titles_[i]);
+    xrays_[i] = new XrayView;
+    xrays_[i]->setObjectName(QString("xray%1").arg(i));
+    stack->addWidget(xrays_[i], 1);
+    sides->addWidget(box);
+    sides->setStretchFactor(int(i), 3);
+    connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
+  }
+  auto* right = new QSplitter(Qt::Vertical);
+  scene_ = new SceneView;
+  scene_->setObjectName("scene");
+  right->addWidget(scene_);
+  pages_ = new QStackedWidget;
+  auto* rectify = new RectifyPage(desk_, this);
+  plan_ = new PlanPage(desk_, this);
+  navigate_ = new NavigatePage(desk_, this);
+  auto* verify = new VerifyPage(desk_, this);
+  for (Page* page : std::initializer_list<Page*>{new AcquirePage(desk_, this), rectify,
+                                                 new CalibratePage(desk_, this), plan_, navigate_, verify})
+    pages_->addWidget(page);
+  right->addWidget(pages_);
+  right->setSizes({330, 330});
+  sides->addWidget(right);
+  sides->setStretchFactor(2, 3);
+  column->addWidget(sides, 1);
+  live_bar_ = new LiveBar;
+  column->addWidget(live_bar_);
+  setCentralWidget(middle);
+  statusBar();
+
+  connect(rectify, &RectifyPage::layer_wanted, this, [this](Layer layer) {
+    for (XrayView* xray : xrays_) xray->set_layer(layer);
+  });
+  connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);
+  connect(plan_, &PlanPage::map_wanted, this, &MainWindow::show_tre);
+  connect(verify, &VerifyPage::report_wanted, this, &MainWindow::ask_and_export);
+
+  replay_dock_ = new QDockWidget(tr("Replay"), this);
+  replay_ = new ReplayPanel;
+  replay_dock_->setWidget(replay_);
+  addDockWidget(Qt::BottomDockWidgetArea, replay_dock_);
+  replay_dock_->hide();
+  connect(replay_, &ReplayPanel::moment_changed, this, &MainWindow::show_moment);
+}
+
+void MainWindow::show_state() {
+  const DeskState& state = desk_.state();
+  const auto cards = steps_of(state);
+  strip_->show_steps(cards);
+  if (!state.busy && !moved_on_) show_phase(open_phase(cards));
+  if (state.busy) moved_on_ = false;
+  for (int i = 0; i < pages_->count(); ++i) static_cast<Page*>(pages_->widget(i))->show_state(state);
+  setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
+  rehearsal_menu_->setEnabled(state.source == Source::virtual_room);
+  if (state.busy)
+    statusBar()->showMessage(text(state.doing));
+  else if (state.refusals.empty())
+    statusBar()->clearMessage();
+  show_pictures();
+  show_picks();
+}
+
+void MainWindow::show_pictures() {
+  const DeskState& state = desk_.state();
+  if (shown_ == state.result && shown_source_ == state.source) return;
+  shown_ = state.result;
+  shown_source_ = state.source;
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    const bool has = shown_ && i < shown_->views.size();
+    titles_[i]->setText(has ? text(shown_->views[i].name) : QString());
+    if (has && shown_->views[i].exposure)
+      xrays_[i]->show_view(shown_, i);
+    else
+      xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-rays here")
+                       : has                        ? tr("No picture yet")
+                                                    : tr("No second view"));
+  }
+  scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
+  scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
+}
+
+void MainWindow::show_picks() {
+  const DeskState& state = desk_.state();
+  const auto wanted = state.measured && phase_ == Phase::plan ? plan_->target() : std::nullopt;
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    if (!shown_ || i >= shown_->views.size() || !shown_->views[i].exposure) continue;
+    const ViewResult& view = shown_->views[i];
+    std::vector<FreshPick> picks;
+    for (const Pick& pick : state.picks)
+      if (pick.view == view.name && next_pick(state)) picks.push_back({text(pick.name), pick.uv_raw});
+    xrays_[i]->set_picks(std::move(picks));
+    xrays_[i]->set_picking(wanted.has_value() && !state.busy);
+    const auto path = state.path.by_view.find(view.name);
+    xrays_[i]->set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
+
+    std::vector<Eigen::Vector2d> epipolar;
+    if (wanted)
+      for (const ViewResult& other : shown_->views) {
+        const Pick* pick = pick_of(state, wanted->point, other.name);
+        if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated) continue;
+        const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
+        const double depth = other.calibrated->view.depth(middle_of(state.calibrator));
+        if (uv)
+          epipolar = epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
+                                   depth - epipolar_reach_mm, depth + epipolar_reach_mm);
+      }
+    xrays_[i]->set_epipolar(std::move(epipolar));
+  }
+}
+
+void MainWindow::show_phase(Phase phase) {
+  phase_ = phase;
+  strip_->choose(phase);
+  pages_->setCurrentIndex(int(phase));
+  show_picks();
+}
+
+void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
+  const auto wanted = plan_->target();
+  if (!wanted || !shown_ || view >= shown_->views.size()) return;
+  Pick pick{.name = wanted->point, .view = shown_->views[view].name, .uv_raw = {raw.x(), raw.y()}};
+  if (plan_->snaps()) pick.snap = Snap::ball;
+  if (desk_.state().source != Source::files) pick.moves_with = wanted->bone;
+  desk_.pick(std::move(pick));
+}
+
+void MainWindow::show_live() {
+  const LiveState live = desk_.live();
+  live_bar_->show_live(live);
+  navigate_->show_live(live);
+  const auto& tool = live.tool;
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    std::optional<PictureLine> line;
+    QString note;
+    if (tool && *tool && shown_ && i < shown_->views.size()) {
+      const auto seen = (*tool)->by_view.find(shown_->views[i].name);
+      if (seen != (*tool)->by_view.end()) line = seen->second;
+      note = age_text((*tool)->age_s);
+    }
+    xrays_[i]->set_tool(line, note);
+  }
+  if (++looks_ % scene_every != 0) return;
+  LiveScene scene;
+  if (tool && *tool && (*tool)->calibrator_from_tip) {
+    scene.calibrator_from_tip = (*tool)->calibrator_from_tip;
+    if (live.robot.state) {
+      scene.calibrator_from_base = *scene.calibrator_from_tip * live.robot.state->base_from_tcp.inverse();
+      scene.joints = live.robot.state->joints;
+    }
+  }
+  scene_->show_live(scene);
+}
+
+bool MainWindow::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() == QEvent::KeyPress || event->type() == QEvent::ShortcutOverride) {
+    const auto* key = static_cast<QKeyEvent*>(event);
+    const Source source = desk_.state().source;
+    // The space bar belongs to the robot's stop; Enter presses buttons instead.
+    if (key->key() == Qt::Key_Space && (source == Source::virtual_room || source == Source::devices)) {
+      if (event->type() == QEvent::KeyPress && !key->isAutoRepeat()) desk_.stop();
+      event->accept();
+      return true;
+    }
+    auto* button = qobject_cast<QAbstractButton*>(watched);
+    const bool enter = key->key() == Qt::Key_Return || key->key() == Qt::Key_Enter;
+    if (enter && event->type() == QEvent::KeyPress && button && !qobject_cast<HoldButton*>(button)) {
+      button->click();
+      return true;
+    }
+  }
+  return QMainWindow::eventFilter(watched, event);
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QLabel>
+#include <QMainWindow>
+#include <QSettings>
+#include <QStackedWidget>
+#include <filesystem>
+
+#include "gui/desk/desk.h"
+#include "gui/replay/replay_panel.h"
+#include "gui/replay/settings_dialog.h"
+#include "gui/scene/scene_view.h"
+#include "gui/window/live_bar.h"
+#include "gui/window/pages.h"
+#include "gui/window/step_strip.h"
+#include "gui/xray/xray_view.h"
+
+namespace helicarm::gui {
+
+/// The strip of steps, two X-rays, the scene, the page of the step, and what is live; all of it shows the
+/// desk's state.
+class MainWindow : public QMainWindow {
+  Q_OBJECT
+
+ public:
+  /// Sessions are kept below `sessions`.
+  explicit MainWindow(std::filesystem::path sessions, QWidget* parent = nullptr);
+  ~MainWindow() override;
+
+  Desk& desk() { return desk_; }
+  StepStrip& strip() { return *strip_; }
+  XrayView& xray(std::size_t number) { return *xrays_.at(number); }
+  SceneView& scene() { return *scene_; }
+  LiveBar& live_bar() { return *live_bar_; }
+
+  void open_rehearsal();
+  void open_plan(const std::filesystem::path& plan);
+  /// A case folder, a session's folder, or X-rays.
+  void open_paths(const std::vector<std::filesystem::path>& paths);
+  /// Report (HTML, PDF), result.json and other programs' formats into a folder.
+  Expected<void> export_to(const std::filesystem::path& folder) const;
+
+  /// Shows what the devices say now; the timer does so 60 times a second.
+  void show_live();
+
+ protected:
+  void dragEnterEvent(QDragEnterEvent* event) override;
+  void dropEvent(QDropEvent* event) override;
+  bool eventFilter(QObject* watched, QEvent* event) override;
+  void closeEvent(QCloseEvent* event) override;
+
+ private:
+  void build();
+  void build_menus();
+  void build_rehearsal_menu();
+  void build_recent();
+  void open_session(const std::filesystem::path& session);
+  std::filesystem::path new_session() const;
+  void remember(Folder kind, const std::filesystem::path& folder);
+
+  void show_state();
+  void show_pictures();
+  void show_picks();
+  void show_phase(Phase phase);
+  void place_pick(std::size_t view, const QPointF& raw);
+  void show_tre(bool shown);
+  void show_moment(int index);
+  void ask_and_export();
+  void save_screenshot();
+  void ask_settings();
+  void say(const Failure& failure);
+
+  std::filesystem::path sessions_;
+  QSettings recent_;
+  Settings settings_;
+  Desk desk_;
+  QTimer timer_;
+
+  StepStrip* strip_ = nullptr;
+  std::array<XrayView*, 2> xrays_{};
+  std::array<QLabel*, 2> titles_{};
+  SceneView* scene_ = nullptr;
+  LiveBar* live_bar_ = nullptr;
+  QStackedWidget* pages_ = nullptr;
+  PlanPage* plan_ = nullptr;
+  NavigatePage* navigate_ = nullptr;
+  ReplayPanel* replay_ = nullptr;
+  QDockWidget* replay_dock_ = nullptr;
+  QMenu* recent_menu_ = nullptr;
+  QMenu* rehearsal_menu_ = nullptr;
+
+  std::shared_ptr<const Result> shown_;
+  Source shown_source_ = Source::none;
+  Phase phase_ = Phase::acquire;
+  unsigned looks_ = 0;
+  bool moved_on_ = false;  ///< the person chose a step; until the next success it stays
+};
+
+}  // namespace helicarm::gui

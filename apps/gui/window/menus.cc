@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QApplication>
+#include <QCloseEvent>
+#include <QDateTime>
+#include <QDockWidget>
+#include <QDragEnterEvent>
+#include <QFileDialog>
+#include <QMenuBar>
+#include <QMessageBox>
+#include <QMimeData>
+#include <QStatusBar>
+#include <QThreadPool>
+
+#include "gui/desk/steps.h"
+#include "gui/replay/pdf_report.h"
+#include "gui/window/main_window.h"
+#include "helicarm/core/files.h"
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/report/exports.h"
+#include "helicarm/report/report.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double tre_half_mm = 80, tre_step_mm = 10;
+
+QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
+fs::path path_of(const QString& words) { return words.toStdString(); }
+
+}  // namespace
+
+void MainWindow::build_menus() {
+  QMenu* file = menuBar()->addMenu(tr("&File"));
+  file->addAction(tr("&New rehearsal in a virtual operating room"), QKeySequence::New, this,
+                  &MainWindow::open_rehearsal);
+  file->addAction(tr("&Connect the devices of a plan..."), this, [this] {
+    const QString plan = QFileDialog::getOpenFileName(this, tr("Plan"), {}, tr("Plan (*.json)"));
+    if (!plan.isEmpty()) open_plan(path_of(plan));
+  });
+  file->addAction(tr("&Open a case or session folder..."), QKeySequence::Open, this, [this] {
+    const QString folder = QFileDialog::getExistingDirectory(this, tr("Case or session"));
+    if (!folder.isEmpty()) open_paths({path_of(folder)});
+  });
+  file->addAction(tr("Open &X-rays..."), this, [this] {
+    std::vector<fs::path> paths;
+    for (const QString& name : QFileDialog::getOpenFileNames(this, tr("X-rays")))
+      paths.push_back(path_of(name));
+    if (!paths.empty()) open_paths(paths);
+  });
+  recent_menu_ = file->addMenu(tr("&Recent"));
+  build_recent();
+  file->addSeparator();
+  file->addAction(tr("&Export report and results..."), QKeySequence(tr("Ctrl+E")), this,
+                  &MainWindow::ask_and_export);
+  file->addAction(tr("Save &screenshot..."), QKeySequence(tr("Ctrl+P")), this, &MainWindow::save_screenshot);
+  file->addAction(tr("Se&ttings..."), QKeySequence(tr("Ctrl+,")), this, &MainWindow::ask_settings);
+  file->addSeparator();
+  file->addAction(tr("&Quit"), QKeySequence(tr("Ctrl+Q")), this, &QWidget::close);
+
+  QMenu* view = menuBar()->addMenu(tr("&View"));
+  using Preset = SceneView::Preset;
+  for (const auto& [words, preset, key] : {std::tuple(tr("Scene as in the &AP view"), Preset::ap, "Ctrl+1"),
+                                           {tr("Scene as in the &lateral view"), Preset::lateral, "Ctrl+2"},
+                                           {tr("Scene from &outside"), Preset::free, "Ctrl+3"}})
+    view->addAction(words, QKeySequence(key), this, [this, wanted = preset] { scene_->set_preset(wanted); });
+  view->addAction(replay_dock_->toggleViewAction());
+  build_rehearsal_menu();
+
+  menuBar()->addMenu(tr("&Help"))->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [this] {
+    QMessageBox::information(
+        this, tr("Keys"),
+        tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
+           "Enter: press; hold it on a yellow button\n\nOn an X-ray: + - 0 zoom, arrows pan, Shift+arrows "
+           "and "
+           "Enter place a tunnel's end, L layer, M magnifier, W contrast\n\n"
+           "In 3-D: 1 AP, 2 lateral, 3 outside, arrows turn, + - zoom, R back\n\n"
+           "Research instrument, not a medical device."));
+  });
+}
+
+void MainWindow::build_rehearsal_menu() {
+  rehearsal_menu_ = menuBar()->addMenu(tr("&Rehearsal"));
+  for (const auto& [words, fault] : {std::pair(tr("Hide the &tool's marker"), "hide:tool"),
+                                     {tr("Hide the &femur's marker"), "hide:femur"},
+                                     {tr("Hide the t&ibia's marker"), "hide:tibia"},
+                                     {tr("Tracker repeats itself (f&rozen)"), "frozen"},
+                                     {tr("Tracker falls &silent"), "silent"},
+                                     {tr("Tracker's &clock jumps"), "time_jump"}}) {
+    QAction* action = rehearsal_menu_->addAction(words);
+    action->setCheckable(true);
+    action->setObjectName(fault);
+    connect(action, &QAction::toggled, this,
+            [this, name = std::string(fault)](bool on) { desk_.set_fault(name, on); });
+  }
+  rehearsal_menu_->addSeparator();
+  rehearsal_menu_->addAction(tr("&Move the leg by some millimetres"), this, [this] {
+    desk_.move_bone("femur", {2, -1.5, 1});
+    desk_.move_bone("tibia", {-1, 2, 1.5});
+  });
+}
+
+void MainWindow::build_recent() {
+  recent_menu_->clear();
+  for (const Folder kind : {Folder::cases, Folder::sessions})
+    for (const fs::path& folder : recent_folders(recent_, kind))
+      recent_menu_->addAction(text(folder), this, [this, folder] { open_paths({folder}); });
+  recent_menu_->setEnabled(!recent_menu_->isEmpty());
+}
+
+void MainWindow::remember(Folder kind, const fs::path& folder) {
+  remember_folder(recent_, kind, folder);
+  build_recent();
+}
+
+fs::path MainWindow::new_session() const {
+  const QString now = QDateTime::currentDateTime().toString("yyyy-MM-dd_HH-mm-ss-zzz");
+  return sessions_ / now.toStdString();
+}
+
+void MainWindow::open_rehearsal() {
+  operating_room::VirtualRoomOptions room = settings_.room;
+  room.tracker_port = room.rtde_port = room.dashboard_port = room.script_port = 0;
+  const fs::path folder = new_session();
+  desk_.open_room(room, folder);
+}
+
+void MainWindow::open_plan(const fs::path& plan) {
+  desk_.open_devices(plan, settings_.receiver, new_session());
+}
+
+void MainWindow::open_paths(const std::vector<fs::path>& paths) {
+  if (paths.size() == 1 && fs::exists(paths.front() / "session.log")) return open_session(paths.front());
+  if (paths.size() == 1 && fs::is_directory(paths.front())) {
+    remember(Folder::cases, paths.front());
+    return desk_.open_case(paths.front());
+  }
+  desk_.open_pictures(paths);
+}
+
+void MainWindow::open_session(const fs::path& session) {
+  if (const auto opened = replay_->open(session); !opened) return say(opened.error());
+  remember(Folder::sessions, session);
+  replay_dock_->show();
+  replay_dock_->raise();
+}
+
+void MainWindow::show_moment(int index) {
+  if (!replay_->timeline() || index < 0) return;
+  const auto then = state_at(*replay_->timeline(), std::size_t(index));
+  if (!then) return say(then.error());
+  if (then->case_folder && then->measured && desk_.state().folder != *then->case_folder)
+    desk_.open_case(*then->case_folder);
+}
+
+Expected<void> MainWindow::export_to(const fs::path& folder) const {
+  return guarded([&] {
+    if (!shown_ || !desk_.state().measured)
+      throw BadInput(Reason::usage, "nothing is measured yet: there is nothing to export");
+    value_or_throw(write_report(*shown_, folder));
+    value_or_throw(write_pdf_report(*shown_, folder / "report.pdf"));
+    value_or_throw(write_exports(*shown_, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(*shown_)) + "\n"));
+  });
+}
+
+void MainWindow::ask_and_export() {
+  const QString folder = QFileDialog::getExistingDirectory(this, tr("Folder for the report and the results"));
+  if (folder.isEmpty()) return;
+  if (const auto done = export_to(path_of(folder)); !done) return say(done.error());
+  statusBar()->showMessage(tr("Written to %1").arg(folder));
+}
+
+void MainWindow::save_screenshot() {
+  const QImage picture = grab().toImage();
+  const QString name =
+      QFileDialog::getSaveFileName(this, tr("Screenshot"), "helicarm.png", tr("PNG (*.png)"));
+  if (!name.isEmpty() && !picture.save(name))
+    say({Reason::cannot_write, name.toStdString() + ": cannot write"});
+}
+
+void MainWindow::ask_settings() {
+  SettingsDialog dialog(settings_, this);
+  if (dialog.exec() == QDialog::Accepted) {
+    settings_ = dialog.settings();
+    desk_.set_options(settings_.run);
+  }
+}
+
+void MainWindow::show_tre(bool shown) {
+  if (!shown || !shown_ || !desk_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
+  Calibration calibration{{}, shown_->joint_covariance};
+  for (const ViewResult& view : shown_->views)
+    if (view.calibrated) calibration.views.push_back(*view.calibrated);
+  const Eigen::Vector3d centre = middle_of(desk_.state().calibrator);
+  QPointer<MainWindow> self(this);
+  QThreadPool::globalInstance()->start([self, calibration, centre] {
+    auto volume = predict_tre(calibration, centre, tre_half_mm, tre_step_mm, click_sigma_px, 1);
+    QMetaObject::invokeMethod(
+        qApp,
+        [self, volume = std::move(volume), z = centre.z()] {
+          if (self) self->scene_->show_tre(volume, SliceAxis::z, z);
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+void MainWindow::say(const Failure& failure) { statusBar()->showMessage(sentence_of(failure)); }
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
+  if (event->mimeData()->hasUrls()) event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event) {
+  std::vector<fs::path> paths;
+  for (const QUrl& url : event->mimeData()->urls())
+    if (url.isLocalFile()) paths.push_back(path_of(url.toLocalFile()));
+  if (!paths.empty()) open_paths(paths);
+}
+
+void MainWindow::closeEvent(QCloseEvent* event) {
+  desk_.stop();
+  QMainWindow::closeEvent(event);
+}
+
+}  // namespace helicarm::gui

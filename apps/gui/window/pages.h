@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QCheckBox>
+#include <QComboBox>
+#include <QLabel>
+#include <QPushButton>
+#include <QTableWidget>
+
+#include "gui/desk/desk.h"
+#include "gui/window/hold_button.h"
+#include "gui/xray/layers.h"
+
+namespace helicarm::gui {
+
+/// What can be done in a step: a page each beside the pictures. Pages ask the desk; they hold nothing that
+/// the desk does not know.
+class Page : public QWidget {
+  Q_OBJECT
+
+ public:
+  Page(const QString& lead, Desk& desk, QWidget* parent);
+  virtual void show_state(const DeskState& state) = 0;
+
+ protected:
+  QPushButton* add_button(const QString& text, const char* name, std::function<void()> act);
+  HoldButton* add_hold(const QString& text, const char* name, std::function<void()> act);
+  QTableWidget* add_table(const QStringList& columns, const char* name);
+
+  Desk& desk_;
+};
+
+class AcquirePage : public Page {
+  Q_OBJECT
+
+ public:
+  AcquirePage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+
+ private:
+  std::vector<std::string> views_;
+  QWidget* shots_;
+  QLabel* where_;
+};
+
+/// Figures of stage 1 by view, and which layer of the picture is shown.
+class RectifyPage : public Page {
+  Q_OBJECT
+
+ public:
+  RectifyPage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+
+ signals:
+  void layer_wanted(helicarm::gui::Layer layer);
+
+ private:
+  QTableWidget* table_;
+};
+
+class CalibratePage : public Page {
+  Q_OBJECT
+
+ public:
+  CalibratePage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+
+ private:
+  QTableWidget* views_;
+  QTableWidget* balls_;
+};
+
+class PlanPage : public Page {
+  Q_OBJECT
+
+ public:
+  PlanPage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+  /// The end that the next click places; the next one to come, or the one chosen in the table.
+  std::optional<WantedPick> target() const;
+  bool snaps() const { return snap_->isChecked(); }
+
+ signals:
+  void map_wanted(bool shown);
+  void target_changed();
+
+ private:
+  QLabel* next_;
+  QTableWidget* ends_;
+  QCheckBox* snap_;
+  QPushButton* offered_;
+  std::optional<std::string> chosen_;
+};
+
+class NavigatePage : public Page {
+  Q_OBJECT
+
+ public:
+  NavigatePage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+  void show_live(const LiveState& live);
+
+ private:
+  void allow();
+
+  QLabel* says_;
+  QComboBox* tunnel_;
+  HoldButton *unlock_, *register_, *go_, *withdraw_;
+  QPushButton* plan_;
+  LinkPhase phase_ = LinkPhase::disconnected;
+};
+
+class VerifyPage : public Page {
+  Q_OBJECT
+
+ public:
+  VerifyPage(Desk& desk, QWidget* parent);
+  void show_state(const DeskState& state) override;
+
+ signals:
+  void report_wanted();
+
+ private:
+  QTableWidget* table_;
+};
+
+}  // namespace helicarm::gui

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QToolButton>
+#include <QWidget>
+
+#include "gui/desk/steps.h"
+
+namespace helicarm::gui {
+
+/// One card of the strip: name, mood (by colour, sign and word), figure and reason.
+class StepButton : public QToolButton {
+  Q_OBJECT
+
+ public:
+  StepButton(Phase phase, QWidget* parent);
+  void show_card(const StepCard& card);
+  const StepCard& card() const { return card_; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  QSize sizeHint() const override { return {180, 72}; }
+
+ private:
+  StepCard card_;
+};
+
+/// The six steps; a click, or Alt+1 to 6, opens one.
+class StepStrip : public QWidget {
+  Q_OBJECT
+
+ public:
+  explicit StepStrip(QWidget* parent = nullptr);
+  void show_steps(const std::array<StepCard, phases.size()>& cards);
+  void choose(Phase phase);
+  StepButton* button(Phase phase) const { return buttons_[std::size_t(phase)]; }
+
+ signals:
+  void chosen(helicarm::gui::Phase phase);
+
+ private:
+  std::array<StepButton*, phases.size()> buttons_;
+};
+
+}  // namespace helicarm::gui
