@@ -49,11 +49,12 @@ void run_calibration_test(const CalibrationStudyOptions& options, std::size_t nu
   simulated.seed = seed_of_case(options, number);
   simulated.size = options.size_px;
   simulated.threads = 1;
-  const auto folder = options.folder / fmt::format("calibration-case-{}", number);
+  const auto folder = options.folder / fmt::format("calibration.partial-{}", number);
+  std::error_code ignored;
+  std::filesystem::remove_all(folder, ignored);  // half a case, where a run was killed
   value_or_throw(simulation::write_case(folder, value_or_throw(simulation::simulate_case(simulated))));
   const Case given = value_or_throw(read_case(folder));
   for (const Method method : {Method::paper, Method::best}) put_record(measured(given, method), out);
-  std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);
 }
 

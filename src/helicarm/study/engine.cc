@@ -81,8 +81,11 @@ class Run {
     for (std::size_t block = 0; block < setting.blocks; ++block)
       if (!done_[block]) open.push_back(block);
     const auto crew = std::size_t(ranks_.count());
+    // The leader's threads: all ranks must meet as often, also where their machines have other numbers of
+    // them.
+    const auto threads = std::size_t(ranks_.from_leader({double(threads_)}).front());
     const std::size_t turn =
-        crew == 1 ? std::max<std::size_t>(open.size(), 1) : crew * threads_ * blocks_per_turn;
+        crew == 1 ? std::max<std::size_t>(open.size(), 1) : crew * threads * blocks_per_turn;
     for (std::size_t begin = 0; begin < open.size(); begin += turn) {
       std::vector<std::size_t> own;
       for (std::size_t i = begin + std::size_t(ranks_.own()); i < std::min(begin + turn, open.size());

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <csignal>
+#include <fstream>
+#include <ostream>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/study/journal.h"
+#include "helicarm/study/small_studies.h"
+
+namespace helicarm {
+
+void PrintTo(const SmallStudy& study, std::ostream* out) { *out << study.name; }
+
+namespace {
+
+namespace fs = std::filesystem;
+
+class EveryStudy : public ::testing::TestWithParam<SmallStudy> {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) / ("every_study_" + GetParam().name);
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string bytes(const EngineOptions& engine) const { return GetParam().bytes(engine, Ranks(), folder_); }
+  std::string bytes_by(unsigned threads) const {
+    EngineOptions engine;
+    engine.threads = threads;
+    return bytes(engine);
+  }
+
+  fs::path folder_;
+};
+
+TEST_P(EveryStudy, BytesDoNotDependOnThreads) { EXPECT_EQ(bytes_by(1), bytes_by(3)); }
+
+/// What a journal holds, whosever it is.
+JournalContent content_of(const fs::path& path) {
+  std::string kind, identity;
+  std::ifstream file(path);
+  file >> kind >> std::ws;
+  std::getline(file, identity);
+  return Journal(path, identity).read().value();
+}
+
+TEST_P(EveryStudy, KilledRunLosesNoFinishedBlockAndGoesOnToTheSameBytes) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // OpenCV may have threads
+  EngineOptions engine;
+  engine.threads = 2;
+  engine.journal = folder_ / "some.partial";
+  engine.journal_after_s = 0;
+  engine.progress = [done = std::size_t{0}](double) mutable {
+    if (++done == GetParam().stop) std::raise(SIGKILL);
+  };
+  EXPECT_EXIT((void)bytes(engine), ::testing::KilledBySignal(SIGKILL), "");
+  const JournalContent kept = content_of(engine.journal);
+  EXPECT_EQ(kept.settled.size() * GetParam().blocks + kept.blocks.size(), GetParam().stop);
+
+  engine.resume = true;
+  engine.progress = [](double) {};
+  EXPECT_EQ(bytes(engine), bytes_by(1));
+  fs::remove(engine.journal);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryStudy, ::testing::ValuesIn(small_studies()),
+                         [](const auto& given) { return given.param.name; });
+
+}  // namespace
+}  // namespace helicarm
