@@ -96,13 +96,6 @@ Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& 
   });
 }
 
-std::optional<PictureLine> line_in_xray(const View& view, const ToolLine& line) {
-  constexpr double nearest_mm = 1;
-  if (view.depth(line.p1_in_calibrator) < nearest_mm || view.depth(line.p2_in_calibrator) < nearest_mm)
-    return std::nullopt;
-  return PictureLine{view.project(line.p1_in_calibrator), view.project(line.p2_in_calibrator)};
-}
-
 EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance, const HandEye& hand_eye,
                  const RobotTool& tool) {
   const RigidTransform& flange_from_marker = hand_eye.flange_from_marker;

@@ -6,6 +6,7 @@
 #include "helicarm/devices/tracker/hand_eye.h"
 #include "helicarm/navigation/result.h"
 #include "helicarm/operation/seen_poses.h"
+#include "helicarm/verification/picture_line.h"
 
 namespace helicarm {
 
@@ -33,15 +34,6 @@ Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, co
 /// the calibrator (3.3). Refuses no_pose where the bone was not seen then or is not now.
 Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& exposure, const Poses& now,
                              const RigidTransform& marker_from_tcp);
-
-/// A line in a rectified picture.
-struct PictureLine {
-  Eigen::Vector2d back;
-  Eigen::Vector2d tip;
-};
-
-/// The tool's line in a calibrated X-ray (Eq. 6); nothing where it lies behind the source.
-std::optional<PictureLine> line_in_xray(const View& view, const ToolLine& line);
 
 /// How far a tunnel's end lies from the tool's axis, across it.
 struct EndMiss {

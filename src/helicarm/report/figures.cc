@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <iterator>
-#include <optional>
 
 #include <fmt/format.h>
 
 #include "helicarm/image/png.h"
+#include "helicarm/report/marks.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/picture.h"
 
@@ -75,58 +75,34 @@ void scale_bar(Drawing& drawing, int height, double length, double magnification
                fmt::format("{} {:g} px, magnified {:g} times", what, length, magnification));
 }
 
-std::optional<Pixel> rectified(const ViewResult& view, const Pixel& raw) {
-  return view.rectification->map.rectified_from_raw(raw);
+void draw_dots(Drawing& drawing, const ViewMarks& marks) {
+  for (const DotMark& dot : marks.plate_dots)
+    drawing.circle("plate", dot.place, dot.radius_px / drawing.unit());
+  for (const DotMark& blob : marks.false_blobs) drawing.cross("false", blob.place, 8);
 }
 
-void draw_dots(Drawing& drawing, const ViewResult& view) {
-  for (const Dot& dot : view.rectification->plate_dots)
-    if (const auto at = rectified(view, dot.centre_px))
-      drawing.circle("plate", *at, dot.radius_px / drawing.unit());
-  if (view.found)
-    for (const Dot& blob : view.found->false_blobs)
-      if (const auto at = rectified(view, blob.centre_px)) drawing.cross("false", *at, 8);
-}
-
-void draw_fiducials(Drawing& drawing, const ViewResult& view, int height) {
-  const auto& calibrated = view.calibrated;
-  double largest = 0;
-  for (const Fiducial& fiducial : view.found->fiducials)
-    if (fiducial.status == FiducialStatus::used) largest = std::max(largest, fiducial.residual_px);
+void draw_balls(Drawing& drawing, const ViewMarks& marks, int height) {
+  const double largest = largest_residual(marks);
   const double magnification = largest > 0 ? round_below(60 * drawing.unit() / largest) : 1;
-  for (const Fiducial& fiducial : view.found->fiducials) {
-    const bool used = fiducial.status == FiducialStatus::used;
-    if (!used && fiducial.status != FiducialStatus::rejected) continue;
-    drawing.circle(used ? "ball" : "ball lost", fiducial.uv, 15);
-    drawing.text("label", fiducial.uv + drawing.unit() * Pixel(18, -10), fiducial.label);
-    if (used && calibrated) {
-      const Pixel residual = fiducial.uv - calibrated->view.project(fiducial.centre_in_calibrator);
-      drawing.arrow("residual", fiducial.uv, fiducial.uv + magnification * residual);
-    }
+  for (const BallMark& ball : marks.balls) {
+    drawing.circle(ball.used ? "ball" : "ball lost", ball.place, 15);
+    drawing.text("label", ball.place + drawing.unit() * Pixel(18, -10), ball.label);
+    if (ball.used && ball.residual)
+      drawing.arrow("residual", ball.place, ball.place + magnification * *ball.residual);
   }
-  if (calibrated && largest > 0)
-    scale_bar(drawing, height, round_below(largest), magnification, "residuals:");
+  if (largest > 0) scale_bar(drawing, height, round_below(largest), magnification, "residuals:");
 }
 
-void draw_points(Drawing& drawing, const Result& result, std::size_t view) {
-  for (const PointResult& point : result.points)
-    if (const auto& seen = point.seen[view]) {
-      drawing.cross("point", seen->uv, 7);
-      drawing.text("label point-text", seen->uv + drawing.unit() * Pixel(11, 16), point.name);
-    }
+void draw_points(Drawing& drawing, const ViewMarks& marks) {
+  for (const PointMark& point : marks.points) {
+    drawing.cross("point", point.place, 7);
+    drawing.text("label point-text", point.place + drawing.unit() * Pixel(11, 16), point.name);
+  }
 }
 
-void draw_lines(Drawing& drawing, const Result& result, std::size_t view) {
-  const View& projection = result.views[view].calibrated->view;
-  for (const auto& [start, end] : result.tunnel_ends)
-    if (result.points[start].seen[view] && result.points[end].seen[view])
-      drawing.line("planned", result.points[start].seen[view]->uv, result.points[end].seen[view]->uv);
-  for (const ToolLine& tool : result.tool_lines) {
-    if (projection.depth(tool.p1_in_calibrator) < 1 || projection.depth(tool.p2_in_calibrator) < 1) continue;
-    const Pixel a = projection.project(tool.p1_in_calibrator);
-    const Pixel b = projection.project(tool.p2_in_calibrator);
-    drawing.line("tool", a - 3 * (b - a), b + 3 * (b - a));
-  }
+void draw_lines(Drawing& drawing, const ViewMarks& marks) {
+  for (const PixelPath& tunnel : marks.tunnels) drawing.line("planned", tunnel.front(), tunnel.back());
+  for (const PixelPath& tool : marks.tool_lines) drawing.line("tool", tool.front(), tool.back());
 }
 
 }  // namespace
@@ -138,10 +114,11 @@ std::string view_figure(const Result& result, std::size_t index) {
   Drawing drawing(unit_of(view));
   drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)",
               picture.width(), picture.height(), base64(encode_png(picture)));
-  if (view.rectification) draw_dots(drawing, view);
-  if (view.found) draw_fiducials(drawing, view, picture.height());
-  draw_points(drawing, result, index);
-  if (view.calibrated) draw_lines(drawing, result, index);
+  const ViewMarks marks = marks_of(result, index);
+  draw_dots(drawing, marks);
+  draw_balls(drawing, marks, picture.height());
+  draw_points(drawing, marks);
+  draw_lines(drawing, marks);
   return drawing.svg("X-ray " + view.name, picture.width(), picture.height());
 }
 

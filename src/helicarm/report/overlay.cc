@@ -9,6 +9,7 @@
 
 #include "helicarm/image/opencv.h"
 #include "helicarm/image/png.h"
+#include "helicarm/report/marks.h"
 #include "helicarm/report/picture.h"
 
 namespace helicarm {
@@ -55,45 +56,23 @@ class Canvas {
   double scale_;
 };
 
-void draw_lines(Canvas& canvas, const Result& result, std::size_t index) {
-  for (const auto& [start, end] : result.tunnel_ends)
-    if (result.points[start].seen[index] && result.points[end].seen[index])
-      canvas.line(result.points[start].seen[index]->uv, result.points[end].seen[index]->uv, yellow);
-  const View& view = result.views[index].calibrated->view;
-  for (const ToolLine& tool : result.tool_lines) {
-    if (view.depth(tool.p1_in_calibrator) < 1 || view.depth(tool.p2_in_calibrator) < 1) continue;
-    const Eigen::Vector2d a = view.project(tool.p1_in_calibrator);
-    const Eigen::Vector2d b = view.project(tool.p2_in_calibrator);
-    canvas.line(a - 3 * (b - a), b + 3 * (b - a), crimson);
-  }
-}
-
 }  // namespace
 
 std::string overlay_png(const Result& result, std::size_t index, std::span<const Eigen::Vector2d> path) {
-  const ViewResult& view = result.views[index];
-  Canvas canvas(rectified_picture(view));
-  if (view.rectification) {
-    const DistortionMap& map = view.rectification->map;
-    for (const Dot& dot : view.rectification->plate_dots)
-      if (const auto at = map.rectified_from_raw(dot.centre_px)) canvas.circle(*at, 9, blue);
-    if (view.found)
-      for (const Dot& blob : view.found->false_blobs)
-        if (const auto at = map.rectified_from_raw(blob.centre_px)) canvas.cross(*at, 8, red);
+  Canvas canvas(rectified_picture(result.views[index]));
+  const ViewMarks marks = marks_of(result, index);
+  for (const DotMark& dot : marks.plate_dots) canvas.circle(dot.place, 9, blue);
+  for (const DotMark& blob : marks.false_blobs) canvas.cross(blob.place, 8, red);
+  for (const BallMark& ball : marks.balls) {
+    canvas.circle(ball.place, 15, ball.used ? green : red);
+    canvas.text(ball.place, ball.label, ball.used ? green : red);
   }
-  if (view.found)
-    for (const Fiducial& fiducial : view.found->fiducials) {
-      const bool used = fiducial.status == FiducialStatus::used;
-      if (!used && fiducial.status != FiducialStatus::rejected) continue;
-      canvas.circle(fiducial.uv, 15, used ? green : red);
-      canvas.text(fiducial.uv, fiducial.label, used ? green : red);
-    }
-  for (const PointResult& point : result.points)
-    if (const auto& seen = point.seen[index]) {
-      canvas.cross(seen->uv, 7, violet);
-      canvas.text(seen->uv, point.name, violet);
-    }
-  if (view.calibrated) draw_lines(canvas, result, index);
+  for (const PointMark& point : marks.points) {
+    canvas.cross(point.place, 7, violet);
+    canvas.text(point.place, point.name, violet);
+  }
+  for (const PixelPath& tunnel : marks.tunnels) canvas.line(tunnel.front(), tunnel.back(), yellow);
+  for (const PixelPath& tool : marks.tool_lines) canvas.line(tool.front(), tool.back(), crimson);
   for (std::size_t i = 1; i < path.size(); ++i) canvas.line(path[i - 1], path[i], orange);
   return canvas.png();
 }

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/raw_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+/// Between places so near each other the distortion bends a line by less than a tenth of a pixel.
+constexpr double step_px = 16;
+
+/// The part of a line, as shares from 0 to 1, within half a picture of the picture: no map reaches farther.
+std::pair<double, double> part_near(const DistortionMap& map, const Vector2d& from, const Vector2d& to) {
+  const Vector2d size(map.width, map.height);
+  std::pair<double, double> part{0, 1};
+  for (int axis = 0; axis < 2; ++axis) {
+    const double low = -0.5 * size[axis] - from[axis], high = 1.5 * size[axis] - from[axis];
+    const double way = to[axis] - from[axis];
+    if (way == 0 && (low > 0 || high < 0)) return {1, 0};
+    if (way == 0) continue;
+    part.first = std::max(part.first, std::min(low / way, high / way));
+    part.second = std::min(part.second, std::max(low / way, high / way));
+  }
+  return part;
+}
+
+}  // namespace
+
+std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Vector2d> rectified) {
+  std::vector<PixelPath> paths(1);
+  const auto cut = [&] {
+    if (!paths.back().empty()) paths.emplace_back();
+  };
+  const auto add = [&](const Vector2d& place) {
+    if (const auto raw = raw_in_picture(map, place))
+      paths.back().push_back(*raw);
+    else
+      cut();
+  };
+  for (std::size_t i = 1; i < rectified.size(); ++i) {
+    const Vector2d way = rectified[i] - rectified[i - 1];
+    const auto [first, last] = part_near(map, rectified[i - 1], rectified[i]);
+    if (!(first <= last)) {
+      cut();
+      continue;
+    }
+    const int steps = std::max(1, static_cast<int>(std::ceil((last - first) * way.norm() / step_px)));
+    const bool goes_on = i > 1 && first == 0;
+    if (!goes_on) cut();
+    for (int k = goes_on ? 1 : 0; k <= steps; ++k)
+      add(rectified[i - 1] + (first + (last - first) * k / steps) * way);
+    if (last < 1) cut();
+  }
+  std::erase_if(paths, [](const PixelPath& path) { return path.size() < 2; });
+  return paths;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "helicarm/rectification/distortion_map.h"
+
+namespace helicarm {
+
+/// A chain of straight pieces through pixels.
+using PixelPath = std::vector<Eigen::Vector2d>;
+
+/// How a path in rectified pixels runs through the raw picture: bent by the distortion, and cut where it
+/// leaves the picture or the map folds.
+std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Eigen::Vector2d> rectified);
+
+}  // namespace helicarm

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/marks.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "helicarm/verification/picture_line.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+
+std::vector<DotMark> rectified_dots(const DistortionMap& map, const std::vector<Dot>& dots) {
+  std::vector<DotMark> marks;
+  for (const Dot& dot : dots)
+    if (const auto at = map.rectified_from_raw(dot.centre_px)) marks.push_back({*at, dot.radius_px});
+  return marks;
+}
+
+std::vector<BallMark> balls_of(const ViewResult& view) {
+  std::vector<BallMark> marks;
+  for (const Fiducial& fiducial : view.found->fiducials) {
+    const bool used = fiducial.status == FiducialStatus::used;
+    if (!used && fiducial.status != FiducialStatus::rejected) continue;
+    BallMark ball{fiducial.label, fiducial.uv, used, fiducial.sigma_px};
+    if (view.calibrated)
+      ball.residual = fiducial.uv - view.calibrated->view.project(fiducial.centre_in_calibrator);
+    marks.push_back(std::move(ball));
+  }
+  return marks;
+}
+
+std::vector<PointMark> points_of(const Result& result, std::size_t view) {
+  std::vector<PointMark> marks;
+  for (const PointResult& point : result.points)
+    if (const auto& seen = point.seen[view]) {
+      PointMark mark{point.name, seen->uv, point.source};
+      if (point.place) mark.error_95_mm = length_at_95(point.place->covariance_in_calibrator);
+      if (point.reason) mark.reason = point.reason->message;
+      marks.push_back(std::move(mark));
+    }
+  return marks;
+}
+
+void add_lines(ViewMarks& marks, const Result& result, std::size_t view) {
+  for (const auto& [start, end] : result.tunnel_ends) {
+    const auto &from = result.points[start].seen[view], &to = result.points[end].seen[view];
+    if (from && to) marks.tunnels.push_back({from->uv, to->uv});
+  }
+  for (const ToolLine& tool : result.tool_lines)
+    if (const auto line = line_in_xray(result.views[view].calibrated->view, tool)) {
+      const Vector2d beyond = 3 * (line->tip - line->back);
+      marks.tool_lines.push_back({line->back - beyond, line->tip + beyond});
+    }
+}
+
+template <class Mark>
+void carry(std::vector<Mark>& marks, const DistortionMap& map) {
+  for (Mark& mark : marks) mark.place = map.raw_from_rectified(mark.place);
+}
+
+std::vector<PixelPath> carried(const std::vector<PixelPath>& paths, const DistortionMap& map) {
+  std::vector<PixelPath> raw;
+  for (const PixelPath& path : paths) std::ranges::move(raw_paths(map, path), std::back_inserter(raw));
+  return raw;
+}
+
+}  // namespace
+
+ViewMarks marks_of(const Result& result, std::size_t index) {
+  const ViewResult& view = result.views[index];
+  ViewMarks marks;
+  if (view.rectification)
+    marks.plate_dots = rectified_dots(view.rectification->map, view.rectification->plate_dots);
+  if (view.rectification && view.found)
+    marks.false_blobs = rectified_dots(view.rectification->map, view.found->false_blobs);
+  if (view.found) marks.balls = balls_of(view);
+  marks.points = points_of(result, index);
+  if (view.calibrated) add_lines(marks, result, index);
+  return marks;
+}
+
+ViewMarks raw_marks(const ViewMarks& rectified, const DistortionMap& map) {
+  ViewMarks raw = rectified;
+  for (BallMark& ball : raw.balls)
+    if (ball.residual)
+      ball.residual =
+          map.raw_from_rectified(ball.place) - map.raw_from_rectified(ball.place - *ball.residual);
+  carry(raw.balls, map);
+  carry(raw.plate_dots, map);
+  carry(raw.false_blobs, map);
+  carry(raw.points, map);
+  raw.tunnels = carried(rectified.tunnels, map);
+  raw.tool_lines = carried(rectified.tool_lines, map);
+  return raw;
+}
+
+double largest_residual(const ViewMarks& marks) {
+  double largest = 0;
+  for (const BallMark& ball : marks.balls)
+    if (ball.used && ball.residual) largest = std::max(largest, ball.residual->norm());
+  return largest;
+}
+
+}  // namespace helicarm
