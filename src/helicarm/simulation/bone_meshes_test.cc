@@ -28,7 +28,7 @@ TEST(BoneMeshes, HoldTheVolumesOfTheBones) {
 }
 
 TEST(BoneMeshes, CoarseOnesAreSmall) {
-  const BoneMeshes bones = bone_meshes(5);
+  const BoneMeshes bones = bone_meshes(6);
   EXPECT_LT(bones.femur.triangles.size() + bones.tibia.triangles.size(), 20000u);
   EXPECT_GT(bones.femur.triangles.size(), 1000u);
 }
