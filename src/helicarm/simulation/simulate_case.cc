@@ -189,6 +189,7 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
   patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
   const RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
+  if (options.knee) room.calibrator_from_knee = calibrator_from_knee;
 
   const double plate_height = room.plate ? *room.plate->height_above_receiver_mm : 0;
   const std::vector<Shot> shots = take_stand(options, plate_height, calibrator_from_patient);

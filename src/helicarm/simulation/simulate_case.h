@@ -41,7 +41,8 @@ struct SimulatedCase {
   std::optional<Plate> plate;
   std::vector<SimulatedView> views;
   std::optional<NavigationTruth> navigation;
-  std::optional<RigidTransform> calibrator_from_ct;  ///< the CT's patient frame (L, P, S)
+  std::optional<RigidTransform> calibrator_from_knee;  ///< of knee_body; nothing without a knee
+  std::optional<RigidTransform> calibrator_from_ct;    ///< the CT's patient frame (L, P, S)
 };
 
 /// A whole case from its options: the same bytes for the same seed. Refuses (bad_value) an unknown size,

@@ -284,5 +284,15 @@ TEST(SimulateCase, UnknownSizeDepthAndBallAreRefusedByName) {
   EXPECT_THAT(simulate_case(options).error().message, testing::HasSubstr("P99"));
 }
 
+TEST(SimulateCase, KneeLiesWhereTheTunnelsAre) {
+  SimulationOptions options = small(CaseKind::tunnels);
+  EXPECT_FALSE(simulate_case(options)->calibrator_from_knee);
+  options.knee = true;
+  const SimulatedCase simulated = *simulate_case(options);
+  ASSERT_TRUE(simulated.calibrator_from_knee);
+  const Eigen::Vector3d start = *simulated.calibrator_from_knee * femoral_tunnel().start;
+  EXPECT_LT((start - simulated.navigation->points[0].in_calibrator).norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace helicarm::simulation

@@ -133,6 +133,35 @@ Solid moved(const Solid& solid, const RigidTransform& a_from_b) {
                 a_from_b * solid.world_from_unit.translation(), solid.taper);
 }
 
+double signed_distance(const Solid& solid, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d u = solid.unit_from_world * point;
+  const Eigen::Matrix3d unit_by_world = solid.unit_from_world.linear();
+  const auto to_wall = [&](double value, const Eigen::RowVector3d& by_unit) {
+    return value / (by_unit * unit_by_world).norm();
+  };
+  switch (solid.kind) {
+    case Solid::Kind::ball: {
+      // In the middle every direction is as good as another.
+      const Eigen::Vector3d out = u.norm() > 1e-12 ? u.normalized() : Eigen::Vector3d::UnitX();
+      return to_wall(u.norm() - 1, out.transpose());
+    }
+    case Solid::Kind::frustum: {
+      const double k = solid.taper - 1, radius = u.head<2>().norm();
+      const Eigen::Vector2d out =
+          radius > 1e-12 ? Eigen::Vector2d(u.head<2>() / radius) : Eigen::Vector2d::UnitX();
+      return std::max({to_wall(radius - 1 - k * u.z(), {out.x(), out.y(), -k}), to_wall(-u.z(), {0, 0, -1}),
+                       to_wall(u.z() - 1, {0, 0, 1})});
+    }
+    case Solid::Kind::box: {
+      double most = -infinity;
+      for (int axis = 0; axis < 3; ++axis)
+        most = std::max(most, to_wall(std::abs(u[axis]) - 1, Eigen::RowVector3d::Unit(axis)));
+      return most;
+    }
+  }
+  return infinity;
+}
+
 double union_length(const std::vector<Solid>& solids, const Eigen::Vector3d& source,
                     const Eigen::Vector3d& direction) {
   if (solids.size() == 1) {

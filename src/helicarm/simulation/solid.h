@@ -48,6 +48,9 @@ Solid box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_sides,
 
 Solid moved(const Solid& solid, const RigidTransform& a_from_b);
 
+/// mm, negative inside; zero exactly at the surface, elsewhere to first order in the distance.
+double signed_distance(const Solid& solid, const Eigen::Vector3d& point);
+
 /// Length (in t) of the ray inside any of the solids: where they overlap it counts once.
 double union_length(const std::vector<Solid>& solids, const Eigen::Vector3d& source,
                     const Eigen::Vector3d& direction);

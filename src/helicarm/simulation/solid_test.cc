@@ -86,5 +86,37 @@ TEST(Solid, MovingSolidAndRayTogetherChangesNothing) {
               chord(cone, source, direction), 1e-9);
 }
 
+TEST(Solid, SignedDistanceIsThatOfABallAndOfABoxAndOfAConesWall) {
+  EXPECT_NEAR(signed_distance(sphere({3, -2, 5}, 4), {3, 5, 5}), 3, 1e-12);
+  EXPECT_NEAR(signed_distance(sphere({3, -2, 5}, 4), {3, -2, 5}), -4, 1e-12);
+  EXPECT_NEAR(signed_distance(box({0, 0, 0}, {1, 2, 3}), {0, 1.5, 0}), -0.5, 1e-12);
+  const Solid cone = frustum({0, 0, 0}, {0, 0, 80}, 60, 30);
+  EXPECT_NEAR(signed_distance(cone, {0, 55, 40}), 10 / std::hypot(1, 30.0 / 80), 1e-12);
+  EXPECT_NEAR(signed_distance(cone, {1, 0, 83}), 3, 1e-12);
+}
+
+TEST(Solid, SignedDistanceIsNegativeExactlyWhereARayIsInside) {
+  RandomStream random(3, 1);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  for (const Solid& solid :
+       {ellipsoid({4, 0, 2}, {12, 30, 21}, turn), flat_frustum({0, 5, 0}, {20, 0, 40}, 25, 9, {0, 0, 1}, 0.6),
+        box({1, 2, 3}, {20, 10, 15}, turn)})
+    for (int trial = 0; trial < 500; ++trial) {
+      const Vector3d point =
+          60 * Vector3d(random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.3);
+      const Interval part = solid.intersect(point, Vector3d(1, 0.2, -0.3));
+      const bool inside = part.enter < 0 && part.leave > 0;
+      EXPECT_EQ(signed_distance(solid, point) < 0, inside) << point.transpose();
+    }
+}
+
+TEST(Solid, SignedDistanceGrowsByAMillimetrePerMillimetreAtTheSurface) {
+  const Solid egg = ellipsoid({0, 0, 0}, {12, 30, 21});
+  const Vector3d on = Vector3d(12 * 0.6, 0, 21 * 0.8);
+  const Vector3d normal = Vector3d(0.6 / 12, 0, 0.8 / 21).normalized();
+  EXPECT_NEAR(signed_distance(egg, on), 0, 1e-12);
+  EXPECT_NEAR(signed_distance(egg, on + 0.1 * normal), 0.1, 0.001);
+}
+
 }  // namespace
 }  // namespace helicarm::simulation

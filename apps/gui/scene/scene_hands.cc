@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// How SceneView is looked around in: presets, mouse and keys.
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QWheelEvent>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "gui/scene/scene_view.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr double turn_per_pixel = 0.008, zoom_per_pixel = 1.008;
+constexpr double turn_per_key = 0.09, zoom_per_key = 1.15;
+
+}  // namespace
+
+const ViewShape* SceneView::view_of(Preset preset) const {
+  if (preset == Preset::free) return nullptr;
+  const QString start = preset == Preset::ap ? QStringLiteral("ap") : QStringLiteral("lat");
+  for (const ViewShape& view : scene_.views)
+    if (QString::fromStdString(view.name).startsWith(start, Qt::CaseInsensitive)) return &view;
+  const std::size_t number = preset == Preset::ap ? 0 : 1;
+  return number < scene_.views.size() ? &scene_.views[number] : nullptr;
+}
+
+SceneCamera SceneView::camera_of(Preset preset) const {
+  if (const ViewShape* view = view_of(preset)) return camera_through(*view, middle_, aspect());
+  std::vector<Eigen::Vector3d> places;
+  for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
+  for (const ViewShape& view : scene_.views) {
+    places.push_back(view.central_ray.from);
+    places.insert(places.end(), view.detector.begin(), view.detector.end());
+  }
+  if (live_.calibrator_from_base && live_.joints) places.push_back(live_.calibrator_from_base->translation);
+  return overview_of(places, aspect());
+}
+
+void SceneView::set_preset(Preset preset) {
+  const bool fresh = preset != preset_;
+  preset_ = preset;
+  moved_ = false;
+  camera_ = camera_of(preset);
+  update();
+  if (fresh) emit preset_changed(preset);
+}
+
+void SceneView::move_camera(const SceneCamera& camera) {
+  camera_ = camera;
+  moved_ = true;
+  update();
+  if (std::exchange(preset_, Preset::free) != Preset::free) emit preset_changed(Preset::free);
+}
+
+void SceneView::mousePressEvent(QMouseEvent* event) { mouse_ = event->position(); }
+
+void SceneView::mouseMoveEvent(QMouseEvent* event) {
+  const QPointF way = event->position() - mouse_;
+  mouse_ = event->position();
+  if (event->buttons() & Qt::LeftButton)
+    move_camera(turned(camera_, turn_per_pixel * way.x(), -turn_per_pixel * way.y()));
+  else if (event->buttons() & Qt::RightButton)
+    move_camera(zoomed(camera_, std::pow(zoom_per_pixel, -way.y())));
+  else if (event->buttons() & Qt::MiddleButton)
+    move_camera(shifted(camera_, way.x() / std::max(1, height()), -way.y() / std::max(1, height())));
+}
+
+void SceneView::wheelEvent(QWheelEvent* event) {
+  constexpr double notch = 120;  // eighths of a degree
+  move_camera(zoomed(camera_, std::pow(zoom_per_key, event->angleDelta().y() / notch)));
+  event->accept();
+}
+
+void SceneView::keyPressEvent(QKeyEvent* event) {
+  switch (event->key()) {
+    case Qt::Key_1:
+      return set_preset(Preset::ap);
+    case Qt::Key_2:
+      return set_preset(Preset::lateral);
+    case Qt::Key_3:
+      return set_preset(Preset::free);
+    case Qt::Key_R:
+      return set_preset(preset_);
+    case Qt::Key_Left:
+      return move_camera(turned(camera_, -turn_per_key, 0));
+    case Qt::Key_Right:
+      return move_camera(turned(camera_, turn_per_key, 0));
+    case Qt::Key_Up:
+      return move_camera(turned(camera_, 0, turn_per_key));
+    case Qt::Key_Down:
+      return move_camera(turned(camera_, 0, -turn_per_key));
+    case Qt::Key_Plus:
+    case Qt::Key_Equal:
+      return move_camera(zoomed(camera_, zoom_per_key));
+    case Qt::Key_Minus:
+      return move_camera(zoomed(camera_, 1 / zoom_per_key));
+    default:
+      QOpenGLWidget::keyPressEvent(event);
+  }
+}
+
+}  // namespace helicarm::gui

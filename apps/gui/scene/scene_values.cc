@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/scene/scene_values.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Eigenvalues>
+
+#include "helicarm/geometry/ray.h"
+#include "helicarm/simulation/calibrator_body.h"
+
+namespace helicarm::gui {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Where no pixel size tells the focal length, the picture is drawn this much farther than the calibrator.
+constexpr double beyond_calibrator = 1.5;
+
+double detector_depth(const ViewResult& view, const Vector3d& middle) {
+  const View& calibrated = view.calibrated->view;
+  std::optional<double> pixel_mm;
+  if (view.rectification && view.rectification->map.rectified_plane == RectifiedPlane::detector)
+    pixel_mm = view.rectification->map.rectified_pixel_mm;
+  if (!pixel_mm && view.exposure && view.exposure->acquisition.pixel_mm)
+    pixel_mm = view.exposure->acquisition.pixel_mm->y();
+  return pixel_mm ? calibrated.intrinsics.fy * *pixel_mm : beyond_calibrator * calibrated.depth(middle);
+}
+
+Vector3d on_detector(const ViewShape& shape, const Vector2d& pixel) {
+  const Ray ray = ray_through(shape.view, pixel);
+  const Vector3d along = shape.central_ray.to - shape.central_ray.from;
+  return ray.origin + ray.direction * (along.squaredNorm() / ray.direction.dot(along));
+}
+
+ViewShape shape_of(const ViewResult& view, const Vector3d& middle) {
+  const View& calibrated = view.calibrated->view;
+  ViewShape shape{view.name, calibrated, {1024, 1024}, {}, {}};
+  if (view.exposure) shape.size_px = {view.exposure->pixels.width(), view.exposure->pixels.height()};
+  const Vector3d source = calibrated.source_in_world();
+  const Vector3d beam = calibrated.camera_from_world.rotation.row(2).transpose();
+  shape.central_ray = {source, source + detector_depth(view, middle) * beam};
+  const Vector2d last = shape.size_px.array() - 0.5;
+  const std::array<Vector2d, 4> corners{
+      {{-0.5, -0.5}, {last.x(), -0.5}, {last.x(), last.y()}, {-0.5, last.y()}}};
+  for (std::size_t i = 0; i < 4; ++i) shape.detector[i] = on_detector(shape, corners[i]);
+  return shape;
+}
+
+PointShape shape_of(const PointResult& point, const Result& result, const std::vector<ViewShape>& views) {
+  PointShape shape{point.name, point.source, point.moves_with, {}, {}};
+  shape.error = ellipsoid_95(point.place->in_calibrator, point.place->covariance_in_calibrator);
+  std::size_t calibrated = 0;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    if (!result.views[i].calibrated) continue;
+    const ViewShape& view = views[calibrated++];
+    if (i < point.seen.size() && point.seen[i])
+      shape.rays.push_back({view.central_ray.from, on_detector(view, point.seen[i]->uv)});
+  }
+  return shape;
+}
+
+}  // namespace
+
+Ellipsoid ellipsoid_95(const Vector3d& centre, const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  Eigen::Matrix3d axes = solver.eigenvectors();
+  if (axes.determinant() < 0) axes.col(0) *= -1;
+  return {centre, axes, (chi2_95 * solver.eigenvalues().cwiseMax(0)).cwiseSqrt()};
+}
+
+std::optional<TriangleMesh> cone_of(const Calibrator& calibrator) {
+  constexpr unsigned sides = 48;
+  constexpr double off_wall_mm = 5;
+  const simulation::ConeWall wall = simulation::cone_wall(calibrator);
+  if (!(wall.radius_at(wall.bottom_mm) > 0 && wall.radius_at(wall.top_mm) > 0)) return {};
+  for (const CalibratorBall& ball : calibrator.balls) {
+    const Vector3d& at = ball.centre_in_calibrator;
+    if (std::abs(at.head<2>().norm() - wall.radius_at(at.z())) > off_wall_mm) return {};
+  }
+  TriangleMesh mesh;
+  for (unsigned i = 0; i < sides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / sides;
+    for (const double z : {wall.bottom_mm, wall.top_mm})
+      mesh.corners.push_back({wall.radius_at(z) * std::cos(angle), wall.radius_at(z) * std::sin(angle), z});
+    const unsigned low = 2 * i, high = low + 1, next = 2 * ((i + 1) % sides);
+    mesh.triangles.push_back({low, next, high});
+    mesh.triangles.push_back({high, next, next + 1});
+  }
+  return mesh;
+}
+
+ResultScene scene_of(const Result& result, const Calibrator& calibrator) {
+  ResultScene scene{calibrator.balls, cone_of(calibrator), {}, {}, {}};
+  for (const ViewResult& view : result.views)
+    if (view.calibrated) scene.views.push_back(shape_of(view, middle_of(calibrator)));
+  for (const PointResult& point : result.points)
+    if (point.place) scene.points.push_back(shape_of(point, result, scene.views));
+  for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {
+    const PointResult& start = result.points[result.tunnel_ends[i].start];
+    const PointResult& end = result.points[result.tunnel_ends[i].end];
+    if (start.place && end.place)
+      scene.tunnels.push_back({i < result.tunnels.size() ? result.tunnels[i].name : std::string(),
+                               start.moves_with,
+                               {start.place->in_calibrator, end.place->in_calibrator}});
+  }
+  return scene;
+}
+
+std::vector<Segment> robot_links(const LiveScene& live) {
+  const auto model = robot_model(live.robot_model);
+  if (!live.calibrator_from_base || !live.joints || !model) return {};
+  std::vector<Segment> links;
+  Vector3d from = live.calibrator_from_base->translation;
+  for (const RigidTransform& base_from_frame : joint_frames(*model, *live.joints)) {
+    const Vector3d to = *live.calibrator_from_base * base_from_frame.translation;
+    links.push_back({from, to});
+    from = to;
+  }
+  return links;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/scene/scene_values.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "gui/scene/simulated_result_test.h"
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/ray.h"
+
+namespace helicarm::gui {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+TEST(SceneValues, EllipsoidHoldsNineteenOfTwentySamples) {
+  const Matrix3d root = (Matrix3d() << 3, 0, 0, 1, 0.5, 0, -0.4, 0.2, 1).finished();
+  const Vector3d centre(5, -3, 40);
+  const Ellipsoid ellipsoid = ellipsoid_95(centre, root * root.transpose());
+  EXPECT_NEAR(ellipsoid.axes.determinant(), 1, 1e-12);
+  RandomStream random(1, 1);
+  constexpr int trials = 20000;
+  int inside = 0;
+  for (int i = 0; i < trials; ++i) {
+    const Vector3d sample = root * Vector3d(random.normal(), random.normal(), random.normal());
+    inside += (ellipsoid.axes.transpose() * sample).cwiseQuotient(ellipsoid.radii).norm() <= 1;
+  }
+  EXPECT_NEAR(double(inside) / trials, 0.95, 0.006);
+}
+
+TEST(SceneValues, ExactPointHasNoExtent) {
+  EXPECT_EQ(ellipsoid_95({1, 2, 3}, Matrix3d::Zero()).radii, Vector3d::Zero());
+}
+
+double distance_from(const Segment& ray, const Vector3d& point) {
+  return (point - ray.from).cross((ray.to - ray.from).normalized()).norm();
+}
+
+TEST(SceneValues, RaysPassThroughTheirPointsAndEndOnTheDetectors) {
+  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  ASSERT_EQ(scene.views.size(), 2u);
+  ASSERT_EQ(scene.points.size(), 4u);
+  for (const PointShape& point : scene.points) {
+    ASSERT_EQ(point.rays.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LT(distance_from(point.rays[i], point.error.centre), 0.5) << point.name;
+      const ViewShape& view = scene.views[i];
+      const Vector3d across =
+          (view.detector[1] - view.detector[0]).cross(view.detector[3] - view.detector[0]);
+      EXPECT_NEAR(across.normalized().dot(point.rays[i].to - view.detector[0]), 0, 1e-6);
+    }
+  }
+}
+
+TEST(SceneValues, DetectorIsAsLargeAndAsFarAsTheSimulatedOne) {
+  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const simulation::Shot& shot = simulated().truth.views[i].shot;
+    const ViewShape& view = scene.views[i];
+    EXPECT_NEAR((view.central_ray.to - view.central_ray.from).norm(),
+                shot.view.intrinsics.fy * shot.pixel_mm(), 15);
+    EXPECT_NEAR((view.detector[1] - view.detector[0]).norm(), 512 * shot.pixel_mm(), 4);
+    EXPECT_LT((view.central_ray.from - shot.view.source_in_world()).norm(), 15);
+  }
+}
+
+TEST(SceneValues, TunnelsRunBetweenTheirPoints) {
+  const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
+  ASSERT_EQ(scene.tunnels.size(), 2u);
+  EXPECT_EQ(scene.tunnels[0].axis.from, scene.points[0].error.centre);
+  EXPECT_EQ(scene.tunnels[0].axis.to, scene.points[1].error.centre);
+}
+
+TEST(SceneValues, RefusedResultShowsTheCalibratorAlone) {
+  const ResultScene scene = scene_of({}, udcsc());
+  EXPECT_EQ(scene.balls.size(), 12u);
+  EXPECT_TRUE(scene.views.empty());
+  EXPECT_TRUE(scene.points.empty());
+}
+
+TEST(SceneValues, ConeIsDrawnOnlyUnderBallsOfACone) {
+  Calibrator calibrator = udcsc();
+  const auto cone = cone_of(calibrator);
+  ASSERT_TRUE(cone);
+  for (const auto& [a, b, c] : cone->triangles) {  // outside is outside
+    const Vector3d normal = (cone->corners[b] - cone->corners[a]).cross(cone->corners[c] - cone->corners[a]);
+    EXPECT_GT(normal.head<2>().dot(cone->corners[a].head<2>()), 0);
+  }
+  calibrator.balls[3].centre_in_calibrator.head<2>() *= 0.4;
+  EXPECT_FALSE(cone_of(calibrator));
+}
+
+TEST(SceneValues, RobotsLinksEndInItsFlange) {
+  LiveScene live;
+  EXPECT_TRUE(robot_links(live).empty());
+  live.calibrator_from_base = RigidTransform{Matrix3d::Identity(), {60, 520, -160}};
+  live.joints = (Joints() << 0.1, -1.2, 1.4, -0.6, 0.3, 2).finished();
+  const auto links = robot_links(live);
+  ASSERT_EQ(links.size(), 6u);
+  EXPECT_EQ(links.front().from, live.calibrator_from_base->translation);
+  EXPECT_LT((links.back().to - *live.calibrator_from_base * base_from_flange(ur5(), *live.joints).translation)
+                .norm(),
+            1e-9);
+  live.robot_model = "another";
+  EXPECT_TRUE(robot_links(live).empty());
+}
+
+}  // namespace
+}  // namespace helicarm::gui

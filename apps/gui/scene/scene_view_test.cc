@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Needs a display with OpenGL: CTest runs it under Xvfb. HELICARM_SHOTS=folder keeps what it saw.
+#include "gui/scene/scene_view.h"
+
+#include <QApplication>
+#include <QMouseEvent>
+#include <QTest>
+#include <algorithm>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "gui/scene/simulated_result_test.h"
+#include "helicarm/core/random.h"
+
+namespace helicarm::gui {
+namespace {
+
+class ShownScene : public testing::Test {
+ protected:
+  void SetUp() override {
+    view_.resize(420, 420);
+    view_.show();
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(&view_));
+    ASSERT_TRUE(view_.isValid());
+    view_.show_result(simulated().result, simulated().given.calibrator);
+  }
+
+  QImage shot(const char* name) {
+    const QImage image = view_.grabFramebuffer().convertToFormat(QImage::Format_RGB32);
+    if (qEnvironmentVariableIsSet("HELICARM_SHOTS"))
+      image.save(qEnvironmentVariable("HELICARM_SHOTS") + "/" + name + ".png");
+    return image;
+  }
+
+  static LiveScene live() {
+    LiveScene live;
+    const auto& points = simulated().truth.navigation->points;
+    const Eigen::Vector3d end = points[1].in_calibrator, start = points[0].in_calibrator;
+    const Eigen::Matrix3d turn =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), end - start).toRotationMatrix();
+    live.calibrator_from_tip = RigidTransform{turn, start};
+    live.calibrator_from_base =
+        RigidTransform{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(), {60, 520, -160}};
+    const RigidTransform calibrator_from_flange =
+        *live.calibrator_from_tip * RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, -150}};
+    const auto ways = inverse(ur5(), live.calibrator_from_base->inverse() * calibrator_from_flange);
+    live.joints = ways.empty() ? Joints((Joints() << 0, -1.2, 1.5, -1, 0.5, 0).finished()) : ways.front();
+    const Poses& poses = simulated().given.views[0].poses;
+    live.calibrator_from_femur_marker = calibrator_from(Bone::femur, poses);
+    live.calibrator_from_tibia_marker = calibrator_from(Bone::tibia, poses);
+    for (int i = 10; i >= 0; --i) live.path.push_back(start - 12 * i * turn.col(2));
+    return live;
+  }
+
+  static BoneMeshes bones() {
+    return simulation::moved(simulation::bone_meshes(6), *simulated().truth.calibrator_from_knee);
+  }
+
+  static TreVolume tre() {
+    const Result& result = *simulated().result;
+    Calibration calibration{{}, result.joint_covariance};
+    for (const ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
+    TreVolume volume = predict_tre(calibration, {0, 0, 40}, 100, 10, 0.5, 0);
+    volume.rms_mm[std::size_t((10 * 21 + 3) * 21 + 4)] = std::nan("");
+    return volume;
+  }
+
+  SceneView view_;
+};
+
+std::size_t colours_in(const QImage& image) {
+  std::set<QRgb> colours;
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x) colours.insert(image.pixel(x, y));
+  return colours.size();
+}
+
+int pixels_apart(const QImage& a, const QImage& b) {
+  int apart = 0;
+  for (int y = 0; y < a.height(); ++y)
+    for (int x = 0; x < a.width(); ++x) apart += a.pixel(x, y) != b.pixel(x, y);
+  return apart;
+}
+
+TEST_F(ShownScene, EachPresetShowsAnotherPicture) {
+  const QImage overview = shot("overview");
+  EXPECT_GT(colours_in(overview), 50u);
+  view_.set_preset(SceneView::Preset::ap);
+  const QImage ap = shot("ap");
+  view_.set_preset(SceneView::Preset::lateral);
+  const QImage lateral = shot("lateral");
+  EXPECT_GT(pixels_apart(overview, ap), 5000);
+  EXPECT_GT(pixels_apart(ap, lateral), 5000);
+  view_.set_preset(SceneView::Preset::free);
+  EXPECT_EQ(pixels_apart(shot("overview"), overview), 0);
+}
+
+TEST_F(ShownScene, ToolRobotAndBonesMove) {
+  view_.show_bones(bones());
+  LiveScene now = live();
+  view_.set_preset(SceneView::Preset::lateral);
+  const QImage bare = shot("bones_lateral");
+  view_.show_live(now);
+  const QImage with_tool = shot("tool_lateral");
+  EXPECT_GT(pixels_apart(bare, with_tool), 200);
+  now.calibrator_from_tip->translation.x() += 8;
+  view_.show_live(now);
+  EXPECT_GT(pixels_apart(shot("tool_moved"), with_tool), 100);
+  view_.set_preset(SceneView::Preset::free);
+  const QImage still = shot("robot");
+  (*now.joints)[0] += 0.2;
+  view_.show_live(now);
+  const QImage turned = shot("robot_turned");
+  EXPECT_GT(pixels_apart(still, turned), 100);
+  now.calibrator_from_tibia_now = RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
+  view_.show_live(now);
+  EXPECT_GT(pixels_apart(shot("tibia_moved"), turned), 100);
+  view_.show_live({});
+  view_.show_bones({});
+  view_.show_result(nullptr, simulated().given.calibrator);
+  EXPECT_LT(colours_in(shot("empty")), 60u);
+}
+
+TEST_F(ShownScene, TreSliceLiesInThePicture) {
+  view_.show_bones(bones());
+  view_.set_preset(SceneView::Preset::ap);
+  const QImage without = shot("bones_ap");
+  view_.show_tre(tre(), SliceAxis::z, 40);
+  const QImage with = shot("tre_ap");
+  EXPECT_GT(pixels_apart(without, with), 10000);
+  view_.set_preset(SceneView::Preset::free);
+  view_.show_tre(tre(), SliceAxis::x, 0);
+  shot("tre_overview");
+  view_.set_preset(SceneView::Preset::ap);
+  view_.show_tre({}, SliceAxis::z, 40);
+  EXPECT_EQ(pixels_apart(shot("tre_gone"), without), 0);
+}
+
+TEST_F(ShownScene, SurvivesTwoHundredRandomEvents) {
+  view_.show_bones(bones());
+  view_.show_live(live());
+  RandomStream random(1, 1);
+  const auto below = [&](int n) { return int(random.uniform() * n) % n; };
+  const Qt::MouseButton buttons[]{Qt::LeftButton, Qt::RightButton, Qt::MiddleButton};
+  const Qt::Key keys[]{Qt::Key_1,    Qt::Key_2,  Qt::Key_3,    Qt::Key_R,     Qt::Key_Left, Qt::Key_Right,
+                       Qt::Key_Down, Qt::Key_Up, Qt::Key_Plus, Qt::Key_Minus, Qt::Key_X};
+  for (int i = 0; i < 200; ++i) {
+    const QPointF at(below(420), below(420));
+    if (below(3) == 0) {
+      QTest::keyClick(&view_, keys[below(11)]);
+    } else if (below(4) == 0) {
+      QWheelEvent wheel(at, at, {}, {0, below(2) ? 120 : -120}, Qt::NoButton, Qt::NoModifier,
+                        Qt::NoScrollPhase, false);
+      QApplication::sendEvent(&view_, &wheel);
+    } else {
+      const Qt::MouseButton button = buttons[below(3)];
+      QTest::mousePress(&view_, button, Qt::NoModifier, at.toPoint());
+      QMouseEvent way(QEvent::MouseMove, QPointF(below(420), below(420)), QPointF(), button, button, {});
+      QApplication::sendEvent(&view_, &way);
+      QTest::mouseRelease(&view_, button);
+    }
+    if (i % 20 == 0) view_.resize(120 + below(400), 120 + below(400));
+    if (i % 50 == 0) view_.hide(), view_.show();
+    QApplication::processEvents();
+  }
+  EXPECT_TRUE(view_.isValid());
+  QTest::keyClick(&view_, Qt::Key_3);
+  EXPECT_GT(colours_in(shot("after_events")), 50u);
+}
+
+TEST_F(ShownScene, LivesOnInAnotherWindow) {
+  view_.set_preset(SceneView::Preset::ap);
+  const QImage before = shot("before_move");
+  {
+    QWidget window;
+    window.resize(420, 420);
+    view_.setParent(&window);
+    view_.setGeometry(0, 0, 420, 420);
+    view_.show();
+    window.show();
+    ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
+    EXPECT_LT(pixels_apart(shot("after_move"), before), 100);
+    view_.setParent(nullptr);
+  }
+  view_.show();
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&view_));
+  EXPECT_GT(colours_in(shot("after_return")), 50u);
+}
+
+TEST_F(ShownScene, RedrawIsQuick) {
+  view_.show_bones(bones());
+  view_.show_tre(tre(), SliceAxis::z, 40);
+  view_.show_live(live());
+  shot("all");
+  std::vector<double> times;
+  for (int i = 0; i < 100; ++i) {
+    LiveScene now = live();
+    now.calibrator_from_tip->translation.x() += 0.1 * i;
+    view_.show_live(now);
+    view_.repaint();
+    times.push_back(view_.last_render_ms());
+  }
+  std::ranges::sort(times);
+  std::printf("redraw: median %.2f ms, 95 %% %.2f ms\n", times[50], times[95]);
+  EXPECT_LT(times[50], 60);  // a busy machine may be slow; a calm one takes a tenth
+}
+
+}  // namespace
+}  // namespace helicarm::gui
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  QSurfaceFormat::setDefaultFormat(helicarm::gui::SceneView::default_format());
+  QApplication application(argc, argv);
+  return RUN_ALL_TESTS();
+}

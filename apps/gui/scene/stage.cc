@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/scene/stage.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <vtkCamera.h>
+#include <vtkCommand.h>
+#include <vtkMatrix4x4.h>
+#include <vtkOpenGLFramebufferObject.h>
+#include <vtkOpenGLState.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkProperty.h>
+#include <vtk_glew.h>
+
+#include "gui/scene/palette.h"
+
+namespace helicarm::gui {
+namespace {
+
+using Eigen::Vector3d;
+
+void give(vtkActor* actor, const ShapeBuilder& shapes) {
+  vtkPolyDataMapper::SafeDownCast(actor->GetMapper())->SetInputData(shapes.build());
+  actor->SetVisibility(shapes.build()->GetNumberOfCells() > 0);
+}
+
+/// Blended over what was drawn before, front faces only: no sorting, no second pass.
+void make_glass(vtkActor* actor, double opacity) {
+  actor->GetProperty()->SetOpacity(opacity);
+  actor->GetProperty()->BackfaceCullingOn();
+  actor->ForceOpaqueOn();
+}
+
+void add_triad(ShapeBuilder& shapes, double length_mm) {
+  for (int axis = 0; axis < 3; ++axis)
+    shapes.add_tube({Vector3d::Zero(), length_mm * Vector3d::Unit(axis)}, 1, 1,
+                    palette::axes[std::size_t(axis)]);
+}
+
+/// Carries the unit tube along z onto a link.
+RigidTransform along(const Segment& link) {
+  const Vector3d way = link.to - link.from;
+  return {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix(), link.from};
+}
+
+}  // namespace
+
+Stage::Stage() {
+  window_->SetOwnContext(0);
+  window_->SetIsCurrent(true);  // as Stage demands
+  window_->SetSupportsOpenGL(1);
+  window_->SetIsDirect(1);
+  window_->SetMultiSamples(0);
+  window_->SetFrameBlitModeToNoBlit();
+  window_->SetReadyForRendering(true);
+  window_->OpenGLInit();
+  window_->AddRenderer(renderer_);
+  renderer_->SetBackground(palette::background[0] / 255.0, palette::background[1] / 255.0,
+                           palette::background[2] / 255.0);
+  renderer_->SetAutomaticLightCreation(true);
+
+  solids_ = add(true);
+  lines_ = add(false);
+  path_ = add(false);
+  for (vtkActor*& points : points_) points = add(true);
+  tool_ = add(true);
+  for (vtkActor*& marker : markers_) marker = add(true);
+  for (vtkActor*& link : links_) link = add(true);
+  slice_ = add(false);
+  for (vtkActor*& bone : bones_) make_glass(bone = add(true), 0.38);
+  make_glass(cone_ = add(true), 0.16);
+
+  ShapeBuilder tool;
+  tool.add_tube({{0, 0, -150}, {0, 0, -30}}, 9, 9, palette::tool_grip);
+  tool.add_tube({{0, 0, -30}, {0, 0, -8}}, 2.5, 2.5, palette::tool);
+  tool.add_tube({{0, 0, -8}, {0, 0, 0}}, 2.5, 0.2, palette::tool);
+  give(tool_, tool);
+  for (vtkActor* marker : markers_) {
+    ShapeBuilder triad;
+    add_triad(triad, 25);
+    give(marker, triad);
+  }
+  move(tool_, {});
+  for (vtkActor* marker : markers_) move(marker, {});
+  for (vtkActor* link : links_) move(link, {});
+}
+
+Stage::~Stage() {
+  window_->Finalize();
+  window_->SetReadyForRendering(false);
+}
+
+vtkActor* Stage::add(bool lit) {
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetColorModeToDirectScalars();
+  mapper->SetInputData(ShapeBuilder().build());
+  vtkNew<vtkActor> actor;
+  actor->SetMapper(mapper);
+  actor->GetProperty()->SetLighting(lit);
+  actor->GetProperty()->SetAmbient(lit ? 0.25 : 1);
+  actor->GetProperty()->SetDiffuse(lit ? 0.8 : 0);
+  actor->SetVisibility(false);
+  renderer_->AddActor(actor);
+  return actor;
+}
+
+void Stage::move(vtkActor* actor, const std::optional<RigidTransform>& calibrator_from_body) {
+  actor->SetVisibility(calibrator_from_body.has_value());
+  if (!calibrator_from_body) return;
+  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = calibrator_from_body->matrix();
+  vtkNew<vtkMatrix4x4> matrix;
+  matrix->DeepCopy(rows.data());
+  actor->SetUserMatrix(matrix);
+}
+
+void Stage::set_result(const ResultScene& scene, double error_scale) {
+  ShapeBuilder solids, lines, cone;
+  for (const CalibratorBall& ball : scene.balls)
+    solids.add_ball(ball.centre_in_calibrator, ball.diameter_mm / 2, palette::steel);
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const ViewShape& view = scene.views[i];
+    solids.add_ball(view.central_ray.from, 12, palette::of_view(i));
+    lines.add_line(view.detector, palette::of_view(i), true);
+    const Vector3d ray[]{view.central_ray.from, view.central_ray.to};
+    lines.add_line(ray, palette::dim(palette::of_view(i)));
+  }
+  std::array<ShapeBuilder, 3> points;
+  const auto group = [&](const std::optional<Bone>& bone) -> ShapeBuilder& {
+    return points[bone ? (*bone == Bone::femur ? 1 : 2) : 0];
+  };
+  for (const PointShape& point : scene.points) {
+    for (const Segment& ray : point.rays) {
+      const Vector3d ends[]{ray.from, ray.to};
+      lines.add_line(ends, palette::ray);
+    }
+    Ellipsoid drawn = point.error;
+    drawn.radii *= error_scale;
+    group(point.moves_with).add_ellipsoid(drawn, palette::point);
+  }
+  for (const TunnelShape& tunnel : scene.tunnels)
+    group(tunnel.moves_with).add_tube(tunnel.axis, tunnel.radius_mm, tunnel.radius_mm, palette::tunnel);
+  if (scene.body) cone.add_mesh(*scene.body, palette::plastic);
+  give(solids_, solids);
+  give(lines_, lines);
+  give(cone_, cone);
+  for (std::size_t i = 0; i < points.size(); ++i) give(points_[i], points[i]);
+}
+
+void Stage::set_bones(const std::optional<BoneMeshes>& bones) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    ShapeBuilder bone;
+    if (bones) bone.add_mesh(i == 0 ? bones->femur : bones->tibia, palette::bone);
+    give(bones_[i], bone);
+  }
+}
+
+void Stage::set_slice(const std::optional<TreSlice>& slice, const TreScale& scale) {
+  ShapeBuilder shapes;
+  if (slice) shapes.add_slice(*slice, scale);
+  give(slice_, shapes);
+}
+
+void Stage::set_live(const LiveScene& live) {
+  const std::array motions{live.calibrator_from_femur_now, live.calibrator_from_tibia_now};
+  const std::array markers{live.calibrator_from_femur_marker, live.calibrator_from_tibia_marker};
+  const auto filled = [](vtkActor* actor) {
+    return vtkPolyDataMapper::SafeDownCast(actor->GetMapper())->GetInput()->GetNumberOfCells() > 0;
+  };
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (vtkActor* actor : {bones_[i], points_[i + 1]}) {
+      move(actor, motions[i].value_or(RigidTransform()));
+      actor->SetVisibility(filled(actor));
+    }
+    move(markers_[i], markers[i]);
+  }
+  move(tool_, live.calibrator_from_tip);
+
+  std::vector<Segment> links = robot_links(live);
+  if (!links.empty()) {
+    const Vector3d up = live.calibrator_from_base->rotation.col(2);
+    links.push_back({links.front().from - 30 * up, links.front().from + 20 * up});
+  }
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    const bool shown = i < links.size() && (links[i].to - links[i].from).norm() > 1;
+    if (shown && !filled(links_[i])) {  // the arm's lengths never change
+      const double length = (links[i].to - links[i].from).norm();
+      const double radius = i == 6 ? 60 : i < 3 ? 38 : 26;
+      ShapeBuilder link;
+      link.add_tube({Vector3d::Zero(), length * Vector3d::UnitZ()}, radius, radius, palette::robot);
+      link.add_ball(length * Vector3d::UnitZ(), i == 6 ? 1 : 1.15 * radius, palette::joint);
+      give(links_[i], link);
+    }
+    move(links_[i], shown ? std::optional(along(links[i])) : std::nullopt);
+  }
+  if (live.path == shown_path_) return;
+  ShapeBuilder path;
+  path.add_line(live.path, palette::path);
+  give(path_, path);
+  shown_path_ = live.path;
+}
+
+void Stage::render(const SceneCamera& camera, unsigned framebuffer) {
+  vtkCamera* vtk = renderer_->GetActiveCamera();
+  vtk->SetPosition(camera.position.data());
+  vtk->SetFocalPoint(camera.focal_point.data());
+  vtk->SetViewUp(camera.up.data());
+  vtk->SetViewAngle(camera.height_deg);
+  renderer_->ResetCameraClippingRange();
+  vtkOpenGLState* state = window_->GetState();
+  state->Reset();  // Qt has been at work since
+  state->Push();
+  state->vtkglDepthFunc(GL_LEQUAL);
+  window_->Render();
+  state->Pop();
+  const int* size = window_->GetSize();
+  state->vtkglBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
+  state->vtkglViewport(0, 0, size[0], size[1]);
+  state->vtkglScissor(0, 0, size[0], size[1]);
+  window_->BlitDisplayFramebuffer(0, 0, 0, size[0], size[1], 0, 0, size[0], size[1], GL_COLOR_BUFFER_BIT,
+                                  GL_NEAREST);
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include <vtkActor.h>
+#include <vtkGenericOpenGLRenderWindow.h>
+#include <vtkNew.h>
+#include <vtkRenderer.h>
+
+#include "gui/scene/scene_camera.h"
+#include "gui/scene/shape_builder.h"
+#include "helicarm/simulation/bone_meshes.h"
+
+namespace helicarm::gui {
+
+using simulation::BoneMeshes;
+
+/// The scene in VTK's hands. Lives as long as one OpenGL context, which must be current in every call.
+class Stage {
+ public:
+  Stage();
+  ~Stage();
+
+  /// Ellipsoids are drawn `error_scale` times as large as they are.
+  void set_result(const ResultScene& scene, double error_scale);
+  void set_bones(const std::optional<BoneMeshes>& bones);
+  void set_slice(const std::optional<TreSlice>& slice, const TreScale& scale);
+  /// Moves what is there already; only a new path is built.
+  void set_live(const LiveScene& live);
+
+  void resize(int width, int height) { window_->SetSize(width, height); }
+  /// Draws into the framebuffer of this number.
+  void render(const SceneCamera& camera, unsigned framebuffer);
+
+ private:
+  vtkActor* add(bool lit);
+  void move(vtkActor* actor, const std::optional<RigidTransform>& calibrator_from_body);
+
+  vtkNew<vtkGenericOpenGLRenderWindow> window_;
+  vtkNew<vtkRenderer> renderer_;
+  vtkActor *solids_, *lines_, *slice_, *tool_, *path_;
+  std::array<vtkActor*, 3> points_;  ///< at rest, with the femur, with the tibia
+  std::array<vtkActor*, 2> markers_;
+  std::array<vtkActor*, 7> links_;  ///< the last is the base's foot
+  std::array<vtkActor*, 2> bones_;
+  vtkActor* cone_;
+  std::vector<Eigen::Vector3d> shown_path_;
+};
+
+}  // namespace helicarm::gui
