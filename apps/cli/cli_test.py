@@ -167,6 +167,37 @@ class CommandLine(unittest.TestCase):
         for name in ("report.html", "AP_overlay.png", "LAT_overlay.png"):
             self.assertTrue((self.root / "out" / name).stat().st_size > 1000, name)
 
+    def test_export_writes_what_other_programs_read(self):
+        out = self.root / "exported"
+        done = run("export", self.root / "case", "--out", out, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        names = ["AP_matrix.txt", "AP_mayacam.txt", "LAT_matrix.txt", "LAT_mayacam.txt", "dlt.csv", "points.csv",
+                 "points.mrk.json"]
+        self.assertEqual(sorted(path.name for path in out.iterdir()), names)
+        self.assertEqual(json.loads(done.stdout)["written"], [str(out / name) for name in names])
+        back = [json.loads(run("import", out / f"AP_{kind}.txt", "--json").stdout) for kind in ("mayacam", "matrix")]
+        self.assertEqual(back[0]["image_size"], [512, 512])
+        for row, other in zip(back[0]["projection"], back[1]["projection"]):
+            for a, b in zip(row, other):
+                self.assertAlmostEqual(a, b, delta=1e-6 * max(1, abs(a)))
+        self.assertEqual({len(line.split(",")) for line in (out / "dlt.csv").read_text().splitlines()}, {2})
+        some = self.root / "some"
+        self.assertEqual(run("export", self.root / "case", "--out", some, "--as", "csv,dlt").returncode, 0)
+        self.assertEqual(sorted(path.name for path in some.iterdir()), ["dlt.csv", "points.csv"])
+
+    def test_export_refuses_as_the_measurement_does(self):
+        out = self.root / "not-exported"
+        done = run("export", self.root / "case", "--out", out, "--max-error", 0.0001)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("uncertain", done.stderr)
+        self.assertFalse(out.exists())
+        done = run("export", self.root / "case", "--as", "csv,stl", "--out", out)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("stl", done.stderr)
+        (self.root / "only-result").mkdir()
+        (self.root / "only-result/result.json").write_text("{}")
+        self.assertIn("give the case", run("export", self.root / "only-result").stderr)
+
     def test_published_recipe_gives_the_same_fields(self):
         outs = []
         for method in ("best", "paper"):
@@ -196,7 +227,8 @@ class CommandLine(unittest.TestCase):
 
     def test_wrong_usage_is_exit_2(self):
         for words in ([], ["run"], ["fly"], ["run", "x", "--colour"], ["demo", "--seed", "-1"], ["demo", "--seed", "1e30"],
-                      ["run", "x", "--max-error", "nan"], ["detect", "x", "--frame", "0"], ["rectify"],
+                      ["run", "x", "--max-error", "nan"], ["run", "x", "--max-error", "1001"],
+                      ["virtual-or", "--size", "700"], ["receive", "--port", "70000"], ["detect", "x", "--frame", "0"], ["rectify"],
                       ["run", "x", "--method", "worst"], ["detect", "x", "--kind", "cats"]):
             done = run(*words, "--json")
             self.assertEqual(done.returncode, 2, words)
@@ -218,7 +250,7 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(json.loads(done.stdout), {"written": [str(drawing)]})
 
     def test_help_teaches_with_an_example(self):
-        for command in ("demo", "run", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):
+        for command in ("demo", "run", "export", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
             self.assertIn(f"Example:\n  helicarm {command}", done.stdout)

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "command.h"
+#include "helicarm/core/field.h"
 
 namespace helicarm::cli {
 
@@ -30,6 +34,38 @@ inline CLI::Validator within(double low, double high) {
     return good ? std::string{} : fmt::format("{} is not a number of {}", word, bounds);
   };
   return {check, bounds};
+}
+
+/// The number that a word means to a field, if any.
+template <class Options>
+std::optional<double> number_for(const Field<Options>& field, const std::string& word) {
+  if (const auto choice = std::ranges::find(field.words, word); choice != field.words.end())
+    return double(choice - field.words.begin());
+  double value = 0;
+  if (field.words.empty() && CLI::detail::lexical_cast(word, value)) return value;
+  return std::nullopt;
+}
+
+/// Flags of those fields that have one, with their help, limits and defaults.
+template <class Options, std::size_t count>
+void add_fields(CLI::App* command, Options& options, const std::array<Field<Options>, count>& fields) {
+  for (const Field<Options>& field : fields) {
+    if (field.flag.empty()) continue;
+    const auto check = [&field](const std::string& word) -> std::string {
+      const auto number = number_for(field, word);
+      return number && check_number(field, number, "") ? ""
+                                                       : fmt::format("{} is not {}", word, limits_of(field));
+    };
+    auto* option = command->add_option_function<std::string>(
+        std::string(field.flag),
+        [&](const std::string& word) { field.set(options, number_for(field, word)); },
+        std::string(field.help));
+    option->type_name(field.words.empty() ? "NUMBER" : "WORD")
+        ->check(CLI::Validator(check, limits_of(field)));
+    if (const auto value = field.get(options))
+      option->default_str(field.words.empty() ? fmt::format("{:.12g}", *value)
+                                              : std::string(field.words[std::size_t(*value)]));
+  }
 }
 
 /// A command whose arguments live as long as its callback.

@@ -66,7 +66,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     if (!console.quiet)
       console.progress << "helicarm: simulating two X-rays of a knee with the calibrator on it\n";
     const SimulatedCase truth = value_or_throw(simulation::simulate_case(options));
-    RunArguments run{arguments.out / "case", arguments.out / "result", "best", {}, false};
+    RunArguments run{arguments.out / "case", arguments.out / "result"};
     value_or_throw(simulation::check_case_folder(run.folder));
     value_or_throw(simulation::write_case(run.folder, truth));
     if (!console.quiet) console.progress << "helicarm: measuring\n\n";

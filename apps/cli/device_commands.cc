@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
+#include "helicarm/devices/receiver/receiver_fields.h"
+#include "helicarm/operating_room/room_fields.h"
 #include "navigate_command.h"
 #include "operate_command.h"
 #include "receive_command.h"
@@ -22,7 +24,7 @@ void add_receive(CLI::App& app, Action& action) {
       ->add_option("--address", a.receiver.address,
                    "Where to listen; other than 127.0.0.1 opens the port to the network")
       ->capture_default_str();
-  command->add_option("--port", a.receiver.port, "Port; 0: any that is free")->capture_default_str();
+  add_fields(command, a.receiver, receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
       ->capture_default_str();
   command->add_option("--peer", a.receiver.negotiation.peers,
@@ -90,10 +92,7 @@ void add_virtual_or(CLI::App& app, Action& action) {
                   "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
   auto& a = arguments_of(command, action, virtual_or_command);
   command->add_option("--plan", a.plan, "Write a plan for navigate, with a surgeon's clicks");
-  command->add_option("--size", a.room.picture_size, "Pixels a side: 512 or 1024")->capture_default_str();
-  command->add_option("--rate", a.room.tracker_rate_hz, "Of the tracker, Hz")
-      ->check(within(1, 1000))
-      ->capture_default_str();
+  add_fields(command, a.room, operating_room::room_fields);
   command->add_option("--tracker-port", a.room.tracker_port, "OpenIGTLink; each port 0: any that is free")
       ->capture_default_str();
   command->add_option("--rtde-port", a.room.rtde_port, "of the robot")->capture_default_str();
@@ -118,7 +117,7 @@ void add_navigate(CLI::App& app, Action& action) {
   command->add_option("--picks", a.picks,
                       "JSON with \"picks\" as in case.json: waited for after the pictures");
   command->add_option("--address", a.receiver.address, "Where to listen for pictures")->capture_default_str();
-  command->add_option("--port", a.receiver.port, "DICOM port; 0: any that is free")->capture_default_str();
+  add_fields(command, a.receiver, receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
       ->capture_default_str();
   command->add_flag("--yes", a.yes, "Confirm every order without asking: only where nobody can be hurt");

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
 #include "detect_command.h"
+#include "export_command.h"
+#include "helicarm/navigation/run_fields.h"
+#include "helicarm/report/exports.h"
 #include "import_command.h"
 #include "locate_command.h"
 #include "predict_command.h"
@@ -19,12 +22,26 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
       ->capture_default_str();
-  command->add_option("--method", a.method, "best, or paper: the published recipe")->capture_default_str();
-  command->add_option("--max-error", a.max_error_mm, "Refuse when a point may be off by more, mm (95 %)")
-      ->check(within(1e-6, 1000));
+  add_fields(command, a.options, run_fields);
   command->add_option("--machine", a.machine,
                       "The C-arm's history (JSON): serves as prior, and this case's shots are added to it");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
+}
+
+void add_export(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "export", "Measure a case and write the result for other programs",
+                              "helicarm export my-case --out exported\n"
+                              "  helicarm export my-case --out exported --as csv,slicer");
+  auto& a = arguments_of(command, action, export_command);
+  command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
+  command
+      ->add_option(
+          "--as", a.as,
+          fmt::format("Some of {}, with commas between (default: all)", fmt::join(export_words, ", ")))
+      ->delimiter(',');
+  add_fields(command, a.run.options, run_fields);
+  command->add_option("--machine", a.run.machine, "The C-arm's history (JSON), which is left as it is");
 }
 
 void add_predict(CLI::App& app, Action& action) {
@@ -111,6 +128,7 @@ void add_import(CLI::App& app, Action& action) {
 
 void add_measuring_commands(CLI::App& app, Action& action) {
   add_run(app, action);
+  add_export(app, action);
   add_predict(app, action);
   add_solve(app, action);
   add_locate(app, action);

@@ -109,19 +109,27 @@ std::string summary_of(const Result& result) {
   return text + (result.verifications.empty() ? "" : "\n");
 }
 
-Expected<Result> run_and_write(const RunArguments& arguments, Console& console) {
+Expected<Result> measure(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    const RunOptions options{value_or_throw(method_named(arguments.method)), arguments.max_error_mm,
-                             console.threads, value_or_throw(machine_at(arguments.machine))};
-    forget(arguments.out);
-    const Result result = value_or_throw(result_of(arguments.folder, options));
-    value_or_throw(write(result, arguments));
-    if (arguments.machine && !result.failure)
-      value_or_throw(remember(*arguments.machine, *options.machine, result.shots, console));
+    RunOptions options = arguments.options;
+    options.threads = console.threads;
+    options.machine = value_or_throw(machine_at(arguments.machine));
+    Result result = value_or_throw(result_of(arguments.folder, options));
     if (!console.quiet)
       for (const Warning& warning : result.warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
                                         warning.view.empty() ? "" : ": ", warning.message);
+    return result;
+  });
+}
+
+Expected<Result> run_and_write(const RunArguments& arguments, Console& console) {
+  return guarded([&] {
+    forget(arguments.out);
+    const Result result = value_or_throw(measure(arguments, console));
+    value_or_throw(write(result, arguments));
+    if (arguments.machine && !result.failure)
+      value_or_throw(remember(*arguments.machine, *result.options.machine, result.shots, console));
     return result;
   });
 }

@@ -13,9 +13,8 @@ namespace helicarm::cli {
 struct RunArguments {
   std::filesystem::path folder;  ///< holds case.json
   std::filesystem::path out = "helicarm-result";
-  std::string method = "best";         ///< best or paper
-  std::optional<double> max_error_mm;  ///< refuse when a point's predicted error (95 %) is larger
-  bool no_report = false;              ///< only result.json
+  RunOptions options = {};                            ///< threads and the machine's history are filled in
+  bool no_report = false;                             ///< only result.json
   std::optional<std::filesystem::path> machine = {};  ///< the C-arm's history: read, and added to
 };
 
@@ -23,7 +22,10 @@ struct RunArguments {
 /// fails with its reason; input that cannot be used leaves no result.json behind.
 CommandResult run_command(const RunArguments& arguments, Console& console);
 
-/// The same, and the result for the caller to look at; prints nothing to `console.out`.
+/// Only runs the case, and warns on `console.progress`; a refusal is in the result.
+Expected<Result> measure(const RunArguments& arguments, Console& console);
+
+/// As `run_command`, and the result for the caller to look at; prints nothing to `console.out`.
 Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
 
 /// A C-arm's history, where a file is named; one that is not there yet is empty.

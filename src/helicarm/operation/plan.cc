@@ -7,6 +7,7 @@
 
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/operation/plan_fields.h"
 
 namespace helicarm {
 namespace {
@@ -23,6 +24,11 @@ RigidTransform pose_from(JsonReader& reader, const char* key) {
   constexpr double rounding = 1e-9;
   if ((mended.matrix() - given).cwiseAbs().maxCoeff() > rounding) return mended;
   return {given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
+}
+
+/// Within the limits that the list of fields gives to the key.
+double planned_number(JsonReader& reader, const char* key) {
+  return reader.number(key, field_named<OperationPlan>(plan_fields, key).range);
 }
 
 std::uint16_t port_from(JsonReader& reader, const char* key) {
@@ -55,8 +61,8 @@ TrackerPlan tracker_from(JsonReader reader) {
     entry.finish();
     tracker.facets.push_back(std::move(facet));
   }
-  tracker.sigma_mm = reader.number("sigma_mm", {0, 10});
-  tracker.sigma_deg = reader.number("sigma_deg", {0, 10});
+  tracker.sigma_mm = planned_number(reader, "sigma_mm");
+  tracker.sigma_deg = planned_number(reader, "sigma_deg");
   reader.finish();
   return tracker;
 }
@@ -72,13 +78,13 @@ KeepOut keep_out_from(JsonReader& reader) {
 
 ApproachOptions approach_from(JsonReader reader) {
   ApproachOptions approach;
-  approach.stand_off_mm = reader.number("stand_off_mm", {1, 500});
-  approach.gap_mm = reader.number("gap_mm", {-200, 500});
-  approach.travel_mm_s = reader.number("travel_mm_s", {0.1, 250});
-  approach.approach_mm_s = reader.number("approach_mm_s", {0.1, 250});
+  approach.stand_off_mm = planned_number(reader, "stand_off_mm");
+  approach.gap_mm = planned_number(reader, "gap_mm");
+  approach.travel_mm_s = planned_number(reader, "travel_mm_s");
+  approach.approach_mm_s = planned_number(reader, "approach_mm_s");
   approach.corrections.most = reader.integer("corrections", 0, 20);
-  approach.corrections.tolerance_mm = reader.number("tolerance_mm", {0.01, 10});
-  approach.corrections.tolerance_deg = reader.number("tolerance_deg", {0.01, 10});
+  approach.corrections.tolerance_mm = planned_number(reader, "tolerance_mm");
+  approach.corrections.tolerance_deg = planned_number(reader, "tolerance_deg");
   for (JsonReader& entry : reader.objects("keep_outs", false, 100))
     approach.keep_outs.push_back(keep_out_from(entry));
   reader.finish();
@@ -175,7 +181,8 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
       take_once(entry, names, plan.tunnels.back().name);
     }
     if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
-    plan.max_error_mm = reader.optional_number("max_error_mm", {1e-6, 1000}).value_or(plan.max_error_mm);
+    if (reader.has("max_error_mm")) plan.max_error_mm = planned_number(reader, "max_error_mm");
+    reader.raw("max_error_mm");
     reader.finish();
     return plan;
   });

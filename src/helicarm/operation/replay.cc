@@ -86,7 +86,7 @@ class Replay {
 
 }  // namespace
 
-Expected<ReplayReport> replay(const std::filesystem::path& session) {
+Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& go_on) {
   return guarded([&] {
     const SessionHistory history = value_or_throw(read_session(session / "session.log"));
     if (history.records.empty())
@@ -95,6 +95,9 @@ Expected<ReplayReport> replay(const std::filesystem::path& session) {
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;
     for (const SessionRecord& record : history.records) try {
+        if (!go_on(record.number, history.records.size()))
+          throw BadInput(Reason::interrupted,
+                         fmt::format("{}: stopped at record {}", session.string(), record.number));
         replay.take(record);
       } catch (const Json::exception&) {
         throw BadInput(Reason::bad_value, fmt::format("record {}: lacks what its kind needs", record.number));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -20,9 +21,14 @@ struct ReplayReport {
   std::vector<std::string> differences;  ///< what came out otherwise than recorded
 };
 
+/// Told before each record how many are done; answers whether to go on.
+using GoOn = std::function<bool(std::size_t done, std::size_t all)>;
+
 /// Recomputes an operation from its record: poses of the exposures from the tracker's samples, every case
 /// from its pictures (which must be those recorded), the hand-eye calibration from its pairs; all must come
-/// out to the last bit. Refuses as `read_session`, and a record that holds nothing (bad_value).
-Expected<ReplayReport> replay(const std::filesystem::path& session);
+/// out to the last bit. Refuses as `read_session`, a record that holds nothing (bad_value), and where it may
+/// not go on (interrupted).
+Expected<ReplayReport> replay(
+    const std::filesystem::path& session, const GoOn& go_on = [](std::size_t, std::size_t) { return true; });
 
 }  // namespace helicarm

@@ -77,12 +77,16 @@ std::string overlay_png(const Result& result, std::size_t index, std::span<const
   return canvas.png();
 }
 
-std::string overlay_name(const std::string& view_name, std::size_t index) {
+std::string file_stem(const std::string& view_name, std::size_t index) {
   const auto suits = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
   };
   const bool plain = !view_name.empty() && view_name.size() <= 64 && std::ranges::all_of(view_name, suits);
-  return plain ? view_name + "_overlay.png" : fmt::format("view{}_overlay.png", index + 1);
+  return plain ? view_name : fmt::format("view{}", index + 1);
+}
+
+std::string overlay_name(const std::string& view_name, std::size_t index) {
+  return file_stem(view_name, index) + "_overlay.png";
 }
 
 }  // namespace helicarm

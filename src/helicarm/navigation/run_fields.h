@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "helicarm/core/field.h"
+#include "helicarm/navigation/result.h"
+
+namespace helicarm {
+
+inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
+
+/// What a person may set of a measurement. `--threads` is a flag of all commands.
+inline constexpr std::array<Field<RunOptions>, 3> run_fields{
+    bound<&RunOptions::method>({.name = "method",
+                                .flag = "--method",
+                                .range = {0, 1},
+                                .step = 1,
+                                .help = "best, or paper: the published recipe",
+                                .words = method_words}),
+    bound<&RunOptions::max_error_mm>({.name = "max_error_mm",
+                                      .flag = "--max-error",
+                                      .unit = "mm",
+                                      .range = {1e-6, 1000},
+                                      .help = "Refuse when a point may be off by more, mm (95 %)"}),
+    bound<&RunOptions::threads>(
+        {.name = "threads", .range = {0, 1024}, .step = 1, .help = "Threads to use; 0: all cores"})};
+
+}  // namespace helicarm

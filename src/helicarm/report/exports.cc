@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/exports.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/report/overlay.h"
+
+namespace helicarm {
+namespace {
+
+using Files = std::map<std::string, std::string>;
+
+/// Comma and quote within a field as RFC 4180 has them.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+
+std::string csv_row(const PointResult& point, std::string_view frame, const Eigen::Vector3d& place,
+                    const Eigen::Matrix3d& covariance) {
+  const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name),
+                     point.source == PointSource::pick ? "pick" : "target", frame, place.x(), place.y(),
+                     place.z(), sigma.x(), sigma.y(), sigma.z(), length_at_95(covariance));
+}
+
+std::string points_csv(const Result& result) {
+  std::string rows;
+  for (const PointResult& point : result.points) {
+    if (!point.place) continue;
+    const GuidedPoint& at = *point.place;
+    rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
+    if (at.in_femur && at.covariance_in_femur)
+      rows += csv_row(point, "femur", *at.in_femur, *at.covariance_in_femur);
+    if (at.in_tibia && at.covariance_in_tibia)
+      rows += csv_row(point, "tibia", *at.in_tibia, *at.covariance_in_tibia);
+    if (at.in_tool && at.covariance_in_tool)
+      rows += csv_row(point, "tool", *at.in_tool, *at.covariance_in_tool);
+  }
+  if (rows.empty()) return rows;
+  return "name,source,frame,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,error_95_mm\n" + rows;
+}
+
+Json control_point(const PointResult& point) {
+  const Eigen::Vector3d& at = point.place->in_calibrator;
+  return {{"id", point.name},
+          {"label", point.name},
+          {"description", fmt::format("within {:.3f} mm (95 %), in the calibrator's frame",
+                                      length_at_95(point.place->covariance_in_calibrator))},
+          {"position", {at.x(), at.y(), at.z()}},
+          {"positionStatus", "defined"}};
+}
+
+Json markup(const char* type, const std::string& name, Json points) {
+  return {{"type", type},
+          {"name", name},
+          {"description",
+           "Coordinates are of helicarm's calibrator (mm), which is no patient's frame: LPS is a label only, "
+           "and L, "
+           "P, S here mean the calibrator's x, y, z. Register before laying them over a CT."},
+          {"coordinateSystem", "LPS"},
+          {"coordinateUnits", "mm"},
+          {"locked", true},
+          {"controlPoints", std::move(points)}};
+}
+
+std::string slicer_markups(const Result& result) {
+  Json points = Json::array(), markups = Json::array();
+  for (const PointResult& point : result.points)
+    if (point.place) points.push_back(control_point(point));
+  if (points.empty()) return {};
+  markups.push_back(markup("Fiducial", "helicarm points, calibrator frame", std::move(points)));
+  for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {
+    const PointResult& start = result.points[result.tunnel_ends[i].start];
+    const PointResult& end = result.points[result.tunnel_ends[i].end];
+    if (start.place && end.place && i < result.tunnels.size())
+      markups.push_back(markup("Line", "tunnel " + result.tunnels[i].name,
+                               Json::array({control_point(start), control_point(end)})));
+  }
+  return to_text({{"@schema",
+                   "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
+                   "Resources/Schema/"
+                   "markups-schema-v1.0.0.json#"},
+                  {"markups", std::move(markups)}}) +
+         "\n";
+}
+
+std::string rows_of(const Eigen::MatrixXd& matrix, std::string_view between) {
+  std::string rows;
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+      rows += fmt::format("{}{}", matrix(i, j), j + 1 < matrix.cols() ? between : "\n");
+  return rows;
+}
+
+std::string maya_cam(const ViewResult& view) {
+  const View& of = view.calibrated->view;
+  return fmt::format("image size\n{},{}\n\ncamera matrix\n{}\nrotation\n{}\ntranslation\n{}",
+                     view.exposure->pixels.width(), view.exposure->pixels.height(),
+                     rows_of(of.intrinsics.matrix(), ","), rows_of(of.camera_from_world.rotation, ","),
+                     rows_of(of.camera_from_world.translation, ","));
+}
+
+std::string matrix_text(const ViewResult& view) {
+  return "# 3x4: calibrator (mm) to rectified pixels, (0, 0) is the centre of the top-left one\n" +
+         rows_of(view.calibrated->view.projection(), " ");
+}
+
+/// L1 to L11, a column for each view: u = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y + L11 z + 1), v with L5
+/// to L8.
+std::string dlt_csv(const std::vector<const ViewResult*>& views) {
+  Eigen::MatrixXd columns(11, Eigen::Index(views.size()));
+  for (Eigen::Index i = 0; i < columns.cols(); ++i) {
+    const ViewResult& view = *views[std::size_t(i)];
+    const Projection p = view.calibrated->view.projection();
+    if (!factors_from_projection(p))
+      throw BadInput({Reason::point_at_infinity,
+                      "has no DLT coefficients: the calibrator's origin lies in the source's plane",
+                      view.name,
+                      {}});
+    const Projection scaled = p / p(2, 3);
+    columns.col(i) << scaled.row(0).transpose(), scaled.row(1).transpose(),
+        scaled.row(2).head<3>().transpose();
+  }
+  return rows_of(columns, ",");
+}
+
+Files files_of(const Result& result, std::span<const Export> kinds) {
+  const auto wanted = [&](Export kind) { return std::ranges::find(kinds, kind) != kinds.end(); };
+  Files files;
+  const auto add = [&](const std::string& name, std::string text) {
+    if (!text.empty() && !files.emplace(name, std::move(text)).second)
+      throw BadInput(Reason::name_clash, fmt::format("{}: two views would share this file", name));
+  };
+  if (wanted(Export::csv)) add("points.csv", points_csv(result));
+  if (wanted(Export::slicer)) add("points.mrk.json", slicer_markups(result));
+  std::vector<const ViewResult*> calibrated;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    const ViewResult& view = result.views[i];
+    if (!view.calibrated || !view.exposure) continue;
+    calibrated.push_back(&view);
+    const std::string stem = file_stem(view.name, i);
+    if (wanted(Export::mayacam)) add(stem + "_mayacam.txt", maya_cam(view));
+    if (wanted(Export::matrix)) add(stem + "_matrix.txt", matrix_text(view));
+  }
+  if (wanted(Export::dlt) && !calibrated.empty()) add("dlt.csv", dlt_csv(calibrated));
+  return files;
+}
+
+}  // namespace
+
+Expected<std::vector<std::filesystem::path>> write_exports(const Result& result,
+                                                           const std::filesystem::path& folder,
+                                                           std::span<const Export> kinds) {
+  if (result.failure) return tl::unexpected<Failure>(*result.failure);
+  const auto files = guarded([&] { return files_of(result, kinds); });
+  if (!files) return tl::unexpected<Failure>(files.error());
+  std::vector<std::filesystem::path> paths;
+  for (const auto& [name, text] : *files) {
+    if (const auto written = write_file(folder / name, text); !written) {
+      std::error_code ignored;
+      for (const auto& path : paths) std::filesystem::remove(path, ignored);
+      return tl::unexpected<Failure>(written.error());
+    }
+    paths.push_back(folder / name);
+  }
+  return paths;
+}
+
+}  // namespace helicarm

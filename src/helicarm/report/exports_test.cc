@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/exports.h"
+
+#include <cmath>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+namespace {
+namespace fs = std::filesystem;
+
+View view_at(double turn, double fx) {
+  const Eigen::Matrix3d rotation =
+      Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 0.2, 0.1).normalized()).matrix();
+  return {{fx, 4000.25, 511.1, 490.7, 0.3}, {rotation, {3, -5, 801.0 / 3}}};
+}
+
+class Exports : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "helicarm_exports_XXXXXX").string();
+    ASSERT_TRUE(mkdtemp(name.data()));
+    folder_ = name;
+    for (const auto& [view, turn, fx] : {std::tuple{"AP", 0.1, 4000.5}, std::tuple{"LAT", 1.7, -4100.75}}) {
+      ViewResult& of = result_.views.emplace_back();
+      of.name = view;
+      of.exposure = Exposure{view, Image<float>(64, 48), 0, 4095, {}, {}};
+      of.calibrated = CalibratedView{};
+      of.calibrated->view = view_at(turn, fx);
+    }
+    for (const char* name_of_point : {"a, \"b\"", "end"}) {
+      PointResult& point = result_.points.emplace_back();
+      point.name = name_of_point;
+      point.source = PointSource::pick;
+      point.place = GuidedPoint{};
+      point.place->in_calibrator = {1.0 / 3, 2, -3};
+      point.place->covariance_in_calibrator = Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
+    }
+    result_.points[1].place->in_femur = Eigen::Vector3d(7, 8, 9);
+    result_.points[1].place->covariance_in_femur = Eigen::Matrix3d::Identity();
+    PointResult& lost = result_.points.emplace_back();
+    lost.name = "lost";
+    result_.tunnel_ends = {{0, 1}};
+    result_.tunnels.push_back({"femur", {}, {}, {}, 30});
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string text(const char* name) const { return read_file(folder_ / name, 1 << 20).value(); }
+
+  fs::path folder_;
+  Result result_;
+};
+
+TEST_F(Exports, AllAreWritten) {
+  const auto written = write_exports(result_, folder_);
+  ASSERT_TRUE(written) << written.error().message;
+  std::vector<std::string> names;
+  for (const fs::path& path : *written) names.push_back(path.filename().string());
+  EXPECT_THAT(names, testing::ElementsAre("AP_matrix.txt", "AP_mayacam.txt", "LAT_matrix.txt",
+                                          "LAT_mayacam.txt", "dlt.csv", "points.csv", "points.mrk.json"));
+}
+
+TEST_F(Exports, MayaCamComesBackToTheLastBit) {
+  ASSERT_TRUE(write_exports(result_, folder_));
+  for (const ViewResult& view : result_.views) {
+    const auto back = import_matrix(folder_ / (view.name + "_mayacam.txt"));
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->view.projection(), view.calibrated->view.projection());
+    EXPECT_EQ(back->image_size, Eigen::Vector2i(64, 48));
+  }
+}
+
+TEST_F(Exports, MatrixComesBack) {
+  ASSERT_TRUE(write_exports(result_, folder_));
+  for (const ViewResult& view : result_.views) {
+    const auto back = import_matrix(folder_ / (view.name + "_matrix.txt"));
+    ASSERT_TRUE(back) << back.error().message;
+    const Projection expected = view.calibrated->view.projection();
+    EXPECT_LT((back->view.projection() - expected).norm(), 1e-9 * expected.norm()) << view.name;
+    EXPECT_EQ(std::signbit(back->view.intrinsics.fx), view.name == "LAT");
+  }
+}
+
+TEST_F(Exports, DltCoefficientsProject) {
+  ASSERT_TRUE(write_exports(result_, folder_));
+  std::istringstream lines(text("dlt.csv"));
+  Eigen::Matrix<double, 11, 2> l;
+  char comma = 0;
+  for (int i = 0; i < 11; ++i) ASSERT_TRUE(lines >> l(i, 0) >> comma >> l(i, 1));
+  EXPECT_FALSE(lines >> comma);
+  const Eigen::Vector3d p(10, 20, 30);
+  for (int i = 0; i < 2; ++i) {
+    const double w = l.col(i).segment<3>(8).dot(p) + 1;
+    const Eigen::Vector2d uv((l.col(i).head<3>().dot(p) + l(3, i)) / w,
+                             (l.col(i).segment<3>(4).dot(p) + l(7, i)) / w);
+    EXPECT_LT((uv - result_.views[std::size_t(i)].calibrated->view.project(p)).norm(), 1e-9);
+  }
+}
+
+TEST_F(Exports, PointsAreQuotedAndOnlyThoseFound) {
+  ASSERT_TRUE(write_exports(result_, folder_));
+  const std::string csv = text("points.csv");
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 4);
+  EXPECT_THAT(csv,
+              testing::HasSubstr("\"a, \"\"b\"\"\",pick,calibrator,0.3333333333333333,2,-3,0.1,0.2,0.3,"));
+  EXPECT_THAT(csv, testing::HasSubstr("end,pick,femur,7,8,9,1,1,1,"));
+  EXPECT_THAT(csv, testing::Not(testing::HasSubstr("lost")));
+}
+
+TEST_F(Exports, MarkupsSayThatTheirFrameIsNoPatients) {
+  ASSERT_TRUE(write_exports(result_, folder_));
+  const Json json = parse_json(text("points.mrk.json"), "markups").value();
+  ASSERT_EQ(json.at("markups").size(), 2u);
+  const Json& points = json["markups"][0];
+  EXPECT_EQ(points.at("type"), "Fiducial");
+  EXPECT_EQ(points.at("coordinateSystem"), "LPS");
+  EXPECT_THAT(points.at("description").get<std::string>(), testing::HasSubstr("no patient's frame"));
+  EXPECT_EQ(points.at("controlPoints").size(), 2u);
+  EXPECT_EQ(points.at("controlPoints")[0].at("position"), Json({1.0 / 3, 2.0, -3.0}));
+  EXPECT_EQ(json["markups"][1].at("type"), "Line");
+  EXPECT_EQ(json["markups"][1].at("name"), "tunnel femur");
+}
+
+TEST_F(Exports, OnlyWhatIsAskedForAndKnownIsWritten) {
+  result_.points.clear();
+  result_.tunnel_ends.clear();
+  result_.views[1].calibrated.reset();
+  EXPECT_EQ(write_exports(result_, folder_).value().size(), 3u);
+  const std::array kinds{Export::csv, Export::matrix};
+  EXPECT_EQ(write_exports(result_, folder_, kinds).value().size(), 1u);
+}
+
+TEST_F(Exports, RefusedResultIsRefusedForItsReason) {
+  result_.failure = Failure{Reason::uncertain, "too far off", "", {}};
+  EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::uncertain);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(Exports, NothingIsLeftWhereOneCannotBeWritten) {
+  fs::create_directories(folder_ / "points.csv");
+  EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::cannot_write);
+  EXPECT_FALSE(fs::exists(folder_ / "AP_matrix.txt"));
+  result_.views[1].name = "AP";
+  EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::name_clash);
+}
+
+TEST_F(Exports, ViewWithoutDltCoefficientsIsNamed) {
+  result_.views[1].calibrated->view.camera_from_world.translation.z() = 0;
+  const auto written = write_exports(result_, folder_);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().reason, Reason::point_at_infinity);
+  EXPECT_EQ(written.error().view, "LAT");
+}
+
+}  // namespace
+}  // namespace helicarm
