@@ -12,12 +12,14 @@ using Eigen::Vector2d;
 /// Between places so near each other the distortion bends a line by less than a tenth of a pixel.
 constexpr double step_px = 16;
 
-/// The part of a line, as shares from 0 to 1, within half a picture of the picture: no map reaches farther.
+/// The part of a line, as shares from 0 to 1, in the picture, or within half a picture of it where a map
+/// bends it: no map reaches farther.
 std::pair<double, double> part_near(const DistortionMap& map, const Vector2d& from, const Vector2d& to) {
   const Vector2d size(map.width, map.height);
   std::pair<double, double> part{0, 1};
   for (int axis = 0; axis < 2; ++axis) {
-    const double low = -0.5 * size[axis] - from[axis], high = 1.5 * size[axis] - from[axis];
+    const double beyond = map.is_identity() ? -0.5 : 0.5 * size[axis];
+    const double low = -0.5 - beyond - from[axis], high = size[axis] - 0.5 + beyond - from[axis];
     const double way = to[axis] - from[axis];
     if (way == 0 && (low > 0 || high < 0)) return {1, 0};
     if (way == 0) continue;
@@ -47,7 +49,8 @@ std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Vecto
       cut();
       continue;
     }
-    const int steps = std::max(1, static_cast<int>(std::ceil((last - first) * way.norm() / step_px)));
+    const double length = map.is_identity() ? 0 : (last - first) * way.norm();
+    const int steps = std::max(1, static_cast<int>(std::ceil(length / step_px)));
     const bool goes_on = i > 1 && first == 0;
     if (!goes_on) cut();
     for (int k = goes_on ? 1 : 0; k <= steps; ++k)

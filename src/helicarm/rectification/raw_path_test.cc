@@ -75,6 +75,9 @@ TEST(RawPaths, OfALineThatComesFromAfarGoOnAtACorner) {
   const DistortionMap map = identity_map(100, 100, {});
   const auto paths = raw_paths(map, PixelPath{{-1000, 50}, {50, 50}, {50, 1000}});
   ASSERT_EQ(paths.size(), 1u);
+  ASSERT_EQ(paths[0].size(), 3u);
+  EXPECT_LT((paths[0].front() - Vector2d(0, 50)).norm(), 1e-9);
+  EXPECT_LT((paths[0].back() - Vector2d(50, 99)).norm(), 1e-9);
 }
 
 }  // namespace

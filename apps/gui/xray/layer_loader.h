@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QObject>
+#include <QThreadPool>
+#include <atomic>
+#include <memory>
+
+#include "gui/xray/layers.h"
+
+namespace helicarm::gui {
+
+/// A layer's picture and the window that suits it.
+struct LoadedLayer {
+  Layer layer;
+  Image<float> pixels;
+  GreyWindow usual;
+};
+
+/// Computes layers in a thread of its own. Only the newest request is answered.
+class LayerLoader : public QObject {
+  Q_OBJECT
+ public:
+  explicit LayerLoader(QObject* parent = nullptr);
+  ~LayerLoader() override;
+
+  void load(std::shared_ptr<const Result> result, std::size_t view, Layer layer);
+  /// Whatever was asked for is no longer wanted.
+  void cancel();
+
+ Q_SIGNALS:
+  /// Null where it could not be computed.
+  void loaded(std::shared_ptr<const LoadedLayer> layer);
+
+ private:
+  using Ticket = std::atomic<unsigned>;
+  std::shared_ptr<Ticket> newest_ = std::make_shared<Ticket>(0);
+  QThreadPool pool_;
+};
+
+}  // namespace helicarm::gui

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/layers.h"
+
+#include <memory>
+
+#include "helicarm/rectification/inpaint.h"
+
+namespace helicarm::gui {
+
+Layer layer_at_hand(const ViewResult& view, Layer wanted) { return view.rectification ? wanted : Layer::raw; }
+
+Image<float> layer_of(const ViewResult& view, Layer layer) {
+  if (!view.exposure) return {};
+  const auto& rectification = view.rectification;
+  switch (layer_at_hand(view, layer)) {
+    case Layer::raw:
+      break;
+    case Layer::rectified:
+      return resample(*view.exposure, rectification->map);
+    case Layer::inpainted: {
+      Exposure hidden = *view.exposure;
+      hidden.pixels = inpainted(view.exposure->pixels, rectification->plate_dots);
+      return resample(hidden, rectification->map);
+    }
+  }
+  return view.exposure->pixels;
+}
+
+QImage windowed(const Image<float>& picture, GreyWindow window) {
+  if (picture.empty()) return {};
+  auto grey = std::make_unique<Image<std::uint8_t>>(eight_bit(picture, window));
+  const uchar* pixels = grey->row(0);
+  const int width = grey->width(), height = grey->height();
+  const auto discard = [](void* owner) { delete static_cast<Image<std::uint8_t>*>(owner); };
+  return QImage(pixels, width, height, width, QImage::Format_Grayscale8, discard, grey.release());
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/live_marks.h"
+
+#include <utility>
+
+#include "gui/xray/label_placer.h"
+#include "gui/xray/mark_painter.h"
+
+namespace helicarm::gui {
+
+void LiveMarks::set_tool(const std::optional<PictureLine>& rectified, const QString& note) {
+  tool_ = {rectified ? PixelPath{rectified->back, rectified->tip} : PixelPath{}};
+  note_ = note;
+}
+
+void LiveMarks::set_picks(std::vector<FreshPick> raw) {
+  picks_.clear();
+  for (FreshPick& pick : raw) picks_.push_back({std::move(pick), {}});
+}
+
+void LiveMarks::forget_layer() {
+  for (Carried* one : {&epipolar_, &path_, &tool_}) one->is_carried = false;
+  for (CarriedPick& pick : picks_) pick.in_layer.reset();
+}
+
+void LiveMarks::carry(const ViewResult& view, Layer layer) {
+  for (Carried* one : {&epipolar_, &path_, &tool_}) {
+    if (std::exchange(one->is_carried, true)) continue;
+    one->in_layer = in_layer(view, layer, one->given);
+    one->end = one->given.empty() ? std::nullopt : in_layer(view, layer, one->given.back());
+  }
+  for (CarriedPick& pick : picks_)
+    if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
+}
+
+void LiveMarks::paint(QPainter& painter, const PictureFrame& frame) const {
+  for (const PixelPath& piece : epipolar_.in_layer)
+    paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
+  for (const PixelPath& piece : path_.in_layer) paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
+  painter.setBrush(ink::residual);
+  painter.setPen(Qt::NoPen);
+  if (path_.end) painter.drawEllipse(frame.to_widget(*path_.end), 4, 4);
+  for (const PixelPath& piece : tool_.in_layer) paint_path(painter, piece, frame, QPen(ink::tool, 3));
+  painter.setBrush(Qt::NoBrush);
+  if (tool_.end) {
+    const QPointF at = frame.to_widget(*tool_.end);
+    for (const QPen& pen : {QPen(QColor(0, 0, 0, 170), 4), QPen(QColor(255, 255, 255), 2)}) {
+      painter.setPen(pen);
+      painter.drawEllipse(at, 6, 6);
+    }
+    if (!note_.isEmpty()) outlined_text(painter, at + QPointF(12, 18), note_, QColor(255, 255, 255));
+  }
+  for (const auto& [pick, place] : picks_) {
+    if (!place) continue;
+    const QPointF at = frame.to_widget(*place);
+    for (const QPen& pen : {QPen(QColor(0, 0, 0, 170), 3.6), QPen(ink::point, 1.6)}) {
+      painter.setPen(pen);
+      painter.drawEllipse(at, 9, 9);
+      for (const QPointF& arm : {QPointF(1, 0), QPointF(0, 1), QPointF(-1, 0), QPointF(0, -1)})
+        painter.drawLine(at + 5 * arm, at + 13 * arm);
+    }
+    outlined_text(painter, at + QPointF(13, -9), pick.name, ink::point);
+  }
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QPainter>
+
+#include "gui/xray/marks.h"
+#include "gui/xray/picture_frame.h"
+#include "helicarm/verification/picture_line.h"
+
+namespace helicarm::gui {
+
+/// A place that somebody has picked and that no result holds yet, raw pixels.
+struct FreshPick {
+  QString name;
+  Eigen::Vector2d raw;
+};
+
+/// What comes and goes over the picture: as it was given (picks raw, the rest rectified) and in the layer's
+/// pixels.
+class LiveMarks {
+ public:
+  void set_epipolar(PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
+  void set_path(PixelPath rectified) { path_ = {std::move(rectified)}; }
+  void set_tool(const std::optional<PictureLine>& rectified, const QString& note);
+  void set_picks(std::vector<FreshPick> raw);
+
+  /// Another layer: what was carried into the former one is so no longer.
+  void forget_layer();
+  /// Carries into the layer what is not yet; to be called after a change.
+  void carry(const ViewResult& view, Layer layer);
+  void paint(QPainter& painter, const PictureFrame& frame) const;
+
+ private:
+  struct Carried {
+    PixelPath given;
+    bool is_carried = false;
+    std::vector<PixelPath> in_layer = {};
+    std::optional<Eigen::Vector2d> end = {};
+  };
+  struct CarriedPick {
+    FreshPick given;
+    std::optional<Eigen::Vector2d> in_layer;
+  };
+  Carried epipolar_, path_, tool_;
+  QString note_;
+  std::vector<CarriedPick> picks_;
+};
+
+}  // namespace helicarm::gui

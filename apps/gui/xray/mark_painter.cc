@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/mark_painter.h"
+
+#include <QObject>
+#include <QPolygonF>
+#include <algorithm>
+#include <cmath>
+
+#include "gui/xray/label_placer.h"
+#include "helicarm/report/picture.h"
+
+namespace helicarm::gui {
+namespace {
+
+QPointF as_point(const Eigen::Vector2d& v) { return {v.x(), v.y()}; }
+
+QRectF square(const QPointF& centre, double half) {
+  return {centre - QPointF(half, half), QSizeF(2 * half, 2 * half)};
+}
+
+void cross(QPainter& painter, const QPointF& at, double arm) {
+  painter.drawLine(at + QPointF(-arm, -arm), at + QPointF(arm, arm));
+  painter.drawLine(at + QPointF(-arm, arm), at + QPointF(arm, -arm));
+}
+
+/// Draws twice: a dark edge, then the line itself.
+template <class Shape>
+void edged(QPainter& painter, QPen pen, const Shape& shape) {
+  painter.setBrush(Qt::NoBrush);
+  QPen edge = pen;
+  edge.setColor(QColor(0, 0, 0, 150));
+  edge.setWidthF(pen.widthF() + 2);
+  edge.setStyle(Qt::SolidLine);
+  if (pen.style() == Qt::SolidLine) {
+    painter.setPen(edge);
+    shape();
+  }
+  painter.setPen(pen);
+  shape();
+}
+
+void arrow(QPainter& painter, const QPointF& from, const QPointF& way) {
+  edged(painter, QPen(ink::residual, 1.8), [&] {
+    const QPointF to = from + way;
+    painter.drawLine(from, to);
+    const double length = std::hypot(way.x(), way.y());
+    if (length < 4) return;
+    const QPointF back = -std::min(7.0, 0.5 * length) / length * way;
+    const QPointF side(-0.5 * back.y(), 0.5 * back.x());
+    painter.drawLine(to, to + back + side);
+    painter.drawLine(to, to + back - side);
+  });
+}
+
+/// Marks that are drawn at the same size however the picture is zoomed, unless it is zoomed far in.
+double ball_radius(const PictureFrame& frame, int picture_width) {
+  return std::max(8.0, 15 / 1024.0 * picture_width * frame.scale);
+}
+
+void paint_balls(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, double radius) {
+  for (const BallMark& ball : marks.balls) {
+    const QPointF at = frame.to_widget(ball.place);
+    if (ball.used)
+      edged(painter, QPen(ink::ball, 1.6), [&] { painter.drawEllipse(at, radius, radius); });
+    else
+      edged(painter, QPen(ink::rejected, 1.8), [&] {
+        painter.drawRect(square(at, radius));
+        cross(painter, at, radius);
+      });
+  }
+}
+
+/// Arrows from the balls and a bar that says how long they are.
+void paint_residuals(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame,
+                     const QRectF& bounds, LabelPlacer& labels) {
+  constexpr double longest_arrow = 45;
+  const double largest = largest_residual(marks);
+  if (!(largest > 0)) return;
+  const double magnification = round_below(std::max(1.0, longest_arrow / (largest * frame.scale)));
+  const double enlarged = magnification * frame.scale;
+  for (const BallMark& ball : marks.balls)
+    if (ball.used && ball.residual) {
+      const QPointF at = frame.to_widget(ball.place), way = enlarged * as_point(*ball.residual);
+      arrow(painter, at, way);
+      labels.keep_free(QRectF(at, at + way).normalized().adjusted(-2, -2, 2, 2));
+    }
+  const double length = round_below(longest_arrow / enlarged);
+  const QPointF left = bounds.bottomLeft() + QPointF(14, -14), right = left + QPointF(length * enlarged, 0);
+  edged(painter, QPen(ink::residual, 2), [&] {
+    painter.drawLine(left, right);
+    for (const QPointF& end : {left, right}) painter.drawLine(end + QPointF(0, -4), end + QPointF(0, 4));
+  });
+  outlined_text(painter, left + QPointF(-2, -9),
+                QObject::tr("residuals × %1, %2 px").arg(magnification).arg(length), ink::residual);
+}
+
+void paint_point(QPainter& painter, const PointMark& point, const QPointF& at) {
+  constexpr double arm = 6;
+  const QPen pen(ink::point, 1.8, point.error_95_mm ? Qt::SolidLine : Qt::DotLine);
+  edged(painter, pen, [&] {
+    cross(painter, at, arm);
+    if (!point.error_95_mm) painter.drawEllipse(at, arm + 3, arm + 3);
+  });
+}
+
+}  // namespace
+
+void paint_path(QPainter& painter, const PixelPath& path, const PictureFrame& frame, const QPen& pen) {
+  QPolygonF line;
+  for (const Eigen::Vector2d& place : path) line << frame.to_widget(place);
+  edged(painter, pen, [&] { painter.drawPolyline(line); });
+}
+
+void paint_marks(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, int picture_width,
+                 const QRectF& bounds) {
+  const double radius = ball_radius(frame, picture_width);
+  painter.setBrush(Qt::NoBrush);
+  painter.setPen(QPen(ink::plate, 1));
+  for (const DotMark& dot : marks.plate_dots) {
+    const double size = std::max(2.0, dot.radius_px * frame.scale);
+    painter.drawEllipse(frame.to_widget(dot.place), size, size);
+  }
+  for (const PixelPath& tunnel : marks.tunnels) paint_path(painter, tunnel, frame, QPen(ink::tunnel, 1.8));
+  for (const PixelPath& tool : marks.tool_lines)
+    paint_path(painter, tool, frame, QPen(ink::tool, 1.6, Qt::DashDotLine));
+  for (const DotMark& blob : marks.false_blobs)
+    edged(painter, QPen(ink::rejected, 1.6), [&] { cross(painter, frame.to_widget(blob.place), 5); });
+  paint_balls(painter, marks, frame, radius);
+  for (const PointMark& point : marks.points) paint_point(painter, point, frame.to_widget(point.place));
+
+  LabelPlacer labels(bounds);
+  labels.keep_free({bounds.bottomLeft() + QPointF(0, -44), QSizeF(220, 44)});  // the scale bar
+  for (const BallMark& ball : marks.balls)
+    labels.keep_free(square(frame.to_widget(ball.place), 0.8 * radius));
+  for (const PointMark& point : marks.points) labels.keep_free(square(frame.to_widget(point.place), 6));
+  paint_residuals(painter, marks, frame, bounds, labels);
+  for (const BallMark& ball : marks.balls)
+    labels.place(painter, frame.to_widget(ball.place), radius, QString::fromStdString(ball.label),
+                 ball.used ? ink::ball : ink::rejected);
+  for (const PointMark& point : marks.points)
+    labels.place(painter, frame.to_widget(point.place), 8, QString::fromStdString(point.name), ink::point);
+}
+
+}  // namespace helicarm::gui

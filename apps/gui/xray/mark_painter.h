@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QColor>
+#include <QPainter>
+
+#include "gui/xray/picture_frame.h"
+#include "helicarm/report/marks.h"
+
+namespace helicarm::gui {
+
+/// The colours of the marks: as in the report, told apart by shape too.
+namespace ink {
+inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197, 253, 150),
+    point(240, 171, 252), tunnel(250, 204, 21), residual(251, 146, 60), tool(239, 68, 68),
+    epipolar(94, 234, 242), quiet(200, 208, 220);
+}  // namespace ink
+
+/// Draws what the stages found. Lines keep their width at any zoom; `picture_width` sets the balls' circles.
+void paint_marks(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, int picture_width,
+                 const QRectF& bounds);
+
+/// A line with a dark edge, so that it shows on bright ground too.
+void paint_path(QPainter& painter, const PixelPath& path, const PictureFrame& frame, const QPen& pen);
+
+}  // namespace helicarm::gui

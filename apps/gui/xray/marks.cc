@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/marks.h"
+
+#include <QObject>
+#include <algorithm>
+
+namespace helicarm::gui {
+namespace {
+
+using Eigen::Vector2d;
+using Kind = MarkUnderCursor::Kind;
+
+/// Whether the layer's pixels differ from the raw ones.
+bool is_mapped(const ViewResult& view, Layer layer) { return view.rectification && layer != Layer::raw; }
+
+QString fixed(double value, int digits) { return QString::number(value, 'f', digits); }
+
+QString tip_of(const BallMark& ball) {
+  QString tip = QString::fromStdString(ball.label);
+  if (!ball.used) tip += QObject::tr("  rejected");
+  tip += QObject::tr("\nσ %1 px").arg(fixed(ball.sigma_px, 3));
+  if (ball.residual) tip += QObject::tr("\nresidual %1 px").arg(fixed(ball.residual->norm(), 3));
+  return tip;
+}
+
+QString tip_of(const PointMark& point) {
+  QString tip = QString::fromStdString(point.name);
+  tip += point.source == PointSource::target ? QObject::tr("  check target") : QObject::tr("  pick");
+  if (point.error_95_mm)
+    tip += QObject::tr("\nwithin %1 mm (95 %)").arg(fixed(*point.error_95_mm, 2));
+  else
+    tip += QObject::tr("\nnot located");
+  if (!point.reason.empty()) tip += "\n" + QString::fromStdString(point.reason);
+  return tip;
+}
+
+}  // namespace
+
+ViewMarks marks_of(const Result& result, std::size_t view, Layer layer) {
+  ViewMarks marks = marks_of(result, view);
+  const auto& rectification = result.views[view].rectification;
+  return rectification && layer == Layer::raw ? raw_marks(marks, rectification->map) : marks;
+}
+
+std::optional<Vector2d> in_layer(const ViewResult& view, Layer layer, const Vector2d& rectified) {
+  if (!view.rectification || layer != Layer::raw) return rectified;
+  return raw_in_picture(view.rectification->map, rectified);
+}
+
+std::vector<PixelPath> in_layer(const ViewResult& view, Layer layer, const PixelPath& rectified) {
+  if (view.rectification && layer == Layer::raw) return raw_paths(view.rectification->map, rectified);
+  if (!view.exposure) return {};
+  const Image<float>& pixels = view.exposure->pixels;
+  return raw_paths(identity_map(pixels.width(), pixels.height(), {}), rectified);
+}
+
+std::optional<Vector2d> raw_from_layer(const ViewResult& view, Layer layer, const Vector2d& place) {
+  if (is_mapped(view, layer)) return raw_in_picture(view.rectification->map, place);
+  if (!view.exposure) return std::nullopt;
+  const Image<float>& pixels = view.exposure->pixels;
+  const bool inside = place.x() >= -0.5 && place.y() >= -0.5 && place.x() <= pixels.width() - 0.5 &&
+                      place.y() <= pixels.height() - 0.5;
+  return inside ? std::optional(place) : std::nullopt;
+}
+
+std::optional<Vector2d> layer_from_raw(const ViewResult& view, Layer layer, const Vector2d& raw) {
+  return is_mapped(view, layer) ? rectified_in_picture(view.rectification->map, raw) : std::optional(raw);
+}
+
+std::optional<MarkUnderCursor> mark_near(const ViewMarks& marks, const Vector2d& place, double reach_px) {
+  std::optional<MarkUnderCursor> nearest;
+  const auto consider = [&](const auto& some, Kind kind, const auto& name_of) {
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      const double distance = (some[i].place - place).norm();
+      if (!(distance <= reach_px)) continue;
+      reach_px = distance;
+      nearest = MarkUnderCursor{kind, i, QString::fromStdString(name_of(some[i])), tip_of(some[i])};
+    }
+  };
+  consider(marks.balls, Kind::ball, [](const BallMark& ball) { return ball.label; });
+  consider(marks.points, Kind::point, [](const PointMark& point) { return point.name; });
+  return nearest;
+}
+
+QString described(const ViewMarks& marks) {
+  const auto used = std::ranges::count(marks.balls, true, &BallMark::used);
+  QString words = QObject::tr("%1 balls used, %2 rejected, %3 false blobs, %4 points.")
+                      .arg(used)
+                      .arg(marks.balls.size() - static_cast<std::size_t>(used))
+                      .arg(marks.false_blobs.size())
+                      .arg(marks.points.size());
+  if (const double largest = largest_residual(marks); largest > 0)
+    words += QObject::tr(" Largest residual %1 px.").arg(fixed(largest, 3));
+  return words;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QTemporaryDir>
+#include <filesystem>
+#include <memory>
+
+#include "helicarm/navigation/run_case.h"
+#include "helicarm/simulation/write_case.h"
+
+namespace helicarm::gui {
+
+/// A case with tunnels, stray balls and 512 pixels a side, measured from its files; measured once.
+inline std::shared_ptr<const Result> simulated_result() {
+  static const auto result = [] {
+    simulation::SimulationOptions options;
+    options.seed = 7;
+    options.kind = simulation::CaseKind::tunnels;
+    options.size = 512;
+    options.faults = {simulation::Fault::decoys};
+    const QTemporaryDir folder;
+    const std::filesystem::path path = folder.filePath("case").toStdString();
+    if (const auto written = simulation::write_case(path, simulation::simulate_case(options).value());
+        !written)
+      throw std::runtime_error(written.error().message);
+    return std::make_shared<const Result>(run_case(read_case(path).value(), {}).value());
+  }();
+  return result;
+}
+
+}  // namespace helicarm::gui

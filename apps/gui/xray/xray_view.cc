@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/xray_view.h"
+
+#include <QResizeEvent>
+#include <utility>
+
+namespace helicarm::gui {
+namespace {
+
+/// Whether two views show the same pixels, so that zoom and window may stay.
+bool same_picture(const ViewResult& a, const ViewResult& b) {
+  return a.exposure && b.exposure && a.name == b.name &&
+         a.exposure->acquisition.instance_key == b.exposure->acquisition.instance_key &&
+         a.exposure->pixels.width() == b.exposure->pixels.width() &&
+         a.exposure->pixels.height() == b.exposure->pixels.height();
+}
+
+}  // namespace
+
+XrayView::XrayView(QWidget* parent) : QWidget(parent) {
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  setAttribute(Qt::WA_OpaquePaintEvent);
+  connect(&loader_, &LayerLoader::loaded, this, &XrayView::take);
+  clear(tr("No picture yet"));
+}
+
+XrayView::~XrayView() = default;
+
+void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index) {
+  if (!result || index >= result->views.size()) return clear(tr("No picture yet"));
+  const ViewResult& next = result->views[index];
+  const QString name = QString::fromStdString(next.name);
+  if (!next.exposure || next.exposure->pixels.empty())
+    return clear(name.isEmpty() ? tr("No picture yet") : tr("No picture yet: shoot %1").arg(name));
+  const bool stays = result_ && same_picture(view(), next);
+  clear({});
+  result_ = std::move(result);
+  view_ = index;
+  if (!stays) {
+    window_.reset();
+    fits_ = true;
+  }
+  setAccessibleName(tr("X-ray %1").arg(name));
+  computing_ = true;
+  loader_.load(result_, view_, wanted_);
+}
+
+void XrayView::clear(const QString& why) {
+  loader_.cancel();
+  result_.reset();
+  shown_.reset();
+  grey_ = {};
+  marks_ = {};
+  live_ = {};
+  cursor_.reset();
+  drag_ = {};
+  computing_ = false;
+  why_empty_ = why;
+  setAccessibleName(tr("X-ray"));
+  setAccessibleDescription(why);
+  hover_over({});
+  redraw_still();
+}
+
+void XrayView::set_layer(Layer layer) {
+  if (layer == wanted_) return;
+  wanted_ = layer;
+  if (result_) {
+    computing_ = true;
+    loader_.load(result_, view_, wanted_);
+    update();
+  }
+  Q_EMIT layer_changed(layer);
+}
+
+void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
+  computing_ = false;
+  if (!layer) return clear(tr("This layer cannot be computed"));
+  if (cursor_ && shown_)
+    if (const auto raw = raw_from_layer(view(), shown_->layer, *cursor_))
+      cursor_ = layer_from_raw(view(), layer->layer, *raw);
+  shown_ = layer;
+  window_picture();
+  marks_ = marks_of(*result_, view_, shown_->layer);
+  setAccessibleDescription(described(marks_));
+  if (fits_) fit();
+  live_.forget_layer();
+  carry_live();
+  hover_over({});
+  Q_EMIT shown();
+}
+
+std::optional<GreyWindow> XrayView::window() const {
+  if (window_) return window_;
+  return shown_ ? std::optional(shown_->usual) : std::nullopt;
+}
+
+void XrayView::set_window(GreyWindow window) {
+  window_ = window;
+  if (!shown_) return;
+  window_picture();
+  Q_EMIT window_changed(window);
+}
+
+void XrayView::set_usual_window() {
+  if (!shown_) return window_.reset();
+  set_window(shown_->usual);
+  window_.reset();
+}
+
+void XrayView::set_picking(bool picking) {
+  picking_ = picking;
+  drag_ = {};
+  setCursor(picking ? Qt::CrossCursor : Qt::ArrowCursor);
+  update();
+}
+
+void XrayView::set_marks_visible(bool visible) {
+  marks_visible_ = visible;
+  redraw_still();
+}
+
+void XrayView::set_magnifier(bool on) {
+  magnifier_ = on;
+  update();
+}
+
+void XrayView::set_epipolar(std::vector<Eigen::Vector2d> rectified) {
+  live_.set_epipolar(std::move(rectified));
+  carry_live();
+}
+
+void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
+  live_.set_path(std::move(rectified));
+  carry_live();
+}
+
+void XrayView::set_tool(std::optional<PictureLine> rectified, const QString& note) {
+  live_.set_tool(rectified, note);
+  carry_live();
+}
+
+void XrayView::set_picks(std::vector<FreshPick> raw) {
+  live_.set_picks(std::move(raw));
+  carry_live();
+}
+
+void XrayView::window_picture() {
+  // Qt scales this format three times as fast as grey.
+  grey_ = windowed(shown_->pixels, *window()).convertToFormat(QImage::Format_RGB32);
+  redraw_still();
+}
+
+void XrayView::carry_live() {
+  if (shown_) live_.carry(view(), shown_->layer);
+  update();
+}
+
+QSizeF XrayView::picture_size() const { return shown_ ? QSizeF(grey_.size()) : QSizeF(1, 1); }
+
+std::optional<QPointF> XrayView::raw_at(const QPointF& place) const {
+  if (!shown_) return std::nullopt;
+  const auto raw = raw_from_layer(view(), shown_->layer, frame_.to_picture(place));
+  return raw ? std::optional(QPointF(raw->x(), raw->y())) : std::nullopt;
+}
+
+std::optional<QPointF> XrayView::place_of(const QPointF& raw_pixel) const {
+  if (!shown_) return std::nullopt;
+  const auto pixel = layer_from_raw(view(), shown_->layer, {raw_pixel.x(), raw_pixel.y()});
+  return pixel ? std::optional(frame_.to_widget(*pixel)) : std::nullopt;
+}
+
+void XrayView::fit() {
+  fits_ = true;
+  frame_ = PictureFrame::fitted(picture_size(), size());
+  redraw_still();
+}
+
+void XrayView::resizeEvent(QResizeEvent* event) {
+  if (fits_) return fit();
+  const QSizeF grown = event->size() - event->oldSize();
+  pan({0.5 * grown.width(), 0.5 * grown.height()});
+}
+
+void XrayView::redraw_still() {
+  still_ = {};
+  update();
+}
+
+}  // namespace helicarm::gui

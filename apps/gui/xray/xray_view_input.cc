@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QGuiApplication>
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QStyleHints>
+#include <QWheelEvent>
+#include <cmath>
+
+#include "gui/xray/xray_view.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr double key_zoom = 1.25;
+
+std::optional<QPointF> way_of(int key) {
+  switch (key) {
+    case Qt::Key_Left:
+      return QPointF(-1, 0);
+    case Qt::Key_Right:
+      return QPointF(1, 0);
+    case Qt::Key_Up:
+      return QPointF(0, -1);
+    case Qt::Key_Down:
+      return QPointF(0, 1);
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void XrayView::zoom(double factor, const QPointF& about) {
+  if (!shown_) return;
+  const double smallest = 0.5 * PictureFrame::fitted(picture_size(), size()).scale;
+  fits_ = false;
+  frame_ = frame_.zoomed(factor, about, smallest).within(picture_size(), size());
+  redraw_still();
+}
+
+void XrayView::pan(const QPointF& by) {
+  if (!shown_) return;
+  fits_ = false;
+  frame_.origin += by;
+  frame_ = frame_.within(picture_size(), size());
+  redraw_still();
+}
+
+void XrayView::adjust_window(const QPointF& by) {
+  const auto now = window();
+  if (!now || !shown_) return;
+  const double width = std::max(1e-6, double(now->high) - now->low);
+  const double middle = 0.5 * (double(now->low) + now->high) - width * by.y() / 300;
+  const double widened = width * std::exp(by.x() / 200);
+  set_window({float(middle - 0.5 * widened), float(middle + 0.5 * widened)});
+}
+
+void XrayView::wheelEvent(QWheelEvent* event) {
+  zoom(std::pow(1.0015, event->angleDelta().y()), event->position());
+  hover_at(event->position());
+  event->accept();
+}
+
+void XrayView::mousePressEvent(QMouseEvent* event) {
+  cursor_.reset();
+  drag_ = {event->button(), event->position(), event->position(), false,
+           picking_ && event->button() == Qt::LeftButton};
+  update();
+}
+
+void XrayView::mouseMoveEvent(QMouseEvent* event) {
+  const QPointF at = event->position(), by = at - drag_.last;
+  mouse_ = at;
+  if (drag_.button != Qt::NoButton && !(event->buttons() & drag_.button)) drag_ = {};
+  const int threshold = QGuiApplication::styleHints()->startDragDistance();
+  if ((at - drag_.from).manhattanLength() >= threshold) drag_.moved = true;
+  if (drag_.button != Qt::NoButton && drag_.moved) {
+    drag_.last = at;
+    if (drag_.button == Qt::RightButton) return adjust_window(by);
+    if (drag_.button == Qt::MiddleButton || !picking_) return pan(by);
+  }
+  hover_at(at);
+  if (magnifier_) update();
+}
+
+void XrayView::mouseReleaseEvent(QMouseEvent* event) {
+  if (event->button() != drag_.button) return;
+  const bool picks = drag_.may_pick && !drag_.moved;
+  drag_ = {};
+  // The middle of the screen's pixel that was hit.
+  const double half = 0.5 / devicePixelRatioF();
+  if (picks) pick_at(event->position() + QPointF(half, half));
+}
+
+void XrayView::mouseDoubleClickEvent(QMouseEvent* event) {
+  drag_ = {};
+  if (event->button() == Qt::LeftButton && !picking_) fit();
+}
+
+void XrayView::leaveEvent(QEvent*) {
+  mouse_.reset();
+  if (!cursor_) hover_over({});
+  update();
+}
+
+void XrayView::keyPressEvent(QKeyEvent* event) {
+  if (const auto way = way_of(event->key())) {
+    if (event->modifiers() & Qt::ShiftModifier)
+      return move_cursor((event->modifiers() & Qt::ControlModifier ? 1 : 10) * *way);
+    return pan(-40 * *way);
+  }
+  const QPointF middle = cursor_ ? frame_.to_widget(*cursor_) : QRectF(rect()).center();
+  switch (event->key()) {
+    case Qt::Key_Plus:
+    case Qt::Key_Equal:
+      return zoom(key_zoom, middle);
+    case Qt::Key_Minus:
+      return zoom(1 / key_zoom, middle);
+    case Qt::Key_0:
+      return fit();
+    case Qt::Key_L:
+      return set_layer(static_cast<Layer>((static_cast<int>(wanted_) + 1) % 3));
+    case Qt::Key_H:
+      return set_marks_visible(!marks_visible_);
+    case Qt::Key_M:
+      return set_magnifier(!magnifier_);
+    case Qt::Key_W:
+      return set_usual_window();
+    case Qt::Key_Return:
+    case Qt::Key_Enter:
+      if (cursor_ && picking_) return pick_at(frame_.to_widget(*cursor_));
+      break;
+    case Qt::Key_Escape:
+      if (!cursor_) break;
+      cursor_.reset();
+      return hover_over({});
+    default:
+      break;
+  }
+  event->ignore();
+}
+
+void XrayView::move_cursor(const QPointF& by) {
+  if (!shown_) return;
+  const QPointF from = cursor_ ? frame_.to_widget(*cursor_) : QRectF(rect()).center();
+  const Eigen::Vector2d size(grey_.width() - 1, grey_.height() - 1);
+  cursor_ = frame_.to_picture(from + by).cwiseMax(0).cwiseMin(size);
+  const QPointF at = frame_.to_widget(*cursor_);
+  const QRectF sight = QRectF(rect()).adjusted(20, 20, -20, -20);
+  if (!sight.contains(at)) pan(sight.center() - at);
+  hover_at(frame_.to_widget(*cursor_));
+}
+
+void XrayView::pick_at(const QPointF& place) {
+  if (const auto raw = raw_at(place)) Q_EMIT picked(*raw);
+}
+
+void XrayView::hover_at(const QPointF& place) {
+  constexpr double reach = 14;  // on the screen
+  if (shown_) hover_over(mark_near(marks_, frame_.to_picture(place), reach / frame_.scale));
+}
+
+void XrayView::hover_over(const std::optional<MarkUnderCursor>& mark) {
+  update();
+  if (mark == under_) return;
+  under_ = mark;
+  if (cursor_ && mark) setAccessibleDescription(mark->tip);
+  Q_EMIT hovered(mark);
+}
+
+}  // namespace helicarm::gui

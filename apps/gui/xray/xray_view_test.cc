@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/xray/xray_view.h"
+
+#include <QApplication>
+#include <QSignalSpy>
+#include <QTest>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "gui/xray/simulated_result_test.h"
+
+namespace helicarm::gui {
+namespace {
+
+class XrayViewTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    view.resize(640, 640);
+    view.show();
+    view.show_view(simulated_result(), 0);
+    settle();
+  }
+  void settle() {
+    for (int i = 0; i < 500 && view.is_computing(); ++i) QTest::qWait(10);
+    ASSERT_FALSE(view.is_computing());
+  }
+  const ViewResult& shown() { return simulated_result()->views[0]; }
+  void key(int which, Qt::KeyboardModifiers with = Qt::NoModifier) {
+    QTest::keyClick(&view, static_cast<Qt::Key>(which), with);
+  }
+  void drag(const QPoint& from, const QPoint& to, Qt::MouseButton button) {
+    QTest::mousePress(&view, button, {}, from);
+    for (const QPoint& at : {from + (to - from) / 2, to}) {
+      QMouseEvent move(QEvent::MouseMove, at, view.mapToGlobal(QPointF(at)), Qt::NoButton, button, {});
+      QApplication::sendEvent(&view, &move);
+    }
+    QTest::mouseRelease(&view, button, {}, to);
+  }
+  void wheel(const QPoint& at, int angle) {
+    QWheelEvent event(at, view.mapToGlobal(QPointF(at)), {}, {0, angle}, {}, {}, Qt::NoScrollPhase, false);
+    QApplication::sendEvent(&view, &event);
+  }
+
+  XrayView view;
+};
+
+TEST_F(XrayViewTest, AClickArrivesAsARawPixelInEveryLayerAtAnyZoom) {
+  const Fiducial& ball = shown().found->fiducials[3];
+  const QPointF raw(ball.uv_raw.x(), ball.uv_raw.y());
+  view.set_picking(true);
+  for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
+    view.set_layer(layer);
+    settle();
+    key(Qt::Key_0);
+    for (const double screen_px : {1.3, 2.6, 9.0}) {
+      QSignalSpy spy(&view, &XrayView::picked);
+      const QPointF at = *view.place_of(raw);
+      QTest::mouseClick(&view, Qt::LeftButton, {}, QPoint(int(std::floor(at.x())), int(std::floor(at.y()))));
+      ASSERT_EQ(spy.count(), 1);
+      const QPointF off = spy[0][0].toPointF() - raw;
+      EXPECT_LT(std::hypot(off.x(), off.y()), 0.75 / screen_px) << int(layer);
+      wheel(at.toPoint(), screen_px < 2 ? 500 : 900);
+    }
+  }
+}
+
+TEST_F(XrayViewTest, WhatIsDrawnStandsWhereAClickOnItGoes) {
+  Result bare;
+  bare.views.push_back({"dot", Exposure{}, {}, {}, {}});
+  bare.views[0].exposure->pixels = Image<float>(33, 33, 1);
+  bare.views[0].exposure->pixels(20, 9) = 100;
+  view.show_view(std::make_shared<const Result>(std::move(bare)), 0);
+  settle();
+  view.set_window({1, 100});
+  view.clearFocus();
+  const QImage picture = view.grab().toImage().convertToFormat(QImage::Format_Grayscale8);
+  const QPointF expected = *view.place_of({20, 9});
+  QPointF sum;
+  double weight = 0;
+  for (int y = -40; y <= 40; ++y)
+    for (int x = -40; x <= 40; ++x) {
+      const QPoint at = expected.toPoint() + QPoint(x, y);
+      const double grey = picture.pixelColor(at).red();
+      sum += grey * (QPointF(at) + QPointF(0.5, 0.5));
+      weight += grey;
+    }
+  EXPECT_NEAR(sum.x() / weight, expected.x(), 0.3);
+  EXPECT_NEAR(sum.y() / weight, expected.y(), 0.3);
+}
+
+TEST_F(XrayViewTest, ADragIsNoPickAndAClickIsNoneUnlessPicking) {
+  QSignalSpy spy(&view, &XrayView::picked);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  view.set_picking(true);
+  drag({300, 300}, {360, 320}, Qt::LeftButton);
+  QTest::mouseClick(&view, Qt::RightButton, {}, {300, 300});
+  EXPECT_EQ(spy.count(), 0);
+}
+
+TEST_F(XrayViewTest, ADoubleClickWhilePickingIsOnePick) {
+  QSignalSpy spy(&view, &XrayView::picked);
+  view.set_picking(true);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  QTest::mouseDClick(&view, Qt::LeftButton, {}, {300, 300});
+  EXPECT_EQ(spy.count(), 1);
+}
+
+TEST_F(XrayViewTest, LeftDragPansAndDoubleClickFits) {
+  const QPointF before = *view.place_of({256, 256});
+  drag({300, 300}, {350, 280}, Qt::LeftButton);
+  const QPointF moved = *view.place_of({256, 256}) - before;
+  EXPECT_NEAR(moved.x(), 50, 1e-6);
+  EXPECT_NEAR(moved.y(), -20, 1e-6);
+  QTest::mouseDClick(&view, Qt::LeftButton, {}, {300, 300});
+  EXPECT_LT((*view.place_of({256, 256}) - before).manhattanLength(), 1e-6);
+}
+
+TEST_F(XrayViewTest, WheelKeepsThePixelUnderTheCursor) {
+  const QPointF raw = *view.raw_at({200, 410});
+  wheel({200, 410}, 360);
+  EXPECT_LT((*view.raw_at({200, 410}) - raw).manhattanLength(), 1e-6);
+}
+
+TEST_F(XrayViewTest, RightDragChangesTheWindowAndWRestoresIt) {
+  const GreyWindow usual = *view.window();
+  drag({300, 300}, {400, 340}, Qt::RightButton);
+  EXPECT_GT(view.window()->high - view.window()->low, usual.high - usual.low);
+  key(Qt::Key_W);
+  EXPECT_EQ(view.window()->high, usual.high);
+}
+
+TEST_F(XrayViewTest, KeysZoomPanAndCycleTheLayers) {
+  QSignalSpy layers(&view, &XrayView::layer_changed);
+  key(Qt::Key_L);
+  key(Qt::Key_L);
+  EXPECT_EQ(view.layer(), Layer::raw);
+  EXPECT_EQ(layers.count(), 2);
+  settle();
+  const QPointF before = *view.place_of({100, 100});
+  key(Qt::Key_Plus);
+  key(Qt::Key_Right);
+  EXPECT_GT((*view.place_of({100, 100}) - before).manhattanLength(), 10);
+  key(Qt::Key_0);
+  EXPECT_LT((*view.place_of({100, 100}) - before).manhattanLength(), 1e-6);
+}
+
+TEST_F(XrayViewTest, PicksByKeyboardAlone) {
+  view.set_picking(true);
+  QSignalSpy spy(&view, &XrayView::picked);
+  key(Qt::Key_Return);
+  EXPECT_EQ(spy.count(), 0);
+  for (int i = 0; i < 3; ++i) key(Qt::Key_Right, Qt::ShiftModifier);
+  key(Qt::Key_Up, Qt::ShiftModifier | Qt::ControlModifier);
+  const QPointF expected = *view.raw_at({320 + 30, 320 - 1});
+  key(Qt::Key_Return);
+  ASSERT_EQ(spy.count(), 1);
+  EXPECT_LT((spy[0][0].toPointF() - expected).manhattanLength(), 1e-6);
+  for (int i = 0; i < 200; ++i) key(Qt::Key_Left, Qt::ShiftModifier);
+  key(Qt::Key_Escape);
+  key(Qt::Key_Return);
+  EXPECT_LE(spy.count(), 1);
+}
+
+TEST_F(XrayViewTest, HoveringNamesTheBall) {
+  std::vector<std::string> names;
+  QObject::connect(&view, &XrayView::hovered, [&](const std::optional<MarkUnderCursor>& mark) {
+    names.push_back(mark ? mark->name.toStdString() : "");
+  });
+  const auto hover = [&](const QPointF& at) {
+    QMouseEvent move(QEvent::MouseMove, at, view.mapToGlobal(at), Qt::NoButton, Qt::NoButton, {});
+    QApplication::sendEvent(&view, &move);
+  };
+  for (const Fiducial& ball : shown().found->fiducials) {
+    if (ball.status != FiducialStatus::used) continue;
+    hover({2, 2});
+    names.clear();
+    hover(*view.place_of({ball.uv_raw.x(), ball.uv_raw.y()}));
+    EXPECT_EQ(names, std::vector{ball.label});
+  }
+  view.clear("gone");
+  EXPECT_EQ(names.back(), "");
+}
+
+TEST_F(XrayViewTest, ClearForgetsEverything) {
+  view.clear("No picture yet: shoot AP");
+  EXPECT_FALSE(view.raw_at({300, 300}));
+  EXPECT_FALSE(view.window());
+  view.set_picking(true);
+  QSignalSpy spy(&view, &XrayView::picked);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  for (int which : {Qt::Key_H, Qt::Key_L, Qt::Key_0, Qt::Key_W, Qt::Key_Plus, Qt::Key_Return}) key(which);
+  view.set_tool(PictureLine{{1, 2}, {3, 4}}, "note");
+  view.grab();
+  EXPECT_EQ(spy.count(), 0);
+}
+
+TEST_F(XrayViewTest, AnOldRequestIsDroppedAndAClearedViewStaysClear) {
+  for (int i = 0; i < 7; ++i) key(Qt::Key_L);
+  view.show_view(simulated_result(), 1);
+  settle();
+  EXPECT_EQ(view.accessibleName(), "X-ray LAT");
+  view.set_layer(Layer::raw);
+  view.set_layer(Layer::inpainted);
+  view.clear("gone");
+  QTest::qWait(300);
+  EXPECT_FALSE(view.raw_at({300, 300}));
+}
+
+TEST_F(XrayViewTest, MayGoWhileALayerIsComputed) {
+  for (int i = 0; i < 10; ++i) {
+    auto other = std::make_unique<XrayView>();
+    other->show_view(simulated_result(), 0);
+    QTest::qWait(3 * i);
+  }
+}
+
+TEST_F(XrayViewTest, AViewThatIsNotThereSaysWhatToDo) {
+  Result empty;
+  empty.views.push_back({"AP", {}, {}, {}, {}});
+  const auto result = std::make_shared<const Result>(std::move(empty));
+  view.show_view(result, 0);
+  EXPECT_EQ(view.accessibleDescription(), "No picture yet: shoot AP");
+  view.show_view(result, 5);
+  view.show_view(nullptr, 0);
+  EXPECT_FALSE(view.is_computing());
+}
+
+TEST_F(XrayViewTest, RandomInputDoesNotCrash) {
+  std::mt19937 random(5);
+  const auto below = [&](int n) { return int(random() % unsigned(n)); };
+  const int keys[] = {Qt::Key_H,    Qt::Key_L,      Qt::Key_M,      Qt::Key_W,     Qt::Key_0,
+                      Qt::Key_Plus, Qt::Key_Minus,  Qt::Key_Left,   Qt::Key_Right, Qt::Key_Up,
+                      Qt::Key_Down, Qt::Key_Return, Qt::Key_Escape, Qt::Key_A};
+  const Qt::MouseButton buttons[] = {Qt::LeftButton, Qt::RightButton, Qt::MiddleButton};
+  const Qt::KeyboardModifier with[] = {Qt::NoModifier, Qt::ShiftModifier, Qt::ControlModifier};
+  for (int i = 0; i < 500; ++i) {
+    const QPoint at(below(700) - 30, below(700) - 30), to(below(700) - 30, below(700) - 30);
+    switch (below(9)) {
+      case 0:
+        drag(at, to, buttons[below(3)]);
+        break;
+      case 1:
+        QTest::mouseClick(&view, buttons[below(3)], {}, at);
+        break;
+      case 2:
+        QTest::mouseDClick(&view, buttons[below(3)], {}, at);
+        break;
+      case 3:
+        wheel(at, below(2000) - 1000);
+        break;
+      case 4:
+        view.resize(1 + below(900), 1 + below(900));
+        break;
+      case 5:
+        view.set_picking(below(2));
+        break;
+      case 6:
+        view.set_tool(PictureLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
+        break;
+      default:
+        key(keys[below(int(std::size(keys)))], with[below(3)]);
+    }
+    if (i % 50 == 20) view.show_view(simulated_result(), std::size_t(below(3)));
+    if (i % 5 == 0) QApplication::processEvents();
+    if (i % 25 == 0) view.grab();
+  }
+}
+
+}  // namespace
+}  // namespace helicarm::gui
+
+int main(int count, char** arguments) {
+  qputenv("QT_QPA_PLATFORM", "offscreen");
+  QApplication application(count, arguments);
+  testing::InitGoogleTest(&count, arguments);
+  return RUN_ALL_TESTS();
+}
