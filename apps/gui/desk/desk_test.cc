@@ -30,6 +30,13 @@ ViewResult exposed(const std::string& name) {
   return view;
 }
 
+Pick pick(const std::string& name, const std::string& view) {
+  Pick made;
+  made.name = name;
+  made.view = view;
+  return made;
+}
+
 const StepCard& card_of(const std::array<StepCard, phases.size()>& cards, Phase phase) {
   return cards[std::size_t(phase)];
 }
@@ -68,8 +75,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsPlacedAndSaysTheWorst) {
   state.measured = true;
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).why, "click FS in AP");
   for (const char* end : {"FS", "FE"})
-    for (const char* view : {"AP", "LAT"})
-      state.picks.push_back({.name = end, .view = view, .uv_raw = {1, 2}});
+    for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).mood, StepMood::waiting);  // not measured with them yet
   auto result = std::make_shared<Result>(*state.result);
   for (const double sigma_mm : {0.1, 0.2}) {
@@ -87,8 +93,7 @@ TEST(Steps, PointThatCannotBePlacedRefusesThePlan) {
   DeskState state = state_with({exposed("AP"), exposed("LAT")});
   state.measured = true;
   for (const char* end : {"FS", "FE"})
-    for (const char* view : {"AP", "LAT"})
-      state.picks.push_back({.name = end, .view = view, .uv_raw = {1, 2}});
+    for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
   auto result = std::make_shared<Result>(*state.result);
   result->points.push_back(
       {"FE", PointSource::pick, {}, {}, {}, 0, Failure{Reason::parallel_rays, "rays are parallel"}});
@@ -100,7 +105,7 @@ TEST(Steps, PointThatCannotBePlacedRefusesThePlan) {
 TEST(Picks, NextOneGoesThroughViewsThenEnds) {
   DeskState state = state_with({exposed("AP"), exposed("LAT")});
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSAP");
-  state.picks.push_back({.name = "FS", .view = "AP", .uv_raw = {1, 2}});
+  state.picks.push_back(pick("FS", "AP"));
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSLAT");
 }
 

@@ -5,6 +5,7 @@
 #include <QDockWidget>
 #include <QHBoxLayout>
 #include <QKeyEvent>
+#include <QMenu>
 #include <QSplitter>
 #include <QStatusBar>
 #include <QVBoxLayout>
@@ -202,7 +203,10 @@ void MainWindow::show_phase(Phase phase) {
 void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   const auto wanted = plan_->target();
   if (!wanted || !shown_ || view >= shown_->views.size()) return;
-  Pick pick{.name = wanted->point, .view = shown_->views[view].name, .uv_raw = {raw.x(), raw.y()}};
+  Pick pick;
+  pick.name = wanted->point;
+  pick.view = shown_->views[view].name;
+  pick.uv_raw = {raw.x(), raw.y()};
   if (plan_->snaps()) pick.snap = Snap::ball;
   if (desk_.state().source != Source::files) pick.moves_with = wanted->bone;
   desk_.pick(std::move(pick));

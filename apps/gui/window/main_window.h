@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "gui/desk/desk.h"
+#include "gui/replay/recent.h"
 #include "gui/replay/replay_panel.h"
 #include "gui/replay/settings_dialog.h"
 #include "gui/scene/scene_view.h"

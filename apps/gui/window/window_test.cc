@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// The window for real: events of mouse and keyboard, on a screen, against the virtual operating room.
+#include <QApplication>
+#include <QDropEvent>
+#include <QMenu>
+#include <QMimeData>
+#include <QStandardPaths>
+#include <QTest>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "gui/desk/steps.h"
+#include "gui/window/main_window.h"
+#include "gui/window/style.h"
+#include "helicarm/core/files.h"
+#include "helicarm/simulation/write_case.h"
+
+namespace helicarm::gui {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr int long_ms = 120000;
+
+/// A window on the screen, and a folder that goes with it.
+class Window : public testing::Test {
+ protected:
+  Window() : folder_(fs::temp_directory_path() / ("helicarm_window_" + std::to_string(::getpid()))) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    QSettings().clear();
+    window_ = std::make_unique<MainWindow>(folder_ / "sessions");
+    window_->resize(1280, 800);
+    window_->show();
+    EXPECT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
+  }
+  ~Window() override {
+    window_.reset();
+    fs::remove_all(folder_);
+  }
+
+  const DeskState& state() { return window_->desk().state(); }
+  StepCard card(Phase phase) { return window_->strip().button(phase)->card(); }
+  template <class Done>
+  bool wait(const Done& done, int patience_ms = long_ms) {
+    return QTest::qWaitFor(done, patience_ms);
+  }
+  bool wait_idle() {
+    return wait([&] { return !state().busy; });
+  }
+  template <class Widget = QPushButton>
+  Widget* find(const char* name) {
+    auto* found = window_->findChild<Widget*>(name);
+    EXPECT_NE(found, nullptr) << name;
+    return found;
+  }
+  void click(const char* name) { QTest::mouseClick(find(name), Qt::LeftButton); }
+  /// With the mouse, or with Enter.
+  void hold(const char* name, bool by_key = false) {
+    auto* button = find<HoldButton>(name);
+    ASSERT_TRUE(wait([&] { return button->isEnabled(); })) << name;
+    if (by_key) {
+      button->setFocus();
+      QTest::keyPress(button, Qt::Key_Return);
+      QTest::qWait(HoldButton::hold_ms + 150);
+      QTest::keyRelease(button, Qt::Key_Return);
+    } else {
+      QTest::mousePress(button, Qt::LeftButton);
+      QTest::qWait(HoldButton::hold_ms + 150);
+      QTest::mouseRelease(button, Qt::LeftButton);
+    }
+  }
+  /// Kept where HELICARM_SCREENSHOTS says.
+  void screenshot(const char* name) {
+    QTest::qWait(100);
+    if (const char* place = std::getenv("HELICARM_SCREENSHOTS"))
+      window_->grab().save(QString("%1/%2.png").arg(place, name));
+  }
+
+  void open_rehearsal() {
+    window_->open_rehearsal();
+    ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+  }
+  void shoot_both() {
+    click("shootAP");
+    ASSERT_TRUE(wait([&] { return !state().busy && state().result->views[0].exposure; }));
+    auto* lateral = find("shootLAT");
+    lateral->setFocus();
+    QTest::keyClick(lateral, Qt::Key_Return);
+    ASSERT_TRUE(wait([&] { return state().measured && !state().busy; }));
+  }
+  Json result_file() {
+    const fs::path newest = state().folder / ("case-" + std::to_string(state().measurements)) / "result.json";
+    return read_json(newest).value();
+  }
+  void pick_all() {
+    while (const auto wanted = next_pick(state())) {
+      const std::size_t view = wanted->view == "AP" ? 0 : 1;
+      const auto offered = std::ranges::find_if(state().offered_picks, [&](const Pick& pick) {
+        return pick.name == wanted->point && pick.view == wanted->view;
+      });
+      XrayView& xray = window_->xray(view);
+      const auto place = xray.place_of({offered->uv_raw.x(), offered->uv_raw.y()});
+      ASSERT_TRUE(place);
+      QTest::mouseClick(&xray, Qt::LeftButton, Qt::NoModifier, place->toPoint());
+      ASSERT_TRUE(wait([&] { return pick_of(state(), wanted->point, wanted->view) != nullptr; }));
+      QTest::qWait(QApplication::doubleClickInterval() + 50);
+    }
+    ASSERT_TRUE(wait_idle());
+  }
+
+  fs::path folder_;
+  std::unique_ptr<MainWindow> window_;
+};
+
+void drop(QWidget& onto, const std::vector<fs::path>& paths) {
+  QMimeData data;
+  QList<QUrl> urls;
+  for (const fs::path& path : paths) urls << QUrl::fromLocalFile(QString::fromStdString(path.string()));
+  data.setUrls(urls);
+  QDropEvent event(QPointF(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(&onto, &event);
+}
+
+TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
+  screenshot("0-start");
+  open_rehearsal();
+  EXPECT_EQ(card(Phase::acquire).mood, StepMood::waiting);
+  screenshot("1-acquire");
+  shoot_both();
+  for (const Phase phase : {Phase::acquire, Phase::rectify, Phase::calibrate})
+    EXPECT_TRUE(card(phase).mood == StepMood::good || card(phase).mood == StepMood::warning);
+  const Json first = result_file();
+  EXPECT_THAT(card(Phase::calibrate).figure.toStdString(),
+              HasSubstr(fmt::format("FRE {:.3f} mm", first["accuracy"]["fre_mm"]["mean"].get<double>())));
+  for (const Phase phase : {Phase::rectify, Phase::calibrate}) {
+    QTest::mouseClick(window_->strip().button(phase), Qt::LeftButton);
+    QTest::qWait(300);
+    screenshot(phase == Phase::rectify ? "2-rectify" : "3-calibrate");
+  }
+
+  QTest::keyClick(window_.get(), Qt::Key_4, Qt::AltModifier);
+  pick_all();
+  ASSERT_EQ(card(Phase::plan).mood, StepMood::good) << card(Phase::plan).why.toStdString();
+  const Json second = result_file();
+  ASSERT_EQ(second["points"].size(), state().result->points.size());
+  auto* ends = find<QTableWidget>("endTable");
+  ASSERT_EQ(ends->rowCount(), 4);
+  for (int row = 0; row < 4; ++row)
+    for (const Json& point : second["points"])
+      if (point["name"] == ends->item(row, 0)->text().toStdString())
+        EXPECT_EQ(ends->item(row, 3)->text().toStdString(),
+                  fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
+  screenshot("4-plan");
+
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
+  hold("register", true);
+  ASSERT_TRUE(wait([&] { return state().hand_eye_rms_mm.has_value() && !state().busy; }));
+  for (const PlannedTunnel& tunnel : state().tunnels) {
+    find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
+    ASSERT_TRUE(wait([&] { return find("planWay")->isEnabled(); }));
+    click("planWay");
+    ASSERT_TRUE(wait([&] { return state().order.has_value() && !state().busy; }));
+    if (state().outcomes.empty()) screenshot("5-path");
+    hold("go");
+    ASSERT_TRUE(wait([&] { return state().outcomes.contains(tunnel.name) && !state().busy; }));
+    screenshot("6-navigate");
+    hold("withdraw");
+    ASSERT_TRUE(wait([&] { return !state().at_target && !state().busy; }));
+  }
+  EXPECT_EQ(card(Phase::navigate).mood, StepMood::good);
+  EXPECT_EQ(card(Phase::verify).mood, StepMood::good);
+  QTest::keyClick(window_.get(), Qt::Key_6, Qt::AltModifier);
+  auto* table = find<QTableWidget>("outcomeTable");
+  ASSERT_EQ(table->rowCount(), 4);
+  // Two checks followed the measurement of the picks; the last one is of the last tunnel.
+  const fs::path last = state().folder / ("case-" + std::to_string(state().measurements + 2));
+  const Json checked = read_json(last / "result.json").value();
+  const Json& start = checked["verifications"][0]["start"];
+  const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
+  EXPECT_EQ(table->item(row, 3)->text().toStdString(),
+            fmt::format("{:.2f}", start["combined_px"].get<double>()));
+  screenshot("7-verify");
+
+  const auto exported = window_->export_to(folder_ / "export");
+  ASSERT_TRUE(exported) << exported.error().message;
+  for (const char* file : {"report.html", "report.pdf", "result.json"})
+    EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
+}
+
+TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
+  open_rehearsal();
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
+  hold("register");
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::moving; }));
+  QTest::keyClick(find("shootAP"), Qt::Key_Space);
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::stopped; }, 2000));
+  ASSERT_TRUE(wait_idle());
+  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
+}
+
+TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
+  open_rehearsal();
+  auto* unlock = find<HoldButton>("unlock");
+  ASSERT_TRUE(wait([&] { return unlock->isEnabled(); }));
+  QTest::mouseClick(unlock, Qt::LeftButton);
+  QTest::keyClick(unlock, Qt::Key_Return);
+  QTest::qWait(HoldButton::hold_ms + 200);
+  EXPECT_EQ(window_->desk().live().robot.phase, LinkPhase::idle);
+}
+
+TEST_F(Window, PulledCablesShowWithinASecondAndAHalf) {
+  open_rehearsal();
+  const auto lamp = [&](int number) { return window_->desk().live().lamps.at(std::size_t(number)).light; };
+  ASSERT_TRUE(wait([&] { return lamp(3) == Light::green && lamp(4) == Light::amber; }));
+  window_->desk().set_fault("silent", true);
+  EXPECT_TRUE(wait([&] { return lamp(1) == Light::red && lamp(3) == Light::red; }, 1500));
+  window_->desk().set_fault("silent", false);
+  EXPECT_TRUE(wait([&] { return lamp(1) == Light::green; }, 3000));
+}
+
+TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
+  simulation::SimulationOptions options;
+  options.size = 512;
+  auto simulated = simulation::simulate_case(options).value();
+  for (auto& pixel : simulated.views[1].pixels.pixels()) pixel = 2000;
+  simulation::write_case(folder_ / "blank", simulated).value();
+  drop(*window_, {folder_ / "blank"});
+  ASSERT_TRUE(wait([&] { return state().source == Source::files && !state().busy; }));
+  EXPECT_EQ(card(Phase::rectify).mood, StepMood::refused);
+  EXPECT_THAT(card(Phase::rectify).why.toStdString(), HasSubstr("blank_image"));
+  EXPECT_FALSE(state().measured);
+  EXPECT_EQ(window_->export_to(folder_ / "export").error().reason, Reason::usage);
+}
+
+TEST_F(Window, BadFilesDroppedOnItAreRefusedByName) {
+  std::ofstream(folder_ / "a.dcm") << "no picture";
+  std::ofstream(folder_ / "b.dcm") << "nor this";
+  for (const auto& paths : {std::vector<fs::path>{folder_ / "a.dcm", folder_ / "b.dcm"},
+                            {folder_ / "a.dcm"},
+                            {folder_ / "gone"},
+                            {folder_}}) {
+    drop(*window_, paths);
+    ASSERT_TRUE(wait_idle());
+    EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
+    EXPECT_FALSE(card(Phase::acquire).why.isEmpty());
+  }
+}
+
+TEST_F(Window, ThousandRandomClicksAndKeysFreezeNothing) {
+  open_rehearsal();
+  std::srand(7);
+  const std::array keys{Qt::Key_Tab, Qt::Key_Return, Qt::Key_Space, Qt::Key_L,    Qt::Key_M, Qt::Key_Plus,
+                        Qt::Key_0,   Qt::Key_Up,     Qt::Key_1,     Qt::Key_2,    Qt::Key_R, Qt::Key_Escape,
+                        Qt::Key_W,   Qt::Key_Minus,  Qt::Key_Left,  Qt::Key_Down, Qt::Key_H, Qt::Key_3};
+  qint64 longest = 0;
+  for (int i = 0; i < 1000; ++i) {
+    QElapsedTimer since;
+    since.start();
+    const QPoint place(std::rand() % window_->width(), 30 + std::rand() % (window_->height() - 30));
+    QWidget* widget = window_->childAt(place);
+    if (widget == nullptr) widget = window_.get();
+    if (std::rand() % 2 == 0)
+      QTest::mouseClick(widget, std::rand() % 4 == 0 ? Qt::RightButton : Qt::LeftButton, Qt::NoModifier,
+                        widget->mapFrom(window_.get(), place));
+    else
+      QTest::keyClick(widget, keys[std::size_t(std::rand()) % keys.size()]);
+    if (QWidget* popup = QApplication::activePopupWidget()) popup->close();
+    QApplication::processEvents();
+    longest = std::max(longest, since.elapsed());
+  }
+  RecordProperty("longest_ms", int(longest));
+  ASSERT_TRUE(wait_idle());
+  window_->open_rehearsal();
+  ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+}
+
+}  // namespace
+}  // namespace helicarm::gui
+
+int main(int argc, char** argv) {
+  QSurfaceFormat::setDefaultFormat(helicarm::gui::SceneView::default_format());
+  QStandardPaths::setTestModeEnabled(true);
+  QApplication app(argc, argv);
+  QApplication::setOrganizationName("helicarm");
+  QApplication::setApplicationName("helicarm-gui-test");
+  app.setStyleSheet(helicarm::gui::style::sheet());
+  testing::InitGoogleMock(&argc, argv);
+  return RUN_ALL_TESTS();
+}
