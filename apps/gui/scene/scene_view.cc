@@ -178,16 +178,16 @@ void SceneView::paint_overlay() {
   QFont small = font();
   small.setPixelSize(11);
   painter.setFont(small);
-  paint_labels(painter, size(), camera_, labels());
-  paint_triad(painter, size(), camera_);
-  if (tre_) paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_);
-  const ViewShape* view = moved_ ? nullptr : view_of(preset_);
-  int line = 0;
-  if (view)
-    paint_note(painter, line++, tr("From the source of %1").arg(QString::fromStdString(view->name)),
-               palette::text);
+  std::vector<QRect> taken;
+  if (const ViewShape* view = moved_ ? nullptr : view_of(preset_))
+    taken.push_back(paint_note(
+        painter, 0, tr("From the source of %1").arg(QString::fromStdString(view->name)), palette::text));
   if (!scene_.points.empty() && error_scale_ != 1)
-    paint_note(painter, line++, tr("95 % ellipsoids, %1 times as large").arg(error_scale_), palette::point);
+    taken.push_back(paint_note(painter, int(taken.size()),
+                               tr("95 % ellipsoids, %1 times as large").arg(error_scale_), palette::point));
+  if (tre_) taken.push_back(paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_));
+  paint_triad(painter, size(), camera_);
+  paint_labels(painter, size(), camera_, labels(), taken);
 }
 
 }  // namespace helicarm::gui

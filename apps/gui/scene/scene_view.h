@@ -18,7 +18,7 @@ class Stage;
 using simulation::BoneMeshes;
 
 /// Calibrator, X-rays, points, bones, tool and robot in space. The left button turns, the right one and the
-/// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, R back, arrows turn, + and - zoom.
+/// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, 4 near, R back, arrows turn, + and - zoom.
 class SceneView : public QOpenGLWidget {
   Q_OBJECT
 
@@ -72,6 +72,7 @@ class SceneView : public QOpenGLWidget {
   double aspect() const { return double(std::max(1, width())) / std::max(1, height()); }
   const ViewShape* view_of(Preset preset) const;
   SceneCamera camera_of(Preset preset) const;
+  SceneCamera near_camera() const;
   void move_camera(const SceneCamera& camera);
   void tear_down();
   void give_up(const QString& reason);

@@ -28,7 +28,6 @@ void give(vtkActor* actor, const ShapeBuilder& shapes) {
 /// Blended over what was drawn before, front faces only: no sorting, no second pass.
 void make_glass(vtkActor* actor, double opacity) {
   actor->GetProperty()->SetOpacity(opacity);
-  actor->GetProperty()->BackfaceCullingOn();
   actor->ForceOpaqueOn();
 }
 
@@ -98,6 +97,7 @@ vtkActor* Stage::add(bool lit) {
   vtkNew<vtkActor> actor;
   actor->SetMapper(mapper);
   actor->GetProperty()->SetLighting(lit);
+  actor->GetProperty()->SetBackfaceCulling(lit);  // a camera within a source's ball sees through it
   actor->GetProperty()->SetAmbient(lit ? 0.25 : 1);
   actor->GetProperty()->SetDiffuse(lit ? 0.8 : 0);
   actor->SetVisibility(false);
