@@ -33,14 +33,16 @@ void paint_labels(QPainter& painter, const QSize& size, const SceneCamera& camer
     const int above = at.y() - 4 - box.height(), below = at.y() + 4, beside = at.y() - box.height() / 2;
     std::vector<QRect> choices;
     for (const QPoint& corner : {QPoint(right, above), QPoint(right, below), QPoint(left, above),
-                                 QPoint(left, below), QPoint(right + 14, beside), QPoint(left - 14, beside)})
+                                 QPoint(left, below), QPoint(right + 14, beside), QPoint(left - 14, beside),
+                                 QPoint(left - 50, above), QPoint(left - 50, below)})
       choices.emplace_back(corner, box);
     const QRect window(QPoint(0, 0), size);
     const auto free = std::ranges::find_if(choices, [&](const QRect& choice) {
       return window.contains(choice) &&
              std::ranges::none_of(taken, [&](const QRect& other) { return choice.intersects(other); });
     });
-    taken.push_back(free == choices.end() ? choices.front() : *free);
+    if (free == choices.end()) continue;
+    taken.push_back(*free);
     paint_plate(painter, taken.back(), label.text, label.colour);
   }
 }

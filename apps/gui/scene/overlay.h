@@ -17,7 +17,8 @@ struct SceneLabel {
   Colour colour;
 };
 
-/// Each beside its place on a dark plate; one that would cover another or what is `taken` steps aside.
+/// Each beside its place on a dark plate; one that would cover another or what is `taken` steps aside, or is
+/// left out.
 void paint_labels(QPainter& painter, const QSize& size, const SceneCamera& camera,
                   const std::vector<SceneLabel>& labels, std::vector<QRect> taken);
 

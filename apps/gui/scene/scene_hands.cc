@@ -52,7 +52,8 @@ SceneCamera SceneView::near_camera() const {
   for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
   for (const PointShape& point : scene_.points) places.push_back(point.error.centre);
   if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
-  return overview_of(places, aspect());
+  constexpr double room_around = 0.72;
+  return zoomed(overview_of(places, aspect()), room_around);
 }
 
 void SceneView::move_camera(const SceneCamera& camera) {
