@@ -21,10 +21,9 @@ void paint_plate(QPainter& painter, const QRect& box, const QString& text, const
 }  // namespace
 
 void paint_labels(QPainter& painter, const QSize& size, const SceneCamera& camera,
-                  const std::vector<SceneLabel>& labels) {
+                  const std::vector<SceneLabel>& labels, std::vector<QRect> taken) {
   const double aspect = double(size.width()) / size.height();
   const QFontMetrics metrics = painter.fontMetrics();
-  std::vector<QRect> taken;
   for (const SceneLabel& label : labels) {
     const auto seen = seen_at(camera, aspect, label.place);
     if (!seen || std::abs(seen->x()) > 1 || std::abs(seen->y()) > 1) continue;
@@ -34,14 +33,16 @@ void paint_labels(QPainter& painter, const QSize& size, const SceneCamera& camer
     const int above = at.y() - 4 - box.height(), below = at.y() + 4, beside = at.y() - box.height() / 2;
     std::vector<QRect> choices;
     for (const QPoint& corner : {QPoint(right, above), QPoint(right, below), QPoint(left, above),
-                                 QPoint(left, below), QPoint(right + 14, beside), QPoint(left - 14, beside)})
+                                 QPoint(left, below), QPoint(right + 14, beside), QPoint(left - 14, beside),
+                                 QPoint(left - 50, above), QPoint(left - 50, below)})
       choices.emplace_back(corner, box);
     const QRect window(QPoint(0, 0), size);
     const auto free = std::ranges::find_if(choices, [&](const QRect& choice) {
       return window.contains(choice) &&
              std::ranges::none_of(taken, [&](const QRect& other) { return choice.intersects(other); });
     });
-    taken.push_back(free == choices.end() ? choices.front() : *free);
+    if (free == choices.end()) continue;
+    taken.push_back(*free);
     paint_plate(painter, taken.back(), label.text, label.colour);
   }
 }
@@ -62,7 +63,7 @@ void paint_triad(QPainter& painter, const QSize& size, const SceneCamera& camera
   }
 }
 
-void paint_colour_bar(QPainter& painter, const QSize& size, const QString& title, const TreScale& scale) {
+QRect paint_colour_bar(QPainter& painter, const QSize& size, const QString& title, const TreScale& scale) {
   constexpr int width = 14, strips = 40;
   const QFontMetrics metrics = painter.fontMetrics();
   const int count = int(std::lround((scale.high - scale.low) / scale.step));
@@ -86,17 +87,18 @@ void paint_colour_bar(QPainter& painter, const QSize& size, const QString& title
                      mark(k));
   }
   const int title_width = metrics.horizontalAdvance(title) + 12;
-  paint_plate(
-      painter,
-      {size.width() - title_width - 4, plate.top() - metrics.height() - 4, title_width, metrics.height() + 4},
-      title, palette::text);
+  const QRect head(size.width() - title_width - 4, plate.top() - metrics.height() - 4, title_width,
+                   metrics.height() + 4);
+  paint_plate(painter, head, title, palette::text);
+  return plate.united(head);
 }
 
-void paint_note(QPainter& painter, int line, const QString& text, const Colour& colour) {
+QRect paint_note(QPainter& painter, int line, const QString& text, const Colour& colour) {
   const QFontMetrics metrics = painter.fontMetrics();
   const QRect box(6, 6 + line * (metrics.height() + 2), metrics.horizontalAdvance(text) + 10,
                   metrics.height() + 2);
   paint_plate(painter, box, text, colour);
+  return box;
 }
 
 }  // namespace helicarm::gui

@@ -17,17 +17,18 @@ struct SceneLabel {
   Colour colour;
 };
 
-/// Each beside its place on a dark plate; of those that would cover each other the later steps aside.
+/// Each beside its place on a dark plate; one that would cover another or what is `taken` steps aside, or is
+/// left out.
 void paint_labels(QPainter& painter, const QSize& size, const SceneCamera& camera,
-                  const std::vector<SceneLabel>& labels);
+                  const std::vector<SceneLabel>& labels, std::vector<QRect> taken);
 
 /// The calibrator's axes in the lower left corner.
 void paint_triad(QPainter& painter, const QSize& size, const SceneCamera& camera);
 
-/// At the right edge, with marks and unit.
-void paint_colour_bar(QPainter& painter, const QSize& size, const QString& title, const TreScale& scale);
+/// At the right edge, with marks and unit; gives its place.
+QRect paint_colour_bar(QPainter& painter, const QSize& size, const QString& title, const TreScale& scale);
 
-/// A line of text in the upper left corner.
-void paint_note(QPainter& painter, int line, const QString& text, const Colour& colour);
+/// A line of text in the upper left corner; gives its place.
+QRect paint_note(QPainter& painter, int line, const QString& text, const Colour& colour);
 
 }  // namespace helicarm::gui

@@ -47,6 +47,15 @@ void SceneView::set_preset(Preset preset) {
   if (fresh) emit preset_changed(preset);
 }
 
+SceneCamera SceneView::near_camera() const {
+  std::vector<Eigen::Vector3d> places;
+  for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
+  for (const PointShape& point : scene_.points) places.push_back(point.error.centre);
+  if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
+  constexpr double room_around = 0.72;
+  return zoomed(overview_of(places, aspect()), room_around);
+}
+
 void SceneView::move_camera(const SceneCamera& camera) {
   camera_ = camera;
   moved_ = true;
@@ -81,6 +90,8 @@ void SceneView::keyPressEvent(QKeyEvent* event) {
       return set_preset(Preset::lateral);
     case Qt::Key_3:
       return set_preset(Preset::free);
+    case Qt::Key_4:
+      return move_camera(near_camera());
     case Qt::Key_R:
       return set_preset(preset_);
     case Qt::Key_Left:

@@ -3,6 +3,7 @@
 
 #include <QElapsedTimer>
 #include <QEvent>
+#include <QOffscreenSurface>
 #include <QOpenGLContext>
 #include <QOpenGLFunctions>
 #include <QTimer>
@@ -35,6 +36,21 @@ QSurfaceFormat SceneView::default_format() {
   format.setStencilBufferSize(8);
   format.setSamples(0);
   return format;
+}
+
+std::optional<QString> SceneView::obstacle() {
+  QOffscreenSurface surface;
+  surface.setFormat(default_format());
+  surface.create();
+  QOpenGLContext context;
+  context.setFormat(default_format());
+  if (!context.create() || !context.makeCurrent(&surface)) return tr("There is no OpenGL here.");
+  return obstacle_of(context.format());
+}
+
+std::optional<QString> SceneView::obstacle_of(const QSurfaceFormat& format) {
+  if (format.renderableType() != QSurfaceFormat::OpenGLES && format.version() >= qMakePair(3, 2)) return {};
+  return tr("OpenGL 3.2 is needed; here is %1.%2.").arg(format.majorVersion()).arg(format.minorVersion());
 }
 
 void SceneView::show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator) {
@@ -72,10 +88,7 @@ void SceneView::set_error_scale(double scale) {
 }
 
 void SceneView::initializeGL() {
-  const QSurfaceFormat format = context()->format();
-  if (context()->isOpenGLES() || format.version() < qMakePair(3, 2))
-    return give_up(
-        tr("OpenGL 3.2 is needed; here is %1.%2.").arg(format.majorVersion()).arg(format.minorVersion()));
+  if (const auto reason = obstacle_of(context()->format())) return give_up(*reason);
   connect(context(), &QOpenGLContext::aboutToBeDestroyed, this, &SceneView::tear_down, Qt::DirectConnection);
   stage_ = std::make_unique<Stage>();
   result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = true;
@@ -159,7 +172,7 @@ std::vector<SceneLabel> SceneView::labels() const {
     const ViewShape& view = scene_.views[i];
     const QString name = QString::fromStdString(view.name);
     labels.push_back({view.central_ray.from, tr("%1 source").arg(name), palette::of_view(i)});
-    labels.push_back({view.detector[0], name, palette::of_view(i)});
+    labels.push_back({view.detector[2], name, palette::of_view(i)});
   }
   if (live_.calibrator_from_tip)
     labels.push_back({live_.calibrator_from_tip->translation, tr("tip"), palette::tool});
@@ -178,16 +191,16 @@ void SceneView::paint_overlay() {
   QFont small = font();
   small.setPixelSize(11);
   painter.setFont(small);
-  paint_labels(painter, size(), camera_, labels());
-  paint_triad(painter, size(), camera_);
-  if (tre_) paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_);
-  const ViewShape* view = moved_ ? nullptr : view_of(preset_);
-  int line = 0;
-  if (view)
-    paint_note(painter, line++, tr("From the source of %1").arg(QString::fromStdString(view->name)),
-               palette::text);
+  std::vector<QRect> taken;
+  if (const ViewShape* view = moved_ ? nullptr : view_of(preset_))
+    taken.push_back(paint_note(
+        painter, 0, tr("From the source of %1").arg(QString::fromStdString(view->name)), palette::text));
   if (!scene_.points.empty() && error_scale_ != 1)
-    paint_note(painter, line++, tr("95 % ellipsoids, %1 times as large").arg(error_scale_), palette::point);
+    taken.push_back(paint_note(painter, int(taken.size()),
+                               tr("95 % ellipsoids, %1 times as large").arg(error_scale_), palette::point));
+  if (tre_) taken.push_back(paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_));
+  paint_triad(painter, size(), camera_);
+  paint_labels(painter, size(), camera_, labels(), taken);
 }
 
 }  // namespace helicarm::gui

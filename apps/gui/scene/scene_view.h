@@ -5,6 +5,7 @@
 #include <QOpenGLWidget>
 #include <QSurfaceFormat>
 #include <memory>
+#include <optional>
 
 #include "gui/scene/overlay.h"
 #include "gui/scene/scene_camera.h"
@@ -18,7 +19,7 @@ class Stage;
 using simulation::BoneMeshes;
 
 /// Calibrator, X-rays, points, bones, tool and robot in space. The left button turns, the right one and the
-/// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, R back, arrows turn, + and - zoom.
+/// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, 4 near, R back, arrows turn, + and - zoom.
 class SceneView : public QOpenGLWidget {
   Q_OBJECT
 
@@ -31,6 +32,10 @@ class SceneView : public QOpenGLWidget {
 
   /// To be set by QSurfaceFormat::setDefaultFormat before the application starts.
   static QSurfaceFormat default_format();
+
+  /// Why no scene can be drawn here; nothing: it can. To be asked before a view comes into a window, for Qt
+  /// 6.4 itself crashes in flushing a window with a QOpenGLWidget on a platform without OpenGL.
+  static std::optional<QString> obstacle();
 
   /// Nothing empties the scene. The live part stays.
   void show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator);
@@ -69,9 +74,11 @@ class SceneView : public QOpenGLWidget {
   void keyPressEvent(QKeyEvent* event) override;
 
  private:
+  static std::optional<QString> obstacle_of(const QSurfaceFormat& format);
   double aspect() const { return double(std::max(1, width())) / std::max(1, height()); }
   const ViewShape* view_of(Preset preset) const;
   SceneCamera camera_of(Preset preset) const;
+  SceneCamera near_camera() const;
   void move_camera(const SceneCamera& camera);
   void tear_down();
   void give_up(const QString& reason);

@@ -19,6 +19,7 @@ namespace {
 class ShownScene : public testing::Test {
  protected:
   void SetUp() override {
+    ASSERT_FALSE(SceneView::obstacle());
     view_.resize(420, 420);
     view_.show();
     ASSERT_TRUE(QTest::qWaitForWindowExposed(&view_));
@@ -119,7 +120,7 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   view_.show_live({});
   view_.show_bones({});
   view_.show_result(nullptr, simulated().given.calibrator);
-  EXPECT_LT(colours_in(shot("empty")), 60u);
+  EXPECT_LT(colours_in(shot("empty")), 150u);  // the triad's letters
 }
 
 TEST_F(ShownScene, TreSliceLiesInThePicture) {
@@ -193,17 +194,34 @@ TEST_F(ShownScene, RedrawIsQuick) {
   view_.show_tre(tre(), SliceAxis::z, 40);
   view_.show_live(live());
   shot("all");
+  QTest::keyClick(&view_, Qt::Key_4);
+  shot("all_near");
+  view_.show_tre({}, SliceAxis::z, 40);
+  shot("near");
+  view_.show_tre(tre(), SliceAxis::z, 40);
   std::vector<double> times;
   for (int i = 0; i < 100; ++i) {
     LiveScene now = live();
     now.calibrator_from_tip->translation.x() += 0.1 * i;
     view_.show_live(now);
-    view_.repaint();
+    view_.grabFramebuffer();  // repaint() waits for the screen
     times.push_back(view_.last_render_ms());
   }
   std::ranges::sort(times);
   std::printf("redraw: median %.2f ms, 95 %% %.2f ms\n", times[50], times[95]);
   EXPECT_LT(times[50], 60);  // a busy machine may be slow; a calm one takes a tenth
+}
+
+TEST(WithoutOpenGL, TheViewSaysSoBeforeItIsShown) {
+  if (QGuiApplication::platformName() != "offscreen") GTEST_SKIP();
+  ASSERT_TRUE(SceneView::obstacle());
+  EXPECT_FALSE(SceneView::obstacle()->isEmpty());
+  SceneView view;
+  view.show_result(simulated().result, simulated().given.calibrator);
+  view.show_live({});
+  view.set_preset(SceneView::Preset::ap);
+  EXPECT_FALSE(view.isValid());
+  EXPECT_EQ(view.last_render_ms(), 0);
 }
 
 }  // namespace

@@ -28,7 +28,6 @@ void give(vtkActor* actor, const ShapeBuilder& shapes) {
 /// Blended over what was drawn before, front faces only: no sorting, no second pass.
 void make_glass(vtkActor* actor, double opacity) {
   actor->GetProperty()->SetOpacity(opacity);
-  actor->GetProperty()->BackfaceCullingOn();
   actor->ForceOpaqueOn();
 }
 
@@ -98,6 +97,7 @@ vtkActor* Stage::add(bool lit) {
   vtkNew<vtkActor> actor;
   actor->SetMapper(mapper);
   actor->GetProperty()->SetLighting(lit);
+  actor->GetProperty()->SetBackfaceCulling(lit);  // a camera within a source's ball sees through it
   actor->GetProperty()->SetAmbient(lit ? 0.25 : 1);
   actor->GetProperty()->SetDiffuse(lit ? 0.8 : 0);
   actor->SetVisibility(false);
@@ -140,7 +140,13 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
   }
   for (const TunnelShape& tunnel : scene.tunnels)
     group(tunnel.moves_with).add_tube(tunnel.axis, tunnel.radius_mm, tunnel.radius_mm, palette::tunnel);
-  if (scene.body) cone.add_mesh(*scene.body, palette::plastic);
+  if (scene.body) {
+    cone.add_mesh(*scene.body, palette::plastic);
+    std::array<std::vector<Vector3d>, 2> rims;  // as cone_of lays them, base and top in turn
+    for (std::size_t i = 0; i < scene.body->corners.size(); ++i)
+      rims[i % 2].push_back(scene.body->corners[i]);
+    for (const auto& rim : rims) lines.add_line(rim, palette::dim(palette::plastic), true);
+  }
   give(solids_, solids);
   give(lines_, lines);
   give(cone_, cone);
