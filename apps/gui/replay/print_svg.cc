@@ -52,10 +52,12 @@ QByteArray print_svg(const std::string& figure, bool on_paper) {
   svg.replace("class=\"bar\"",
               on_paper ? R"(stroke="#1d2326" stroke-width="3")" : R"(stroke="#fff" stroke-width="3")");
   static const QRegularExpression text(R"(<text class="[^"]*" ([^>]*)>([^<]*)</text>)");
-  svg.replace(
-      text, on_paper ? R"(<text fill="#1d2326" stroke="none" \1>\2</text>)"
-                     : R"(<text fill="none" stroke="#000" stroke-opacity="0.7" stroke-width="3" \1>\2</text>)"
-                       R"(<text fill="#fff" stroke="none" \1>\2</text>)");
+  // QtSvg knows no halo about letters: a shadow keeps white ones legible on white bone
+  svg.replace(text, on_paper
+                        ? R"x(<text fill="#1d2326" stroke="none" \1>\2</text>)x"
+                        : R"x(<text fill="#000" stroke="none" transform="translate(1.7 1.7)" \1>\2</text>)x"
+                          R"x(<text fill="#000" stroke="none" transform="translate(-1 -1)" \1>\2</text>)x"
+                          R"x(<text fill="#fff" stroke="none" \1>\2</text>)x");
   return svg.toUtf8();
 }
 
