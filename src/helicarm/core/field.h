@@ -23,9 +23,10 @@ namespace helicarm {
 /// a file. What it is called, how far it goes and what it means are said once, here.
 template <class Options>
 struct Field {
-  std::string_view name;       ///< as in files: "max_error_mm"
-  std::string_view flag = {};  ///< of the command line: "--max-error"; empty: none of its own
-  std::string_view unit = {};  ///< "mm"; empty: a plain number
+  std::string_view name;        ///< as in files: "max_error_mm"
+  std::string_view label = {};  ///< for a person; empty: the name without its unit
+  std::string_view flag = {};   ///< of the command line: "--max-error"; empty: none of its own
+  std::string_view unit = {};   ///< "mm"; empty: a plain number
   Range range;
   double step = 0;  ///< only `range.low` and whole steps above it; 0: anything between
   std::string_view help;
@@ -119,9 +120,10 @@ Expected<void> check_fields(std::span<const Field<std::type_identity_t<Options>>
   return {};
 }
 
-/// "Max error" of "max_error_mm": what stands before a box.
+/// What stands before a box: the label, or "Max error" of "max_error_mm".
 template <class Options>
 std::string label_of(const Field<Options>& field) {
+  if (!field.label.empty()) return std::string(field.label);
   std::string label(field.name);
   std::string unit(field.unit);
   std::ranges::transform(unit, unit.begin(),

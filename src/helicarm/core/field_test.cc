@@ -26,8 +26,12 @@ constexpr std::array<Field<Options>, 3> fields{
     bound<&Options::colour>(
         {.name = "colour", .range = {0, 1}, .step = 1, .help = "Red or blue", .words = colours}),
     bound<&Options::limit_mm>({.name = "limit_mm", .unit = "mm", .range = {0.5, 10}, .help = "How far"}),
-    bound<&Options::inner, &Inner::size>(
-        {.name = "size", .unit = "px", .range = {512, 1024}, .step = 512, .help = "A side"})};
+    bound<&Options::inner, &Inner::size>({.name = "size",
+                                          .label = "Size of a side",
+                                          .unit = "px",
+                                          .range = {512, 1024},
+                                          .step = 512,
+                                          .help = "A side"})};
 
 std::string complaint(const Field<Options>& field, std::optional<double> number) {
   const auto checked = check_number(field, number, "test");
@@ -76,7 +80,7 @@ TEST(Field, IsFoundByItsName) {
   EXPECT_EQ(range.high, 10);
   EXPECT_THROW(field_named<Options>(fields, "weight"), std::out_of_range);
   EXPECT_EQ(label_of(fields[1]), "Limit");
-  EXPECT_EQ(label_of(fields[2]), "Size");
+  EXPECT_EQ(label_of(fields[2]), "Size of a side");
 }
 
 }  // namespace

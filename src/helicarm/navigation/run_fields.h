@@ -19,6 +19,7 @@ inline constexpr std::array<Field<RunOptions>, 3> run_fields{
                                 .help = "best, or paper: the published recipe",
                                 .words = method_words}),
     bound<&RunOptions::max_error_mm>({.name = "max_error_mm",
+                                      .label = "Limit of a point's error",
                                       .flag = "--max-error",
                                       .unit = "mm",
                                       .range = {1e-6, 1000},

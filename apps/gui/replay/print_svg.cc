@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/replay/print_svg.h"
+
+#include <QRegularExpression>
+#include <QString>
+
+namespace helicarm::gui {
+namespace {
+
+struct Look {
+  const char* kind;
+  const char* attributes;
+};
+
+/// Half a page is less than a screen: letters and lines are drawn so much larger.
+constexpr double letters = 1.9, lines = 1.5;
+
+constexpr Look looks[] = {{"ball", R"(stroke="#4ade80")"},
+                          {"ball lost", R"(stroke="#f87171" stroke-dasharray="4 3")"},
+                          {"plate", R"(stroke="#93c5fd" stroke-opacity="0.6")"},
+                          {"residual", R"(stroke="#fb923c")"},
+                          {"false", R"(stroke="#f87171")"},
+                          {"point", R"(stroke="#f0abfc")"},
+                          {"planned", R"(stroke="#facc15")"},
+                          {"tool", R"(stroke="#ef4444")"},
+                          {"field", R"(stroke="#0b6e75")"},
+                          {"frame", R"(stroke="#dcd8cf")"}};
+
+/// All numbers of an attribute times a factor.
+void enlarge(QString& svg, const QString& attribute, double factor) {
+  const QRegularExpression pattern(attribute + "=\"([0-9.]+)\"");
+  qsizetype from = 0;
+  for (auto found = pattern.match(svg); found.hasMatch(); found = pattern.match(svg, from)) {
+    const QString number = QString::number(found.captured(1).toDouble() * factor);
+    from = found.capturedStart(1) + number.size();
+    svg.replace(found.capturedStart(1), found.capturedLength(1), number);
+  }
+}
+
+}  // namespace
+
+QByteArray print_svg(const std::string& figure, bool on_paper) {
+  QString svg = QString::fromStdString(figure);
+  svg.replace(
+      QRegularExpression("^<svg "),
+      R"(<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" fill="none" )"
+      R"(font-family="DejaVu Sans, sans-serif" )");
+  enlarge(svg, "font-size", letters);
+  enlarge(svg, "stroke-width", lines);
+  svg.replace(" href=\"data:", " xlink:href=\"data:");
+  for (const auto& [kind, attributes] : looks) svg.replace(QString("class=\"%1\"").arg(kind), attributes);
+  svg.replace("class=\"bar\"",
+              on_paper ? R"(stroke="#1d2326" stroke-width="3")" : R"(stroke="#fff" stroke-width="3")");
+  static const QRegularExpression text(R"(<text class="[^"]*" ([^>]*)>([^<]*)</text>)");
+  // QtSvg knows no halo about letters: a shadow keeps white ones legible on white bone
+  svg.replace(text, on_paper
+                        ? R"x(<text fill="#1d2326" stroke="none" \1>\2</text>)x"
+                        : R"x(<text fill="#000" stroke="none" transform="translate(1.7 1.7)" \1>\2</text>)x"
+                          R"x(<text fill="#000" stroke="none" transform="translate(-1 -1)" \1>\2</text>)x"
+                          R"x(<text fill="#fff" stroke="none" \1>\2</text>)x");
+  return svg.toUtf8();
+}
+
+}  // namespace helicarm::gui

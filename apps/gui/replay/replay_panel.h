@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QElapsedTimer>
+#include <QTimer>
+#include <QWidget>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "gui/replay/timeline.h"
+#include "helicarm/operation/replay.h"
+
+class QComboBox;
+class QLabel;
+class QListWidget;
+class QPlainTextEdit;
+class QProgressBar;
+class QPushButton;
+class QSlider;
+
+namespace helicarm::gui {
+
+/// An operation's record to leaf through: J and comma step back, L and period forward, K plays and halts. The
+/// space bar stays free: it stops the robot.
+class ReplayPanel : public QWidget {
+  Q_OBJECT
+
+ public:
+  explicit ReplayPanel(QWidget* parent = nullptr);
+  /// Stops a verification, which may take as long as one measurement.
+  ~ReplayPanel() override = default;
+
+  /// Shows a session's record from its first moment. Refuses as `read_timeline` and then shows what it did.
+  Expected<void> open(const std::filesystem::path& session);
+
+  const std::optional<Timeline>& timeline() const { return timeline_; }
+  int moment() const { return moment_; }
+  bool is_playing() const { return clock_.isActive(); }
+  QString verdict() const;
+
+ public Q_SLOTS:
+  void set_moment(int index);
+  void step(int by);
+  void set_playing(bool playing);
+  /// Recomputes the operation aside; `verified` tells the end.
+  void verify();
+
+ Q_SIGNALS:
+  void moment_changed(int index);
+  /// Whether all came out the same, to the last bit.
+  void verified(bool same);
+
+ private:
+  void build();
+  void bind_keys();
+  void advance();
+  void show_moment(int index);
+  void show_verdict(const Expected<ReplayReport>& report);
+
+  std::optional<Timeline> timeline_;
+  int moment_ = -1;
+  QTimer clock_;
+  QElapsedTimer since_;
+  double seconds_ = 0;
+  QLabel* about_;
+  QListWidget* list_;
+  QPlainTextEdit* detail_;
+  QSlider* slider_;
+  QLabel* time_;
+  QPushButton *back_, *play_, *forward_, *verify_;
+  QComboBox* speed_;
+  QProgressBar* progress_;
+  QLabel* verdict_;
+  std::jthread worker_;  ///< last: it ends before what it tells is gone
+};
+
+}  // namespace helicarm::gui

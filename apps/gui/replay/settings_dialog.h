@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QDialog>
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "helicarm/core/field.h"
+#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/navigation/result.h"
+#include "helicarm/operating_room/virtual_room.h"
+#include "helicarm/operation/plan.h"
+
+class QTabWidget;
+
+namespace helicarm::gui {
+
+/// All options that have lists of fields.
+struct Settings {
+  RunOptions run = {};
+  OperationPlan plan = {};
+  ReceiverOptions receiver = {};
+  operating_room::VirtualRoomOptions room = {};
+};
+
+/// A page for each list of fields: label, box with unit and limits, tooltip.
+class SettingsDialog : public QDialog {
+  Q_OBJECT
+
+ public:
+  explicit SettingsDialog(Settings settings, QWidget* parent = nullptr);
+
+  /// As given, with what stands in the boxes; always within the fields' limits.
+  Settings settings() const;
+
+ private:
+  template <class Options, std::size_t count>
+  void add_page(QTabWidget& pages, const QString& title, Options Settings::*part,
+                const std::array<Field<Options>, count>& fields);
+
+  Settings given_;
+  std::vector<std::function<void(Settings&)>> readers_;
+  std::vector<std::function<void()>> resetters_;
+};
+
+}  // namespace helicarm::gui

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/replay/settings_dialog.h"
+
+#include <QCheckBox>
+#include <QDialogButtonBox>
+#include <QDoubleSpinBox>
+#include <QPushButton>
+#include <QTest>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gui/replay/application_test.h"
+#include "gui/replay/field_box.h"
+#include "helicarm/navigation/run_fields.h"
+#include "helicarm/operating_room/room_fields.h"
+#include "helicarm/operation/plan_fields.h"
+
+namespace helicarm::gui {
+namespace {
+
+class Dialog : public testing::Test {
+ protected:
+  void SetUp() override { application(); }
+  static FieldBox& box(SettingsDialog& dialog, const char* name) {
+    return *dialog.findChildren<FieldBox*>(name).front();
+  }
+};
+
+TEST_F(Dialog, GivesBackWhatNobodyChanged) {
+  Settings given;
+  given.run.method = Method::paper;
+  given.run.max_error_mm = 0.123456789;  // more digits than the box shows
+  given.plan.robot.approach.gap_mm = -3;
+  given.plan.views = {"one", "two"};
+  const Settings back = SettingsDialog(given).settings();
+  EXPECT_EQ(back.run.method, Method::paper);
+  EXPECT_EQ(back.run.max_error_mm, 0.123456789);
+  EXPECT_EQ(to_json(back.plan), to_json(given.plan));
+  EXPECT_EQ(back.room.tracker_rate_hz, given.room.tracker_rate_hz);
+}
+
+TEST_F(Dialog, HasABoxForEveryField) {
+  SettingsDialog dialog({});
+  for (const auto& field : run_fields) EXPECT_FALSE(box(dialog, field.name.data()).toolTip().isEmpty());
+  for (const auto& field : plan_fields)
+    EXPECT_FALSE(dialog.findChildren<FieldBox*>(field.name.data()).isEmpty()) << field.name;
+}
+
+TEST_F(Dialog, KeysChangeANumber) {
+  SettingsDialog dialog({});
+  auto* rate = box(dialog, "tracker_rate_hz").findChild<QDoubleSpinBox*>();
+  rate->selectAll();
+  QTest::keyClicks(rate, "75.5");
+  EXPECT_EQ(dialog.settings().room.tracker_rate_hz, 75.5);
+  EXPECT_TRUE(rate->text().endsWith(" Hz"));
+  QTest::keyClicks(rate, "99999");
+  EXPECT_TRUE(check_fields<operating_room::VirtualRoomOptions>(operating_room::room_fields,
+                                                               dialog.settings().room, ""));
+}
+
+TEST_F(Dialog, NumberSnapsToItsSteps) {
+  SettingsDialog dialog({});
+  auto* size = box(dialog, "picture_size_px").findChild<QDoubleSpinBox*>();
+  size->setValue(700);
+  EXPECT_EQ(dialog.settings().room.picture_size, 512);
+  size->setValue(1000);
+  EXPECT_EQ(dialog.settings().room.picture_size, 1024);
+}
+
+TEST_F(Dialog, LimitMayBeLeftUnset) {
+  SettingsDialog dialog({});
+  FieldBox& limit = box(dialog, "max_error_mm");
+  EXPECT_FALSE(dialog.settings().run.max_error_mm);
+  limit.findChild<QCheckBox*>()->setChecked(true);
+  limit.findChild<QDoubleSpinBox*>()->setValue(1.5);
+  EXPECT_EQ(dialog.settings().run.max_error_mm, 1.5);
+}
+
+TEST_F(Dialog, DefaultsComeBack) {
+  Settings given;
+  given.run.max_error_mm = 3;
+  given.room.seed = 77;
+  SettingsDialog dialog(given);
+  dialog.findChild<QDialogButtonBox*>()->button(QDialogButtonBox::RestoreDefaults)->click();
+  EXPECT_FALSE(dialog.settings().run.max_error_mm);
+  EXPECT_EQ(dialog.settings().room.seed, 1u);
+}
+
+}  // namespace
+}  // namespace helicarm::gui

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/replay/timeline.h"
+
+#include <QCoreApplication>
+#include <QStringList>
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/operation/seen_poses.h"
+#include "helicarm/session/session_log.h"
+
+namespace helicarm::gui {
+namespace {
+
+struct Words {
+  Q_DECLARE_TR_FUNCTIONS(Timeline)
+};
+
+QString text_of(const Json& content, const char* key) {
+  return QString::fromStdString(content.at(key).get<std::string>());
+}
+
+QString millimetres(const Json& number) { return QString::number(number.get<double>(), 'f', 2); }
+
+QString count_of(const Json& list) { return QString::number(list.size()); }
+
+QString exposure_summary(const Json& content) {
+  const QString view = text_of(content, "view");
+  return content.at("poses").is_null() ? Words::tr("Exposure %1, without poses").arg(view)
+                                       : Words::tr("Exposure %1").arg(view);
+}
+
+QString loop_summary(const Json& content) {
+  const Json& loop = content.at("loop");
+  const QString tunnel = text_of(content, "tunnel");
+  if (loop.empty()) return Words::tr("Tool at %1").arg(tunnel);
+  return Words::tr("Tool at %1: off by %2 mm, looks: %3")
+      .arg(tunnel, millimetres(loop.back().at("distance_mm")), count_of(loop));
+}
+
+QString outcome_summary(const Json& content) {
+  return Words::tr("Check of %1: start %2 mm, end %3 mm from the tool's axis")
+      .arg(text_of(content, "tunnel"), millimetres(content.at("start").at("distance_mm")),
+           millimetres(content.at("end").at("distance_mm")));
+}
+
+QString poses_summary(const Json& content) {
+  QStringList seen;
+  for (const auto& [tool, samples] : content.at("window").at("tools").items())
+    if (!samples.empty()) seen << QString::fromStdString(tool);
+  return Words::tr("Look at the tracker (%1): %2")
+      .arg(text_of(content, "why"), seen.isEmpty() ? Words::tr("nothing seen") : seen.join(", "));
+}
+
+QString summary_of(const std::string& kind, const Json& content) {
+  if (kind == "session") return Words::tr("Record begins, helicarm %1").arg(text_of(content, "version"));
+  if (kind == "plan") return Words::tr("Plan, tunnels: %1").arg(count_of(content.at("tunnels")));
+  if (kind == "exposure") return exposure_summary(content);
+  if (kind == "refused")
+    return Words::tr("Picture for %1 refused: %2").arg(text_of(content, "view"), text_of(content, "why"));
+  if (kind == "case") return Words::tr("Measurement %1 begins").arg(text_of(content, "folder"));
+  if (kind == "result") return Words::tr("Measurement %1 done").arg(text_of(content, "folder"));
+  if (kind == "poses") return poses_summary(content);
+  if (kind == "hand_eye")
+    return Words::tr("Robot registered within %1 mm rms, poses: %2")
+        .arg(millimetres(content.at("found").at("rms_mm")), count_of(content.at("pairs")));
+  if (kind == "order")
+    return Words::tr("Order %1, waypoints: %2")
+        .arg(text_of(content, "name"), count_of(content.at("waypoints")));
+  if (kind == "confirmed")
+    return Words::tr("Order %1 confirmed by %2").arg(text_of(content, "order"), text_of(content, "by"));
+  if (kind == "navigated") return loop_summary(content);
+  if (kind == "outcome") return outcome_summary(content);
+  if (kind == "end") return Words::tr("End of the operation");
+  return QString::fromStdString(kind);
+}
+
+/// Runs `read`; a record that is not as its kind should be is bad_value.
+template <class Read>
+auto of_record(std::size_t number, Read&& read) {
+  try {
+    return read();
+  } catch (const Json::exception&) {
+    throw BadInput(Reason::bad_value, fmt::format("record {}: lacks what its kind needs", number));
+  }
+}
+
+void see(SessionState& state, const Json& window, std::size_t number) {
+  const std::string origin = fmt::format("record {}", number);
+  for (const auto& [tool, samples] : value_or_throw(pose_window_from(window, origin)).samples)
+    if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
+}
+
+void take(SessionState& state, const Timeline& timeline, std::size_t number) {
+  const auto& [seconds, kind, summary, content] = timeline.moments[number];
+  if (kind == "exposure") {
+    const auto view = content.at("view").get<std::string>();
+    std::erase(state.exposures, view);
+    state.exposures.push_back(view);
+  }
+  if (kind == "exposure" || kind == "poses") see(state, content.at("window"), number);
+  if (kind == "case")
+    state.case_folder =
+        value_or_throw(path_inside(timeline.session, content.at("folder").get<std::string>()));
+  if (kind == "case" || kind == "result") state.measured = kind == "result";
+  if (kind == "navigated") {
+    auto& misses = state.misses[content.at("tunnel").get<std::string>()];
+    misses.clear();
+    for (const Json& miss : content.at("loop"))
+      misses.push_back({miss.at("distance_mm").get<double>(), miss.at("turn_deg").get<double>()});
+  }
+}
+
+}  // namespace
+
+QString Moment::detail() const { return QString::fromStdString(to_text(content)); }
+
+std::size_t Timeline::at(double seconds) const {
+  const auto later = std::ranges::upper_bound(moments, seconds, {}, &Moment::seconds);
+  return std::size_t(std::max<std::ptrdiff_t>(later - moments.begin() - 1, 0));
+}
+
+Expected<Timeline> read_timeline(const std::filesystem::path& session) {
+  return guarded([&] {
+    SessionHistory history = value_or_throw(read_session(session / "session.log"));
+    if (history.records.empty())
+      throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
+    Timeline timeline{session, {}, history.torn};
+    double seconds = 0;
+    const double begin = history.records.front().time_s;
+    for (SessionRecord& record : history.records) {
+      seconds = std::max(seconds, record.time_s - begin);  // a clock may be set back
+      QString summary = of_record(record.number, [&] { return summary_of(record.kind, record.content); });
+      timeline.finished = timeline.finished || record.kind == "end";
+      timeline.moments.push_back({seconds, record.kind, std::move(summary), std::move(record.content)});
+    }
+    return timeline;
+  });
+}
+
+Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
+  return guarded([&] {
+    SessionState state;
+    for (std::size_t i = 0; i <= index && i < timeline.moments.size(); ++i)
+      of_record(i, [&] { take(state, timeline, i); });
+    return state;
+  });
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/replay/timeline.h"
+
+#include <QTemporaryDir>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gui/replay/session_test.h"
+
+namespace helicarm::gui {
+namespace {
+
+class TimelineTest : public testing::Test {
+ protected:
+  void SetUp() override { write_session(folder_); }
+  Timeline read() const { return read_timeline(folder_).value(); }
+
+  QTemporaryDir root_;
+  const std::filesystem::path folder_ = root_.path().toStdString();
+};
+
+TEST_F(TimelineTest, EveryKindHasALine) {
+  const Timeline timeline = read();
+  ASSERT_EQ(timeline.moments.size(), session_kinds.size());
+  for (std::size_t i = 0; i < timeline.moments.size(); ++i) {
+    EXPECT_EQ(timeline.moments[i].kind, session_kinds[i]);
+    EXPECT_NE(timeline.moments[i].summary.toStdString(), session_kinds[i]) << "no line of its own";
+    EXPECT_EQ(parse_json(timeline.moments[i].detail().toStdString(), "detail").value(),
+              timeline.moments[i].content);
+  }
+  EXPECT_TRUE(timeline.finished);
+  EXPECT_FALSE(timeline.torn);
+  EXPECT_EQ(timeline.moments[3].summary, "Exposure AP");
+  EXPECT_THAT(timeline.moments[11].summary.toStdString(), testing::HasSubstr("off by 0.25 mm"));
+}
+
+TEST_F(TimelineTest, TimeRunsForwardFromZero) {
+  const Timeline timeline = read();
+  EXPECT_EQ(timeline.moments.front().seconds, 0);
+  for (std::size_t i = 1; i < timeline.moments.size(); ++i)
+    EXPECT_GE(timeline.moments[i].seconds, timeline.moments[i - 1].seconds);
+  EXPECT_EQ(timeline.at(-1), 0u);
+  EXPECT_EQ(timeline.at(timeline.length_s() + 1), timeline.moments.size() - 1);
+}
+
+TEST_F(TimelineTest, StateGrowsWithTheMoments) {
+  const Timeline timeline = read();
+  const SessionState begin = state_at(timeline, 1).value();
+  EXPECT_TRUE(begin.exposures.empty());
+  EXPECT_FALSE(begin.case_folder);
+  const SessionState exposed = state_at(timeline, 4).value();
+  EXPECT_THAT(exposed.exposures, testing::ElementsAre("AP", "LAT"));
+  EXPECT_EQ(exposed.tracker_from.at("femur").translation.x(), 2);
+  EXPECT_FALSE(exposed.tracker_from.contains("tibia"));
+  const SessionState begun = state_at(timeline, 5).value();
+  EXPECT_EQ(begun.case_folder, folder_ / "case-1");
+  EXPECT_FALSE(begun.measured);
+  EXPECT_TRUE(state_at(timeline, 6).value().measured);
+  const SessionState end = state_at(timeline, timeline.moments.size() - 1).value();
+  ASSERT_EQ(end.misses.at("femur").size(), 2u);
+  EXPECT_EQ(end.misses.at("femur")[1].distance_mm, 0.25);
+  EXPECT_EQ(end.tracker_from.at("femur").translation.x(), 3);
+}
+
+TEST_F(TimelineTest, TornLogIsReadUpToItsTear) {
+  const auto log = folder_ / "session.log";
+  std::filesystem::resize_file(log, std::filesystem::file_size(log) - 5);
+  const Timeline timeline = read();
+  EXPECT_TRUE(timeline.torn);
+  EXPECT_FALSE(timeline.finished);
+  EXPECT_EQ(timeline.moments.size(), session_kinds.size() - 1);
+}
+
+TEST_F(TimelineTest, DamageIsToldAsTheFailureItIs) {
+  EXPECT_EQ(read_timeline(folder_ / "nowhere").error().reason, Reason::missing_file);
+  std::fstream log(folder_ / "session.log", std::ios::in | std::ios::out | std::ios::binary);
+  log.seekp(200);
+  log.put('~');
+  log.close();
+  EXPECT_EQ(read_timeline(folder_).error().reason, Reason::bad_value);
+}
+
+TEST_F(TimelineTest, RecordWithoutItsContentIsNamed) {
+  const auto session = SessionLog::open(folder_ / "session.log").value();
+  ASSERT_TRUE(session->append("exposure", {{"view", 7}}));
+  const auto timeline = read_timeline(folder_);
+  ASSERT_FALSE(timeline);
+  EXPECT_THAT(timeline.error().message, testing::HasSubstr("record 14"));
+}
+
+TEST_F(TimelineTest, CaseOutsideTheSessionIsRefused) {
+  const auto session = SessionLog::open(folder_ / "session.log").value();
+  ASSERT_TRUE(session->append("case", {{"folder", "../elsewhere"}}));
+  EXPECT_EQ(state_at(read(), session_kinds.size()).error().reason, Reason::path_outside);
+}
+
+}  // namespace
+}  // namespace helicarm::gui
