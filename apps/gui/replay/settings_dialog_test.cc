@@ -6,6 +6,7 @@
 #include <QDoubleSpinBox>
 #include <QPushButton>
 #include <QTest>
+#include <algorithm>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -70,7 +71,12 @@ TEST_F(Dialog, NumberSnapsToItsSteps) {
 
 TEST_F(Dialog, LimitMayBeLeftUnset) {
   SettingsDialog dialog({});
-  FieldBox& limit = box(dialog, "max_error_mm");
+  const auto limits =
+      dialog.findChildren<FieldBox*>("max_error_mm");  // the plan's must be set, the run's may
+  const auto found =
+      std::ranges::find_if(limits, [](FieldBox* each) { return each->findChild<QCheckBox*>() != nullptr; });
+  ASSERT_NE(found, limits.end());
+  FieldBox& limit = **found;
   EXPECT_FALSE(dialog.settings().run.max_error_mm);
   limit.findChild<QCheckBox*>()->setChecked(true);
   limit.findChild<QDoubleSpinBox*>()->setValue(1.5);
