@@ -79,22 +79,22 @@ void MainWindow::build() {
 
   auto* sides = new QSplitter(Qt::Horizontal);
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    auto* box = new QWidget;
-    auto* stack = new QVBoxLayout(box);
-    stack->setContentsMargins(0, 0, 0, 0);
-    titles_[i] = new QLabel;
-    stack->addWidget(titles_[i]);
     xrays_[i] = new XrayView;
     xrays_[i]->setObjectName(QString("xray%1").arg(i));
-    stack->addWidget(xrays_[i], 1);
-    sides->addWidget(box);
+    sides->addWidget(xrays_[i]);
     sides->setStretchFactor(int(i), 3);
     connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
   }
   auto* right = new QSplitter(Qt::Vertical);
-  scene_ = new SceneView;
-  scene_->setObjectName("scene");
-  right->addWidget(scene_);
+  if (const auto obstacle = SceneView::obstacle()) {
+    auto* notice = new QLabel(*obstacle);
+    notice->setWordWrap(true);
+    right->addWidget(notice);
+  } else {
+    scene_ = new SceneView;
+    scene_->setObjectName("scene");
+    right->addWidget(scene_);
+  }
   pages_ = new QStackedWidget;
   auto* rectify = new RectifyPage(desk_, this);
   plan_ = new PlanPage(desk_, this);
@@ -152,14 +152,14 @@ void MainWindow::show_pictures() {
   shown_source_ = state.source;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     const bool has = shown_ && i < shown_->views.size();
-    titles_[i]->setText(has ? text(shown_->views[i].name) : QString());
     if (has && shown_->views[i].exposure)
       xrays_[i]->show_view(shown_, i);
     else
       xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-rays here")
-                       : has                        ? tr("No picture yet")
-                                                    : tr("No second view"));
+                       : has ? tr("%1: no picture yet").arg(text(shown_->views[i].name))
+                             : tr("No second view"));
   }
+  if (scene_ == nullptr) return;
   scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
 }
@@ -227,7 +227,7 @@ void MainWindow::show_live() {
     }
     xrays_[i]->set_tool(line, note);
   }
-  if (++looks_ % scene_every != 0) return;
+  if (scene_ == nullptr || ++looks_ % scene_every != 0) return;
   LiveScene scene;
   if (tool && *tool && (*tool)->calibrator_from_tip) {
     scene.calibrator_from_tip = (*tool)->calibrator_from_tip;
