@@ -159,7 +159,7 @@ TEST_F(FaultyOperation, PictureThatCameBeforeIsRefused) {
 
 TEST_F(FaultyOperation, PictureOfATimeWithoutPosesIsRefused) {
   const DatedArrival picture = shot("AP");
-  for (const double off_s : {-3600.0, 3600.0})
+  for (const double off_s : {3600.0, -3600.0})  // the later one first: it would have been held back
     EXPECT_EQ(operation_->take("AP", picture.arrival, picture.time_s + off_s).error().reason,
               Reason::no_pose);
   EXPECT_EQ(operation_->views_to_come().size(), 2u);
