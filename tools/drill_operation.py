@@ -62,15 +62,39 @@ def drill_pictures(program, folder):
         for fault, reason in (("same_picture", "views_too_close"), ("other_patient", "patient_mismatch")):
             theatre.say(f"shoot LAT {fault}", "shot LAT")
             check(f"{fault}: expose again", bool(theatre.navigation.wait_for(f"{reason}.*expose again")))
+        theatre.say("shoot LAT held_back", "shot LAT")
+        check("picture held back while the leg moved: expose again",
+              bool(theatre.navigation.wait_for("stale_pose.*later after its acquisition.*expose again")))
+        time.sleep(EXPOSURE_S)
         theatre.shoot("LAT", "^measure: ")
         theatre.navigation.end(signal.SIGKILL)
         theatre.expect_replay("wrong pictures")
+    with Theatre(program, folder / "order") as theatre:
+        theatre.shoot("LAT", "waiting for AP")
+        check("lateral picture first is taken as such",
+              any("LAT: came in place of AP" in line for line in theatre.navigation.heard))
+        theatre.shoot("AP", "^measure: ")
     with Theatre(program, folder / "hidden") as theatre:
         theatre.say("fault hide:femur on", "hide:femur on")
         time.sleep(EXPOSURE_S)
         theatre.say("shoot AP", "shot AP")
         check("femur hidden during the exposure: expose again",
               bool(theatre.navigation.wait_for("no_pose: AP: the marker of the femur.*expose again")))
+
+
+def drill_checks(program, folder):
+    """A marker that is bumped between the X-rays and the robot's first order to its bone."""
+    with Theatre(program, folder / "checks", room=["--check-points"], begins="touch \"femur notch\"") as theatre:
+        for bone in ("femur", "tibia"):
+            theatre.touch(bone, f"{bone} notch: taken, 0.00 mm off")
+        theatre.navigation.wait_for("waiting for AP")
+        theatre.say("touch nothing", "touching nothing")
+        theatre.expose()
+        theatre.navigation.wait_for("touch \"femur notch\"", 120)
+        theatre.say("bump femur 0 2.5 0", "bumped femur")
+        theatre.touch("femur", "residual_too_large")
+        theatre.expect_end("bumped marker", "residual_too_large")
+        theatre.expect_replay("bumped marker")
 
 
 def drill_motion(program, folder):
@@ -219,7 +243,7 @@ def footprint(process):
 
 
 def main():
-    drills = {"whole": drill_whole, "pictures": drill_pictures, "motion": drill_motion, "ends": drill_ends,
+    drills = {"whole": drill_whole, "pictures": drill_pictures, "checks": drill_checks, "motion": drill_motion, "ends": drill_ends,
               "system": drill_system}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)

@@ -72,15 +72,15 @@ class Program:
 class Theatre:
     """A virtual room and a navigation in it."""
 
-    def __init__(self, program, folder, *options):
+    def __init__(self, program, folder, *options, room=(), begins="waiting for AP"):
         self.program, self.folder = program, folder
         folder.mkdir()
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
         self.room = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan, "--receiver-port",
-                            self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0)
+                            self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0, *room)
         self.room.wait_for("^say:")
         self.navigation = self.navigate(*options)
-        self.navigation.wait_for("waiting for AP")
+        self.navigation.wait_for(begins)
         time.sleep(EXPOSURE_S)
 
     def navigate(self, *options):
@@ -110,6 +110,17 @@ class Theatre:
                 return
             time.sleep(EXPOSURE_S)
         raise TimeoutError(f"{view} is never taken")
+
+    def touch(self, bone, then):
+        """Holds the pointer there and presses Enter until it is seen at rest."""
+        self.say(f"touch {bone}", f"touching {bone}")
+        for _ in range(5):
+            time.sleep(EXPOSURE_S)
+            self.navigation.process.stdin.write("\n")
+            self.navigation.process.stdin.flush()
+            if not self.navigation.wait_for(f"; again$|{then}").endswith("; again"):
+                return
+        raise TimeoutError(f"{bone} is never seen touched")
 
     def expose(self):
         self.shoot("AP", "waiting for LAT")

@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -387,6 +388,28 @@ class Tracker(unittest.TestCase):
         done = run("tracker", "pivot", self.file, "--tool", "ToolToTracker")
         self.assertEqual(done.returncode, 3)
         self.assertIn("poses_too_alike", done.stderr)
+
+    def test_what_is_asked_for_must_be_there(self):
+        for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),
+                            (("tracker", "watch", "127.0.0.1:70000"), "1 to 65535"),
+                            (("tracker", "replay", self.file, "--port", "70000"), "0 to 65535"),
+                            (("receive", "--watch", self.file.parent, "--port", "11112"), "excludes")):
+            done = run(*words)
+            self.assertEqual(done.returncode, 2, words)
+            self.assertIn(said, done.stderr)
+
+
+class Operate(unittest.TestCase):
+    def test_told_to_end_it_says_so(self):
+        with tempfile.TemporaryDirectory() as folder:
+            operate = subprocess.Popen([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder], text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.addCleanup(operate.kill)
+            operate.stderr.readline()  # opening the virtual room
+            operate.send_signal(signal.SIGINT)
+            _, said = operate.communicate(timeout=60)
+            self.assertEqual(operate.returncode, 3)
+            self.assertIn("interrupted", said)
 
 
 if __name__ == "__main__":

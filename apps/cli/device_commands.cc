@@ -12,6 +12,10 @@
 namespace helicarm::cli {
 namespace {
 
+CLI::Option* add_port(CLI::App* command, const char* name, std::uint16_t& port, const char* what) {
+  return command->add_option(name, port, what)->check(within(0, 65535))->capture_default_str();
+}
+
 void add_receive(CLI::App& app, Action& action) {
   auto* command = add_command(app, "receive", "Take X-rays from a C-arm by DICOM (C-STORE), or from a folder",
                               "helicarm receive --out inbox\n"
@@ -20,15 +24,16 @@ void add_receive(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, receive_command);
   command->add_option("--out", a.out, "Folder for the pictures: one program at a time")
       ->capture_default_str();
-  command
-      ->add_option("--address", a.receiver.address,
-                   "Where to listen; other than 127.0.0.1 opens the port to the network")
-      ->capture_default_str();
+  auto* address = command
+                      ->add_option("--address", a.receiver.address,
+                                   "Where to listen; other than 127.0.0.1 opens the port to the network")
+                      ->capture_default_str();
   add_fields(command, a.receiver, receiver_fields);
-  command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
-      ->capture_default_str();
-  command->add_option("--peer", a.receiver.negotiation.peers,
-                      "Title of a C-arm that may send; repeatable (default: any)");
+  auto* port = command->get_option("--port");
+  auto* title = command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
+                    ->capture_default_str();
+  auto* peer = command->add_option("--peer", a.receiver.negotiation.peers,
+                                   "Title of a C-arm that may send; repeatable (default: any)");
   auto* certificate = command->add_option("--tls-certificate", a.certificate, "PEM: speak TLS only, as this");
   auto* key = command->add_option("--tls-key", a.key, "PEM: key of the certificate");
   auto* authorities =
@@ -36,7 +41,9 @@ void add_receive(CLI::App& app, Action& action) {
   certificate->needs(key, authorities);
   key->needs(certificate);
   authorities->needs(certificate);
-  command->add_option("--watch", a.watch, "Take pictures from this folder instead; its files stay");
+  auto* watch =
+      command->add_option("--watch", a.watch, "Take pictures from this folder instead; its files stay");
+  for (auto* of_network : {address, port, title, peer, certificate}) watch->excludes(of_network);
   command->add_option("--count", a.count, "End after so many pictures")->check(within(1, 1e9));
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
@@ -69,7 +76,7 @@ void add_tracker(CLI::App& app, Action& action) {
   auto* replay = tracker->add_subcommand("replay", "A MetaImage sequence file as a tracker, over and over");
   auto& replayed = arguments_of(replay, action, tracker_replay_command);
   replay->add_option("FILE", replayed.file, "The file to play")->required();
-  replay->add_option("--port", replayed.options.port, "Port to listen at; 0: any")->capture_default_str();
+  add_port(replay, "--port", replayed.options.port, "Port to listen at; 0: any");
   replay
       ->add_option("--address", replayed.options.address,
                    "Address to listen at: whoever reaches it may connect")
@@ -92,14 +99,13 @@ void add_virtual_or(CLI::App& app, Action& action) {
                   "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
   auto& a = arguments_of(command, action, virtual_or_command);
   command->add_option("--plan", a.plan, "Write a plan for navigate, with a surgeon's clicks");
+  command->add_flag("--check-points", a.check_points, "The plan asks for a check point on each bone");
   add_fields(command, a.room, operating_room::room_fields);
-  command->add_option("--tracker-port", a.room.tracker_port, "OpenIGTLink; each port 0: any that is free")
-      ->capture_default_str();
-  command->add_option("--rtde-port", a.room.rtde_port, "of the robot")->capture_default_str();
-  command->add_option("--dashboard-port", a.room.dashboard_port, "of the robot")->capture_default_str();
-  command->add_option("--script-port", a.room.script_port, "of the robot")->capture_default_str();
-  command->add_option("--receiver-port", a.receiver.port, "Where the C-arm sends its pictures")
-      ->capture_default_str();
+  add_port(command, "--tracker-port", a.room.tracker_port, "OpenIGTLink; each port 0: any that is free");
+  add_port(command, "--rtde-port", a.room.rtde_port, "of the robot");
+  add_port(command, "--dashboard-port", a.room.dashboard_port, "of the robot");
+  add_port(command, "--script-port", a.room.script_port, "of the robot");
+  add_port(command, "--receiver-port", a.receiver.port, "Where the C-arm sends its pictures");
   command->add_option("--receiver-title", a.receiver.title, "Its application entity title")
       ->capture_default_str();
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));

@@ -52,6 +52,14 @@ std::string grey_png(const Image<float>& integrals, float greatest) {
   return encode_png(grey);
 }
 
+void check_outputs(const DrrArguments& arguments, const Console& console) {
+  if (arguments.out.empty() && arguments.raw.empty() && !console.json)
+    throw BadInput(Reason::usage, "drr: give --out for a picture or --raw for the line integrals");
+  if (!arguments.out.empty() && arguments.out.extension() != ".png")
+    throw BadInput(Reason::usage,
+                   fmt::format("--out: {} must end in .png, the one format written", arguments.out.string()));
+}
+
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -63,6 +71,7 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
     const Ramp ramp = ramp_of(arguments.values);
     if (!arguments.centre_mm.empty() && arguments.centre_mm.size() != 3)
       throw BadInput(Reason::usage, "--centre takes three numbers");
+    check_outputs(arguments, console);
     const Volume volume = value_or_throw(read_volume(arguments.volume));
     for (const Warning& warning : volume.warnings)
       console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);

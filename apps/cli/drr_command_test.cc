@@ -39,6 +39,13 @@ TEST(DrrCommand, LeftAndHeadAreWhereTheHelpSays) {
   const auto png = decode_png(*read_file(folder / "a.png", 9999), "a.png");
   arguments.values = "hounsfield";
   const auto refused = drr_command(arguments, console);
+  arguments.values = "raw";
+  arguments.out = folder / "a.jpg";
+  const auto no_png = drr_command(arguments, console);
+  arguments.out.clear();
+  arguments.raw.clear();
+  console.json = false;
+  const auto no_output = drr_command(arguments, console);
   fs::remove_all(folder);
   ASSERT_TRUE(done.has_value()) << done.error().message;
   EXPECT_NEAR(parse_json(out.str(), "out")->at("maximum").get<double>(), 100, 0.1);
@@ -52,7 +59,7 @@ TEST(DrrCommand, LeftAndHeadAreWhereTheHelpSays) {
   EXPECT_EQ(pixel(1, 1), 0);
   EXPECT_EQ(pixel(7, 7), 0);
   EXPECT_GT(png->pixels(7, 1), 60000);
-  EXPECT_EQ(refused.error().reason, Reason::usage);
+  for (const auto& wrong : {refused, no_png, no_output}) EXPECT_EQ(wrong.error().reason, Reason::usage);
 }
 
 }  // namespace

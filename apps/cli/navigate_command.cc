@@ -5,8 +5,10 @@
 #include <atomic>
 #include <chrono>
 #include <iostream>
+#include <numbers>
 #include <thread>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <poll.h>
 #include <unistd.h>
@@ -53,6 +55,11 @@ class Ending {
   std::jthread thread_;
 };
 
+bool input_waits() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, 0) > 0;
+}
+
 /// Asks the person at the terminal; nobody there means no.
 class Consent {
  public:
@@ -77,10 +84,7 @@ class Consent {
                without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
                last.translation.y(), last.translation.z())
         << std::flush;
-    ending_.wait_until([] {
-      pollfd input{STDIN_FILENO, POLLIN, 0};
-      return ::poll(&input, 1, 0) > 0;
-    });
+    ending_.wait_until(input_waits);
     std::string answer;
     return std::getline(std::cin, answer) && answer == "go";
   }
@@ -160,6 +164,47 @@ void tell_points(const Result& result, Console& console) {
     }
 }
 
+/// What the robot is about to do before anything is known of where it stands.
+void tell_tour(const std::vector<RobotOrder>& orders, Console& console) {
+  if (console.quiet || orders.empty()) return;
+  const RigidTransform home = orders.back().waypoints.back().base_from_tcp;  // where it stands now
+  console.progress << fmt::format("hand-eye calibration: {} moves at {:g} mm/s about where the tool is\n",
+                                  orders.size(), orders.front().waypoints.back().speed_mm_s);
+  for (std::size_t i = 0; i < orders.size(); ++i) {
+    const RigidTransform there = orders[i].waypoints.back().base_from_tcp;
+    const Eigen::Vector3d shift = there.translation - home.translation;
+    const double turn_rad = Eigen::AngleAxisd(home.rotation.transpose() * there.rotation).angle();
+    console.progress << fmt::format(
+        "  {}: tip {:+.0f} {:+.0f} {:+.0f} mm along the robot's base, turned by {:.0f} degrees\n", i + 1,
+        shift.x(), shift.y(), shift.z(), turn_rad * 180 / std::numbers::pi);
+  }
+  console.progress << std::flush;
+}
+
+/// Until the pointer is held still where the tracker sees it.
+void touch(Operation& operation, const std::string& name, const Ending& ending, Console& console) {
+  console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
+                                  without_control_characters(name))
+                   << std::flush;
+  for (;;) {
+    ending.wait_until(input_waits);
+    std::string line;
+    if (!std::getline(std::cin, line)) throw BadInput(Reason::interrupted, "the input ended");
+    const auto off = operation.touch(name);
+    if (off) {
+      console.progress << fmt::format("{}: taken, {:.2f} mm off\n", without_control_characters(name), *off)
+                       << std::flush;
+      return;
+    }
+    if (off.error().reason != Reason::no_pose && off.error().reason != Reason::stale_pose &&
+        off.error().reason != Reason::pose_spread)
+      throw BadInput(off.error());
+    console.progress << fmt::format("{}: {}; again\n", code(off.error().reason),
+                                    without_control_characters(off.error().message))
+                     << std::flush;
+  }
+}
+
 void tell_outcome(const TunnelOutcome& outcome, Console& console) {
   console.out << fmt::format(
       "{}: start {:.2f} mm off the tool's axis (expect {:.2f}), end {:.2f} (expect {:.2f}), after {} "
@@ -187,6 +232,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     const Ending ending(stop, devices.robot());
     operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
     wait_for_devices(plan, devices, ending, console);
+    for (const PlannedCheck& each : plan.check_points) touch(*operation, each.name, ending, console);
     while (!operation->views_to_come().empty()) {
       const std::string view = operation->views_to_come().front();
       if (!console.quiet)
@@ -213,9 +259,12 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     ending.wait_until(
         [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
     value_or_throw(devices.robot().unlock("the operator at the terminal"));
+    tell_tour(value_or_throw(operation->preview_tour()), console);
     value_or_throw(operation->register_robot(confirm));
     for (const PlannedTunnel& tunnel : plan.tunnels) {
       const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
+      for (const std::string& name : operation->checks_to_come(tunnel.bone))
+        touch(*operation, name, ending, console);
       const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
       console.progress << fmt::format("look at {}\n",
                                       (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "operate_command.h"
 
+#include <atomic>
 #include <mutex>
+#include <thread>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/rehearsal/rehearsal_files.h"
+#include "stop_signal.h"
 
 namespace helicarm::cli {
 namespace {
@@ -33,6 +36,17 @@ void refuse_earlier_operation(const std::filesystem::path& folder) {
 CommandResult operate_command(const OperateArguments& arguments, Console& console) {
   return guarded([&] {
     refuse_earlier_operation(arguments.out);
+    StopSignal signal;
+    std::atomic<bool> told{false};
+    const std::jthread ear([&](const std::stop_token& over) {
+      constexpr double glance_s = 0.05;
+      while (!over.stop_requested() && !told) told = signal.wait(glance_s);
+    });
+    const auto check = [&] {
+      if (told)
+        throw BadInput(Reason::interrupted,
+                       fmt::format("told to end; the sessions in {} are broken off", arguments.out.string()));
+    };
     std::mutex telling;
     std::vector<Expected<Rehearsal>> done(static_cast<std::size_t>(arguments.cases),
                                           fail(Reason::not_connected, "not begun"));
@@ -41,20 +55,25 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
       RehearsalOptions options;
       options.picture_size = arguments.size;
       options.tracker_rate_hz = arguments.rate_hz;
-      options.tell = [&](const std::string& what) {
+      const auto say = [&](const std::string& what) {
         if (console.quiet) return;
         const std::lock_guard lock(telling);
         console.progress << fmt::format("bones {}: {}\n", i + 1, what) << std::flush;
       };
+      options.tell = [&](const std::string& what) {
+        check();
+        say(what);
+      };
       for (int attempt = 1; attempt <= most_attempts; ++attempt) {
         const std::string folder =
             attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
-        done[i] = rehearse(console.seed + i, arguments.out / folder, options);
-        if (done[i] || !came_late(done[i].error())) break;
-        options.tell(
-            fmt::format("broken off ({}: {})", code(done[i].error().reason), done[i].error().message));
+        done[i] = guarded(
+            [&] { return value_or_throw(rehearse(console.seed + i, arguments.out / folder, options)); });
+        if (done[i] || told || !came_late(done[i].error())) break;
+        say(fmt::format("broken off ({}: {})", code(done[i].error().reason), done[i].error().message));
       }
     });
+    check();
     std::vector<Rehearsal> rehearsals;
     for (Expected<Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));
     const Json json = to_json(rehearsals);

@@ -91,7 +91,7 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
       if (std::filesystem::equivalent(arguments.watch, arguments.out))
         throw BadInput(Reason::usage, "--watch: is the folder of --out itself");
-      watched.emplace(arguments.watch, *inbox, tale.hooks());
+      watched.emplace(arguments.watch, *inbox, tale.hooks(), WatchedFolder::usual_pause, arguments.count);
     }
     stop.wait(arguments.seconds);
   });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/simulation/write_case.h"
@@ -17,6 +18,20 @@ Eigen::Vector3d three(const std::vector<double>& numbers, const char* option) {
   if (numbers.size() != 3)
     throw BadInput(Reason::usage, fmt::format("simulate: {} takes three numbers", option));
   return Eigen::Vector3d::Map(numbers.data());
+}
+
+void check_inside(const Volume& volume, const Eigen::Vector3d& centre) {
+  const Eigen::Vector3d last = (volume.size.cast<double>().array() - 1).matrix();
+  const Eigen::Array3d voxel = (volume.patient_from_voxel.inverse() * centre).array();
+  if ((voxel >= -0.5).all() && (voxel <= last.array() + 0.5).all()) return;
+  const Eigen::AlignedBox3d block =
+      Eigen::AlignedBox3d(Eigen::Vector3d::Zero(), last).transformed(volume.patient_from_voxel);
+  throw BadInput(
+      Reason::bad_value,
+      fmt::format("--ct-centre: {:g},{:g},{:g} lies outside the CT, which reaches from {:g},{:g},{:g} to "
+                  "{:g},{:g},{:g} mm",
+                  centre.x(), centre.y(), centre.z(), block.min().x(), block.min().y(), block.min().z(),
+                  block.max().x(), block.max().y(), block.max().z()));
 }
 
 std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& arguments,
@@ -35,7 +50,10 @@ std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& ar
     console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
   const std::filesystem::path whole = std::filesystem::absolute(arguments.ct).lexically_normal();
   ct.name = (whole.has_filename() ? whole : whole.parent_path()).filename().string();
-  if (!arguments.ct_centre_mm.empty()) ct.centre = three(arguments.ct_centre_mm, "--ct-centre");
+  if (!arguments.ct_centre_mm.empty()) {
+    ct.centre = three(arguments.ct_centre_mm, "--ct-centre");
+    check_inside(ct.volume, *ct.centre);
+  }
   if (!arguments.ct_turn_deg.empty()) ct.turn_deg = three(arguments.ct_turn_deg, "--ct-turn");
   return std::make_shared<simulation::CtOptions>(std::move(ct));
 }

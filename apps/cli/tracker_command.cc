@@ -4,12 +4,14 @@
 #include <charconv>
 #include <limits>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
 #include "helicarm/geometry/view_json.h"
@@ -35,10 +37,12 @@ Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments
   const std::string& peer = arguments.peer;
   const auto colon = peer.rfind(':');
   if (colon != peer.npos) {
-    const auto [end, error] =
-        std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), options.port);
-    if (error != std::errc() || end != peer.data() + peer.size())
-      return fail(Reason::usage, fmt::format("\"{}\" is no address:port", peer));
+    int port = 0;
+    const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
+    if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
+      return fail(Reason::usage, fmt::format("PEER: \"{}\" is no address:port, the port 1 to 65535",
+                                             without_control_characters(peer)));
+    options.port = static_cast<std::uint16_t>(port);
   }
   options.address = peer.substr(0, colon);
   return options;
@@ -72,6 +76,16 @@ std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>
     table += '\n';
   }
   return table;
+}
+
+Expected<void> check_tool(const std::vector<SequenceFrame>& frames, const TrackerPivotArguments& arguments) {
+  std::set<std::string> names;
+  for (const SequenceFrame& frame : frames)
+    for (const auto& [name, pose] : frame.poses) names.insert(name);
+  if (names.contains(arguments.tool)) return {};
+  return fail(Reason::bad_value, without_control_characters(fmt::format(
+                                     "--tool: \"{}\" is not in {}, which holds {}", arguments.tool,
+                                     arguments.file.string(), fmt::join(names, ", "))));
 }
 
 }  // namespace
@@ -149,6 +163,7 @@ CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Co
 CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Console& console) {
   const auto frames = read_sequence(arguments.file);
   if (!frames) return tl::unexpected(frames.error());
+  if (auto known = check_tool(*frames, arguments); !known) return known;
   const GatedPoses poses = gated_poses(*frames, arguments.tool);
   const auto pivot = calibrate_pivot(poses.tracker_from_tool, arguments.options);
   if (!pivot) return tl::unexpected(pivot.error());

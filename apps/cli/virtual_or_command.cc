@@ -20,18 +20,22 @@ namespace {
 
 using operating_room::VirtualRoom;
 
-constexpr const char* words =
-    "shoot VIEW | shoot VIEW wrong_title|breaks_off|same_picture|other_patient | fault NAME on|off | "
-    "move femur|tibia X Y Z (mm) | where | quit";
+/// Five times what the virtual tracker's drift makes of two touches.
+constexpr double notch_limit_mm = 1.5;
 
-operating_room::CArmFault c_arm_fault(const std::string& name) {
-  using operating_room::CArmFault;
-  if (name.empty()) return CArmFault::none;
-  if (name == "wrong_title") return CArmFault::wrong_title;
-  if (name == "breaks_off") return CArmFault::breaks_off;
-  if (name == "same_picture") return CArmFault::same_picture;
-  if (name == "other_patient") return CArmFault::other_patient;
-  throw BadInput(Reason::usage, "no such fault of the C-arm");
+std::string words() {
+  return fmt::format(
+      "shoot VIEW | shoot VIEW {} | fault NAME on|off ({}) | move femur|tibia X Y Z (mm) | bump femur|tibia "
+      "X Y Z (mm: its marker) | touch femur|tibia|nothing | power on | where "
+      "| quit",
+      operating_room::c_arm_fault_names(), operating_room::room_fault_names());
+}
+
+operating_room::CArmFault fault_of_shot(const std::string& name) {
+  if (name.empty()) return operating_room::CArmFault::none;
+  if (const auto fault = operating_room::c_arm_fault(name)) return *fault;
+  throw BadInput(Reason::bad_value,
+                 fmt::format("a fault of the C-arm is one of {}", operating_room::c_arm_fault_names()));
 }
 
 /// Does what one line says and answers with one; throws BadInput.
@@ -42,7 +46,7 @@ std::string obey(const std::string& line, VirtualRoom& room,
   said >> verb >> what;
   if (verb == "shoot") {
     said >> how;
-    value_or_throw(operating_room::shoot(room.theatre(), what, receiver, c_arm_fault(how)));
+    value_or_throw(operating_room::shoot(room.theatre(), what, receiver, fault_of_shot(how)));
     return "shot " + what;
   }
   if (verb == "fault") {
@@ -51,12 +55,28 @@ std::string obey(const std::string& line, VirtualRoom& room,
     value_or_throw(room.set_fault(what, how == "on"));
     return fmt::format("{} {}", what, how);
   }
-  if (verb == "move") {
+  const bool bone = what == "femur" || what == "tibia";
+  if (verb == "move" || verb == "bump") {
     Eigen::Vector3d shift;
-    if (!(said >> shift.x() >> shift.y() >> shift.z()) || (what != "femur" && what != "tibia"))
-      throw BadInput(Reason::usage, "move femur|tibia X Y Z");
-    room.theatre().move_bone(what, {Eigen::Matrix3d::Identity(), shift});
-    return "moved " + what;
+    if (!(said >> shift.x() >> shift.y() >> shift.z()) || !bone)
+      throw BadInput(Reason::usage, verb + " femur|tibia X Y Z");
+    if (verb == "bump")
+      room.theatre().bump_marker(what, shift);
+    else
+      room.theatre().move_bone(what, {Eigen::Matrix3d::Identity(), shift});
+    return (verb == "bump" ? "bumped " : "moved ") + what;
+  }
+  if (verb == "touch") {
+    if (!bone && what != "nothing") throw BadInput(Reason::usage, "touch femur|tibia|nothing");
+    if (bone)
+      room.touch(what);
+    else
+      room.lift_pointer();
+    return "touching " + what;
+  }
+  if (verb == "power") {
+    if (what != "on") throw BadInput(Reason::usage, "power on");
+    return room.power_on();
   }
   if (verb == "where") {
     const Eigen::Vector3d tip = room.tracker_from_tip().translation;
@@ -67,7 +87,7 @@ std::string obey(const std::string& line, VirtualRoom& room,
                              : "never moved";
     return fmt::format("tip {:.3f} {:.3f} {:.3f}, {}", tip.x(), tip.y(), tip.z(), motion);
   }
-  throw BadInput(Reason::usage, std::string("words are: ") + words);
+  throw BadInput(Reason::usage, "words are: " + words());
 }
 
 /// Until its input ends, "quit", or the stop token.
@@ -99,8 +119,13 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     operating_room::VirtualRoomOptions options = arguments.room;
     options.seed = console.seed;
     const auto room = value_or_throw(VirtualRoom::open(options));
-    if (!arguments.plan.empty())
-      value_or_throw(write_file(arguments.plan, to_text(to_json(plan_for(*room, room->tracker().port())))));
+    if (!arguments.plan.empty()) {
+      OperationPlan plan = plan_for(*room, room->tracker().port());
+      if (arguments.check_points)
+        plan.check_points = {{"femur notch", Bone::femur, notch_limit_mm},
+                             {"tibia notch", Bone::tibia, notch_limit_mm}};
+      value_or_throw(write_file(arguments.plan, to_text(to_json(plan))));
+    }
     if (!console.quiet)
       console.progress << fmt::format(
                               "tracker (OpenIGTLink) port {}\nrobot (UR5): RTDE {}, dashboard {}, script {}\n"
@@ -108,7 +133,7 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
                               room->tracker().port(), room->robot().rtde_port(),
                               room->robot().dashboard_port(), room->robot().script_port(),
                               arguments.receiver.title, arguments.receiver.address, arguments.receiver.port,
-                              words)
+                              words())
                        << std::flush;
     const std::jthread listener(
         [&](const std::stop_token& stop) { listen(stop, *room, arguments, console, end); });

@@ -13,6 +13,7 @@ struct VirtualOrArguments {
   operating_room::VirtualRoomOptions room;
   operating_room::PictureReceiver receiver;
   std::filesystem::path plan;  ///< written for `navigate`; empty: none
+  bool check_points = false;   ///< in the plan
   std::optional<double> seconds;
 };
 

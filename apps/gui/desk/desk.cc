@@ -19,19 +19,9 @@ constexpr int look_for_pictures_ms = 100;
 constexpr double bone_step_mm = 3;
 constexpr std::chrono::seconds robot_patience{5};
 
-std::shared_ptr<const Result> with_picture(const DeskState& state, const std::string& view,
-                                           Exposure exposure) {
+std::shared_ptr<const Result> only(Pictures pictures) {
   auto result = std::make_shared<Result>();
-  for (const std::string& name : state.views) {
-    ViewResult shown;
-    shown.name = name;
-    if (name == view)
-      shown.exposure = std::move(exposure);
-    else if (state.result)
-      for (const ViewResult& old : state.result->views)
-        if (old.name == name) shown.exposure = old.exposure;
-    result->views.push_back(std::move(shown));
-  }
+  result->views = std::move(pictures);
   return result;
 }
 
@@ -181,8 +171,11 @@ Desk::Change Desk::with_plan(const OperationPlan& plan, const Json& offered) {
     state.views = plan.views;
     state.calibrator = calibrator;
     state.tunnels = plan.tunnels;
+    for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
     state.offered_picks = picks;
-    state.result = with_picture(state, "", {});
+    Pictures none(plan.views.size());
+    for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
+    state.result = only(std::move(none));
     state.next_view = first_missing(state);
   };
 }
@@ -219,9 +212,8 @@ void Desk::expect(const std::string& view) {
 
 void Desk::shoot(const std::string& view) {
   if (!room_ || !room_->virtual_room) return;
-  begin(Phase::acquire, "shooting " + view, [this, view, room = room_]() -> Change {
-    return came(view, value_or_throw(shoot_and_take(*room, view)));
-  });
+  begin(Phase::acquire, "shooting " + view,
+        [this, view, room = room_]() -> Change { return came(value_or_throw(shoot_and_take(*room, view))); });
 }
 
 void Desk::take_waiting_picture() {
@@ -229,14 +221,14 @@ void Desk::take_waiting_picture() {
   const auto picture = room_->devices->next_picture(0);
   if (!picture) return;
   begin(Phase::acquire, "a picture came", [this, view = state_.next_view, room = room_, picture]() -> Change {
-    return came(view, value_or_throw(take(*room, view, *picture)));
+    return came(value_or_throw(take(*room, view, *picture)));
   });
 }
 
-Desk::Change Desk::came(const std::string& view, Exposure exposure) {
-  return [this, view, exposure = std::move(exposure)](DeskState& state) {
+Desk::Change Desk::came(Pictures pictures) {
+  return [this, pictures = std::move(pictures)](DeskState& state) {
     forget_measurement(state);
-    state.result = with_picture(state, view, exposure);
+    state.result = only(pictures);
     state.next_view = first_missing(state);
     if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.exposure.has_value(); }))
       QMetaObject::invokeMethod(this, &Desk::measure, Qt::QueuedConnection);
@@ -290,6 +282,15 @@ void Desk::clear_picks() {
   if (state_.busy) return;
   state_.picks.clear();
   picks_changed();
+}
+
+void Desk::touch(const std::string& check_point) {
+  if (!room_ || !room_->operation) return;
+  begin(Phase::acquire, "touching " + check_point, [room = room_, check_point]() -> Change {
+    const double off_mm = value_or_throw(room->operation->touch(check_point));
+    return
+        [check_point, off_mm](DeskState& state) { state.touched_mm.insert_or_assign(check_point, off_mm); };
+  });
 }
 
 void Desk::unlock(const std::string& who) {

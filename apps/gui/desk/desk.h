@@ -46,8 +46,9 @@ class Desk : public QObject {
 
   /// For the next measurement.
   void set_options(const RunOptions& options);
-  void expect(const std::string& view);  ///< the next picture is this view's
-  void shoot(const std::string& view);   ///< in the virtual room
+  void expect(const std::string& view);        ///< the next picture is this view's
+  void shoot(const std::string& view);         ///< in the virtual room
+  void touch(const std::string& check_point);  ///< with the pointer
   void pick(Pick pick);
   void take_offered_picks();
   void clear_picks();
@@ -85,7 +86,7 @@ class Desk : public QObject {
   Change measured(Room& room, const std::vector<Pick>& picks);
   static Change with_plan(const OperationPlan& plan, const Json& offered);
   Change with_case(Case given, Room& room);
-  Change came(const std::string& view, Exposure exposure);
+  Change came(std::vector<ViewResult> pictures);
 
   DeskState state_;
   std::shared_ptr<Room> room_;

@@ -36,6 +36,9 @@ struct DeskState {
   bool measured = false;
   int measurements = 0;
 
+  std::vector<std::string> check_points;     ///< on the bones, for the pointer
+  std::map<std::string, double> touched_mm;  ///< how far off each was at its last touch
+
   std::vector<PlannedTunnel> tunnels;
   std::vector<Pick> picks;
   std::vector<Pick> offered_picks;  ///< those that came with the plan

@@ -20,16 +20,25 @@ constexpr std::chrono::milliseconds before_exposure{1800};
 
 }  // namespace
 
-Expected<Exposure> take(Room& room, const std::string& view, const DatedArrival& picture) {
+Expected<Pictures> take(Room& room, const std::string& view, const DatedArrival& picture) {
   return guarded([&] {
     value_or_throw(room.operation->take(view, picture.arrival, picture.time_s));
-    return value_or_throw(read_exposure(picture.arrival.path, view, 1));
+    const auto taken = room.operation->pictures();
+    Pictures pictures;
+    for (const std::string& name : room.operation->plan().views) {
+      ViewResult shown;
+      shown.name = name;
+      if (const auto file = taken.find(name); file != taken.end())
+        shown.exposure = value_or_throw(read_exposure(file->second, name, 1));
+      pictures.push_back(std::move(shown));
+    }
+    return pictures;
   });
 }
 
-Expected<Exposure> shoot_and_take(Room& room, const std::string& view) {
+Expected<Pictures> shoot_and_take(Room& room, const std::string& view) {
   const operating_room::PictureReceiver receiver{"127.0.0.1", room.devices->receiver_port()};
-  Expected<Exposure> taken = fail(Reason::not_connected, "no picture came");
+  Expected<Pictures> taken = fail(Reason::not_connected, "no picture came");
   for (int shot = 0; shot < most_shots && !taken && !room.stopped; ++shot) {
     std::this_thread::sleep_for(before_exposure);
     const auto sent = operating_room::shoot(room.virtual_room->theatre(), view, receiver);

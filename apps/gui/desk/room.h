@@ -22,10 +22,13 @@ struct Room {
   std::atomic<bool> stopped = false;  ///< no move of a tour may follow
 };
 
-/// Shoots until the tracker has seen everything at rest; gives the picture that was taken.
-Expected<Exposure> shoot_and_take(Room& room, const std::string& view);
-/// Takes a picture that came by itself.
-Expected<Exposure> take(Room& room, const std::string& view, const DatedArrival& picture);
+/// All views of the operation with the pictures taken so far.
+using Pictures = std::vector<ViewResult>;
+
+/// Shoots until the tracker has seen everything at rest.
+Expected<Pictures> shoot_and_take(Room& room, const std::string& view);
+/// Takes a picture that came by itself; its file may say that it is another view's.
+Expected<Pictures> take(Room& room, const std::string& view, const DatedArrival& picture);
 
 /// A refused measurement still holds all that was found until then.
 Expected<Result> measure(Room& room, const std::vector<Pick>& picks);

@@ -86,6 +86,12 @@ void AcquirePage::show_state(const DeskState& state) {
   if (views_ != state.views || state.source == Source::files) {
     views_ = state.source == Source::files ? std::vector<std::string>{} : state.views;
     qDeleteAll(shots_->findChildren<QPushButton*>());
+    for (const std::string& point : state.check_points) {
+      auto* button = new QPushButton(tr("The pointer is on check point %1").arg(text(point)));
+      button->setToolTip(tr("Before the first X-ray, and again before the robot goes to this bone"));
+      shots_->layout()->addWidget(button);
+      connect(button, &QPushButton::clicked, this, [this, point] { desk_.touch(point); });
+    }
     for (const std::string& view : views_) {
       const bool own = state.source == Source::virtual_room;
       auto* button = new QPushButton((own ? tr("Shoot %1") : tr("The next X-ray is %1")).arg(text(view)));

@@ -45,6 +45,33 @@ RigidTransform Theatre::tracker_from(const std::string& body) const {
   return tracker_from_.at(body);
 }
 
+RigidTransform Theatre::tracker_from_marker(const std::string& bone) const {
+  const std::lock_guard lock(mutex_);
+  RigidTransform pose = tracker_from_.at(bone);
+  if (const auto bumped = marker_in_bone_.find(bone); bumped != marker_in_bone_.end())
+    pose.translation = pose * bumped->second;
+  return pose;
+}
+
+void Theatre::bump_marker(const std::string& bone, const Vector3d& shift_mm) {
+  const std::lock_guard lock(mutex_);
+  marker_in_bone_.try_emplace(bone, Vector3d::Zero()).first->second += shift_mm;
+}
+
+RigidTransform Theatre::tracker_from_pointer() const {
+  const std::string bone = [&] {
+    const std::lock_guard lock(mutex_);
+    return touched_;
+  }();
+  const Eigen::Matrix3d turn = tracker_from(bone).rotation;  // which the tracker sees
+  return {turn, point_in_tracker(bone == "femur" ? "FE" : "TS") - turn * tip_in_pointer};
+}
+
+void Theatre::touch(const std::string& bone) {
+  const std::lock_guard lock(mutex_);
+  touched_ = bone;
+}
+
 void Theatre::move_bone(const std::string& bone, const RigidTransform& motion_in_tracker) {
   const std::lock_guard lock(mutex_);
   RigidTransform& pose = tracker_from_.at(bone);

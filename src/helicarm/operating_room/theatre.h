@@ -24,11 +24,19 @@ class Theatre {
 
   /// "calibrator", "femur" or "tibia".
   RigidTransform tracker_from(const std::string& body) const;
+  /// Where the tracker would see the bone's marker: in the bone's frame until somebody bumps it.
+  RigidTransform tracker_from_marker(const std::string& bone) const;
+  /// Shifts a bone's marker against the bone (bone's axes).
+  void bump_marker(const std::string& bone, const Eigen::Vector3d& shift_mm);
   /// Moves a bone with its marker, about the marker (tracker's axes).
   void move_bone(const std::string& bone, const RigidTransform& motion_in_tracker);
 
   /// A ball at a tunnel's end (FS, FE, TS, TE) where it is now.
   Eigen::Vector3d point_in_tracker(const std::string& name) const;
+
+  /// A pointer whose tip rests on a tunnel's outer end in this bone, and goes with it.
+  RigidTransform tracker_from_pointer() const;
+  void touch(const std::string& bone);
 
   RigidTransform tracker_from_base() const { return tracker_from_base_; }
   /// Of the drill in the robot's hand: tip and axis (z).
@@ -43,7 +51,12 @@ class Theatre {
   RigidTransform tracker_from_base_;
   mutable std::mutex mutex_;
   std::map<std::string, RigidTransform> tracker_from_;
+  std::map<std::string, Eigen::Vector3d> marker_in_bone_;  ///< of those that were bumped
+  std::string touched_ = "femur";
 };
+
+/// From the middle of its markers to its tip.
+inline const Eigen::Vector3d tip_in_pointer(0, -140, -20);
 
 /// Facets on all sides of a cube.
 simulation::TrackedBody tool_markers();

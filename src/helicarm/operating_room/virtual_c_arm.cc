@@ -2,41 +2,42 @@
 #include "helicarm/operating_room/virtual_c_arm.h"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dctk.h>
 #include <dcmtk/dcmnet/scu.h>
 #include <fmt/format.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/simulation/write_case.h"
+#include "helicarm/xray/write_dicom.h"
 
 namespace helicarm::operating_room {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A file of its own that goes again.
-class PassingFile {
- public:
-  explicit PassingFile(const DerivedImage& image) {
-    std::string name = (fs::temp_directory_path() / "helicarm_shot_XXXXXX").string();
-    if (!::mkdtemp(name.data()))
-      throw BadInput(Reason::cannot_write, fmt::format("{}: cannot be made", name));
-    folder_ = name;
-    value_or_throw(write_dicom(path(), image));
-  }
-  ~PassingFile() {
-    std::error_code ec;
-    fs::remove_all(folder_, ec);
-  }
-  PassingFile(const PassingFile&) = delete;
-  PassingFile& operator=(const PassingFile&) = delete;
-  fs::path path() const { return folder_ / "shot.dcm"; }
+constexpr std::array<std::string_view, 7> c_arm_fault_words = {
+    "none", "wrong_title", "breaks_off", "same_picture", "other_patient", "held_back", "no_tags"};
 
- private:
-  fs::path folder_;
-};
+/// Nobody sets a C-arm's clock by ours.
+constexpr double clock_ahead_s = 31.7;
+constexpr std::chrono::seconds held_back_for{4};
+constexpr double leg_moves_mm = 6;
+
+AcquisitionTime c_arm_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration<double>(now).count() + clock_ahead_s, 1e-6, {}};
+}
+
+void move_leg(Theatre& theatre, double mm) {
+  for (const char* bone : {"femur", "tibia"})
+    theatre.move_bone(bone, {Eigen::Matrix3d::Identity(), {0, mm, 0}});
+}
 
 void need(const OFCondition& done, const char* what) {
   if (done.bad())
@@ -69,7 +70,17 @@ void send(const fs::path& file, const PictureReceiver& receiver, CArmFault fault
 
 }  // namespace
 
-Expected<void> shoot(const Theatre& theatre, const std::string& view, const PictureReceiver& receiver,
+std::optional<CArmFault> c_arm_fault(const std::string& name) {
+  const auto found = std::ranges::find(c_arm_fault_words, name);
+  if (found == c_arm_fault_words.end()) return std::nullopt;
+  return static_cast<CArmFault>(found - c_arm_fault_words.begin());
+}
+
+std::string c_arm_fault_names() {
+  return fmt::format("{}", fmt::join(c_arm_fault_words.begin() + 1, c_arm_fault_words.end(), ", "));
+}
+
+Expected<void> shoot(Theatre& theatre, const std::string& view, const PictureReceiver& receiver,
                      CArmFault fault) {
   return guarded([&] {
     const auto& views = theatre.room().views;
@@ -83,7 +94,21 @@ Expected<void> shoot(const Theatre& theatre, const std::string& view, const Pict
       image.study_uid.clear();
       image.patient_id = "ANOTHER";
     }
-    send(PassingFile(image).path(), receiver, fault);
+    image.acquisition.acquired = c_arm_now();
+    if (fault == CArmFault::no_tags) {
+      image.acquisition.acquired.reset();
+      image.acquisition.primary_angle_deg.reset();
+      image.acquisition.secondary_angle_deg.reset();
+    }
+    const TemporaryFolder folder;
+    const fs::path file = folder.path() / "shot.dcm";
+    value_or_throw(write_dicom(file, image));
+    if (fault != CArmFault::held_back) return send(file, receiver, fault);
+    move_leg(theatre, leg_moves_mm);
+    std::this_thread::sleep_for(held_back_for);
+    const auto sent = guarded([&] { send(file, receiver, fault); });
+    move_leg(theatre, -leg_moves_mm);
+    value_or_throw(sent);
   });
 }
 

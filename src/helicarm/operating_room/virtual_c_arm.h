@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "helicarm/operating_room/theatre.h"
@@ -20,11 +21,18 @@ enum class CArmFault {
   breaks_off,     ///< hangs up before the picture
   same_picture,   ///< sends the other view's picture
   other_patient,  ///< the picture belongs to another study
+  held_back,      ///< waits some seconds in the C-arm, and the leg moves meanwhile
+  no_tags,        ///< the file says neither when nor from where it was shot
 };
+/// By its name; nothing where there is no such fault.
+std::optional<CArmFault> c_arm_fault(const std::string& name);
+/// All names but "none", for a person.
+std::string c_arm_fault_names();
 
-/// Sends the theatre's picture of a view ("AP", "LAT") by C-STORE as a new exposure. Refuses an unknown view
-/// (bad_value), and what the network or the receiver had against it (not_connected).
-Expected<void> shoot(const Theatre& theatre, const std::string& view, const PictureReceiver& receiver,
+/// Sends the theatre's picture of a view ("AP", "LAT") by C-STORE as a new exposure, dated by the C-arm's
+/// clock, which is half a minute fast. Held back, the leg is moved and brought back once the picture is sent.
+/// Refuses an unknown view (bad_value), and what the network or the receiver had against it (not_connected).
+Expected<void> shoot(Theatre& theatre, const std::string& view, const PictureReceiver& receiver,
                      CArmFault fault = CArmFault::none);
 
 }  // namespace helicarm::operating_room

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operating_room/virtual_room.h"
 
+#include <algorithm>
+#include <array>
+
 #include <fmt/format.h>
 
 namespace helicarm::operating_room {
@@ -15,13 +18,14 @@ RobotModel arm_as_built() {
   return arm;
 }
 
-std::optional<TrackerFault> tracker_fault(const std::string& name) {
-  if (name == "frozen") return TrackerFault::frozen;
-  if (name == "identity") return TrackerFault::identity;
-  if (name == "not_finite_poses") return TrackerFault::not_finite;
-  if (name == "time_jump") return TrackerFault::time_jump;
-  if (name == "silent") return TrackerFault::silent;
-  return {};
+/// In the order of TrackerFault.
+constexpr std::array<std::string_view, 6> tracker_fault_words = {"frozen",    "identity", "not_finite_poses",
+                                                                 "time_jump", "silent",   "swapped_bones"};
+
+std::string hide_names(const VirtualTracker& tracker) {
+  std::string names;
+  for (const std::string& body : tracker.bodies()) names += (names.empty() ? "hide:" : ", hide:") + body;
+  return names;
 }
 
 }  // namespace
@@ -43,7 +47,7 @@ Expected<std::unique_ptr<VirtualRoom>> VirtualRoom::open(const VirtualRoomOption
     std::vector<FollowedBody> bodies;
     for (const char* bone : {"femur", "tibia"})
       bodies.push_back(
-          {bone, simulation::marker_array(), [&theatre, bone] { return theatre.tracker_from(bone); }});
+          {bone, simulation::marker_array(), [&theatre, bone] { return theatre.tracker_from_marker(bone); }});
     bodies.push_back({tool_marker, tool_markers(), [&theatre, robot = room->robot_.get()] {
                         return theatre.tracker_from_base() * robot->truth().base_from_tip *
                                theatre.tool().flange_from_tcp.inverse() * theatre.flange_from_marker();
@@ -52,11 +56,14 @@ Expected<std::unique_ptr<VirtualRoom>> VirtualRoom::open(const VirtualRoomOption
       bodies.push_back({facet.name, facet.body, [&theatre, from_facet = facet.calibrator_from_facet] {
                           return theatre.tracker_from("calibrator") * from_facet;
                         }});
+    bodies.push_back(
+        {pointer_marker, simulation::marker_array(), [&theatre] { return theatre.tracker_from_pointer(); }});
     VirtualTrackerOptions tracker;
     tracker.server.port = options.tracker_port;
     tracker.rate_hz = options.tracker_rate_hz;
     tracker.seed = options.seed;
     room->tracker_ = value_or_throw(VirtualTracker::start(tracker, std::move(bodies)));
+    room->lift_pointer();
     return room;
   });
 }
@@ -67,18 +74,38 @@ RigidTransform VirtualRoom::tracker_from_tip() {
 
 Expected<void> VirtualRoom::set_fault(const std::string& name, bool on) {
   constexpr std::string_view hide = "hide:";
+  const auto unknown = [&](const std::string& among) {
+    return fail(Reason::bad_value, fmt::format("\"{}\": must be one of {}", name, among));
+  };
   if (name.starts_with(hide)) {
-    tracker_->hide(name.substr(hide.size()), on);
+    const std::string body = name.substr(hide.size());
+    if (!tracker_->hide(body, on)) return unknown(hide_names(*tracker_));
     return {};
   }
-  if (const auto fault = tracker_fault(name)) {
-    tracker_->set(*fault, on);
+  const auto of_tracker = std::ranges::find(tracker_fault_words, name);
+  if (of_tracker != tracker_fault_words.end()) {
+    tracker_->set(static_cast<TrackerFault>(of_tracker - tracker_fault_words.begin()), on);
     return {};
   }
   const auto fault = robot_fault(name);
-  if (!fault) return tl::unexpected<Failure>(fault.error());
+  if (!fault) return unknown(room_fault_names());
   robot_->set(*fault, on);
   return {};
+}
+
+void VirtualRoom::touch(const std::string& bone) {
+  theatre_->touch(bone);
+  tracker_->hide(pointer_marker, false);
+}
+
+void VirtualRoom::lift_pointer() { tracker_->hide(pointer_marker, true); }
+
+std::string VirtualRoom::power_on() {
+  return fmt::format("{}; {}", robot_->dashboard("power on"), robot_->dashboard("brake release"));
+}
+
+std::string room_fault_names() {
+  return fmt::format("hide:BODY, {}, {}", fmt::join(tracker_fault_words, ", "), robot_fault_names());
 }
 
 }  // namespace helicarm::operating_room

@@ -34,9 +34,15 @@ class VirtualRoom {
   /// Where the tip of the tool truly is, and its axis (z).
   RigidTransform tracker_from_tip();
 
-  /// Switches a fault on or off by its name: hide:BODY, those of the tracker (frozen, identity,
-  /// not_finite_poses, time_jump, silent) and of the robot (`robot_fault`). An unknown one is bad_value.
+  /// Switches a fault on or off by its name, one of `room_fault_names`. An unknown one is bad_value.
   Expected<void> set_fault(const std::string& name, bool on);
+
+  /// Holds the pointer's tip to a bone ("femur" or "tibia"), still; before and after, it is not seen.
+  void touch(const std::string& bone);
+  void lift_pointer();
+
+  /// As somebody at the robot does after an emergency stop: power on, brakes open. The robot's answers.
+  std::string power_on();
 
  private:
   VirtualRoom() = default;
@@ -46,7 +52,11 @@ class VirtualRoom {
   std::unique_ptr<VirtualTracker> tracker_;
 };
 
+/// hide:BODY, and all faults of tracker and robot, for a person.
+std::string room_fault_names();
+
 /// Names of the tools that the tracker follows: the bones, the tool and the calibrator's facets.
 inline constexpr const char* tool_marker = "tool";
+inline constexpr const char* pointer_marker = "pointer";
 
 }  // namespace helicarm::operating_room

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/devices/receiver/receiver.h"
 #include "helicarm/devices/tracker/igtl_client.h"
 #include "helicarm/devices/tracker/pose_board.h"
@@ -120,9 +121,6 @@ TEST_F(Room, UnknownFaultAndViewAreRefused) {
 class Shots : public Room {
  protected:
   void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "helicarm_shots_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    folder_ = name;
     inbox_ = Inbox::open(folder_).value();
     ReceiverOptions options;
     options.port = 0;
@@ -131,13 +129,13 @@ class Shots : public Room {
   void TearDown() override {
     receiver_.reset();
     inbox_.reset();
-    std::filesystem::remove_all(folder_);
   }
   Expected<void> shot(const char* view, CArmFault fault = CArmFault::none) {
     return shoot(room_->theatre(), view, {"127.0.0.1", receiver_->port()}, fault);
   }
 
-  std::filesystem::path folder_;
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
   std::unique_ptr<Inbox> inbox_;
   std::unique_ptr<DicomReceiver> receiver_;
 };

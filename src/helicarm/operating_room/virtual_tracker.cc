@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operating_room/virtual_tracker.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -19,6 +20,10 @@ std::uint64_t stamp_now(double offset_s) {
   return stamp_from_seconds(std::chrono::duration<double>(now).count() + offset_s);
 }
 
+std::string other_bone(const std::string& name) {
+  return name == "femur" ? "tibia" : name == "tibia" ? "femur" : name;
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<VirtualTracker>> VirtualTracker::start(const VirtualTrackerOptions& options,
@@ -35,12 +40,20 @@ VirtualTracker::VirtualTracker(const VirtualTrackerOptions& options, std::vector
       server_(std::move(server)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-void VirtualTracker::hide(const std::string& body, bool hidden) {
+std::vector<std::string> VirtualTracker::bodies() const {
+  std::vector<std::string> names;
+  for (const FollowedBody& followed : bodies_) names.push_back(followed.name);
+  return names;
+}
+
+bool VirtualTracker::hide(const std::string& body, bool hidden) {
+  if (std::ranges::find(bodies_, body, &FollowedBody::name) == bodies_.end()) return false;
   const std::lock_guard lock(mutex_);
   if (hidden)
     hidden_.insert(body);
   else
     hidden_.erase(body);
+  return true;
 }
 
 void VirtualTracker::set(TrackerFault fault, bool on) {
@@ -78,7 +91,8 @@ void VirtualTracker::tell(std::uint64_t number) {
           options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
           options_.seed, samples_stream + 2 * std::uint32_t(i), number);
       if (sample.valid() && !hidden_.contains(followed.name))
-        tracking.tools.push_back({followed.name, 2, sample.tracker_from_body->matrix()});
+        tracking.tools.push_back({has(TrackerFault::swapped) ? other_bone(followed.name) : followed.name, 2,
+                                  sample.tracker_from_body->matrix()});
       else if (has(TrackerFault::identity))
         tracking.tools.push_back({followed.name, 2, Eigen::Matrix4d::Identity()});
     }

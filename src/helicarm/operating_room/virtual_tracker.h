@@ -35,6 +35,7 @@ enum class TrackerFault {
   not_finite,  ///< sends NaN
   time_jump,   ///< its clock goes an hour wrong
   silent,      ///< connected, but says nothing
+  swapped,     ///< takes the femur's marker for the tibia's, and the other way round
 };
 
 /// An OpenIGTLink server that tells the bodies' poses (TDATA) with the noise of a real tracker; what is not
@@ -46,8 +47,10 @@ class VirtualTracker {
                                                          std::vector<FollowedBody> bodies);
 
   std::uint16_t port() const { return server_->port(); }
-  /// Covers a body's markers.
-  void hide(const std::string& body, bool hidden);
+  /// Names of all that it follows.
+  std::vector<std::string> bodies() const;
+  /// Covers a body's markers; whether there is such a body.
+  bool hide(const std::string& body, bool hidden);
   void set(TrackerFault fault, bool on);
 
  private:

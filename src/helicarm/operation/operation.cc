@@ -12,7 +12,6 @@
 #include "helicarm/operation/records.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/xray/digest.h"
-#include "helicarm/xray/read_exposure.h"
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -22,9 +21,6 @@ namespace {
 constexpr std::chrono::seconds robot_patience{5};
 /// The tip is drawn into the X-rays every so many mm.
 constexpr double preview_step_mm = 5;
-
-/// Of keys that may be empty.
-bool differ(const std::string& a, const std::string& b) { return !a.empty() && !b.empty() && a != b; }
 
 }  // namespace
 
@@ -67,22 +63,6 @@ PoseWindow Operation::look(const char* why) {
   return window;
 }
 
-Acquisition Operation::acquisition_of(const std::string& view, const Arrival& arrival) const {
-  if (arrival.repeated)
-    throw BadInput(Reason::stale_pose, fmt::format("{}: this picture came before; expose anew", view));
-  const Acquisition shown = value_or_throw(read_exposure(arrival.path, view, 1)).acquisition;
-  for (const View& other : views_) {
-    if (other.name == view) continue;
-    if (shown.instance_key == other.acquisition.instance_key)
-      throw BadInput(Reason::views_too_close, fmt::format("{}: is the picture of {}", view, other.name));
-    if (differ(shown.patient_key, other.acquisition.patient_key) ||
-        differ(shown.study_key, other.acquisition.study_key))
-      throw BadInput(Reason::patient_mismatch,
-                     fmt::format("{} and {} are of different patients or studies", view, other.name));
-  }
-  return shown;
-}
-
 /// The robot moves only while the tracker sees these.
 Watch Operation::sees(std::vector<std::string> markers) const {
   return [this, markers = std::move(markers)]() -> Expected<void> {
@@ -103,36 +83,6 @@ Expected<void> Operation::finish() {
   return guarded([&] { record("end", Json::object()); });
 }
 
-Expected<void> Operation::take(const std::string& view, const Arrival& arrival, double arrival_s) {
-  return guarded([&] {
-    if (std::ranges::find(plan_.views, view) == plan_.views.end())
-      throw BadInput(Reason::bad_value, fmt::format("{}: is no view of the plan", view));
-    tell_(Step::acquire, view);
-    const auto acquisition = guarded([&] { return acquisition_of(view, arrival); });
-    if (!acquisition) {
-      record("refused",
-             {{"view", view}, {"picture", arrival.digest}, {"why", code(acquisition.error().reason)}});
-      throw BadInput(acquisition.error());
-    }
-    const PoseWindow window = window_of_exposure(board_, plan_.tracker, arrival_s);
-    const auto seen = poses_of_exposure(window, plan_.tracker);
-    record("exposure", {{"view", view},
-                        {"picture", arrival.digest},
-                        {"window", to_json(window)},
-                        {"poses", seen ? to_json(*seen) : Json()}});
-    const Poses poses = value_or_throw(seen);
-    for (const PlannedTunnel& tunnel : plan_.tunnels)
-      if (!poses.tracker_from(tunnel.bone))
-        throw BadInput(Reason::no_pose,
-                       fmt::format("{}: the marker of the {} was not seen during the exposure", view,
-                                   plan_.tracker.marker_of(tunnel.bone)));
-    std::erase_if(views_, [&](const View& other) { return other.name == view; });
-    views_.push_back({view, arrival.path, *acquisition, poses});
-    std::ranges::sort(views_, {}, [&](const View& v) { return std::ranges::find(plan_.views, v.name); });
-    result_.reset();
-  });
-}
-
 fs::path Operation::newest_case() const { return folder_ / fmt::format("case-{}", measurements_); }
 
 Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
@@ -141,7 +91,7 @@ Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines)
   std::vector<CasePicture> pictures;
   for (const View& view : views_) pictures.push_back({view.name, view.picture, view.poses});
   value_or_throw(write_operation_case(folder_ / name, plan_, pictures, now, tool_lines));
-  record("case", {{"folder", name}});
+  record("case", {{"folder", name}, {"case", value_or_throw(read_json(folder_ / name / "case.json"))}});
   CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_));
   record("result", {{"folder", name}, {"digest", run.digest}});
   if (run.result.failure) throw BadInput(*run.result.failure);
@@ -154,6 +104,16 @@ Expected<void> Operation::measure() {
       throw BadInput(Reason::usage, fmt::format("{}: its picture has not come", missing.front()));
     tell_(Step::measure, fmt::format("{} views", views_.size()));
     result_ = run({}, {});
+  });
+}
+
+Expected<std::vector<RobotOrder>> Operation::preview_tour() const {
+  return guarded([&] {
+    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    std::vector<RobotOrder> orders;
+    for (const RigidTransform& pose : hand_eye_tour(present.base_from_tcp))
+      orders.push_back(tour_order(plan_.robot, present, pose));
+    return orders;
   });
 }
 
@@ -188,6 +148,9 @@ const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
 Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(name);
+    if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
+      throw BadInput(Reason::usage,
+                     fmt::format("{}: this check point must be touched again first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "nothing is measured yet");
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered yet");
     tell_(Step::plan, name);
@@ -211,6 +174,12 @@ void Operation::draw_preview(const RobotOrder& order) const {
     if (const auto shown = path.by_view.find(views_[i].name); shown != path.by_view.end())
       value_or_throw(write_file(folder_ / fmt::format("preview-{}-{}.png", order.name, views_[i].name),
                                 overlay_png(*result_, i, shown->second)));
+}
+
+std::map<std::string, fs::path> Operation::pictures() const {
+  std::map<std::string, fs::path> pictures;
+  for (const View& view : views_) pictures[view.name] = view.picture;
+  return pictures;
 }
 
 std::vector<Poses> Operation::exposures() const {
@@ -255,6 +224,7 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
     const auto target = bone_from_target_.find(order.name);
     if (target == bone_from_target_.end())
       throw BadInput(Reason::usage, fmt::format("{}: was not planned in this operation", order.name));
+    in_place_.clear();
     tell_(Step::navigate, order.name);
     const Measure measure = [&] {
       return guarded([&] {

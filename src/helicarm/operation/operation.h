@@ -4,12 +4,14 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/live_tool.h"
+#include "helicarm/operation/picture_delays.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/exposure.h"
 
@@ -54,11 +56,23 @@ class Operation {
   /// Views that still want a picture, in the plan's order.
   std::vector<std::string> views_to_come() const;
 
-  /// Acquire: dates the picture by its arrival (monotonic seconds) and takes everything's pose for it.
-  /// Refuses as `poses_of_exposure`, a tunnel's bone that was not seen (no_pose), a picture that came before
-  /// (stale_pose: nobody knows when it was shot), that is another view's (views_too_close), or another
-  /// patient's (patient_mismatch).
+  /// Check points are touched before the first picture, and again before each order to a tunnel in their
+  /// bone. The first time learns where it is; then gives how far off the tip is, mm, and refuses
+  /// residual_too_large over its limit: then marker and bone are no longer what they were, and only a new
+  /// operation helps. Refuses as `touched_in_bone`, and a first touch after a picture (usage).
+  Expected<double> touch(const std::string& check_point);
+  /// Those that must be touched before this tunnel is planned.
+  std::vector<std::string> checks_to_come(Bone bone) const;
+
+  /// Acquire: dates the picture by its arrival (monotonic seconds) and takes everything's pose for it; as the
+  /// view that its positioner's angle names, else as this one. Refuses as `poses_of_exposure`, a tunnel's
+  /// bone that was not seen (no_pose), a picture that came before or was held back in the C-arm (stale_pose:
+  /// nobody knows where things were), that is another view's (views_too_close), or another patient's
+  /// (patient_mismatch). An earlier picture that turns out to have been held back is to come again.
   Expected<void> take(const std::string& view, const Arrival& arrival, double arrival_s);
+
+  /// The pictures that were taken, by view.
+  std::map<std::string, std::filesystem::path> pictures() const;
 
   /// Picks as in case.json, in place of the plan's.
   void pick(Json picks) { plan_.picks = std::move(picks); }
@@ -71,6 +85,8 @@ class Operation {
   /// What the tracker said at each view's exposure, in the plan's order.
   std::vector<Poses> exposures() const;
 
+  /// The moves that `register_robot` would make from here, in their order. Nothing moves.
+  Expected<std::vector<RobotOrder>> preview_tour() const;
   /// Moves the tool a little to all sides and learns how marker, robot and tracker stand to each other. Asks
   /// `confirm` for each move's token.
   using Confirm = std::function<Expected<std::string>(const RobotOrder&)>;
@@ -78,7 +94,8 @@ class Operation {
   const HandEye& hand_eye() const { return *hand_eye_; }
 
   /// The order that brings the tool to the tunnel, and what it will look like: also as
-  /// preview-TUNNEL-VIEW.png in the session's folder. Nothing moves.
+  /// preview-TUNNEL-VIEW.png in the session's folder. Nothing moves. Refuses (usage) a bone whose check
+  /// points were not touched since the last order.
   Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
   Expected<PathPreview> preview(const RobotOrder& order) const;
 
@@ -97,6 +114,7 @@ class Operation {
     std::string name;
     std::filesystem::path picture;
     Acquisition acquisition;
+    double arrival_s;
     Poses poses;
   };
 
@@ -111,7 +129,11 @@ class Operation {
   const PlannedTunnel& tunnel_named(const std::string& name) const;
   void record(const std::string& kind, Json content);
   PoseWindow look(const char* why);
-  Acquisition acquisition_of(const std::string& view, const Arrival& arrival) const;
+  Acquisition acquisition_of(std::string& view, const Arrival& arrival, double arrival_s);
+  void refuse_other_views(const std::string& view, const Acquisition& shown) const;
+  void weigh_delay(const std::string& view, const Acquisition& shown, double arrival_s);
+  double held_s(const Acquisition& shown, double arrival_s) const;
+  void told_once(const std::string& warning);
   Watch sees(std::vector<std::string> markers) const;
   Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
   std::vector<Miss> carry_out(const RobotOrder& order, const std::string& token, const Measure& measure,
@@ -127,6 +149,10 @@ class Operation {
   std::unique_ptr<SessionLog> log_;
   std::string who_ = "unknown";
   std::vector<View> views_;
+  PictureDelays delays_;
+  std::set<std::string> told_;
+  std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< each check point the first time
+  std::set<std::string> in_place_;  ///< check points touched again since the last order
   int measurements_ = 0;
   std::optional<Result> result_;
   std::optional<HandEye> hand_eye_;

@@ -17,19 +17,18 @@ constexpr Range millimetres{-100000, 100000};
 
 /// Made rigid where its digits are few; else as written, to the last bit, so that a record can be replayed.
 RigidTransform pose_from(JsonReader& reader, const char* key) {
-  const auto numbers = reader.matrix(key, 4, 4, millimetres);
-  const Eigen::Matrix4d given =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix4d given = matrix_from(reader, key, millimetres);
   const RigidTransform mended = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
   constexpr double rounding = 1e-9;
-  if ((mended.matrix() - given).cwiseAbs().maxCoeff() > rounding) return mended;
-  return {given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
+  return (mended.matrix() - given).cwiseAbs().maxCoeff() > rounding ? mended : exact_pose(given);
 }
 
 /// Within the limits that the list of fields gives to the key.
 double planned_number(JsonReader& reader, const char* key) {
   return reader.number(key, field_named<OperationPlan>(plan_fields, key).range);
 }
+
+const char* word(Bone bone) { return bone == Bone::femur ? "femur" : "tibia"; }
 
 std::uint16_t port_from(JsonReader& reader, const char* key) {
   return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
@@ -47,6 +46,20 @@ void take_once(const JsonReader& reader, std::set<std::string>& names, const std
     reader.refuse(Reason::name_clash, "name", fmt::format("\"{}\" is given twice", name));
 }
 
+Pointer pointer_from(JsonReader reader) {
+  Pointer pointer{reader.text("name"),
+                  Eigen::Vector3d(reader.numbers("tip_in_pointer", 3, millimetres).data())};
+  reader.finish();
+  return pointer;
+}
+
+PlannedCheck check_from(JsonReader& reader) {
+  PlannedCheck check{reader.text("name"), static_cast<Bone>(reader.choice("bone", {"femur", "tibia"})),
+                     reader.optional_number("limit_mm", {0.1, 10}).value_or(CheckPoint{}.limit_mm)};
+  reader.finish();
+  return check;
+}
+
 TrackerPlan tracker_from(JsonReader reader) {
   TrackerPlan tracker;
   tracker.address = reader.text("address");
@@ -61,19 +74,11 @@ TrackerPlan tracker_from(JsonReader reader) {
     entry.finish();
     tracker.facets.push_back(std::move(facet));
   }
+  if (!reader.raw("pointer").is_null()) tracker.pointer = pointer_from(reader.object("pointer"));
   tracker.sigma_mm = planned_number(reader, "sigma_mm");
   tracker.sigma_deg = planned_number(reader, "sigma_deg");
   reader.finish();
   return tracker;
-}
-
-KeepOut keep_out_from(JsonReader& reader) {
-  const KeepOut keep_out{Eigen::Vector3d(reader.numbers("point_in_base", 3, millimetres).data()),
-                         Eigen::Vector3d(reader.numbers("normal", 3, {-1, 1}).data())};
-  if (std::abs(keep_out.normal.norm() - 1) > 1e-6)
-    reader.refuse(Reason::bad_value, "normal", "must be of unit length");
-  reader.finish();
-  return keep_out;
 }
 
 ApproachOptions approach_from(JsonReader reader) {
@@ -86,7 +91,7 @@ ApproachOptions approach_from(JsonReader reader) {
   approach.corrections.tolerance_mm = planned_number(reader, "tolerance_mm");
   approach.corrections.tolerance_deg = planned_number(reader, "tolerance_deg");
   for (JsonReader& entry : reader.objects("keep_outs", false, 100))
-    approach.keep_outs.push_back(keep_out_from(entry));
+    approach.keep_outs.push_back(keep_out_from(entry, millimetres));
   reader.finish();
   return approach;
 }
@@ -134,17 +139,23 @@ Json to_json(const TrackerPlan& tracker) {
   for (const Facet& facet : tracker.facets)
     facets.push_back(
         {{"name", facet.name}, {"calibrator_from_facet", json_rows(facet.calibrator_from_facet.matrix())}});
-  return {{"address", tracker.address},   {"port", tracker.port},          {"femur", tracker.femur},
-          {"tibia", tracker.tibia},       {"tool", tracker.tool},          {"facets", std::move(facets)},
-          {"sigma_mm", tracker.sigma_mm}, {"sigma_deg", tracker.sigma_deg}};
+  return {{"address", tracker.address},
+          {"port", tracker.port},
+          {"femur", tracker.femur},
+          {"tibia", tracker.tibia},
+          {"tool", tracker.tool},
+          {"facets", std::move(facets)},
+          {"sigma_mm", tracker.sigma_mm},
+          {"sigma_deg", tracker.sigma_deg},
+          {"pointer", tracker.pointer ? Json{{"name", tracker.pointer->name},
+                                             {"tip_in_pointer", json_list(tracker.pointer->tip_in_pointer)}}
+                                      : Json()}};
 }
 
 Json to_json(const RobotPlan& robot) {
   const ApproachOptions& approach = robot.approach;
   Json keep_outs = Json::array();
-  for (const KeepOut& keep_out : approach.keep_outs)
-    keep_outs.push_back(
-        {{"point_in_base", json_list(keep_out.point_in_base)}, {"normal", json_list(keep_out.normal)}});
+  for (const KeepOut& keep_out : approach.keep_outs) keep_outs.push_back(to_json(keep_out));
   return {{"model", robot.model},
           {"address", robot.address},
           {"rtde_port", robot.rtde_port},
@@ -180,6 +191,13 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
       plan.tunnels.push_back(tunnel_from(entry));
       take_once(entry, names, plan.tunnels.back().name);
     }
+    names.clear();
+    for (JsonReader& entry : reader.objects("check_points", false, 20)) {
+      plan.check_points.push_back(check_from(entry));
+      take_once(entry, names, plan.check_points.back().name);
+    }
+    if (!plan.check_points.empty() && !plan.tracker.pointer)
+      reader.refuse(Reason::bad_value, "check_points", "need \"pointer\" in \"tracker\"");
     if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
     if (reader.has("max_error_mm")) plan.max_error_mm = planned_number(reader, "max_error_mm");
     reader.raw("max_error_mm");
@@ -192,10 +210,13 @@ Json to_json(const OperationPlan& plan) {
   Json tunnels = Json::array();
   for (const PlannedTunnel& tunnel : plan.tunnels)
     tunnels.push_back({{"name", tunnel.name},
-                       {"bone", tunnel.bone == Bone::femur ? "femur" : "tibia"},
+                       {"bone", word(tunnel.bone)},
                        {"start", tunnel.start},
                        {"end", tunnel.end},
                        {"enter_at", tunnel.enter_at == TunnelEnd::start ? "start" : "end"}});
+  Json check_points = Json::array();
+  for (const PlannedCheck& check : plan.check_points)
+    check_points.push_back({{"name", check.name}, {"bone", word(check.bone)}, {"limit_mm", check.limit_mm}});
   return {{"format", plan_format},
           {"calibrator", plan.calibrator},
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
@@ -203,6 +224,7 @@ Json to_json(const OperationPlan& plan) {
           {"tracker", to_json(plan.tracker)},
           {"robot", to_json(plan.robot)},
           {"tunnels", std::move(tunnels)},
+          {"check_points", std::move(check_points)},
           {"picks", plan.picks},
           {"max_error_mm", plan.max_error_mm}};
 }

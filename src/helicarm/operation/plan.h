@@ -8,10 +8,25 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/devices/robot/plan_approach.h"
+#include "helicarm/devices/tracker/check_point.h"
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
 
 namespace helicarm {
+
+/// A calibrated pointer (`tracker pivot`).
+struct Pointer {
+  std::string name;
+  Eigen::Vector3d tip_in_pointer;  ///< mm
+};
+
+/// A divot of a bone that is touched before the first X-ray and again before the robot moves: so a marker
+/// that was bumped, or taken for the other bone's, is noticed.
+struct PlannedCheck {
+  std::string name;
+  Bone bone;
+  double limit_mm;
+};
 
 /// Where the tracker's words come from, and what it calls things.
 struct TrackerPlan {
@@ -21,7 +36,8 @@ struct TrackerPlan {
   std::string tibia = "tibia";
   std::string tool = "tool";
   std::vector<Facet> facets;  ///< of the calibrator; a single marker is one facet
-  double sigma_mm = 0.12;     ///< of a reading, per axis: what no averaging over a second takes away
+  std::optional<Pointer> pointer;
+  double sigma_mm = 0.12;  ///< of a reading, per axis: what no averaging over a second takes away
   double sigma_deg = 0.05;
 
   const std::string& marker_of(Bone bone) const { return bone == Bone::femur ? femur : tibia; }
@@ -55,6 +71,7 @@ struct OperationPlan {
   TrackerPlan tracker;
   RobotPlan robot;
   std::vector<PlannedTunnel> tunnels;
+  std::vector<PlannedCheck> check_points;
   Json picks = Json::array();  ///< as in case.json; may come later, once the pictures are seen
   double max_error_mm = 2;     ///< at 95 %: the robot goes by no point that may be further off
 };

@@ -12,12 +12,6 @@ Json pose_json(const std::optional<RigidTransform>& pose) {
   return pose ? json_rows(pose->matrix()) : Json();
 }
 
-RigidTransform exact_pose(JsonReader& reader, const char* key) {
-  const auto rows = reader.matrix(key, 4, 4, any_place);
-  const Eigen::Matrix4d matrix = Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
-  return {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()};
-}
-
 }  // namespace
 
 Json to_json(const Poses& poses) {
@@ -49,7 +43,8 @@ Expected<std::vector<HandEyePair>> hand_eye_pairs_from(const Json& json, const s
     std::vector<HandEyePair> pairs;
     for (const Json& entry : json) {
       JsonReader reader(entry, origin);
-      pairs.push_back({exact_pose(reader, "base_from_flange"), exact_pose(reader, "tracker_from_marker")});
+      pairs.push_back({exact_pose_from(reader, "base_from_flange", any_place),
+                       exact_pose_from(reader, "tracker_from_marker", any_place)});
       reader.finish();
     }
     return pairs;

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/replay.h"
 
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/session/session_log.h"
@@ -16,6 +18,22 @@ namespace {
 
 constexpr std::uintmax_t most_picture_bytes = std::uintmax_t{256} << 20;
 
+/// The first fields in which two values differ, for a person.
+std::string where(const Json& then, const Json& now) {
+  constexpr std::size_t most = 4;
+  const Json patch = Json::diff(then, now);
+  std::string fields;
+  for (std::size_t i = 0; i < std::min(most, patch.size()); ++i)
+    fields += (i == 0 ? ": " : ", ") + patch[i].at("path").get<std::string>();
+  if (patch.size() > most) fields += fmt::format(" and {} more", patch.size() - most);
+  return fields;
+}
+
+Json without_timing(Json result) {
+  result.erase("timing_ms");
+  return result;
+}
+
 class Replay {
  public:
   explicit Replay(std::filesystem::path session) : session_(std::move(session)) {}
@@ -24,6 +42,7 @@ class Replay {
     const std::string origin = fmt::format("record {}", record.number);
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
     if (record.kind == "exposure") exposure(record, origin);
+    if (record.kind == "touched") touched(record, origin);
     if (record.kind == "case") pictures(record, origin);
     if (record.kind == "end") report.finished = true;
     if (record.kind == "result") result(record, origin);
@@ -37,7 +56,7 @@ class Replay {
     report.differences.push_back(origin + ": " + how);
   }
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
-    if (then != now) differ(origin, fmt::format("the {} comes out otherwise", what));
+    if (then != now) differ(origin, fmt::format("the {} comes out otherwise{}", what, where(then, now)));
   }
 
   void exposure(const SessionRecord& record, const std::string& origin) {
@@ -48,9 +67,26 @@ class Replay {
     compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
   }
 
-  /// The case's pictures must be those that came.
+  void touched(const SessionRecord& record, const std::string& origin) {
+    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
+    const auto check = std::ranges::find(
+        plan_.check_points, record.content.at("check_point").get<std::string>(), &PlannedCheck::name);
+    if (check == plan_.check_points.end()) return differ(origin, "its check point is none of the plan");
+    const auto tip = touched_in_bone(window, plan_.tracker, check->bone);
+    compare(record.content.at("in_bone"), tip ? json_list(*tip) : Json(), origin, "touched point");
+  }
+
+  /// The case must be the one recorded, and its pictures those that came.
   void pictures(const SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
+    if (record.content.contains("case")) {
+      const std::string name = folder + "/case.json";
+      const auto now = read_json(value_or_throw(path_inside(session_, name)));
+      if (!now)
+        differ(origin, now.error().message);
+      else if (*now != record.content.at("case"))
+        differ(origin, fmt::format("{} was changed{}", name, where(record.content.at("case"), *now)));
+    }
     for (const auto& [view, recorded] : picture_digests_) {
       ++report.pictures;
       const std::string name = folder + "/" + view + ".dcm";
@@ -65,11 +101,14 @@ class Replay {
   void result(const SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
-    const auto run = recompute_case(value_or_throw(path_inside(session_, folder)), plan_);
-    if (!run)
-      differ(origin, run.error().message);
-    else
-      compare(record.content.at("digest"), run->digest, origin + ": " + folder, "result");
+    const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
+    const auto run = recompute_case(inside, plan_);
+    if (!run) return differ(origin, run.error().message);
+    if (record.content.at("digest") == run->digest) return;
+    const auto then = read_json(inside / "result.json");
+    differ(origin,
+           fmt::format("{}: the result comes out otherwise{}", folder,
+                       then ? where(without_timing(*then), without_timing(to_json(run->result))) : ""));
   }
 
   void hand_eye(const SessionRecord& record, const std::string& origin) {

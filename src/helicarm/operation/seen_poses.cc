@@ -26,6 +26,7 @@ constexpr Range sample_range{-1e6, 1e6};
 
 std::vector<std::string> tools_of(const TrackerPlan& plan) {
   std::vector<std::string> tools{plan.femur, plan.tibia, plan.tool};
+  if (plan.pointer) tools.push_back(plan.pointer->name);
   for (const Facet& facet : plan.facets) tools.push_back(facet.name);
   return tools;
 }
@@ -93,12 +94,9 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
         JsonReader sample(entry, origin + ": " + tool);
         const double time = sample.number("time_s", any_time), device = sample.number("device_s", any_time);
         const double arrival = sample.number("arrival_s", any_time);
-        const auto rows = sample.matrix("tracker_from_tool", 4, 4, sample_range);
-        const Eigen::Matrix4d matrix =
-            Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows.data());
+        const RigidTransform pose = exact_pose_from(sample, "tracker_from_tool", sample_range);
         sample.finish();
-        samples.push_back(
-            {time, device, arrival, {matrix.topLeftCorner<3, 3>(), matrix.topRightCorner<3, 1>()}});
+        samples.push_back({time, device, arrival, pose});
       }
     }
     reader.finish();
@@ -106,8 +104,10 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
   });
 }
 
-PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s) {
-  return window_about(board, plan, arrival_s - longest_way_s / 2, longest_way_s / 2);
+PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
+                              double coarse_s) {
+  const double half_s = (longest_way_s + coarse_s) / 2;
+  return window_about(board, plan, arrival_s - half_s, half_s);
 }
 
 PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan) {
@@ -170,6 +170,17 @@ Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
     poses.tracker_from_tibia = see(plan.tibia);
     poses.tracker_from_tool = see(plan.tool);
     return poses;
+  });
+}
+
+Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan, Bone bone) {
+  return guarded([&]() -> Eigen::Vector3d {
+    if (!plan.pointer) throw BadInput(Reason::bad_value, "the plan has no pointer");
+    const auto see = [&](const std::string& tool) {
+      return value_or_throw(see_tool(window, plan, tool)).tracker_from_marker;
+    };
+    const Eigen::Vector3d tip = see(plan.pointer->name) * plan.pointer->tip_in_pointer;
+    return see(plan.marker_of(bone)).inverse() * tip;
   });
 }
 

@@ -21,8 +21,10 @@ Json to_json(const PoseWindow& window);
 /// To the last bit. Fails as JsonReader.
 Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origin);
 
-/// The second and a half before a picture came: the shot lies somewhere in it.
-PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s);
+/// The second and a half before a picture came: the shot lies somewhere in it. Longer by what the time of the
+/// shot is coarse, as its delay is then known no better.
+PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
+                              double coarse_s = 0);
 /// The three quarters of a second from now on; waits until they are over.
 PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan);
 
@@ -43,6 +45,10 @@ Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& p
 /// Calibrator and bones during an exposure. A bone whose marker is not seen is absent; one that moved is
 /// refused (pose_spread).
 Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan);
+
+/// Where the pointer's tip is, in the frame of the bone's marker. Refuses as `see_tool`; bad_value without a
+/// pointer.
+Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan, Bone bone);
 
 /// Bones and tool; all must be seen.
 Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan);

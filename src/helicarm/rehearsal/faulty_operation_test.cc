@@ -6,6 +6,7 @@
 #include <sys/resource.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
@@ -30,11 +31,9 @@ class FaultyOperation : public testing::Test {
     options.tracker_rate_hz = 100;
     options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
     room_ = VirtualRoom::open(options).value();
-    std::string name = (fs::temp_directory_path() / "helicarm_operation_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    folder_ = name;
+    folder_ = std::make_unique<TemporaryFolder>();
     plan_ = plan_for(*room_, room_->tracker().port());
-    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_ / "inbox").value());
+    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_->path() / "inbox").value());
     ReceiverOptions receiving;
     receiving.port = 0;
     ASSERT_TRUE(devices_->listen(receiving));
@@ -43,16 +42,17 @@ class FaultyOperation : public testing::Test {
   static void TearDownTestSuite() {
     devices_.reset();
     room_.reset();
-    fs::remove_all(folder_);
+    folder_.reset();
   }
   void SetUp() override {
-    session_ = folder_ / testing::UnitTest::GetInstance()->current_test_info()->name();
+    session_ = folder_->path() / testing::UnitTest::GetInstance()->current_test_info()->name();
     operation_ = begin().value();
   }
   void TearDown() override { operation_.reset(); }
 
   Expected<std::unique_ptr<Operation>> begin() {
-    return Operation::begin(plan_, session_, devices_->board(), devices_->robot());
+    return Operation::begin(plan_, session_, devices_->board(), devices_->robot(),
+                            [this](Step, const std::string& what) { told_.push_back(what); });
   }
   DatedArrival shot(const std::string& view, CArmFault fault = CArmFault::none) {
     EXPECT_TRUE(
@@ -78,14 +78,15 @@ class FaultyOperation : public testing::Test {
   static std::unique_ptr<VirtualRoom> room_;
   static std::unique_ptr<Connections> devices_;
   static OperationPlan plan_;
-  static fs::path folder_;
+  static std::unique_ptr<TemporaryFolder> folder_;
   fs::path session_;
+  std::vector<std::string> told_;
   std::unique_ptr<Operation> operation_;
 };
 std::unique_ptr<VirtualRoom> FaultyOperation::room_;
 std::unique_ptr<Connections> FaultyOperation::devices_;
 OperationPlan FaultyOperation::plan_;
-fs::path FaultyOperation::folder_;
+std::unique_ptr<TemporaryFolder> FaultyOperation::folder_;
 
 TEST_F(FaultyOperation, SamePictureForBothViewsIsRefusedAndTheNextOneTaken) {
   expose("AP");
@@ -102,12 +103,52 @@ TEST_F(FaultyOperation, PictureOfAnotherPatientIsRefused) {
   EXPECT_EQ(operation_->measure().error().reason, Reason::usage);
 }
 
-TEST_F(FaultyOperation, LateralPictureTakenAsApLeavesItsTunnelsUnmeasured) {
+TEST_F(FaultyOperation, PicturesInTheOtherOrderAreSortedByTheirAngles) {
   expose("AP", CArmFault::same_picture);
-  expose("LAT", CArmFault::same_picture);
+  EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"AP"});
+  expose("AP");
+  ASSERT_TRUE(operation_->measure());
+  for (const PlannedTunnel& tunnel : plan_.tunnels)
+    EXPECT_TRUE(tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
+}
+
+TEST_F(FaultyOperation, OtherOrderThatNoFileTellsLeavesItsTunnelsUnmeasured) {
+  for (const auto& [view, taken_as] : {std::pair{"LAT", "AP"}, std::pair{"AP", "LAT"}}) {
+    Expected<void> taken = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_shots && !taken; ++i) {
+      const DatedArrival picture = shot(view, CArmFault::no_tags);
+      taken = operation_->take(taken_as, picture.arrival, picture.time_s);
+    }
+    ASSERT_TRUE(taken) << taken.error().message;
+  }
   ASSERT_TRUE(operation_->measure());
   for (const PlannedTunnel& tunnel : plan_.tunnels)
     EXPECT_EQ(tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
+  const auto warnings = std::ranges::count_if(told_, [](const std::string& what) {
+    return what.find("no time of acquisition") != std::string::npos;
+  });
+  EXPECT_EQ(warnings, 1);
+}
+
+TEST_F(FaultyOperation, PictureHeldBackWhileTheLegMovedIsRefused) {
+  expose("AP");
+  const auto late = take("LAT", CArmFault::held_back);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().reason, Reason::stale_pose) << late.error().message;
+  EXPECT_NEAR(late.error().figures.at("held_s"), 4, 0.9);
+  std::this_thread::sleep_for(window);
+  expose("LAT");
+  EXPECT_TRUE(operation_->measure());
+}
+
+TEST_F(FaultyOperation, FirstPictureHeldBackIsAskedForAgainOnceTheSecondCame) {
+  expose("AP", CArmFault::held_back);
+  std::this_thread::sleep_for(window);
+  expose("LAT");
+  EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"AP"});
+  EXPECT_NE(log().find("held_s"), std::string::npos);
+  expose("AP");
+  EXPECT_TRUE(operation_->measure());
 }
 
 TEST_F(FaultyOperation, PictureThatCameBeforeIsRefused) {
@@ -118,7 +159,7 @@ TEST_F(FaultyOperation, PictureThatCameBeforeIsRefused) {
 
 TEST_F(FaultyOperation, PictureOfATimeWithoutPosesIsRefused) {
   const DatedArrival picture = shot("AP");
-  for (const double off_s : {-3600.0, 3600.0})
+  for (const double off_s : {3600.0, -3600.0})  // the later one first: it would have been held back
     EXPECT_EQ(operation_->take("AP", picture.arrival, picture.time_s + off_s).error().reason,
               Reason::no_pose);
   EXPECT_EQ(operation_->views_to_come().size(), 2u);
@@ -150,6 +191,79 @@ TEST_F(FaultyOperation, CalibratorWhoseMarkersMovedBetweenTheViewsIsRefused) {
   shift("calibrator", -5);
   ASSERT_FALSE(measured);
   EXPECT_EQ(measured.error().reason, Reason::uncertain);
+}
+
+class CheckedOperation : public FaultyOperation {
+ protected:
+  void SetUp() override {
+    FaultyOperation::SetUp();
+    operation_.reset();
+    fs::remove_all(session_);
+    OperationPlan plan = plan_;
+    plan.check_points = {{"femur notch", Bone::femur, 1.5}, {"tibia notch", Bone::tibia, 1.5}};
+    operation_ = Operation::begin(plan, session_, devices_->board(), devices_->robot()).value();
+  }
+  void TearDown() override {
+    room_->lift_pointer();
+    FaultyOperation::TearDown();
+  }
+  Expected<double> touch(const std::string& bone) {
+    room_->touch(bone);
+    std::this_thread::sleep_for(window);  // until the gate believes the pointer's new place
+    Expected<double> off = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_shots; ++i) {
+      off = operation_->touch(bone + " notch");
+      if (off || off.error().reason == Reason::residual_too_large) return off;
+    }
+    return off;
+  }
+};
+
+TEST_F(CheckedOperation, BumpedMarkerIsFoundAtItsCheckPoint) {
+  for (const char* bone : {"femur", "tibia"}) ASSERT_TRUE(touch(bone)) << bone;
+  expose("AP");
+  expose("LAT");
+  ASSERT_TRUE(operation_->measure());
+  EXPECT_EQ(operation_->plan_tunnel("femur").error().message,
+            "femur notch: this check point must be touched again first");
+  room_->theatre().bump_marker("femur", {2.5, 0, 0});
+  std::this_thread::sleep_for(window);
+  const auto femur = touch("femur"), tibia = touch("tibia");
+  room_->theatre().bump_marker("femur", {-2.5, 0, 0});
+  std::this_thread::sleep_for(window);
+  ASSERT_FALSE(femur);
+  EXPECT_EQ(femur.error().reason, Reason::residual_too_large) << femur.error().message;
+  EXPECT_NEAR(femur.error().figures.at("off_mm"), 2.5, 0.8);
+  ASSERT_TRUE(tibia) << tibia.error().message;
+  EXPECT_LT(*tibia, 1.5);
+  EXPECT_EQ(operation_->checks_to_come(Bone::femur).size(), 1u);
+  EXPECT_TRUE(operation_->checks_to_come(Bone::tibia).empty());
+  operation_.reset();
+  const auto replayed = replay(session_);
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_TRUE(replayed->differences.empty());
+}
+
+TEST_F(CheckedOperation, BonesSwappedFromTheStartAreFoundOnceTheKneeBends) {
+  ASSERT_TRUE(room_->set_fault("swapped_bones", true));
+  std::this_thread::sleep_for(2 * window);
+  for (const char* bone : {"femur", "tibia"}) ASSERT_TRUE(touch(bone)) << bone;
+  expose("AP");
+  expose("LAT");
+  ASSERT_TRUE(operation_->measure());  // nothing of the pictures tells two still bones apart
+  shift("tibia", 8);
+  const auto femur = touch("femur"), tibia = touch("tibia");
+  shift("tibia", -8);
+  ASSERT_TRUE(room_->set_fault("swapped_bones", false));
+  std::this_thread::sleep_for(2 * window);
+  EXPECT_EQ(femur.error().reason, Reason::residual_too_large);
+  EXPECT_EQ(tibia.error().reason, Reason::residual_too_large);
+}
+
+TEST_F(CheckedOperation, CheckPointIsLearntBeforeTheFirstPicture) {
+  expose("AP");
+  EXPECT_EQ(operation_->touch("femur notch").error().reason, Reason::usage);
+  EXPECT_EQ(operation_->touch("patella").error().reason, Reason::bad_value);
 }
 
 TEST_F(FaultyOperation, BoneHiddenDuringTheExposureIsRefused) {

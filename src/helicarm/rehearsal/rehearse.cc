@@ -98,6 +98,7 @@ OperationPlan plan_for(VirtualRoom& room, std::uint16_t tracker_port) {
   // Both are drilled from without.
   plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end},
                   {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
+  plan.tracker.pointer = Pointer{operating_room::pointer_marker, operating_room::tip_in_pointer};
   plan.picks = clicks_of(room.theatre().room());
   return plan;
 }

@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
 
 namespace helicarm {
 namespace {
@@ -16,12 +17,6 @@ namespace fs = std::filesystem;
 
 class Session : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "helicarm_session_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    log_ = fs::path(name) / "session.log";
-  }
-  void TearDown() override { fs::remove_all(log_.parent_path()); }
   std::string bytes() const { return read_file(log_, 1 << 20).value(); }
   void overwrite(const std::string& content) const { std::ofstream(log_, std::ios::binary) << content; }
   void write_three() const {
@@ -30,7 +25,8 @@ class Session : public testing::Test {
     EXPECT_TRUE(session->append("order", {{"text", "two\nlines"}}));
   }
 
-  fs::path log_;
+  TemporaryFolder temporary_;
+  fs::path log_ = temporary_.path() / "session.log";
 };
 
 TEST_F(Session, WhatIsAppendedIsRead) {

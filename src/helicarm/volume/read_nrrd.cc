@@ -165,6 +165,13 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
   const std::size_t count = value_or_throw(voxel_count(Vector3d::Map(size.data()), header.field("sizes")));
   volume.size = Vector3d::Map(size.data()).cast<int>();
   volume.patient_from_voxel = place_of(header);
+  if (header.text("space").empty())
+    volume.warnings.push_back(
+        {Reason::spacing_missing,
+         fmt::format(
+             "{}: no \"space\" says which way the axes run; x to the left, y to the back, z to the head "
+             "are assumed",
+             origin)});
   const VoxelFormat format = format_of(header);
   std::string data;
   if (const std::string file = header.text("data file"); !file.empty()) {

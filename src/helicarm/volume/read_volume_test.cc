@@ -197,6 +197,7 @@ TEST_F(ReadVolume, NrrdInEachSpaceAndEncoding) {
   ASSERT_TRUE(lps.has_value()) << lps.error().message;
   EXPECT_THAT(lps->voxels, ElementsAre(1, 2, -3, 4));
   EXPECT_EQ(lps->patient_from_voxel * Vector3d(1, 0, 1), Vector3d(5, 8, 3));
+  EXPECT_TRUE(lps->warnings.empty());
   const auto ras = read("a.nrrd", nrrd("space: RAS\nencoding: gzip\n" + place, packed(four, true)));
   ASSERT_TRUE(ras.has_value()) << ras.error().message;
   EXPECT_THAT(ras->voxels, ElementsAre(1, 2, -3, 4));
@@ -205,6 +206,8 @@ TEST_F(ReadVolume, NrrdInEachSpaceAndEncoding) {
   ASSERT_TRUE(text.has_value()) << text.error().message;
   EXPECT_THAT(text->voxels, ElementsAre(1, 2, -3, 4));
   EXPECT_EQ(text->patient_from_voxel * Vector3d(1, 1, 1), Vector3d(1, 2, 3));
+  ASSERT_EQ(text->warnings.size(), 1u);
+  EXPECT_EQ(text->warnings[0].reason, Reason::spacing_missing);
   put("a.raw", "xx" + four);
   const auto beside = read("a.nhdr", nrrd("encoding: raw\nbyte skip: -1\ndata file: a.raw\n", ""));
   ASSERT_TRUE(beside.has_value()) << beside.error().message;

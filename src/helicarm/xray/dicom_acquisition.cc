@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/digest.h"
 
 namespace helicarm {
@@ -65,6 +66,7 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
         one(elements, tags::source_detector, min_source_detector_mm, max_source_detector_mm);
     a.primary_angle_deg = one(elements, tags::primary_angle, -360, 360);
     a.secondary_angle_deg = one(elements, tags::secondary_angle, -360, 360);
+    a.acquired = acquisition_time(elements);
     if (lossy(elements))
       read.warnings.push_back(
           {Reason::lossy_picture, fmt::format("{}: the picture was compressed with loss", elements.origin)});

@@ -13,6 +13,13 @@
 
 namespace helicarm {
 
+/// By the C-arm's own clock, which need not agree with any other.
+struct AcquisitionTime {
+  double seconds = 0;       ///< since 1970
+  double resolution_s = 0;  ///< what is finer was cut off
+  std::string source;       ///< the elements that say so; times of one source alone can be compared
+};
+
 /// What the file says of how the picture was taken. Nothing is invented: absent stays absent. Flips and
 /// rotation are hints; the pixels stay as stored.
 struct Acquisition {
@@ -20,6 +27,7 @@ struct Acquisition {
   std::optional<double> source_detector_mm;
   std::optional<double> primary_angle_deg;
   std::optional<double> secondary_angle_deg;
+  std::optional<AcquisitionTime> acquired;
   bool flip_hint = false;  ///< the file says that the stored picture is already mirrored
   double rotation_hint_deg = 0;
   std::optional<bool> logarithmic;  ///< grey value is the logarithm of the dose, where the file says

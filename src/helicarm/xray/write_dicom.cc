@@ -14,6 +14,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/image/grey_picture.h"
+#include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
 
 namespace helicarm {
@@ -82,6 +83,7 @@ void put_acquisition(DcmDataset& dataset, const Acquisition& a) {
   put(dataset, DCM_PositionerPrimaryAngle, decimal(a.primary_angle_deg));
   put(dataset, DCM_PositionerSecondaryAngle, decimal(a.secondary_angle_deg));
   put(dataset, DCM_PositionerMotion, "STATIC");
+  if (a.acquired) put(dataset, DCM_AcquisitionDateTime, dicom_date_time(a.acquired->seconds));
   if (a.flip_hint) put(dataset, DCM_FieldOfViewHorizontalFlip, "YES");
   put(dataset, DCM_PixelIntensityRelationship, !a.logarithmic ? "DISP" : *a.logarithmic ? "LOG" : "LIN");
   must(dataset.putAndInsertSint16(DCM_PixelIntensityRelationshipSign, 1), "sign");

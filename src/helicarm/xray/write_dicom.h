@@ -14,9 +14,10 @@ namespace helicarm {
 /// A picture to be written as DICOM. Carries no patient data but what is given here.
 struct DerivedImage {
   Image<std::uint16_t> pixels;
-  int bits_stored = 16;     ///< 8 .. 16; at 8 a byte a pixel is written
-  Acquisition acquisition;  ///< spacing, source distance, angles, flip, logarithmic; keys are not written
-  bool derived = true;      ///< DERIVED, patient identity removed; else ORIGINAL
+  int bits_stored = 16;  ///< 8 .. 16; at 8 a byte a pixel is written
+  Acquisition
+      acquisition;      ///< spacing, source distance, angles, time, flip, logarithmic; keys are not written
+  bool derived = true;  ///< DERIVED, patient identity removed; else ORIGINAL
   std::string series_description = {};
   std::string patient_name = "ANON";
   std::string patient_id = "ANON";

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 
 namespace helicarm {
@@ -15,16 +16,9 @@ namespace fs = std::filesystem;
 
 class InboxOnDisk : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "helicarm_inbox_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    folder_ = name;
-    inbox_ = Inbox::open(folder_).value();
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  fs::path folder_;
-  std::unique_ptr<Inbox> inbox_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
+  std::unique_ptr<Inbox> inbox_ = Inbox::open(folder_).value();
 };
 
 TEST_F(InboxOnDisk, PictureIsKeptAsItCame) {

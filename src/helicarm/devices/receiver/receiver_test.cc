@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/devices/receiver/peer.h"
 
 namespace helicarm {
@@ -20,17 +21,11 @@ constexpr int accepted = 2, rejected = 3, data = 4, released = 6, aborted = 7, c
 class Receiver : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "helicarm_receiver_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    folder_ = name;
     inbox_ = Inbox::open(folder_).value();
     options_.port = 0;
     open();
   }
-  void TearDown() override {
-    receiver_.reset();
-    fs::remove_all(folder_);
-  }
+  void TearDown() override { receiver_.reset(); }
   void open() {
     receiver_.reset();
     receiver_ = DicomReceiver::open(options_, *inbox_).value();
@@ -60,7 +55,8 @@ class Receiver : public testing::Test {
     EXPECT_EQ(client.receive_status(), 0);
   }
 
-  fs::path folder_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
   std::unique_ptr<Inbox> inbox_;
   ReceiverOptions options_;
   std::unique_ptr<DicomReceiver> receiver_;

@@ -36,11 +36,12 @@ std::vector<fs::path> FolderLook::at_rest() {
 }
 
 WatchedFolder::WatchedFolder(fs::path folder, Inbox& inbox, ReceiverHooks hooks,
-                             std::chrono::milliseconds pause)
+                             std::chrono::milliseconds pause, std::optional<std::uint64_t> most)
     : look_(std::move(folder)),
       inbox_(inbox),
       hooks_(std::move(hooks)),
       pause_(pause),
+      left_(most),
       thread_([this](const std::stop_token& stop) { watch(stop); }) {}
 
 void WatchedFolder::watch(const std::stop_token& stop) {
@@ -50,10 +51,12 @@ void WatchedFolder::watch(const std::stop_token& stop) {
       const auto arrival = read_file(path, most_file_bytes).and_then([&](const std::string& file) {
         return inbox_.store(file, origin);
       });
-      if (arrival)
-        hooks_.arrived(*arrival);
-      else
+      if (!arrival) {
         hooks_.refused(arrival.error());
+        continue;
+      }
+      hooks_.arrived(*arrival);
+      if (left_ && --*left_ == 0) return;
     }
     std::unique_lock lock(mutex_);
     wake_.wait_for(lock, stop, pause_, [] { return false; });

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <thread>
 
@@ -33,12 +34,14 @@ class FolderLook {
   std::map<std::filesystem::path, Trace> traces_;
 };
 
-/// Takes every picture that comes into a folder to the inbox, until it is destroyed. The folder is left as it
-/// is. Hooks are called from a thread of its own.
+/// Takes every picture that comes into a folder to the inbox, until it is destroyed or has taken `most`. The
+/// folder is left as it is. Hooks are called from a thread of its own.
 class WatchedFolder {
  public:
+  static constexpr std::chrono::milliseconds usual_pause{500};
+
   WatchedFolder(std::filesystem::path folder, Inbox& inbox, ReceiverHooks hooks,
-                std::chrono::milliseconds pause = std::chrono::milliseconds(500));
+                std::chrono::milliseconds pause = usual_pause, std::optional<std::uint64_t> most = {});
 
  private:
   void watch(const std::stop_token& stop);
@@ -47,6 +50,7 @@ class WatchedFolder {
   Inbox& inbox_;
   ReceiverHooks hooks_;
   std::chrono::milliseconds pause_;
+  std::optional<std::uint64_t> left_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::jthread thread_;

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 
 namespace helicarm {
@@ -18,17 +19,12 @@ using testing::IsEmpty;
 
 class FolderOnDisk : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "helicarm_watched_XXXXXX").string();
-    ASSERT_TRUE(mkdtemp(name.data()));
-    folder_ = name;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
   void put(const std::string& name, const std::string& content) const {
     std::ofstream(folder_ / name, std::ios::binary) << content;
   }
 
-  fs::path folder_;
+  TemporaryFolder temporary_;
+  fs::path folder_ = temporary_.path();
 };
 
 TEST_F(FolderOnDisk, FileIsTakenOnceItIsSeenUnchanged) {
@@ -79,6 +75,25 @@ TEST_F(FolderOnDisk, PictureGoesToTheInboxAndTheFileStays) {
   put("share/knee", DicomBuilder().bytes());
   EXPECT_EQ(arrived.get_future().get().path, folder_ / "inbox" / "2.25.17.dcm");
   EXPECT_TRUE(fs::exists(folder_ / "share/knee"));
+}
+
+TEST_F(FolderOnDisk, NoMorePicturesAreTakenThanAskedFor) {
+  const auto inbox = Inbox::open(folder_ / "inbox").value();
+  fs::create_directory(folder_ / "share");
+  put("share/one", DicomBuilder().bytes());
+  put("share/two", DicomBuilder().text(0x00080018, "UI", "2.25.18").bytes());
+  std::promise<void> arrived;
+  {
+    const WatchedFolder watched(folder_ / "share", *inbox,
+                                {[&](const Arrival&) { arrived.set_value(); }, [](const Failure&) {}},
+                                std::chrono::milliseconds(5), 1);
+    arrived.get_future().wait();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  const auto kept = std::ranges::count_if(fs::directory_iterator(folder_ / "inbox"), [](const auto& entry) {
+    return entry.path().extension() == ".dcm";
+  });
+  EXPECT_EQ(kept, 1);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "helicarm/devices/robot/robot_link.h"
 
 #include <array>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -17,6 +18,10 @@ using Milliseconds = std::chrono::milliseconds;
 
 constexpr double correction_mm_s = 10;
 constexpr double correction_mm_s2 = 100;
+/// The supervision looks every 20 ms. When it comes so late, the machine was held up as a whole.
+constexpr Milliseconds held_up{50};
+/// Then states and poses that wait in their sockets are read first.
+constexpr Milliseconds catch_up{20};
 /// The robot's clock may leap so far between two states before it counts as another clock.
 constexpr double clock_leap_s = 1;
 
@@ -202,7 +207,10 @@ Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t 
     return state_->progress / 100 == number && state_->progress >= progress_of(number, stage);
   };
   bool begun = false;
+  auto looked = Clock::now();
   for (;;) {
+    if (Clock::now() - std::exchange(looked, Clock::now()) > held_up)  // the beat is not renewed meanwhile
+      news_.wait_for(lock, catch_up, [&] { return phase_ != LinkPhase::moving; });
     if (phase_ != LinkPhase::moving) return tl::unexpected<Failure>(why_.value_or(stopped("it was stopped")));
     if (age_s() > config_.stale_s)
       return fail(Reason::stale_state, "the robot's states have stopped coming: where it is now is unknown",

@@ -20,18 +20,11 @@ constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<d
 
 /// As it is written, to the last digit: what a person confirmed must not change by being read.
 RigidTransform pose_of(JsonReader& reader, const char* key) {
-  const auto numbers = reader.matrix(key, 4, 4, any);
-  const Eigen::Matrix4d given =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers.data());
+  const Eigen::Matrix4d given = matrix_from(reader, key, any);
   const RigidTransform mended = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
   if (!((mended.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
     reader.refuse(Reason::bad_value, key, "must be a rotation and a shift to nine digits");
-  return {given.topLeftCorner<3, 3>(), given.topRightCorner<3, 1>()};
-}
-
-Eigen::Vector3d vector_of(JsonReader& reader, const char* key) {
-  const auto numbers = reader.numbers(key, 3, any);
-  return {numbers[0], numbers[1], numbers[2]};
+  return exact_pose(given);
 }
 
 RobotTool tool_of(JsonReader reader) {
@@ -47,14 +40,6 @@ Waypoint waypoint_of(JsonReader& reader) {
   return waypoint;
 }
 
-KeepOut keep_out_of(JsonReader& reader) {
-  KeepOut keep_out{vector_of(reader, "point_in_base"), vector_of(reader, "normal")};
-  if (!(std::abs(keep_out.normal.norm() - 1) < 1e-6))
-    reader.refuse(Reason::bad_value, "normal", "must be of unit length");
-  reader.finish();
-  return keep_out;
-}
-
 Corrections corrections_of(JsonReader reader) {
   Corrections corrections{reader.integer("most", 0, 20), reader.number("longest_mm", any),
                           reader.number("widest_deg", any), reader.number("tolerance_mm", any),
@@ -65,15 +50,26 @@ Corrections corrections_of(JsonReader reader) {
 
 }  // namespace
 
+Json to_json(const KeepOut& keep_out) {
+  return {{"point_in_base", json_list(keep_out.point_in_base)}, {"normal", json_list(keep_out.normal)}};
+}
+
+KeepOut keep_out_from(JsonReader& reader, Range range) {
+  const KeepOut keep_out{Eigen::Vector3d(reader.numbers("point_in_base", 3, range).data()),
+                         Eigen::Vector3d(reader.numbers("normal", 3, {-1, 1}).data())};
+  if (!(std::abs(keep_out.normal.norm() - 1) < 1e-6))
+    reader.refuse(Reason::bad_value, "normal", "must be of unit length");
+  reader.finish();
+  return keep_out;
+}
+
 Json to_json(const RobotOrder& order) {
   Json waypoints = Json::array(), keep_outs = Json::array();
   for (const Waypoint& waypoint : order.waypoints)
     waypoints.push_back({{"base_from_tcp", json_rows(waypoint.base_from_tcp.matrix())},
                          {"speed_mm_s", waypoint.speed_mm_s},
                          {"acceleration_mm_s2", waypoint.acceleration_mm_s2}});
-  for (const KeepOut& keep_out : order.keep_outs)
-    keep_outs.push_back(
-        {{"point_in_base", json_list(keep_out.point_in_base)}, {"normal", json_list(keep_out.normal)}});
+  for (const KeepOut& keep_out : order.keep_outs) keep_outs.push_back(to_json(keep_out));
   const Corrections& corrections = order.corrections;
   return {{"format", order_format},
           {"name", order.name},
@@ -104,7 +100,7 @@ Expected<RobotOrder> robot_order_from(const Json& json, const std::string& origi
     for (JsonReader& waypoint : reader.objects("waypoints", true, 100))
       order.waypoints.push_back(waypoint_of(waypoint));
     for (JsonReader& keep_out : reader.objects("keep_outs", false, 100))
-      order.keep_outs.push_back(keep_out_of(keep_out));
+      order.keep_outs.push_back(keep_out_from(keep_out, any));
     order.corrections = corrections_of(reader.object("corrections"));
     reader.finish();
     return order;

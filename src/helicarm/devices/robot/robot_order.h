@@ -28,6 +28,10 @@ struct KeepOut {
   Eigen::Vector3d normal;         ///< unit
 };
 
+Json to_json(const KeepOut& keep_out);
+/// Coordinates in this range; a normal that is not of unit length is bad_value. Throws as JsonReader.
+KeepOut keep_out_from(JsonReader& reader, Range range);
+
 /// How the loop over the tracker may shift the tool about the last waypoint, and when it is near enough.
 struct Corrections {
   int most = 0;             ///< moves; 0: go there once, by the robot's own measure

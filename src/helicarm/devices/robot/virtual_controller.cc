@@ -61,8 +61,10 @@ std::uint32_t bits_of(SafetyMode mode) {
 Expected<RobotFault> robot_fault(const std::string& name) {
   for (std::size_t i = 0; i < fault_names.size(); ++i)
     if (fault_names[i] == name) return static_cast<RobotFault>(i);
-  return fail(Reason::bad_value, fmt::format("a robot's fault is one of {}", fmt::join(fault_names, ", ")));
+  return fail(Reason::bad_value, fmt::format("a robot's fault is one of {}", robot_fault_names()));
 }
+
+std::string robot_fault_names() { return fmt::format("{}", fmt::join(fault_names, ", ")); }
 
 VirtualController::VirtualController(const RobotModel& model, const RobotTool& tool, const Joints& joints)
     : model_(model), tool_(tool), arm_(model, joints) {}

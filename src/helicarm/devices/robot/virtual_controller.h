@@ -36,6 +36,8 @@ enum class RobotFault {
 
 /// Its name as in the list above, e.g. "cut_cable"; bad_value lists them all.
 Expected<RobotFault> robot_fault(const std::string& name);
+/// Of all faults, for a person.
+std::string robot_fault_names();
 
 /// A virtual robot without its network: modes, stops, the script that runs, the arm. Moves only by `step`.
 class VirtualController : public UrScriptHost {

@@ -164,12 +164,14 @@ class VirtualUr::Server {
                                    });
   }
 
+  /// A machine that was held up holds the robot's clock up too: it would miss beats that nobody could send.
   void tick(std::chrono::steady_clock::time_point due) {
     timer_.expires_at(due);
     timer_.async_wait([this, due](const std::error_code& error) {
       if (error) return;
       step();
-      tick(due + std::chrono::nanoseconds(static_cast<long>(1e9 / options_.controller.rate_hz)));
+      const std::chrono::nanoseconds period(static_cast<long>(1e9 / options_.controller.rate_hz));
+      tick(std::max(due + period, std::chrono::steady_clock::now() - 2 * period));
     });
   }
 

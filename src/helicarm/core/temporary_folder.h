@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm {
+
+/// A folder of its own among the system's temporary ones, which goes again with all that is in it.
+class TemporaryFolder {
+ public:
+  /// Throws BadInput (cannot_write).
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "helicarm_XXXXXX").string();
+    if (!::mkdtemp(name.data()))
+      throw BadInput(Reason::cannot_write, name + ": cannot be made: " + std::strerror(errno));
+    path_ = name;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace helicarm

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether the bones' markers still are where they were at the first X-ray.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/operation/operation.h"
+
+namespace helicarm {
+
+std::vector<std::string> Operation::checks_to_come(Bone bone) const {
+  std::vector<std::string> names;
+  for (const PlannedCheck& check : plan_.check_points)
+    if (check.bone == bone && !in_place_.contains(check.name)) names.push_back(check.name);
+  return names;
+}
+
+Expected<double> Operation::touch(const std::string& name) {
+  return guarded([&]() -> double {
+    const auto check = std::ranges::find(plan_.check_points, name, &PlannedCheck::name);
+    if (check == plan_.check_points.end())
+      throw BadInput(Reason::bad_value, fmt::format("{}: is no check point of the plan", name));
+    const auto first = touched_in_bone_.find(name);
+    if (first == touched_in_bone_.end() && !views_.empty())
+      throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first picture", name));
+    const PoseWindow window = window_now(board_, plan_.tracker);
+    const Eigen::Vector3d tip = value_or_throw(touched_in_bone(window, plan_.tracker, check->bone));
+    record("touched", {{"check_point", name}, {"window", to_json(window)}, {"in_bone", json_list(tip)}});
+    if (first == touched_in_bone_.end()) {
+      touched_in_bone_[name] = tip;
+      return 0;
+    }
+    in_place_.erase(name);
+    const auto off =
+        check_point_off_mm({first->second, check->limit_mm}, {Eigen::Matrix3d::Identity(), {0, 0, 0}}, tip);
+    if (!off) {
+      Failure moved = off.error();
+      moved.message = fmt::format(
+          "{}: is {:.2f} mm from where the marker of the {} has it, limit {:g} mm: the marker "
+          "was bumped, or is another bone's; begin anew",
+          name, moved.figures.at("off_mm"), plan_.tracker.marker_of(check->bone), check->limit_mm);
+      throw BadInput(std::move(moved));
+    }
+    in_place_.insert(name);
+    return *off;
+  });
+}
+
+}  // namespace helicarm
