@@ -86,7 +86,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsPlacedAndSaysTheWorst) {
   state.result = result;
   const StepCard card = card_of(steps_of(state), Phase::plan);
   EXPECT_EQ(card.mood, StepMood::good);
-  EXPECT_EQ(card.figure, "ends within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
+  EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
 }
 
 TEST(Steps, PointThatCannotBePlacedRefusesThePlan) {

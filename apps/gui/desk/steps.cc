@@ -20,6 +20,16 @@ QString doubts(const std::vector<Warning>& warnings) {
   return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
 }
 
+/// A point's doubt concerns the plan, not the calibration.
+bool is_of_a_point(const Warning& warning) { return warning.figures.contains("ray_gap_mm"); }
+
+std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points) {
+  std::vector<Warning> of_them;
+  for (const Warning& warning : warnings)
+    if (is_of_a_point(warning) == of_points) of_them.push_back(warning);
+  return of_them;
+}
+
 void settle(StepCard& card, const QString& doubt) {
   card.mood = doubt.isEmpty() ? StepMood::good : StepMood::warning;
   card.why = doubt;
@@ -59,8 +69,8 @@ void calibrate(StepCard& card, const DeskState& state) {
     balls += view.found->fiducials.size();
   }
   card.figure =
-      tr("FRE %1 mm, %2 of %3 balls").arg(state.result->accuracy.fre_mm.mean, 0, 'f', 3).arg(used).arg(balls);
-  settle(card, doubts(state.result->warnings));
+      tr("FRE %1 mm, %2/%3").arg(state.result->accuracy.fre_mm.mean, 0, 'f', 3).arg(used).arg(balls);
+  settle(card, doubts(chosen(state.result->warnings, false)));
 }
 
 void plan(StepCard& card, const DeskState& state) {
@@ -82,22 +92,20 @@ void plan(StepCard& card, const DeskState& state) {
     worst = std::max(worst, length_at_95(point.place->covariance_in_calibrator));
   }
   if (located == 0) return;
-  card.figure = tr("ends within %1 mm (95 %)").arg(worst, 0, 'f', 2);
-  settle(card, {});
+  card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
+  settle(card, doubts(chosen(state.result->warnings, true)));
 }
 
 void navigate(StepCard& card, const DeskState& state) {
   if (!state.hand_eye_rms_mm) return;
-  card.figure = tr("robot registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
+  card.figure = tr("registered, %1 mm").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   if (state.order) card.why = tr("%1: look at the path, then confirm").arg(text(state.order->name));
   if (state.outcomes.empty()) return;
   double worst = 0;
   for (const auto& [name, outcome] : state.outcomes)
     if (!outcome.loop.empty()) worst = std::max(worst, outcome.loop.back().distance_mm);
-  card.figure = tr("tip within %1 mm, %2 of %3 tunnels")
-                    .arg(worst, 0, 'f', 2)
-                    .arg(state.outcomes.size())
-                    .arg(state.tunnels.size());
+  card.figure =
+      tr("%1 mm off, %2/%3").arg(worst, 0, 'f', 2).arg(state.outcomes.size()).arg(state.tunnels.size());
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 
@@ -107,7 +115,7 @@ void verify(StepCard& card, const DeskState& state) {
   for (const auto& [name, outcome] : state.outcomes)
     for (const EndMiss& end : {outcome.start, outcome.end})
       if (end.distance_mm() >= worst) worst = end.distance_mm(), expected = end.predicted_mm();
-  card.figure = tr("worst end %1 mm off (expect %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
+  card.figure = tr("%1 mm (expect %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 

@@ -56,6 +56,8 @@ SceneCamera SceneView::near_camera() const {
   return zoomed(overview_of(places, aspect()), room_around);
 }
 
+void SceneView::look_near() { move_camera(near_camera()); }
+
 void SceneView::move_camera(const SceneCamera& camera) {
   camera_ = camera;
   moved_ = true;
@@ -91,7 +93,7 @@ void SceneView::keyPressEvent(QKeyEvent* event) {
     case Qt::Key_3:
       return set_preset(Preset::free);
     case Qt::Key_4:
-      return move_camera(near_camera());
+      return look_near();
     case Qt::Key_R:
       return set_preset(preset_);
     case Qt::Key_Left:

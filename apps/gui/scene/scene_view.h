@@ -49,6 +49,8 @@ class SceneView : public QOpenGLWidget {
   /// without such a view it is the overview.
   void set_preset(Preset preset);
   Preset preset() const { return preset_; }
+  /// Near at the knee, from outside.
+  void look_near();
   /// How many times larger than true the 95 % ellipsoids are drawn; 10 at first.
   void set_error_scale(double scale);
 

@@ -67,6 +67,9 @@ void MainWindow::build_menus() {
     view->addAction(words, QKeySequence(key), this, [this, wanted = preset] {
       if (scene_ != nullptr) scene_->set_preset(wanted);
     });
+  view->addAction(tr("Scene &near at the knee"), QKeySequence("Ctrl+4"), this, [this] {
+    if (scene_ != nullptr) scene_->look_near();
+  });
   view->addAction(replay_dock_->toggleViewAction());
   build_rehearsal_menu();
 

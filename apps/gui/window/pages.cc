@@ -304,7 +304,9 @@ void NavigatePage::allow() {
 }
 
 VerifyPage::VerifyPage(Desk& desk, QWidget* parent)
-    : Page(tr("How far the tool's axis runs from each end, by tracker and X-rays, and how far it may be."),
+    : Page(tr("How far (mm) the tool's axis runs from each end by tracker and X-rays, and how far it may be; "
+              "then "
+              "in the X-rays alone: Eq. 17 in px and mm, and in space."),
            desk, parent) {
   table_ = add_table(
       {tr("Tunnel, end"), tr("Off mm"), tr("Expect mm"), tr("Eq. 17 px"), tr("Eq. 17 mm"), tr("In space mm")},

@@ -108,7 +108,7 @@ class Window : public testing::Test {
       const auto place = xray.place_of({offered->uv_raw.x(), offered->uv_raw.y()});
       ASSERT_TRUE(place);
       QTest::mouseClick(&xray, Qt::LeftButton, Qt::NoModifier, place->toPoint());
-      ASSERT_TRUE(wait([&] { return pick_of(state(), wanted->point, wanted->view) != nullptr; }));
+      ASSERT_TRUE(wait([&] { return pick_of(state(), wanted->point, wanted->view) != nullptr; }, 5000));
       QTest::qWait(QApplication::doubleClickInterval() + 50);
     }
     ASSERT_TRUE(wait_idle());
@@ -136,8 +136,9 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   for (const Phase phase : {Phase::acquire, Phase::rectify, Phase::calibrate})
     EXPECT_TRUE(card(phase).mood == StepMood::good || card(phase).mood == StepMood::warning);
   const Json first = result_file();
-  EXPECT_THAT(card(Phase::calibrate).figure.toStdString(),
-              HasSubstr(fmt::format("FRE {:.3f} mm", first["accuracy"]["fre_mm"]["mean"].get<double>())));
+  EXPECT_THAT(
+      card(Phase::calibrate).figure.toStdString(),
+      HasSubstr(fmt::format("FRE {:.3f} mm", first.at("accuracy").at("fre_mm").at("mean").get<double>())));
   for (const Phase phase : {Phase::rectify, Phase::calibrate}) {
     QTest::mouseClick(window_->strip().button(phase), Qt::LeftButton);
     QTest::qWait(300);
@@ -145,8 +146,10 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   }
 
   QTest::keyClick(window_.get(), Qt::Key_4, Qt::AltModifier);
+  ASSERT_TRUE(wait([&] { return window_->strip().button(Phase::plan)->isChecked(); }, 2000));
   pick_all();
-  ASSERT_EQ(card(Phase::plan).mood, StepMood::good) << card(Phase::plan).why.toStdString();
+  ASSERT_TRUE(card(Phase::plan).mood == StepMood::good || card(Phase::plan).mood == StepMood::warning)
+      << card(Phase::plan).why.toStdString();
   const Json second = result_file();
   ASSERT_EQ(second["points"].size(), state().result->points.size());
   auto* ends = find<QTableWidget>("endTable");
@@ -178,15 +181,17 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::good);
   EXPECT_EQ(card(Phase::verify).mood, StepMood::good);
   QTest::keyClick(window_.get(), Qt::Key_6, Qt::AltModifier);
+  ASSERT_TRUE(wait([&] { return window_->strip().button(Phase::verify)->isChecked(); }, 2000));
   auto* table = find<QTableWidget>("outcomeTable");
   ASSERT_EQ(table->rowCount(), 4);
   // Two checks followed the measurement of the picks; the last one is of the last tunnel.
   const fs::path last = state().folder / ("case-" + std::to_string(state().measurements + 2));
   const Json checked = read_json(last / "result.json").value();
-  const Json& start = checked["verifications"][0]["start"];
+  const Json& start = checked.at("verification").at(0).at("start");
   const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
   EXPECT_EQ(table->item(row, 3)->text().toStdString(),
-            fmt::format("{:.2f}", start["combined_px"].get<double>()));
+            fmt::format("{:.2f}", start.at("combined_px").get<double>()));
+  window_->scene()->set_preset(SceneView::Preset::lateral);
   screenshot("7-verify");
 
   const auto exported = window_->export_to(folder_ / "export");
@@ -282,6 +287,86 @@ TEST_F(Window, ThousandRandomClicksAndKeysFreezeNothing) {
   ASSERT_TRUE(wait_idle());
   window_->open_rehearsal();
   ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+}
+
+double resident_mb() {
+  std::ifstream statm("/proc/self/statm");
+  double pages = 0, resident = 0;
+  statm >> pages >> resident;
+  return resident * double(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+/// Times, for a person: HELICARM_TIMING=1.
+TEST_F(Window, TellsItsTimes) {
+  if (std::getenv("HELICARM_TIMING") == nullptr) GTEST_SKIP() << "only with HELICARM_TIMING";
+  QElapsedTimer since;
+  since.start();
+  MainWindow fresh(folder_ / "fresh");
+  fresh.resize(1280, 800);
+  fresh.show();
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&fresh));
+  std::printf("window on the screen after %lld ms\n", since.elapsed());
+  fresh.open_rehearsal();
+  ASSERT_TRUE(wait([&] { return fresh.desk().state().source == Source::virtual_room; }));
+  std::printf("rehearsal ready after %lld ms\n", since.elapsed());
+  fresh.close();
+
+  open_rehearsal();
+  shoot_both();
+  window_->desk().take_offered_picks();
+  ASSERT_TRUE(wait([&] { return state().result->points.size() > 3 && !state().busy; }));
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
+  hold("register");
+  ASSERT_TRUE(wait([&] { return state().hand_eye_rms_mm.has_value() && !state().busy; }));
+  std::vector<double> redraw, scene, latency;
+  for (int i = 0; i < 200; ++i) {
+    QTest::qWait(7);
+    window_->show_live();
+    since.restart();
+    for (std::size_t view : {0U, 1U}) window_->xray(view).repaint();
+    redraw.push_back(double(since.nsecsElapsed()) / 1e6);
+    const LiveState live = window_->desk().live();
+    if (live.tool && *live.tool) latency.push_back((*live.tool)->age_s * 1000 + redraw.back());
+    window_->scene()->repaint();
+    scene.push_back(window_->scene()->last_render_ms());
+  }
+  const auto tell = [](const char* what, std::vector<double>& ms) {
+    std::ranges::sort(ms);
+    std::printf("%s: median %.1f ms, 95 %% below %.1f, worst %.1f (%zu)\n", what, ms[ms.size() / 2],
+                ms[ms.size() * 95 / 100], ms.back(), ms.size());
+  };
+  tell("both X-rays redrawn", redraw);
+  tell("scene drawn", scene);
+  tell("from the tracker's pose to the tool's line on the screen", latency);
+}
+
+/// Operations one after the other for so many minutes: HELICARM_SOAK=30.
+TEST_F(Window, KeepsItsMemoryOverManyOperations) {
+  const char* minutes = std::getenv("HELICARM_SOAK");
+  if (minutes == nullptr) GTEST_SKIP() << "only with HELICARM_SOAK";
+  QElapsedTimer since;
+  since.start();
+  open_rehearsal();
+  shoot_both();
+  window_->desk().take_offered_picks();
+  ASSERT_TRUE(wait([&] { return state().result->points.size() > 3 && !state().busy; }));
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
+  hold("register");
+  ASSERT_TRUE(wait([&] { return state().hand_eye_rms_mm.has_value() && !state().busy; }));
+  for (int round = 0; since.elapsed() < std::atof(minutes) * 60000; ++round) {
+    const std::string tunnel = state().tunnels[std::size_t(round % 2)].name;
+    window_->desk().plan_tunnel(tunnel);
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    window_->desk().go();
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    window_->desk().withdraw();
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    std::printf("%5.1f min: %.1f MB, %zu outcomes, %zu refusals\n", double(since.elapsed()) / 60000,
+                resident_mb(), state().outcomes.size(), state().refusals.size());
+    std::fflush(stdout);
+  }
 }
 
 }  // namespace
