@@ -18,7 +18,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int live_ms = 16;
+constexpr int live_ms = 30;
 /// The scene is drawn by software as a rule, and needs less haste than the pictures.
 constexpr unsigned scene_every = 4;
 /// Of the calibrator's middle: where an end may lie along its ray.

@@ -42,7 +42,7 @@ class MainWindow : public QMainWindow {
   /// Report (HTML, PDF), result.json and other programs' formats into a folder.
   Expected<void> export_to(const std::filesystem::path& folder) const;
 
-  /// Shows what the devices say now; the timer does so 60 times a second.
+  /// Shows what the devices say now; the timer does so 33 times a second.
   void show_live();
 
  protected:
