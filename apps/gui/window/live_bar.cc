@@ -14,6 +14,8 @@ namespace {
 constexpr int lamp_width = 118;
 /// The depth bar shows so much before the tunnel's entry.
 constexpr double before_entry_mm = 60;
+/// Farther from the axis the depth says little, and is drawn without colour.
+constexpr double near_axis_mm = 5;
 
 QColor colour_of(Light light) {
   switch (light) {
@@ -60,7 +62,9 @@ void paint_depth(QPainter& painter, const QRectF& box, const TunnelAim& aim) {
   painter.fillRect(QRectF(QPointF(at(0), box.top()), QPointF(at(aim.length_mm), box.bottom())),
                    style::raised);
   painter.fillRect(QRectF(QPointF(box.left(), box.top() + 4), QPointF(at(aim.depth_mm), box.bottom() - 4)),
-                   aim.depth_mm > aim.length_mm ? style::red : style::blue);
+                   aim.distance_mm > near_axis_mm ? style::line
+                   : aim.depth_mm > aim.length_mm ? style::red
+                                                  : style::blue);
   painter.setPen(style::text);
   painter.drawLine(QPointF(at(0), box.top()), QPointF(at(0), box.bottom()));
 }

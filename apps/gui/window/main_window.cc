@@ -162,7 +162,7 @@ void MainWindow::show_pictures() {
   if (scene_ == nullptr) return;
   scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
-  if (state.measured && state.measurements == 1) scene_->look_near();
+  if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
 }
 
 void MainWindow::show_picks() {

@@ -125,8 +125,7 @@ RectifyPage::RectifyPage(Desk& desk, QWidget* parent)
     connect(choice, &QRadioButton::clicked, this, [this, wanted = layer] { emit layer_wanted(wanted); });
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
-  table_ = add_table({tr("View"), tr("Dots"), tr("Bent by px"), tr("Left px rms"), tr("Held out")},
-                     "rectifyTable");
+  table_ = add_table({tr("View"), tr("Dots"), tr("Bent px"), tr("Left px"), tr("Held out")}, "rectifyTable");
 }
 
 void RectifyPage::show_state(const DeskState& state) {
@@ -308,9 +307,8 @@ VerifyPage::VerifyPage(Desk& desk, QWidget* parent)
               "then "
               "in the X-rays alone: Eq. 17 in px and mm, and in space."),
            desk, parent) {
-  table_ = add_table(
-      {tr("Tunnel, end"), tr("Off mm"), tr("Expect mm"), tr("Eq. 17 px"), tr("Eq. 17 mm"), tr("In space mm")},
-      "outcomeTable");
+  table_ = add_table({tr("Tunnel, end"), tr("Off"), tr("Expect"), tr("px"), tr("mm"), tr("Space")},
+                     "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });
 }
