@@ -176,11 +176,12 @@ def drill_system(program, folder):
             done = subprocess.run([program, "virtual-or", option, str(port), *others], capture_output=True, text=True,
                                   stdin=subprocess.DEVNULL)
             check(f"{option} that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
-        done = subprocess.run([program, "navigate", theatre.plan, "--out", folder / "second", "--port", theatre.port],
+        done = subprocess.run([program, "navigate", theatre.plan, "--yes", "--out", folder / "second", "--port",
+                               theatre.port],
                               capture_output=True, text=True)
         check("navigate's port that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
         for name, out in (("folder that nobody can write", "/proc/session"), ("path too long", folder / ("x" * 300))):
-            done = subprocess.run([program, "navigate", theatre.plan, "--out", out, "--port", "0"], capture_output=True,
+            done = subprocess.run([program, "navigate", theatre.plan, "--yes", "--out", out, "--port", "0"], capture_output=True,
                                   text=True)
             check(name, done.returncode == 2 and "cannot_write" in done.stderr, done.stderr.strip()[-80:])
     case, not_loaded = folder / "memory", 127

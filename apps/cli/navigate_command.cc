@@ -28,14 +28,16 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::seconds robot_patience{10};
 
-/// Stops the robot when the program is told to end, whatever it does just then.
+/// Stops the robot, and what waits for the tracker, when the program is told to end, whatever it does just
+/// then.
 class Ending {
  public:
-  Ending(StopSignal& signal, RobotLink& robot)
-      : thread_([this, &signal, &robot](const std::stop_token& over) {
+  Ending(StopSignal& signal, RobotLink& robot, Operation& operation)
+      : thread_([this, &signal, &robot, &operation](const std::stop_token& over) {
           while (!over.stop_requested())
             if (signal.wait(glance_s)) {
               told_ = true;
+              operation.interrupt();
               return robot.stop();
             }
         }) {}
@@ -229,7 +231,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
             console.progress << fmt::format("{}: {}\n", name_of(step), without_control_characters(what))
                              << std::flush;
         }));
-    const Ending ending(stop, devices.robot());
+    const Ending ending(stop, devices.robot(), *operation);
     operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
     wait_for_devices(plan, devices, ending, console);
     for (const PlannedCheck& each : plan.check_points) touch(*operation, each.name, ending, console);

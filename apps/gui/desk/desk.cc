@@ -59,7 +59,10 @@ Desk::Desk(QObject* parent) : QObject(parent) {
   pictures_.start(look_for_pictures_ms);
 }
 
-Desk::~Desk() { stop(); }
+Desk::~Desk() {
+  stop();
+  if (room_ && room_->operation) room_->operation->interrupt();
+}
 
 void Desk::begin(Phase phase, std::string doing, std::function<Change()> work) {
   if (state_.busy) return;

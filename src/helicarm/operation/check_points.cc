@@ -24,7 +24,7 @@ Expected<double> Operation::touch(const std::string& name) {
     const auto first = touched_in_bone_.find(name);
     if (first == touched_in_bone_.end() && !views_.empty())
       throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first picture", name));
-    const PoseWindow window = window_now(board_, plan_.tracker);
+    const PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
     const Eigen::Vector3d tip = value_or_throw(touched_in_bone(window, plan_.tracker, check->bone));
     record("touched", {{"check_point", name}, {"window", to_json(window)}, {"in_bone", json_list(tip)}});
     if (first == touched_in_bone_.end()) {

@@ -58,7 +58,7 @@ void Operation::record(const std::string& kind, Json content) {
 }
 
 PoseWindow Operation::look(const char* why) {
-  PoseWindow window = window_now(board_, plan_.tracker);
+  PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
   record("poses", {{"why", why}, {"window", to_json(window)}});
   return window;
 }

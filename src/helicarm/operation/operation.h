@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,7 @@ struct PathPreview {
 
 /// One operation from the first X-ray to the last check, over devices that are already connected. Every
 /// decision, with all that led to it, is in the session's record before anything follows from it; a record
-/// that cannot be written stops the operation. Members are called from one thread.
+/// that cannot be written stops the operation. Members are called from one thread, but for `interrupt`.
 class Operation {
  public:
   /// Told each step as it begins and what came of it, for whoever watches.
@@ -51,6 +52,8 @@ class Operation {
   const OperationPlan& plan() const { return plan_; }
   /// Who confirms orders from now on, for the record.
   void confirmed_by(std::string who) { who_ = std::move(who); }
+  /// Ends what waits for the tracker, with `interrupted`, for good; from any thread.
+  void interrupt() { end_.request_stop(); }
   /// Says in the record that the operation came to its end.
   Expected<void> finish();
   /// Views that still want a picture, in the plan's order.
@@ -146,6 +149,7 @@ class Operation {
   const PoseBoard& board_;
   RobotLink& robot_;
   Tell tell_;
+  std::stop_source end_;
   std::unique_ptr<SessionLog> log_;
   std::string who_ = "unknown";
   std::vector<View> views_;

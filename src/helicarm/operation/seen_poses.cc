@@ -2,8 +2,9 @@
 #include "helicarm/operation/seen_poses.h"
 
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <numbers>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -110,9 +111,13 @@ PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, d
   return window_about(board, plan, arrival_s - half_s, half_s);
 }
 
-PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan) {
+PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end) {
   const double from = monotonic_seconds();
-  std::this_thread::sleep_for(std::chrono::duration<double>(now_s + settle_s));
+  std::mutex alone;
+  std::unique_lock lock(alone);
+  std::condition_variable_any().wait_for(lock, end, std::chrono::duration<double>(now_s + settle_s),
+                                         [] { return false; });
+  if (end.stop_requested()) throw BadInput(Reason::interrupted, "told to end");
   return window_about(board, plan, from + now_s / 2, now_s / 2);
 }
 

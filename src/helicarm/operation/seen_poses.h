@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,8 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
 PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
                               double coarse_s = 0);
 /// The three quarters of a second from now on; waits until they are over.
-PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan);
+/// Throws BadInput (interrupted) when told to end meanwhile.
+PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end);
 
 /// A marker at rest over a window.
 struct SeenPose {
