@@ -85,6 +85,19 @@ class Window : public testing::Test {
       QTest::mouseRelease(button, Qt::LeftButton);
     }
   }
+  /// A busy machine holds tracker and robot up, and then the robot stops, as it must: a person unlocks it and
+  /// tries again.
+  void with_robot(const std::function<void()>& attempt, const std::function<bool()>& done) {
+    for (int left = 3; left > 0 && !done(); --left) {
+      if (window_->desk().live().robot.phase == LinkPhase::stopped) {
+        hold("unlock");
+        ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
+      }
+      attempt();
+      wait_for_robot(done);
+    }
+    ASSERT_TRUE(done()) << card(Phase::navigate).why.toStdString();
+  }
   /// Kept where HELICARM_SCREENSHOTS says.
   void screenshot(const char* name) {
     QTest::qWait(100);
@@ -176,23 +189,20 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
 
   hold("unlock");
   ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
-  hold("register", true);
-  ASSERT_TRUE(wait_for_robot([&] { return state().hand_eye_rms_mm.has_value(); }))
-      << card(Phase::navigate).why.toStdString();
+  with_robot([&] { hold("register", true); }, [&] { return state().hand_eye_rms_mm.has_value(); });
   for (const PlannedTunnel& tunnel : state().tunnels) {
     find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
-    ASSERT_TRUE(wait([&] { return find("planWay")->isEnabled(); }));
-    click("planWay");
-    ASSERT_TRUE(wait_for_robot([&] { return state().order.has_value(); }))
-        << card(Phase::navigate).why.toStdString();
-    if (state().outcomes.empty()) screenshot("5-path");
-    hold("go");
-    ASSERT_TRUE(wait_for_robot([&] { return state().outcomes.contains(tunnel.name); }))
-        << card(Phase::navigate).why.toStdString();
+    const auto go = [&] {
+      ASSERT_TRUE(wait([&] { return find("planWay")->isEnabled(); }));
+      click("planWay");
+      ASSERT_TRUE(wait_for_robot([&] { return state().order.has_value(); }));
+      if (state().outcomes.empty()) screenshot("5-path");
+      hold("go");
+    };
+    with_robot(go, [&] { return state().outcomes.contains(tunnel.name); });
     screenshot("6-navigate");
-    hold("withdraw");
-    ASSERT_TRUE(wait_for_robot([&] { return !state().at_target; }))
-        << card(Phase::navigate).why.toStdString();
+    with_robot([&] { hold("withdraw"); }, [&] { return !state().at_target; });
+    ASSERT_FALSE(HasFatalFailure());
   }
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::good);
   EXPECT_EQ(card(Phase::verify).mood, StepMood::good);
