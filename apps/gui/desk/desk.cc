@@ -128,6 +128,7 @@ void Desk::open(Source source, const fs::path& folder, std::string doing, std::f
 }
 
 void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folder) {
+  room.tracker = plan.tracker;
   room.operation =
       value_or_throw(Operation::begin(std::move(plan), folder, room.devices->board(), room.devices->robot(),
                                       [this](Step, const std::string& what) { tell(what); }));
@@ -231,6 +232,7 @@ void Desk::take_waiting_picture() {
 Desk::Change Desk::came(Pictures pictures) {
   return [this, pictures = std::move(pictures)](DeskState& state) {
     forget_measurement(state);
+    live_tool_.reset();  // its lines belong to the former pictures
     state.result = only(pictures);
     state.next_view = first_missing(state);
     if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.exposure.has_value(); }))
@@ -263,6 +265,7 @@ void Desk::measure() {
 
 void Desk::picks_changed() {
   state_.order.reset();
+  state_.path = {};
   emit changed();
   if (!next_pick(state_)) measure();
 }
@@ -383,7 +386,7 @@ LiveState Desk::live() const {
   LiveState now;
   if (!room_ || !room_->operation) return now;
   const PoseBoard& board = room_->devices->board();
-  now.lamps = tracker_lamps(room_->operation->plan().tracker, board.tools(monotonic_seconds()));
+  now.lamps = tracker_lamps(room_->tracker, board.tools(monotonic_seconds()));
   now.robot = room_->devices->robot().status();
   now.lamps.push_back(robot_lamp(now.robot));
   if (!live_tool_) return now;

@@ -15,6 +15,7 @@ struct Room {
   std::unique_ptr<operating_room::VirtualRoom> virtual_room;
   std::unique_ptr<Connections> devices;
   std::unique_ptr<Operation> operation;
+  TrackerPlan tracker;  ///< the operation's, for any thread
   std::optional<Case> given;
   RunOptions options;
   std::optional<RobotOrder> last_order;

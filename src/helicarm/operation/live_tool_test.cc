@@ -4,19 +4,12 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/operation/hand_eye_test.h"
 
 namespace helicarm {
 namespace {
 
 using Eigen::Vector3d;
-
-HandEye hand_eye() {
-  HandEye hand_eye;
-  hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};
-  hand_eye.tracker_from_base = {rotation_from_euler(1, 0.3, -2), {300, 100, 1200}};
-  hand_eye.covariance.setZero();
-  return hand_eye;
-}
 
 const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
 const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
@@ -60,10 +53,10 @@ IgtlMessage message(const RigidTransform& femur, const RigidTransform& tool, dou
 
 TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
   const OperationPlan planned = plan();
-  const LiveTool live(planned, measured(), {exposure()}, hand_eye());
+  const LiveTool live(planned, measured(), {exposure()}, exact_hand_eye());
   // The tip 3 mm beside the axis and 12 mm in, tilted by 0.2 rad, on a femur that has moved.
   const RigidTransform femur_from_tip{rotation_from_vector(Vector3d(0.2, 0, 0)), entry + Vector3d(3, 0, 12)};
-  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), planned.robot.tool);
+  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), planned.robot.tool);
   PoseBoard board;
   const double now_s = monotonic_seconds();
   board.take(message(femur_now, femur_now * femur_from_tip * marker_from_tip.inverse(), now_s), now_s);
@@ -81,12 +74,12 @@ TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
 }
 
 TEST(LiveTool, OfATunnelThatIsNotLocatedSaysSo) {
-  const LiveTool live(plan(), measured(), {exposure()}, hand_eye());
+  const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   EXPECT_EQ(live.aim(PoseBoard(), "tibia").error().reason, Reason::not_seen);
 }
 
 TEST(LiveTool, WithoutAPoseGivesNoPlace) {
-  const LiveTool live(plan(), measured(), {exposure()}, hand_eye());
+  const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   EXPECT_EQ(live.aim(PoseBoard(), "femur").error().reason, Reason::no_pose);
   EXPECT_EQ(live.overlay(PoseBoard(), Bone::femur).error().reason, Reason::no_pose);
 }

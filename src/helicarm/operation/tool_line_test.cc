@@ -5,6 +5,7 @@
 
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/operation/hand_eye_test.h"
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/outcome_table.h"
 
@@ -13,34 +14,26 @@ namespace {
 
 using Eigen::Vector3d;
 
-HandEye hand_eye() {
-  HandEye hand_eye;
-  hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};
-  hand_eye.tracker_from_base = {rotation_from_euler(1, 0.3, -2), {300, 100, 1200}};
-  hand_eye.covariance.setZero();
-  return hand_eye;
-}
-
 RobotTool drill() { return {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
 
 TEST(ToolLine, OfAToolOnTheTunnelMissesNothing) {
-  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
-      end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), hand_eye(), drill());
+      end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
   EXPECT_NEAR(miss.distance_mm(), 0, 1e-9);
   EXPECT_NEAR(miss.predicted_mm(), 0, 1e-9);
 }
 
 TEST(ToolLine, MissIsMeasuredAcrossTheAxisAlone) {
-  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
-      end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), hand_eye(), drill());
+      end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
   EXPECT_NEAR(miss.distance_mm(), 0.5, 1e-9);
   EXPECT_TRUE(miss.across_mm.isApprox(Eigen::Vector2d(0.3, -0.4), 1e-9));
 }
 
 TEST(ToolLine, CovarianceOfAMissIsThatOfDrawnErrors) {
-  HandEye known = hand_eye();
+  HandEye known = exact_hand_eye();
   const Vector3d point(20, -100, 60);
   const Eigen::Matrix3d of_point = Vector3d(0.04, 0.01, 0.09).asDiagonal();
   known.covariance.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
@@ -66,7 +59,7 @@ TEST(ToolLine, StandsInTheCalibratorAsItWouldHaveStoodAtTheExposure) {
   const RigidTransform tracker_from_calibrator{rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
   const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
   const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
-  const RigidTransform marker_from_tip = marker_from_tcp(hand_eye(), drill());
+  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   // A tip on a point of the bone, now.
   const Vector3d on_bone(30, 5, -20);
   Poses exposure, now;
@@ -89,11 +82,12 @@ TEST(HandEyeTour, TurnsAboutAllAxesAndEndsWhereItBegan) {
   std::vector<HandEyePair> pairs;
   for (const RigidTransform& pose : tour) {
     const RigidTransform base_from_flange = pose * drill().flange_from_tcp.inverse();
-    pairs.push_back(
-        {base_from_flange, hand_eye().tracker_from_base * base_from_flange * hand_eye().flange_from_marker});
+    pairs.push_back({base_from_flange, exact_hand_eye().tracker_from_base * base_from_flange *
+                                           exact_hand_eye().flange_from_marker});
   }
   const HandEye found = calibrate_hand_eye(pairs).value();
-  EXPECT_LT((found.flange_from_marker.translation - hand_eye().flange_from_marker.translation).norm(), 1e-6);
+  EXPECT_LT((found.flange_from_marker.translation - exact_hand_eye().flange_from_marker.translation).norm(),
+            1e-6);
 }
 
 TEST(OutcomeTable, FiguresAreThoseOfTheErrors) {

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "helicarm/devices/tracker/hand_eye.h"
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm {
+
+/// A robot beside a tracker and a marker in its hand, known exactly.
+inline HandEye exact_hand_eye() {
+  HandEye hand_eye;
+  hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};
+  hand_eye.tracker_from_base = {rotation_from_euler(1, 0.3, -2), {300, 100, 1200}};
+  hand_eye.covariance.setZero();
+  return hand_eye;
+}
+
+}  // namespace helicarm
