@@ -21,9 +21,14 @@ endif()
 add_library(helicarm_precompiled OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)
 target_link_libraries(helicarm_precompiled PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                       tl::expected)
-target_precompile_headers(helicarm_precompiled PRIVATE
-  <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>
-  <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
+set(helicarm_often_included <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>
+    <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
+target_precompile_headers(helicarm_precompiled PRIVATE ${helicarm_often_included})
+add_library(helicarm_precompiled_tests OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)
+target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json
+                      fmt::fmt tl::expected GTest::gmock)
+target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
+                          <gmock/gmock.h> <gtest/gtest.h>)
 
 # helicarm_room(NAME [APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
 # A room's files are compiled as one unit; APART: file by file, as they use one name for several things.
@@ -45,7 +50,7 @@ function(helicarm_room name)
   if(ARG_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
-    target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled)
+    target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
     target_compile_options(${name}_test PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60)
