@@ -43,7 +43,7 @@ void SceneView::set_preset(Preset preset) {
   preset_ = preset;
   moved_ = false;
   camera_ = camera_of(preset);
-  update();
+  redraw();
   if (fresh) emit preset_changed(preset);
 }
 
@@ -61,7 +61,7 @@ void SceneView::look_near() { move_camera(near_camera()); }
 void SceneView::move_camera(const SceneCamera& camera) {
   camera_ = camera;
   moved_ = true;
-  update();
+  redraw();
   if (std::exchange(preset_, Preset::free) != Preset::free) emit preset_changed(Preset::free);
 }
 
@@ -110,7 +110,7 @@ void SceneView::keyPressEvent(QKeyEvent* event) {
     case Qt::Key_Minus:
       return move_camera(zoomed(camera_, 1 / zoom_per_key));
     default:
-      QOpenGLWidget::keyPressEvent(event);
+      QWidget::keyPressEvent(event);
   }
 }
 

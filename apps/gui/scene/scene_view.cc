@@ -2,55 +2,28 @@
 #include "gui/scene/scene_view.h"
 
 #include <QElapsedTimer>
-#include <QEvent>
-#include <QOffscreenSurface>
-#include <QOpenGLContext>
-#include <QOpenGLFunctions>
-#include <QTimer>
+#include <QPainter>
 
+#include "gui/scene/offscreen_stage.h"
 #include "gui/scene/palette.h"
-#include "gui/scene/stage.h"
 
 namespace helicarm::gui {
 
 SceneView::SceneView(QWidget* parent)
-    : QOpenGLWidget(parent), camera_(overview_of({}, 1)), notice_(new QLabel(this)) {
-  setFormat(default_format());
+    : QWidget(parent), camera_(overview_of({}, 1)), stage_(std::make_unique<OffscreenStage>()) {
   setFocusPolicy(Qt::StrongFocus);
   setMinimumSize(120, 120);
+  setAttribute(Qt::WA_OpaquePaintEvent);
   setAccessibleName(tr("Scene in space"));
-  notice_->setAlignment(Qt::AlignCenter);
-  notice_->setWordWrap(true);
-  notice_->setAutoFillBackground(true);
-  notice_->hide();
 }
 
-SceneView::~SceneView() { tear_down(); }
+SceneView::~SceneView() = default;
 
-QSurfaceFormat SceneView::default_format() {
-  QSurfaceFormat format;
-  format.setRenderableType(QSurfaceFormat::OpenGL);
-  format.setVersion(3, 2);
-  format.setProfile(QSurfaceFormat::CoreProfile);
-  format.setDepthBufferSize(24);
-  format.setStencilBufferSize(8);
-  format.setSamples(0);
-  return format;
-}
+const std::optional<QString>& SceneView::obstacle() const { return stage_->obstacle(); }
 
-std::optional<QString> SceneView::obstacle() {
-  QOffscreenSurface surface;
-  surface.setFormat(default_format());
-  surface.create();
-  QOpenGLContext context;
-  context.setFormat(default_format());
-  if (!context.create() || !context.makeCurrent(&surface)) return tr("There is no OpenGL here.");
-  return obstacle_of(context.format());
-}
-
-std::optional<QString> SceneView::obstacle_of(const QSurfaceFormat& format) {
-  if (format.renderableType() != QSurfaceFormat::OpenGLES && format.version() >= qMakePair(3, 2)) return {};
-  return tr("OpenGL 3.2 is needed; here is %1.%2.").arg(format.majorVersion()).arg(format.minorVersion());
+void SceneView::redraw() {
+  drawn_ = {};
+  update();
 }
 
 void SceneView::show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator) {
@@ -63,13 +36,13 @@ void SceneView::show_result(std::shared_ptr<const Result> result, const Calibrat
 void SceneView::show_bones(std::optional<BoneMeshes> bones) {
   bones_ = std::move(bones);
   bones_changed_ = live_changed_ = true;
-  update();
+  redraw();
 }
 
 void SceneView::show_live(const LiveScene& live) {
   live_ = live;
   live_changed_ = true;
-  update();
+  redraw();
 }
 
 void SceneView::show_tre(std::optional<TreVolume> volume, SliceAxis axis, double place_mm) {
@@ -78,83 +51,47 @@ void SceneView::show_tre(std::optional<TreVolume> volume, SliceAxis axis, double
   slice_axis_ = axis;
   slice_mm_ = place_mm;
   slice_changed_ = true;
-  update();
+  redraw();
 }
 
 void SceneView::set_error_scale(double scale) {
   error_scale_ = scale;
   result_changed_ = live_changed_ = true;
-  update();
+  redraw();
 }
 
-void SceneView::initializeGL() {
-  if (const auto reason = obstacle_of(context()->format())) return give_up(*reason);
-  connect(context(), &QOpenGLContext::aboutToBeDestroyed, this, &SceneView::tear_down, Qt::DirectConnection);
-  stage_ = std::make_unique<Stage>();
-  result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = true;
-}
-
-void SceneView::tear_down() {
-  if (!stage_) return;
-  makeCurrent();
-  stage_.reset();
-  doneCurrent();
-}
-
-void SceneView::give_up(const QString& reason) {
-  if (std::exchange(given_up_, true)) return;
-  notice_->setText(tr("The scene cannot be drawn.") + "\n" + reason);
-  notice_->setGeometry(rect());
-  notice_->show();
-  emit unavailable(reason);
-}
-
-void SceneView::resizeGL(int, int) {
+void SceneView::resizeEvent(QResizeEvent*) {
   if (!moved_) camera_ = camera_of(preset_);
+  redraw();
 }
 
-void SceneView::paintGL() {
-  if (!stage_) return;
+void SceneView::draw() {
   QElapsedTimer timer;
   timer.start();
-  if (result_changed_) stage_->set_result(scene_, error_scale_);
-  if (bones_changed_) stage_->set_bones(bones_);
-  if (slice_changed_)
-    stage_->set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
+  drawn_ = stage_->draw(size() * devicePixelRatioF(), camera_, [this](Stage& stage) {
+    if (result_changed_) stage.set_result(scene_, error_scale_);
+    if (bones_changed_) stage.set_bones(bones_);
+    if (slice_changed_)
+      stage.set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
                       tre_scale_);
-  if (live_changed_) stage_->set_live(live_);
-  result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = false;
-  const QSize pixels = size() * devicePixelRatioF();
-  stage_->resize(pixels.width(), pixels.height());
-  stage_->render(camera_, defaultFramebufferObject());
-  QOpenGLFunctions* gl = context()->functions();
-  gl->glBindFramebuffer(GL_FRAMEBUFFER, defaultFramebufferObject());
-  gl->glUseProgram(0);
-  paint_overlay();
-  // What lies behind this widget must not shine through.
-  gl->glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
-  gl->glClearColor(0, 0, 0, 1);
-  gl->glClear(GL_COLOR_BUFFER_BIT);
-  gl->glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
-  gl->glFinish();
+    if (live_changed_) stage.set_live(live_);
+    result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = false;
+  });
+  drawn_.setDevicePixelRatio(devicePixelRatioF());
   last_render_ms_ = double(timer.nsecsElapsed()) * 1e-6;
 }
 
-void SceneView::showEvent(QShowEvent* event) {
-  QOpenGLWidget::showEvent(event);
-  QTimer::singleShot(0, this, [this] {
-    if (isVisible() && !isValid()) give_up(tr("There is no OpenGL here."));
-  });
-}
-
-void SceneView::resizeEvent(QResizeEvent* event) {
-  QOpenGLWidget::resizeEvent(event);
-  notice_->setGeometry(rect());
-}
-
-void SceneView::changeEvent(QEvent* event) {
-  if (event->type() == QEvent::LanguageChange || event->type() == QEvent::FontChange) update();
-  QOpenGLWidget::changeEvent(event);
+void SceneView::paintEvent(QPaintEvent*) {
+  if (drawn_.isNull()) draw();
+  QPainter painter(this);
+  if (obstacle()) {
+    painter.fillRect(rect(), palette().window());
+    painter.drawText(rect(), Qt::AlignCenter | Qt::TextWordWrap,
+                     tr("The scene cannot be drawn.") + "\n" + *obstacle());
+    return;
+  }
+  painter.drawImage(0, 0, drawn_);
+  paint_overlay(painter);
 }
 
 std::vector<SceneLabel> SceneView::labels() const {
@@ -186,8 +123,7 @@ std::vector<SceneLabel> SceneView::labels() const {
   return labels;
 }
 
-void SceneView::paint_overlay() {
-  QPainter painter(this);
+void SceneView::paint_overlay(QPainter& painter) {
   QFont small = font();
   small.setPixelSize(11);
   painter.setFont(small);

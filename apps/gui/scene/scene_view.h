@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <QLabel>
-#include <QOpenGLWidget>
-#include <QSurfaceFormat>
+#include <QWidget>
 #include <memory>
 #include <optional>
 
@@ -15,12 +13,12 @@
 
 namespace helicarm::gui {
 
-class Stage;
+class OffscreenStage;
 using simulation::BoneMeshes;
 
 /// Calibrator, X-rays, points, bones, tool and robot in space. The left button turns, the right one and the
 /// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, 4 near, R back, arrows turn, + and - zoom.
-class SceneView : public QOpenGLWidget {
+class SceneView : public QWidget {
   Q_OBJECT
 
  public:
@@ -30,12 +28,8 @@ class SceneView : public QOpenGLWidget {
   explicit SceneView(QWidget* parent = nullptr);
   ~SceneView() override;
 
-  /// To be set by QSurfaceFormat::setDefaultFormat before the application starts.
-  static QSurfaceFormat default_format();
-
-  /// Why no scene can be drawn here; nothing: it can. To be asked before a view comes into a window, for Qt
-  /// 6.4 itself crashes in flushing a window with a QOpenGLWidget on a platform without OpenGL.
-  static std::optional<QString> obstacle();
+  /// Why there is no scene; shown in its place.
+  const std::optional<QString>& obstacle() const;
 
   /// Nothing empties the scene. The live part stays.
   void show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator);
@@ -54,37 +48,30 @@ class SceneView : public QOpenGLWidget {
   /// How many times larger than true the 95 % ellipsoids are drawn; 10 at first.
   void set_error_scale(double scale);
 
-  /// What the last drawing took, until the graphics were done, ms.
+  /// What the last drawing took, until its picture was there, ms.
   double last_render_ms() const { return last_render_ms_; }
   QSize sizeHint() const override { return {420, 420}; }
 
  signals:
   void preset_changed(helicarm::gui::SceneView::Preset preset);
-  /// There is no OpenGL here; the reason is shown in place of the scene.
-  void unavailable(const QString& reason);
 
  protected:
-  void initializeGL() override;
-  void resizeGL(int width, int height) override;
-  void paintGL() override;
-  void showEvent(QShowEvent* event) override;
+  void paintEvent(QPaintEvent* event) override;
   void resizeEvent(QResizeEvent* event) override;
-  void changeEvent(QEvent* event) override;
   void mousePressEvent(QMouseEvent* event) override;
   void mouseMoveEvent(QMouseEvent* event) override;
   void wheelEvent(QWheelEvent* event) override;
   void keyPressEvent(QKeyEvent* event) override;
 
  private:
-  static std::optional<QString> obstacle_of(const QSurfaceFormat& format);
   double aspect() const { return double(std::max(1, width())) / std::max(1, height()); }
   const ViewShape* view_of(Preset preset) const;
   SceneCamera camera_of(Preset preset) const;
   SceneCamera near_camera() const;
   void move_camera(const SceneCamera& camera);
-  void tear_down();
-  void give_up(const QString& reason);
-  void paint_overlay();
+  void redraw();
+  void draw();
+  void paint_overlay(QPainter& painter);
   std::vector<SceneLabel> labels() const;
 
   ResultScene scene_;
@@ -101,10 +88,9 @@ class SceneView : public QOpenGLWidget {
   bool moved_ = false;  ///< by hand, away from the preset
   SceneCamera camera_;
   QPointF mouse_;
-  std::unique_ptr<Stage> stage_;
+  std::unique_ptr<OffscreenStage> stage_;
   bool result_changed_ = true, bones_changed_ = true, slice_changed_ = true, live_changed_ = true;
-  QLabel* notice_;
-  bool given_up_ = false;
+  QImage drawn_;  ///< null: to be drawn anew
   double last_render_ms_ = 0;
 };
 

@@ -206,7 +206,7 @@ void Stage::set_live(const LiveScene& live) {
   shown_path_ = live.path;
 }
 
-void Stage::render(const SceneCamera& camera, unsigned framebuffer) {
+void Stage::render_upside_down(const SceneCamera& camera, unsigned framebuffer) {
   vtkCamera* vtk = renderer_->GetActiveCamera();
   vtk->SetPosition(camera.position.data());
   vtk->SetFocalPoint(camera.focal_point.data());
@@ -223,8 +223,8 @@ void Stage::render(const SceneCamera& camera, unsigned framebuffer) {
   state->vtkglBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
   state->vtkglViewport(0, 0, size[0], size[1]);
   state->vtkglScissor(0, 0, size[0], size[1]);
-  window_->BlitDisplayFramebuffer(0, 0, 0, size[0], size[1], 0, 0, size[0], size[1], GL_COLOR_BUFFER_BIT,
-                                  GL_NEAREST);
+  window_->BlitDisplayFramebuffer(0, 0, 0, size[0], size[1], 0, size[1], size[0], -size[1],
+                                  GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
 }  // namespace helicarm::gui

@@ -14,7 +14,6 @@ volatile std::sig_atomic_t told_to_end = 0;
 
 int main(int argc, char** argv) {
   using namespace helicarm::gui;
-  QSurfaceFormat::setDefaultFormat(SceneView::default_format());
   QApplication app(argc, argv);
   QApplication::setOrganizationName("helicarm");
   QApplication::setApplicationName("helicarm-gui");

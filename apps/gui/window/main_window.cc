@@ -86,15 +86,9 @@ void MainWindow::build() {
     connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
   }
   auto* right = new QSplitter(Qt::Vertical);
-  if (const auto obstacle = SceneView::obstacle()) {
-    auto* notice = new QLabel(*obstacle);
-    notice->setWordWrap(true);
-    right->addWidget(notice);
-  } else {
-    scene_ = new SceneView;
-    scene_->setObjectName("scene");
-    right->addWidget(scene_);
-  }
+  scene_ = new SceneView;
+  scene_->setObjectName("scene");
+  right->addWidget(scene_);
   pages_ = new QStackedWidget;
   auto* rectify = new RectifyPage(desk_, this);
   plan_ = new PlanPage(desk_, this);
@@ -159,7 +153,6 @@ void MainWindow::show_pictures() {
                        : has ? tr("%1: no picture yet").arg(text(shown_->views[i].name))
                              : tr("No second view"));
   }
-  if (scene_ == nullptr) return;
   scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
   if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
@@ -228,7 +221,7 @@ void MainWindow::show_live() {
     }
     xrays_[i]->set_tool(line, note);
   }
-  if (scene_ == nullptr || ++looks_ % scene_every != 0) return;
+  if (++looks_ % scene_every != 0) return;
   LiveScene scene;
   if (tool && *tool && (*tool)->calibrator_from_tip) {
     scene.calibrator_from_tip = (*tool)->calibrator_from_tip;

@@ -32,7 +32,7 @@ class MainWindow : public QMainWindow {
   Desk& desk() { return desk_; }
   StepStrip& strip() { return *strip_; }
   XrayView& xray(std::size_t number) { return *xrays_.at(number); }
-  SceneView* scene() { return scene_; }
+  SceneView& scene() { return *scene_; }
   LiveBar& live_bar() { return *live_bar_; }
 
   void open_rehearsal();
@@ -80,7 +80,7 @@ class MainWindow : public QMainWindow {
 
   StepStrip* strip_ = nullptr;
   std::array<XrayView*, 2> xrays_{};
-  SceneView* scene_ = nullptr;  ///< nothing where there is no OpenGL
+  SceneView* scene_ = nullptr;
   LiveBar* live_bar_ = nullptr;
   QStackedWidget* pages_ = nullptr;
   PlanPage* plan_ = nullptr;

@@ -64,12 +64,8 @@ void MainWindow::build_menus() {
   for (const auto& [words, preset, key] : {std::tuple(tr("Scene as in the &AP view"), Preset::ap, "Ctrl+1"),
                                            {tr("Scene as in the &lateral view"), Preset::lateral, "Ctrl+2"},
                                            {tr("Scene from &outside"), Preset::free, "Ctrl+3"}})
-    view->addAction(words, QKeySequence(key), this, [this, wanted = preset] {
-      if (scene_ != nullptr) scene_->set_preset(wanted);
-    });
-  view->addAction(tr("Scene &near at the knee"), QKeySequence("Ctrl+4"), this, [this] {
-    if (scene_ != nullptr) scene_->look_near();
-  });
+    view->addAction(words, QKeySequence(key), this, [this, wanted = preset] { scene_->set_preset(wanted); });
+  view->addAction(tr("Scene &near at the knee"), QKeySequence("Ctrl+4"), scene_, &SceneView::look_near);
   view->addAction(replay_dock_->toggleViewAction());
   build_rehearsal_menu();
 
@@ -194,7 +190,6 @@ void MainWindow::ask_settings() {
 }
 
 void MainWindow::show_tre(bool shown) {
-  if (scene_ == nullptr) return;
   if (!shown || !shown_ || !desk_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
   Calibration calibration{{}, shown_->joint_covariance};
   for (const ViewResult& view : shown_->views)

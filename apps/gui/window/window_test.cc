@@ -226,7 +226,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
   EXPECT_EQ(table->item(row, 3)->text().toStdString(),
             fmt::format("{:.2f}", line.at("err_start_px").get<double>()));
-  window_->scene()->set_preset(SceneView::Preset::lateral);
+  window_->scene().set_preset(SceneView::Preset::lateral);
   screenshot("7-verify");
 
   const auto exported = window_->export_to(folder_ / "export");
@@ -362,7 +362,7 @@ TEST_F(Window, TellsItsTimes) {
     QApplication::processEvents();
     redraw.push_back(double(since.nsecsElapsed()) / 1e6);
     if (live.tool && *live.tool) latency.push_back((*live.tool)->age_s * 1000 + redraw.back());
-    scene.push_back(window_->scene()->last_render_ms());
+    scene.push_back(window_->scene().last_render_ms());
   }
   const auto tell = [](const char* what, std::vector<double>& ms) {
     std::ranges::sort(ms);
@@ -399,7 +399,6 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
 }  // namespace helicarm::gui
 
 int main(int argc, char** argv) {
-  QSurfaceFormat::setDefaultFormat(helicarm::gui::SceneView::default_format());
   QStandardPaths::setTestModeEnabled(true);
   QApplication app(argc, argv);
   QApplication::setOrganizationName("helicarm");
