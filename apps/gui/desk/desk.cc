@@ -7,8 +7,12 @@
 
 #include "gui/desk/room.h"
 #include "gui/desk/steps.h"
+#include "gui/replay/pdf_report.h"
 #include "helicarm/core/files.h"
+#include "helicarm/navigation/run_case.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/report/exports.h"
+#include "helicarm/report/report.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
@@ -17,7 +21,6 @@ namespace {
 
 constexpr int look_for_pictures_ms = 100;
 constexpr double bone_step_mm = 3;
-constexpr std::chrono::seconds robot_patience{5};
 
 std::shared_ptr<const Result> only(Pictures pictures) {
   auto result = std::make_shared<Result>();
@@ -97,11 +100,11 @@ void Desk::begin(Phase phase, std::string doing, std::function<Change()> work) {
   });
 }
 
-void Desk::tell(std::string what) {
+void Desk::meanwhile(Change change) {
   QMetaObject::invokeMethod(
       this,
-      [this, what = std::move(what)] {
-        state_.doing = what;
+      [this, change = std::move(change)] {
+        change(state_);
         emit changed();
       },
       Qt::QueuedConnection);
@@ -131,7 +134,9 @@ void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folde
   room.tracker = plan.tracker;
   room.operation =
       value_or_throw(Operation::begin(std::move(plan), folder, room.devices->board(), room.devices->robot(),
-                                      [this](Step, const std::string& what) { tell(what); }));
+                                      [this](Step, const std::string& what) {
+                                        meanwhile([what](DeskState& state) { state.doing = what; });
+                                      }));
   room.operation->confirmed_by("the person at the screen");
 }
 
@@ -290,111 +295,38 @@ void Desk::clear_picks() {
   picks_changed();
 }
 
-void Desk::touch(const std::string& check_point) {
-  if (!room_ || !room_->operation) return;
-  begin(Phase::acquire, "touching " + check_point, [room = room_, check_point]() -> Change {
-    const double off_mm = value_or_throw(room->operation->touch(check_point));
-    return
-        [check_point, off_mm](DeskState& state) { state.touched_mm.insert_or_assign(check_point, off_mm); };
-  });
-}
-
-void Desk::unlock(const std::string& who) {
-  if (!room_ || !room_->devices) return;
-  begin(Phase::navigate, "unlocking the robot", [room = room_, who]() -> Change {
-    value_or_throw(room->devices->robot().wait_connected(robot_patience));
-    value_or_throw(room->devices->robot().unlock(who));
-    return [](DeskState&) {};
-  });
-}
-
-void Desk::register_robot() {
-  if (!room_ || !room_->operation) return;
-  begin(Phase::navigate, "registering the robot", [this, room = room_]() -> Change {
-    RobotLink& robot = room->devices->robot();
-    value_or_throw(room->operation->register_robot([&](const RobotOrder& order) -> Expected<std::string> {
-      if (room->stopped) return fail(Reason::interrupted, "stopped by a person");
-      return robot.confirm(order);
-    }));
-    auto live = value_or_throw(room->operation->live_tool());
-    return [this, live, rms = room->operation->hand_eye().rms_mm](DeskState& state) {
-      live_tool_ = live;
-      state.hand_eye_rms_mm = rms;
-    };
-  });
-}
-
-void Desk::plan_tunnel(const std::string& tunnel) {
-  if (!room_ || !room_->operation) return;
-  follow(tunnel);
-  begin(Phase::navigate, "planning the way to " + tunnel, [room = room_, tunnel]() -> Change {
-    const RobotOrder order = value_or_throw(room->operation->plan_tunnel(tunnel));
-    const PathPreview path = value_or_throw(room->operation->preview(order));
-    return [order, path](DeskState& state) {
-      state.order = order;
-      state.path = path;
-    };
-  });
-}
-
-void Desk::go() {
-  if (!room_ || !room_->operation || !state_.order) return;
-  const RobotOrder order = *state_.order;
-  begin(Phase::navigate, "going to " + order.name, [room = room_, order]() -> Change {
-    RobotLink& robot = room->devices->robot();
-    const std::string token = robot.confirm(order);
-    room->rest = value_or_throw(robot.wait_connected(robot_patience));
-    room->last_order = order;
-    const TunnelOutcome outcome = value_or_throw(room->operation->go(order, token));
-    return [outcome](DeskState& state) {
-      state.outcomes.insert_or_assign(outcome.tunnel, outcome);
-      state.order.reset();
-      state.path = {};
-      state.at_target = true;
-    };
-  });
-}
-
-void Desk::withdraw() {
-  if (!room_ || !room_->operation || !room_->last_order) return;
-  begin(Phase::navigate, "withdrawing", [room = room_]() -> Change {
-    RobotLink& robot = room->devices->robot();
-    value_or_throw(room->operation->withdraw(*room->last_order, room->rest, [&](const RobotOrder& order) {
-      return Expected<std::string>(robot.confirm(order));
-    }));
-    return [](DeskState& state) { state.at_target = false; };
-  });
-}
-
-void Desk::stop() {
-  if (!room_ || !room_->devices) return;
+void Desk::cancel() {
+  if (!state_.busy || !room_) return;
+  if (room_->devices) return stop();
   room_->stopped = true;
-  errands_.start([room = room_] { room->devices->robot().stop(); });
+}
+
+void Desk::export_to(const fs::path& folder) {
+  if (!state_.measured) {
+    emit refused(Phase::verify, tr("Nothing is measured yet: there is nothing to export."));
+    return;
+  }
+  begin(Phase::verify, "writing the report", [this, result = state_.result, folder]() -> Change {
+    value_or_throw(write_report(*result, folder));
+    value_or_throw(write_pdf_report(*result, folder / "report.pdf"));
+    value_or_throw(write_exports(*result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(*result)) + "\n"));
+    return [this, folder](DeskState&) { emit exported(QString::fromStdString(folder.string())); };
+  });
 }
 
 void Desk::set_fault(const std::string& name, bool on) {
   if (!room_ || !room_->virtual_room) return;
+  if (const auto of_c_arm = operating_room::c_arm_fault(name)) {
+    room_->c_arm_fault = on ? *of_c_arm : operating_room::CArmFault::none;
+    return;
+  }
   errands_.start([room = room_, name, on] { static_cast<void>(room->virtual_room->set_fault(name, on)); });
 }
 
 void Desk::move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm) {
   if (room_ && room_->virtual_room)
     room_->virtual_room->theatre().move_bone(bone, {Eigen::Matrix3d::Identity(), shift_mm});
-}
-
-LiveState Desk::live() const {
-  LiveState now;
-  if (!room_ || !room_->operation) return now;
-  const PoseBoard& board = room_->devices->board();
-  now.lamps = tracker_lamps(room_->tracker, board.tools(monotonic_seconds()));
-  now.robot = room_->devices->robot().status();
-  now.lamps.push_back(robot_lamp(now.robot));
-  if (!live_tool_) return now;
-  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
-  const Bone bone = tunnel == state_.tunnels.end() ? Bone::femur : tunnel->bone;
-  now.tool = live_tool_->overlay(board, bone);
-  if (tunnel != state_.tunnels.end()) now.aim = live_tool_->aim(board, followed_);
-  return now;
 }
 
 }  // namespace helicarm::gui

@@ -18,8 +18,10 @@ struct Room;
 
 /// The live part of the window at one moment.
 struct LiveState {
+  double at_s = 0;  ///< monotonic
   std::vector<Lamp> lamps;
   RobotLinkStatus robot;
+  Bone bone = Bone::femur;                    ///< against which the tool is seen
   std::optional<Expected<ToolOverlay>> tool;  ///< nothing before the robot is registered
   std::optional<Expected<TunnelAim>> aim;     ///< nothing before a tunnel is followed
 };
@@ -61,6 +63,11 @@ class Desk : public QObject {
   void withdraw();
   /// Stops the robot, at once and whatever else goes on.
   void stop();
+  /// Ends what is being done as soon as it can end; nothing of it is kept.
+  void cancel();
+
+  /// Report (HTML, PDF), result.json and other programs' formats into a folder; `exported` tells the end.
+  void export_to(const std::filesystem::path& folder);
 
   void set_fault(const std::string& name, bool on);
   void move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm);
@@ -72,6 +79,7 @@ class Desk : public QObject {
  signals:
   void changed();
   void refused(helicarm::gui::Phase phase, const QString& why);
+  void exported(const QString& folder);
 
  private:
   using Change = std::function<void(DeskState&)>;
@@ -80,7 +88,8 @@ class Desk : public QObject {
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Room&)> work);
   void start_operation(Room& room, OperationPlan plan, const std::filesystem::path& folder);
-  void tell(std::string what);
+  /// From any thread: a change while the work goes on.
+  void meanwhile(Change change);
   void take_waiting_picture();
   void picks_changed();
   Change measured(Room& room, const std::vector<Pick>& picks);

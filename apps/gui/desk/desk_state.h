@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <QString>
 #include <array>
 #include <map>
 #include <memory>
@@ -43,10 +44,11 @@ struct DeskState {
   std::vector<Pick> picks;
   std::vector<Pick> offered_picks;  ///< those that came with the plan
 
+  QString tour;  ///< what registering would do, in words
   std::optional<double> hand_eye_rms_mm;
   std::optional<RobotOrder> order;  ///< previewed, not yet carried out
   PathPreview path;
-  bool at_target = false;  ///< the tool stands in a tunnel and can be withdrawn
+  bool tool_is_out = false;  ///< on its way to a tunnel or in it: it can be withdrawn
   std::map<std::string, TunnelOutcome> outcomes;
 
   std::optional<Phase> busy;  ///< what is being done

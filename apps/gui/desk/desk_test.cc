@@ -139,6 +139,17 @@ TEST(Lamps, StoppedRobotIsRedAndSaysWhy) {
   EXPECT_THAT(lamp.why.toStdString(), HasSubstr("emergency stop"));
 }
 
+TEST(Lamps, CArmIsGreenByItsLastPictureAndRedByWhatWentWrongSince) {
+  EXPECT_EQ(c_arm_lamp({}, 100).light, Light::off);
+  const Lamp well = c_arm_lamp({.last_picture_s = 93, .refused = {}}, 100);
+  EXPECT_EQ(well.light, Light::green);
+  EXPECT_EQ(well.text, "7.0 s ago");
+  EXPECT_EQ(c_arm_lamp({.last_picture_s = 93, .refused = {}, .broke_off = true}, 100).light, Light::red);
+  const Lamp refused = c_arm_lamp({.last_picture_s = 93, .refused = Failure{Reason::bad_dicom, "cut"}}, 100);
+  EXPECT_EQ(refused.light, Light::red);
+  EXPECT_THAT(refused.why.toStdString(), HasSubstr("cut"));
+}
+
 TEST(Worker, DoesItsJobsInOrderAndEndsWithThoseThatRan) {
   std::vector<int> done;
   {

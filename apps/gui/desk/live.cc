@@ -70,4 +70,21 @@ Lamp robot_lamp(const RobotLinkStatus& status) {
   return lamp;
 }
 
+Lamp c_arm_lamp(const CArmStatus& status, double now_s) {
+  Lamp lamp{tr("C-arm"), Light::off, tr("no picture yet"), tr("it calls when it has a picture")};
+  if (status.last_picture_s)
+    lamp = {lamp.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_picture_s)), {}};
+  if (status.broke_off) {
+    lamp.light = Light::red;
+    lamp.text = tr("broke off");
+    lamp.why = tr("a connection was lost or turned down before it had sent a picture");
+  }
+  if (status.refused) {
+    lamp.light = Light::red;
+    lamp.text = tr("refused");
+    lamp.why = sentence_of(*status.refused);
+  }
+  return lamp;
+}
+
 }  // namespace helicarm::gui

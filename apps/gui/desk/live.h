@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "helicarm/devices/robot/robot_link.h"
+#include "helicarm/operation/connections.h"
 #include "helicarm/operation/live_tool.h"
 
 namespace helicarm::gui {
@@ -26,6 +27,8 @@ inline constexpr double late_s = 1;
 /// The markers that the plan names; the calibrator is seen where one of its facets is.
 std::vector<Lamp> tracker_lamps(const TrackerPlan& plan, const std::vector<ToolState>& tools);
 Lamp robot_lamp(const RobotLinkStatus& status);
+/// At this moment, monotonic seconds.
+Lamp c_arm_lamp(const CArmStatus& status, double now_s);
 
 /// "23 ms", "4.1 s", "not seen".
 QString age_text(const std::optional<double>& age_s);

@@ -14,7 +14,7 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int most_shots = 3;
-constexpr double picture_patience_s = 20;
+constexpr double picture_patience_s = 20, picture_glance_s = 0.1;
 /// An exposure's poses are taken from the second and a half before it.
 constexpr std::chrono::milliseconds before_exposure{1800};
 
@@ -36,16 +36,26 @@ Expected<Pictures> take(Room& room, const std::string& view, const DatedArrival&
   });
 }
 
+namespace {
+
+std::optional<DatedArrival> wait_for_picture(Room& room) {
+  for (int glance = 0; glance * picture_glance_s < picture_patience_s && !room.stopped; ++glance)
+    if (auto picture = room.devices->next_picture(picture_glance_s)) return picture;
+  return std::nullopt;
+}
+
+}  // namespace
+
 Expected<Pictures> shoot_and_take(Room& room, const std::string& view) {
   const operating_room::PictureReceiver receiver{"127.0.0.1", room.devices->receiver_port()};
   Expected<Pictures> taken = fail(Reason::not_connected, "no picture came");
   for (int shot = 0; shot < most_shots && !taken && !room.stopped; ++shot) {
     std::this_thread::sleep_for(before_exposure);
-    const auto sent = operating_room::shoot(room.virtual_room->theatre(), view, receiver);
+    const auto sent = operating_room::shoot(room.virtual_room->theatre(), view, receiver, room.c_arm_fault);
     if (!sent) return tl::unexpected<Failure>(sent.error());
-    if (const auto picture = room.devices->next_picture(picture_patience_s))
-      taken = take(room, view, *picture);
+    if (const auto picture = wait_for_picture(room)) taken = take(room, view, *picture);
   }
+  if (!taken && room.stopped) return fail(Reason::interrupted, "cancelled");
   return taken;
 }
 

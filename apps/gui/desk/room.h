@@ -20,13 +20,14 @@ struct Room {
   RunOptions options;
   std::optional<RobotOrder> last_order;
   RobotState rest;                    ///< where the robot was before it
-  std::atomic<bool> stopped = false;  ///< no move of a tour may follow
+  std::atomic<bool> stopped = false;  ///< no move of a tour may follow, no picture is waited for
+  std::atomic<operating_room::CArmFault> c_arm_fault = operating_room::CArmFault::none;
 };
 
 /// All views of the operation with the pictures taken so far.
 using Pictures = std::vector<ViewResult>;
 
-/// Shoots until the tracker has seen everything at rest.
+/// Shoots until the tracker has seen everything at rest. Refuses interrupted once `room.stopped`.
 Expected<Pictures> shoot_and_take(Room& room, const std::string& view);
 /// Takes a picture that came by itself; its file may say that it is another view's.
 Expected<Pictures> take(Room& room, const std::string& view, const DatedArrival& picture);

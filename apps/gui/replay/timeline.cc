@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/operation/records.h"
 #include "helicarm/operation/seen_poses.h"
 #include "helicarm/session/session_log.h"
 
@@ -99,7 +100,10 @@ void take(SessionState& state, const Timeline& timeline, std::size_t number) {
     const auto view = content.at("view").get<std::string>();
     std::erase(state.exposures, view);
     state.exposures.push_back(view);
+    state.exposed_at[view] = number;
   }
+  if (kind == "hand_eye") state.registered_at = number;
+  if (kind == "order") state.tunnel = content.at("name").get<std::string>();
   if (kind == "exposure" || kind == "poses") see(state, content.at("window"), number);
   if (kind == "case")
     state.case_folder =
@@ -111,6 +115,12 @@ void take(SessionState& state, const Timeline& timeline, std::size_t number) {
     for (const Json& miss : content.at("loop"))
       misses.push_back({miss.at("distance_mm").get<double>(), miss.at("turn_deg").get<double>()});
   }
+}
+
+OperationPlan plan_of(const Timeline& timeline) {
+  const auto plan = std::ranges::find(timeline.moments, "plan", &Moment::kind);
+  if (plan == timeline.moments.end()) throw BadInput(Reason::usage, "the record holds no plan");
+  return value_or_throw(plan_from(plan->content, "the record's plan"));
 }
 
 }  // namespace
@@ -146,6 +156,41 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
     for (std::size_t i = 0; i <= index && i < timeline.moments.size(); ++i)
       of_record(i, [&] { take(state, timeline, i); });
     return state;
+  });
+}
+
+Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result) {
+  return guarded([&] {
+    if (!state.measured || !state.registered_at)
+      throw BadInput(Reason::usage, "nothing was measured or registered by then");
+    const OperationPlan plan = plan_of(timeline);
+    std::vector<Poses> exposures;
+    for (const ViewResult& view : result.views) {
+      const auto at = state.exposed_at.find(view.name);
+      if (at == state.exposed_at.end())
+        throw BadInput(Reason::usage, fmt::format("{}: no picture was taken by then", view.name));
+      const std::string origin = fmt::format("record {}", at->second);
+      const Json& window = timeline.moments[at->second].content.at("window");
+      exposures.push_back(
+          value_or_throw(poses_of_exposure(value_or_throw(pose_window_from(window, origin)), plan.tracker)));
+    }
+    const Json& pairs = timeline.moments[*state.registered_at].content.at("pairs");
+    const HandEye hand_eye = value_or_throw(calibrate_hand_eye(
+        value_or_throw(hand_eye_pairs_from(pairs, fmt::format("record {}", *state.registered_at)))));
+    return LiveTool(plan, result, exposures, hand_eye);
+  });
+}
+
+Expected<ToolOverlay> overlay_of(const LiveTool& tool, const Timeline& timeline, const SessionState& state) {
+  return guarded([&] {
+    const OperationPlan plan = plan_of(timeline);
+    const auto pose = [&](const std::string& marker) -> std::optional<RigidTransform> {
+      const auto seen = state.tracker_from.find(marker);
+      return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
+    };
+    const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &PlannedTunnel::name);
+    const Poses now{{}, pose(plan.tracker.femur), pose(plan.tracker.tibia), pose(plan.tracker.tool)};
+    return value_or_throw(tool.overlay(now, tunnel == plan.tunnels.end() ? Bone::femur : tunnel->bone));
   });
 }
 

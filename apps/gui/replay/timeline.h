@@ -10,7 +10,7 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
-#include "helicarm/geometry/rigid_transform.h"
+#include "helicarm/operation/live_tool.h"
 
 namespace helicarm::gui {
 
@@ -48,6 +48,9 @@ struct SessionState {
   bool measured = false;                                ///< that case has its result
   std::map<std::string, RigidTransform> tracker_from;   ///< the newest pose of each tool
   std::map<std::string, std::vector<LoopMiss>> misses;  ///< of the closed loop, by tunnel
+  std::map<std::string, std::size_t> exposed_at;        ///< the moment of each view's picture
+  std::optional<std::size_t> registered_at;             ///< the moment of the robot's newest registration
+  std::string tunnel;                                   ///< to which the newest order goes
 };
 
 /// Reads session.log in a session's folder. A torn end is left out and told; refuses as `read_session`, and
@@ -56,5 +59,12 @@ Expected<Timeline> read_timeline(const std::filesystem::path& session);
 
 /// After the moment with this index and all before it. Refuses as `read_timeline`.
 Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);
+
+/// What follows the tool in that state's case, whose measurement is `result`. Refuses (usage) a state before
+/// measurement or registration.
+Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result);
+
+/// The tool at the newest poses, against the bone of the state's tunnel. Refuses as `LiveTool::overlay`.
+Expected<ToolOverlay> overlay_of(const LiveTool& tool, const Timeline& timeline, const SessionState& state);
 
 }  // namespace helicarm::gui

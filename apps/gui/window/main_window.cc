@@ -6,6 +6,8 @@
 #include <QHBoxLayout>
 #include <QKeyEvent>
 #include <QMenu>
+#include <QProgressBar>
+#include <QPushButton>
 #include <QSplitter>
 #include <QStatusBar>
 #include <QVBoxLayout>
@@ -18,7 +20,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int live_ms = 30;
+constexpr int live_ms = 20;
 /// The scene is drawn by software as a rule, and needs less haste than the pictures.
 constexpr unsigned scene_every = 4;
 /// Of the calibrator's middle: where an end may lie along its ray.
@@ -47,6 +49,8 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
     show_phase(phase);
     statusBar()->showMessage(why);
   });
+  connect(&desk_, &Desk::exported, this,
+          [this](const QString& folder) { statusBar()->showMessage(tr("Written to %1").arg(folder)); });
   connect(&timer_, &QTimer::timeout, this, &MainWindow::show_live);
   timer_.start(live_ms);
   qApp->installEventFilter(this);
@@ -105,13 +109,16 @@ void MainWindow::build() {
   live_bar_ = new LiveBar;
   column->addWidget(live_bar_);
   setCentralWidget(middle);
-  statusBar();
+  build_status();
 
   connect(rectify, &RectifyPage::layer_wanted, this, [this](Layer layer) {
     for (XrayView* xray : xrays_) xray->set_layer(layer);
   });
   connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);
-  connect(plan_, &PlanPage::map_wanted, this, &MainWindow::show_tre);
+  connect(plan_, &PlanPage::map_wanted, this, [this](const std::optional<TreCut>& cut) {
+    cut_ = cut;
+    show_tre();
+  });
   connect(verify, &VerifyPage::report_wanted, this, &MainWindow::ask_and_export);
 
   replay_dock_ = new QDockWidget(tr("Replay"), this);
@@ -120,6 +127,24 @@ void MainWindow::build() {
   addDockWidget(Qt::BottomDockWidgetArea, replay_dock_);
   replay_dock_->hide();
   connect(replay_, &ReplayPanel::moment_changed, this, &MainWindow::show_moment);
+}
+
+void MainWindow::build_status() {
+  recording_ = new QLabel(tr("● recording"));
+  recording_->setStyleSheet("color: #ff6b6b;");
+  statusBar()->addPermanentWidget(recording_);
+  busy_ = new QWidget;
+  auto* row = new QHBoxLayout(busy_);
+  row->setContentsMargins(0, 0, 0, 0);
+  auto* progress = new QProgressBar;
+  progress->setRange(0, 0);
+  progress->setFixedWidth(120);
+  row->addWidget(progress);
+  auto* cancel = new QPushButton(tr("Ca&ncel"));
+  cancel->setObjectName("cancel");
+  connect(cancel, &QPushButton::clicked, &desk_, &Desk::cancel);
+  row->addWidget(cancel);
+  statusBar()->addPermanentWidget(busy_);
 }
 
 void MainWindow::show_state() {
@@ -131,6 +156,9 @@ void MainWindow::show_state() {
   for (int i = 0; i < pages_->count(); ++i) static_cast<Page*>(pages_->widget(i))->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_room);
+  busy_->setVisible(state.busy.has_value());
+  recording_->setVisible(state.source == Source::virtual_room || state.source == Source::devices);
+  recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
   if (state.busy)
     statusBar()->showMessage(text(state.doing));
   else if (state.refusals.empty())
@@ -156,6 +184,7 @@ void MainWindow::show_pictures() {
   scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
   if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
+  show_tre();
 }
 
 void MainWindow::show_picks() {
@@ -207,27 +236,28 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
 }
 
 void MainWindow::show_live() {
-  const LiveState live = desk_.live();
-  live_bar_->show_live(live);
-  navigate_->show_live(live);
-  const auto& tool = live.tool;
+  live_ = desk_.live();
+  live_bar_->show_live(live_);
+  navigate_->show_live(live_);
+  const ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
+  if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     std::optional<PictureLine> line;
-    QString note;
-    if (tool && *tool && shown_ && i < shown_->views.size()) {
-      const auto seen = (*tool)->by_view.find(shown_->views[i].name);
-      if (seen != (*tool)->by_view.end()) line = seen->second;
-      note = age_text((*tool)->age_s);
-    }
-    xrays_[i]->set_tool(line, note);
+    if (tool && shown_ && i < shown_->views.size())
+      if (const auto seen = tool->by_view.find(shown_->views[i].name); seen != tool->by_view.end())
+        line = seen->second;
+    xrays_[i]->set_tool(line, tool && live_.tool ? age_text(tool->age_s) : QString());
   }
   if (++looks_ % scene_every != 0) return;
   LiveScene scene;
-  if (tool && *tool && (*tool)->calibrator_from_tip) {
-    scene.calibrator_from_tip = (*tool)->calibrator_from_tip;
-    if (live.robot.state) {
-      scene.calibrator_from_base = *scene.calibrator_from_tip * live.robot.state->base_from_tcp.inverse();
-      scene.joints = live.robot.state->joints;
+  scene.path = desk_.state().path.in_calibrator;
+  if (tool && tool->calibrator_from_tip) {
+    scene.calibrator_from_tip = tool->calibrator_from_tip;
+    (live_.bone == Bone::femur ? scene.calibrator_from_tibia_now : scene.calibrator_from_femur_now) =
+        tool->other_bone_moved;
+    if (live_.robot.state) {
+      scene.calibrator_from_base = *scene.calibrator_from_tip * live_.robot.state->base_from_tcp.inverse();
+      scene.joints = live_.robot.state->joints;
     }
   }
   scene_->show_live(scene);

@@ -39,11 +39,10 @@ class MainWindow : public QMainWindow {
   void open_plan(const std::filesystem::path& plan);
   /// A case folder, a session's folder, or X-rays.
   void open_paths(const std::vector<std::filesystem::path>& paths);
-  /// Report (HTML, PDF), result.json and other programs' formats into a folder.
-  Expected<void> export_to(const std::filesystem::path& folder) const;
-
-  /// Shows what the devices say now; the timer does so 33 times a second.
+  /// Shows what the devices say now; a timer does so 50 times a second.
   void show_live();
+  /// What is shown of it.
+  const LiveState& live() const { return live_; }
 
  protected:
   void dragEnterEvent(QDragEnterEvent* event) override;
@@ -55,6 +54,7 @@ class MainWindow : public QMainWindow {
   void build();
   void build_menus();
   void build_rehearsal_menu();
+  void build_status();
   void build_recent();
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;
@@ -65,8 +65,9 @@ class MainWindow : public QMainWindow {
   void show_picks();
   void show_phase(Phase phase);
   void place_pick(std::size_t view, const QPointF& raw);
-  void show_tre(bool shown);
+  void show_tre();
   void show_moment(int index);
+  void show_recorded(const SessionState& then);
   void ask_and_export();
   void save_screenshot();
   void ask_settings();
@@ -90,6 +91,17 @@ class MainWindow : public QMainWindow {
   QMenu* recent_menu_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
 
+  QWidget* busy_ = nullptr;  ///< progress and Cancel
+  QLabel* recording_ = nullptr;
+
+  LiveState live_;
+  std::optional<TreCut> cut_;
+  std::optional<TreVolume> tre_;
+  std::shared_ptr<const Result> tre_of_;
+  std::optional<LiveTool> recorded_tool_;   ///< of the replayed session's case
+  std::optional<std::size_t> recorded_at_;  ///< the registration it is of
+  std::shared_ptr<const Result> recorded_of_;
+  std::optional<ToolOverlay> recorded_;  ///< at the replayed moment
   std::shared_ptr<const Result> shown_;
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;

@@ -12,19 +12,15 @@
 #include <QThreadPool>
 
 #include "gui/desk/steps.h"
-#include "gui/replay/pdf_report.h"
 #include "gui/window/main_window.h"
-#include "helicarm/core/files.h"
 #include "helicarm/navigation/run_case.h"
-#include "helicarm/report/exports.h"
-#include "helicarm/report/report.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double tre_half_mm = 80, tre_step_mm = 10;
+constexpr double tre_step_mm = 10;
 
 QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
 fs::path path_of(const QString& words) { return words.toStdString(); }
@@ -88,7 +84,10 @@ void MainWindow::build_rehearsal_menu() {
                                      {tr("Hide the t&ibia's marker"), "hide:tibia"},
                                      {tr("Tracker repeats itself (f&rozen)"), "frozen"},
                                      {tr("Tracker falls &silent"), "silent"},
-                                     {tr("Tracker's &clock jumps"), "time_jump"}}) {
+                                     {tr("Tracker's &clock jumps"), "time_jump"},
+                                     {tr("&Robot's cable is pulled"), "cut_cable"},
+                                     {tr("C-arm hangs &up before the picture"), "breaks_off"},
+                                     {tr("C-arm &sends another patient's picture"), "other_patient"}}) {
     QAction* action = rehearsal_menu_->addAction(words);
     action->setCheckable(true);
     action->setObjectName(fault);
@@ -153,24 +152,27 @@ void MainWindow::show_moment(int index) {
   if (!then) return say(then.error());
   if (then->case_folder && then->measured && desk_.state().folder != *then->case_folder)
     desk_.open_case(*then->case_folder);
+  show_recorded(*then);
 }
 
-Expected<void> MainWindow::export_to(const fs::path& folder) const {
-  return guarded([&] {
-    if (!shown_ || !desk_.state().measured)
-      throw BadInput(Reason::usage, "nothing is measured yet: there is nothing to export");
-    value_or_throw(write_report(*shown_, folder));
-    value_or_throw(write_pdf_report(*shown_, folder / "report.pdf"));
-    value_or_throw(write_exports(*shown_, folder));
-    value_or_throw(write_file(folder / "result.json", to_text(to_json(*shown_)) + "\n"));
-  });
+void MainWindow::show_recorded(const SessionState& then) {
+  recorded_.reset();
+  const bool is_shown =
+      then.case_folder && desk_.state().folder == *then.case_folder && desk_.state().measured;
+  if (!is_shown || !then.registered_at) return;
+  if (!recorded_tool_ || recorded_at_ != then.registered_at || recorded_of_ != shown_) {
+    const auto tool = tool_of(*replay_->timeline(), then, *shown_);
+    if (!tool) return say(tool.error());
+    recorded_tool_ = *tool;
+    recorded_at_ = then.registered_at;
+    recorded_of_ = shown_;
+  }
+  if (const auto overlay = overlay_of(*recorded_tool_, *replay_->timeline(), then)) recorded_ = *overlay;
 }
 
 void MainWindow::ask_and_export() {
   const QString folder = QFileDialog::getExistingDirectory(this, tr("Folder for the report and the results"));
-  if (folder.isEmpty()) return;
-  if (const auto done = export_to(path_of(folder)); !done) return say(done.error());
-  statusBar()->showMessage(tr("Written to %1").arg(folder));
+  if (!folder.isEmpty()) desk_.export_to(path_of(folder));
 }
 
 void MainWindow::save_screenshot() {
@@ -189,19 +191,25 @@ void MainWindow::ask_settings() {
   }
 }
 
-void MainWindow::show_tre(bool shown) {
-  if (!shown || !shown_ || !desk_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
+void MainWindow::show_tre() {
+  const Eigen::Vector3d middle = middle_of(desk_.state().calibrator);
+  if (!cut_ || !shown_ || !desk_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
+  if (tre_of_ == shown_)
+    return scene_->show_tre(tre_, cut_->axis, middle[int(cut_->axis)] + cut_->from_middle_mm);
+  scene_->show_tre({}, SliceAxis::z, 0);
   Calibration calibration{{}, shown_->joint_covariance};
   for (const ViewResult& view : shown_->views)
     if (view.calibrated) calibration.views.push_back(*view.calibrated);
-  const Eigen::Vector3d centre = middle_of(desk_.state().calibrator);
   QPointer<MainWindow> self(this);
-  QThreadPool::globalInstance()->start([self, calibration, centre] {
-    auto volume = predict_tre(calibration, centre, tre_half_mm, tre_step_mm, click_sigma_px, 1);
+  QThreadPool::globalInstance()->start([self, calibration, middle, of = shown_] {
+    auto volume = predict_tre(calibration, middle, tre_half_mm, tre_step_mm, click_sigma_px, 1);
     QMetaObject::invokeMethod(
         qApp,
-        [self, volume = std::move(volume), z = centre.z()] {
-          if (self) self->scene_->show_tre(volume, SliceAxis::z, z);
+        [self, volume = std::move(volume), of] {
+          if (!self || self->shown_ != of) return;
+          self->tre_ = volume;
+          self->tre_of_ = of;
+          self->show_tre();
         },
         Qt::QueuedConnection);
   });

@@ -204,10 +204,36 @@ PlanPage::PlanPage(Desk& desk, QWidget* parent)
   offered_ = add_button(tr("Take the picks that came with the &plan"), "offeredPicks",
                         [this] { desk_.take_offered_picks(); });
   add_button(tr("&Clear all picks"), "clearPicks", [this] { desk_.clear_picks(); });
-  auto* map = new QCheckBox(tr("Show the expected error (&TRE) in 3-D"));
+  add_map();
+}
+
+void PlanPage::add_map() {
+  auto* row = new QHBoxLayout;
+  auto* map = new QCheckBox(tr("Expected error (&TRE) in 3-D"));
   map->setObjectName("treMap");
-  layout()->addWidget(map);
-  connect(map, &QCheckBox::toggled, this, &PlanPage::map_wanted);
+  auto* axis = new QComboBox;
+  axis->setObjectName("treAxis");
+  axis->addItems({"x", "y", "z"});
+  axis->setCurrentIndex(2);
+  axis->setToolTip(tr("The slice lies across this axis of the calibrator"));
+  auto* place = new QSlider(Qt::Horizontal);
+  place->setObjectName("trePlace");
+  place->setRange(-int(tre_half_mm), int(tre_half_mm));
+  place->setAccessibleName(tr("Place of the slice"));
+  auto* words = new QLabel;
+  for (QWidget* part : std::initializer_list<QWidget*>{map, axis, place, words}) row->addWidget(part);
+  static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  const auto tell = [this, map, axis, place, words] {
+    for (QWidget* part : std::initializer_list<QWidget*>{axis, place}) part->setEnabled(map->isChecked());
+    words->setText(tr("%1 mm").arg(place->value()));
+    emit map_wanted(map->isChecked()
+                        ? std::optional(TreCut{SliceAxis(axis->currentIndex()), double(place->value())})
+                        : std::nullopt);
+  };
+  connect(map, &QCheckBox::toggled, this, tell);
+  connect(axis, &QComboBox::currentIndexChanged, this, tell);
+  connect(place, &QSlider::valueChanged, this, tell);
+  tell();
 }
 
 std::optional<WantedPick> PlanPage::target() const {
@@ -258,6 +284,10 @@ NavigatePage::NavigatePage(Desk& desk, QWidget* parent)
                      [this] { desk_.unlock("the person at the screen"); });
   register_ = add_hold(tr("2  &Register it: about a dozen small moves about its tip"), "register",
                        [this] { desk_.register_robot(); });
+  tour_ = new QLabel;
+  tour_->setWordWrap(true);
+  tour_->hide();
+  layout()->addWidget(tour_);
   tunnel_ = new QComboBox;
   tunnel_->setObjectName("tunnel");
   tunnel_->setAccessibleName(tr("Tunnel"));
@@ -280,6 +310,8 @@ void NavigatePage::show_state(const DeskState& state) {
     tunnel_->clear();
     tunnel_->addItems(names);
   }
+  tour_->setText(state.tour);
+  tour_->setVisible(!state.tour.isEmpty() && !state.hand_eye_rms_mm);
   allow();
 }
 
@@ -296,10 +328,10 @@ void NavigatePage::allow() {
   const bool ready = free && phase_ == LinkPhase::ready;
   const bool placed = state.measured && !next_pick(state);
   unlock_->setEnabled(free && (phase_ == LinkPhase::idle || phase_ == LinkPhase::stopped));
-  register_->setEnabled(ready && !state.at_target);
-  plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.at_target);
+  register_->setEnabled(ready && !state.tool_is_out);
+  plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.tool_is_out);
   go_->setEnabled(ready && state.order.has_value());
-  withdraw_->setEnabled(ready && state.at_target);
+  withdraw_->setEnabled(ready && state.tool_is_out);
 }
 
 VerifyPage::VerifyPage(Desk& desk, QWidget* parent)

@@ -8,6 +8,7 @@
 #include <QTableWidget>
 
 #include "gui/desk/desk.h"
+#include "gui/scene/tre_slice.h"
 #include "gui/window/hold_button.h"
 #include "gui/xray/layers.h"
 
@@ -70,6 +71,14 @@ class CalibratePage : public Page {
   QTableWidget* balls_;
 };
 
+/// Where the map of the expected error is cut.
+struct TreCut {
+  SliceAxis axis;
+  double from_middle_mm;  ///< of the calibrator
+};
+/// As far from the calibrator's middle the map reaches.
+inline constexpr double tre_half_mm = 80;
+
 class PlanPage : public Page {
   Q_OBJECT
 
@@ -81,10 +90,12 @@ class PlanPage : public Page {
   bool snaps() const { return snap_->isChecked(); }
 
  signals:
-  void map_wanted(bool shown);
+  void map_wanted(std::optional<helicarm::gui::TreCut> cut);
   void target_changed();
 
  private:
+  void add_map();
+
   QLabel* next_;
   QTableWidget* ends_;
   QCheckBox* snap_;
@@ -103,7 +114,7 @@ class NavigatePage : public Page {
  private:
   void allow();
 
-  QLabel* says_;
+  QLabel *says_, *tour_;
   QComboBox* tunnel_;
   HoldButton *unlock_, *register_, *go_, *withdraw_;
   QPushButton* plan_;

@@ -21,6 +21,7 @@ class LiveMarks {
  public:
   void set_epipolar(PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
   void set_path(PixelPath rectified) { path_ = {std::move(rectified)}; }
+  bool has_tool() const { return !tool_.given.empty(); }
   void set_tool(const std::optional<PictureLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 

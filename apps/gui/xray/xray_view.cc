@@ -137,6 +137,7 @@ void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
 }
 
 void XrayView::set_tool(std::optional<PictureLine> rectified, const QString& note) {
+  if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
   carry_live();
 }

@@ -8,6 +8,7 @@
 namespace helicarm {
 
 enum class Bone { femur, tibia };
+constexpr Bone other_bone(Bone bone) { return bone == Bone::femur ? Bone::tibia : Bone::femur; }
 
 /// What the tracker read at one moment (Fig. 15b): the pose of each marker, absent where it was not seen.
 struct Poses {
@@ -17,6 +18,9 @@ struct Poses {
   std::optional<RigidTransform> tracker_from_tool;
 
   const std::optional<RigidTransform>& tracker_from(Bone bone) const {
+    return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
+  }
+  std::optional<RigidTransform>& tracker_from(Bone bone) {
     return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
   }
 };

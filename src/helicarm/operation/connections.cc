@@ -42,10 +42,32 @@ Expected<void> Connections::listen(const ReceiverOptions& options) {
   hooks.arrived = [this](const Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     arrivals_.push_back({arrival, monotonic_seconds()});
+    c_arm_ = {arrivals_.back().time_s, {}};
+    broken_before_ = broken();
     news_.notify_all();
   };
+  hooks.refused = [this](const Failure& why) {
+    const std::lock_guard lock(mutex_);
+    c_arm_.refused = why;
+  };
   return DicomReceiver::open(options, *inbox_, std::move(hooks))
-      .map([this](std::unique_ptr<DicomReceiver> receiver) { receiver_ = std::move(receiver); });
+      .map([this](std::unique_ptr<DicomReceiver> receiver) {
+        const std::lock_guard lock(mutex_);
+        receiver_ = std::move(receiver);
+      });
+}
+
+std::uint64_t Connections::broken() const {
+  if (!receiver_) return 0;
+  const ReceiverCounters& counters = receiver_->counters();
+  return counters.rejected + counters.aborted + counters.timed_out;
+}
+
+CArmStatus Connections::c_arm() const {
+  const std::lock_guard lock(mutex_);
+  CArmStatus status = c_arm_;
+  status.broke_off = broken() > broken_before_;
+  return status;
 }
 
 std::optional<DatedArrival> Connections::next_picture(double patience_s) {

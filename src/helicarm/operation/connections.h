@@ -21,6 +21,13 @@ struct DatedArrival {
   double time_s;
 };
 
+/// The C-arm as its receiver knows it: it calls when it has a picture, and is not heard of in between.
+struct CArmStatus {
+  std::optional<double> last_picture_s;  ///< monotonic seconds
+  std::optional<Failure> refused;        ///< a picture since then
+  bool broke_off = false;                ///< a connection since then was lost, or its request turned down
+};
+
 /// The three devices of a plan. Tracker and robot are connected to from the start, and again whenever they
 /// were away.
 class Connections {
@@ -37,12 +44,18 @@ class Connections {
 
   const PoseBoard& board() const { return board_; }
   RobotLink& robot() { return robot_; }
+  /// Before `listen`: nothing came yet.
+  CArmStatus c_arm() const;
 
  private:
+  std::uint64_t broken() const;
+
   std::unique_ptr<Inbox> inbox_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable news_;
   std::deque<DatedArrival> arrivals_;
+  CArmStatus c_arm_;
+  std::uint64_t broken_before_ = 0;  ///< connections, when the last picture came
   PoseBoard board_;
   RobotLink robot_;
   std::unique_ptr<IgtlClient> tracker_;

@@ -28,27 +28,42 @@ LiveTool::Now LiveTool::newest(const PoseBoard& board, Bone bone) const {
   const PoseSample marker = value_or_throw(board.latest(tracker_.marker_of(bone), now_s));
   Now now{{}, now_s - std::min(tool.time_s, marker.time_s)};
   now.poses.tracker_from_tool = tool.tracker_from_tool;
-  (bone == Bone::femur ? now.poses.tracker_from_femur : now.poses.tracker_from_tibia) =
-      marker.tracker_from_tool;
+  now.poses.tracker_from(bone) = marker.tracker_from_tool;
+  const auto other = board.latest(tracker_.marker_of(other_bone(bone)), now_s);
+  if (other) now.poses.tracker_from(other_bone(bone)) = other->tracker_from_tool;
   return now;
 }
 
 Expected<ToolOverlay> LiveTool::overlay(const PoseBoard& board, Bone bone) const {
   return guarded([&] {
     const Now now = newest(board, bone);
-    const RigidTransform bone_from_tip =
-        now.poses.tracker_from(bone)->inverse() * *now.poses.tracker_from_tool * marker_from_tip_;
-    ToolOverlay overlay{{}, now.age_s};
-    if (!views_.empty())
-      if (const auto placed = calibrator_from(bone, views_.front().poses))
-        overlay.calibrator_from_tip = *placed * bone_from_tip;
-    for (const Shown& shown : views_) {
-      const auto line = tool_line("", bone, shown.poses, now.poses, marker_from_tip_);
-      if (!line || !shown.view) continue;
-      if (const auto seen = line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
-    }
+    ToolOverlay overlay = value_or_throw(this->overlay(now.poses, bone));
+    overlay.age_s = now.age_s;
     return overlay;
   });
+}
+
+Expected<ToolOverlay> LiveTool::overlay(const Poses& now, Bone bone) const {
+  if (!now.tracker_from_tool || !now.tracker_from(bone))
+    return fail(Reason::no_pose, "the tool or the bone was not seen");
+  const RigidTransform bone_from_tracker = now.tracker_from(bone)->inverse();
+  ToolOverlay overlay;
+  if (!views_.empty()) {
+    const Poses& then = views_.front().poses;
+    const Bone other = other_bone(bone);
+    const auto placed = calibrator_from(bone, then), other_placed = calibrator_from(other, then);
+    if (placed)
+      overlay.calibrator_from_tip = *placed * bone_from_tracker * *now.tracker_from_tool * marker_from_tip_;
+    if (placed && other_placed && now.tracker_from(other))
+      overlay.other_bone_moved =
+          *placed * bone_from_tracker * *now.tracker_from(other) * other_placed->inverse();
+  }
+  for (const Shown& shown : views_) {
+    const auto line = tool_line("", bone, shown.poses, now, marker_from_tip_);
+    if (!line || !shown.view) continue;
+    if (const auto seen = line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
+  }
+  return overlay;
 }
 
 Expected<TunnelAim> LiveTool::aim(const PoseBoard& board, const std::string& name) const {

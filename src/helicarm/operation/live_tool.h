@@ -25,6 +25,9 @@ struct ToolOverlay {
   double age_s = 0;                            ///< of the older of the tool's and the bone's pose
   /// At the first view's exposure, had the tool moved with the bone; nothing where the bone was not seen.
   std::optional<RigidTransform> calibrator_from_tip = {};
+  /// How the other bone has moved against this one since then, in the calibrator's frame; nothing where it
+  /// was not seen then or is not now.
+  std::optional<RigidTransform> other_bone_moved = {};
 };
 
 /// Follows the tool in measured X-rays. A value of its own: any thread may look, whatever the operation does.
@@ -37,6 +40,8 @@ class LiveTool {
   /// The tool's line in each X-ray against this bone. Refuses no_pose, and stale_pose for a pose older than
   /// 0.1 s.
   Expected<ToolOverlay> overlay(const PoseBoard& board, Bone bone) const;
+  /// The same for poses of a record; its age is 0.
+  Expected<ToolOverlay> overlay(const Poses& now, Bone bone) const;
 
   /// Refuses as `overlay`, and not_seen for a tunnel that is not located.
   Expected<TunnelAim> aim(const PoseBoard& board, const std::string& tunnel) const;

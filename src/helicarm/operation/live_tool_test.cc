@@ -13,6 +13,7 @@ using Eigen::Vector3d;
 
 const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
 const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
+const RigidTransform tibia_then{rotation_from_euler(0.4, 0.2, 1), {60, -90, 870}};
 /// In the femur's marker: the drill comes in at `entry` and goes along z.
 const Vector3d entry(30, 5, -20);
 
@@ -43,6 +44,7 @@ Poses exposure() {
   Poses poses;
   poses.tracker_from_calibrator = {rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
   poses.tracker_from_femur = femur_then;
+  poses.tracker_from_tibia = tibia_then;
   return poses;
 }
 
@@ -71,6 +73,23 @@ TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
       exposure().tracker_from_calibrator->inverse() * (femur_then * femur_from_tip.translation);
   EXPECT_LT((overlay.calibrator_from_tip.value().translation - tip).norm(), 1e-6);
   EXPECT_LT((overlay.by_view.at("AP").tip - measured().views[0].calibrated->view.project(tip)).norm(), 0.01);
+}
+
+TEST(LiveTool, TellsHowTheOtherBoneMovedAgainstThisOne) {
+  const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
+  // Both go along with the femur; the tibia bends on its own besides.
+  const RigidTransform calibrator_then = *exposure().tracker_from_calibrator;
+  const RigidTransform bent{rotation_from_vector(Vector3d(0, 0.1, 0)), Vector3d(2, -1, 4)};
+  const RigidTransform leg_moved = femur_now * femur_then.inverse();
+  Poses now;
+  now.tracker_from_tool = femur_now;
+  now.tracker_from_femur = femur_now;
+  now.tracker_from_tibia = leg_moved * calibrator_then * bent * calibrator_then.inverse() * tibia_then;
+  const auto moved = live.overlay(now, Bone::femur).value().other_bone_moved;
+  EXPECT_TRUE(moved.value().matrix().isApprox(bent.matrix(), 1e-9));
+  now.tracker_from_tibia.reset();
+  EXPECT_FALSE(live.overlay(now, Bone::femur).value().other_bone_moved);
+  EXPECT_EQ(live.overlay(now, Bone::tibia).error().reason, Reason::no_pose);
 }
 
 TEST(LiveTool, OfATunnelThatIsNotLocatedSaysSo) {

@@ -199,19 +199,23 @@ Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     const RigidTransform bone_from_base =
         bone_from_target_.at(order.name) * order.waypoints.back().base_from_tcp.inverse();
+    std::vector<Eigen::Vector3d> tips_in_bone;
+    for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
+      const Eigen::Vector3d from = order.waypoints[i - 1].base_from_tcp.translation;
+      const Eigen::Vector3d way = order.waypoints[i].base_from_tcp.translation - from;
+      const int steps = std::max(1, static_cast<int>(way.norm() / preview_step_mm));
+      for (int step = 0; step <= steps; ++step)
+        tips_in_bone.push_back(bone_from_base * (from + way * step / steps));
+    }
     for (const View& view : views_) {
       const auto shown = std::ranges::find(result_->views, view.name, &ViewResult::name);
       const auto calibrator_from_bone = calibrator_from(tunnel.bone, view.poses);
       if (shown == result_->views.end() || !shown->calibrated || !calibrator_from_bone) continue;
       std::vector<Eigen::Vector2d>& path = preview.by_view[view.name];
-      for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
-        const Eigen::Vector3d from = order.waypoints[i - 1].base_from_tcp.translation;
-        const Eigen::Vector3d way = order.waypoints[i].base_from_tcp.translation - from;
-        const int steps = std::max(1, static_cast<int>(way.norm() / preview_step_mm));
-        for (int step = 0; step <= steps; ++step) {
-          const Eigen::Vector3d tip = *calibrator_from_bone * (bone_from_base * (from + way * step / steps));
-          if (shown->calibrated->view.depth(tip) > 0) path.push_back(shown->calibrated->view.project(tip));
-        }
+      for (const Eigen::Vector3d& tip_in_bone : tips_in_bone) {
+        const Eigen::Vector3d tip = *calibrator_from_bone * tip_in_bone;
+        if (&view == &views_.front()) preview.in_calibrator.push_back(tip);
+        if (shown->calibrated->view.depth(tip) > 0) path.push_back(shown->calibrated->view.project(tip));
       }
     }
     return preview;

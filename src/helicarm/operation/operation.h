@@ -31,9 +31,10 @@ struct TunnelOutcome {
   std::optional<Verification> verification;  ///< Eq. 17 in the X-rays
 };
 
-/// The tip's way as it will be seen in each X-ray, rectified pixels (Eq. 6).
+/// The tip's way to a tunnel, had its bone stayed where it was.
 struct PathPreview {
-  std::map<std::string, std::vector<Eigen::Vector2d>> by_view;
+  std::map<std::string, std::vector<Eigen::Vector2d>> by_view;  ///< in each X-ray, rectified pixels (Eq. 6)
+  std::vector<Eigen::Vector3d> in_calibrator;                   ///< at the first view's exposure, mm
 };
 
 /// One operation from the first X-ray to the last check, over devices that are already connected. Every
