@@ -11,7 +11,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int lamp_width = 118;
+constexpr int least_lamp = 88, beside_lamp = 46;
 /// The depth bar shows so much before the tunnel's entry.
 constexpr double before_entry_mm = 60;
 /// Farther from the axis the depth says little, and is drawn without colour.
@@ -46,7 +46,7 @@ void paint_lamp(QPainter& painter, const QRectF& box, const Lamp& lamp) {
 }
 
 QString aim_words(const TunnelAim& aim) {
-  return LiveBar::tr("%1 mm off the axis   %2°   %3 mm %4")
+  return LiveBar::tr("%1 mm off axis   %2°   %3 mm %4")
       .arg(aim.distance_mm, 0, 'f', 1)
       .arg(aim.angle_deg, 0, 'f', 1)
       .arg(std::abs(aim.depth_mm), 0, 'f', 1)
@@ -95,8 +95,12 @@ void LiveBar::paintEvent(QPaintEvent*) {
   painter.fillRect(rect(), style::panel);
   double left = 8;
   for (const Lamp& lamp : live_.lamps) {
-    paint_lamp(painter, {left, 0, lamp_width, double(height())}, lamp);
-    left += lamp_width + (lamp.text.size() > 10 ? 40 : 0);
+    const int words = std::max(painter.fontMetrics().horizontalAdvance(lamp.name),
+                               painter.fontMetrics().horizontalAdvance(lamp.text));
+    const double width =
+        std::max(least_lamp, words / 20 * 20 + beside_lamp + 20);  // in steps: it must not dance
+    paint_lamp(painter, {left, 0, width, double(height())}, lamp);
+    left += width;
   }
   if (live_.lamps.empty()) {
     painter.setPen(style::quiet);
@@ -105,7 +109,7 @@ void LiveBar::paintEvent(QPaintEvent*) {
   if (!live_.aim) return;
   const QRectF box(left + 10, 0, width() - left - 22, height());
   QFont font = painter.font();
-  font.setPixelSize(18);
+  font.setPixelSize(17);
   painter.setFont(font);
   if (!*live_.aim) {
     painter.setPen(style::amber);

@@ -3,6 +3,7 @@
 #include <QCommandLineParser>
 #include <QStandardPaths>
 #include <QTimer>
+#include <QTranslator>
 #include <csignal>
 
 #include "gui/window/main_window.h"
@@ -19,6 +20,10 @@ int main(int argc, char** argv) {
   QApplication::setApplicationName("helicarm-gui");
   QApplication::setApplicationVersion(HELICARM_VERSION);
   app.setStyleSheet(style::sheet());
+  QTranslator language;
+  if (language.load(QLocale(), "helicarm", "_",
+                    QApplication::applicationDirPath() + "/../share/helicarm/translations"))
+    QApplication::installTranslator(&language);
 
   QCommandLineParser words;
   words.setApplicationDescription(

@@ -138,10 +138,11 @@ void MainWindow::build_status() {
   row->setContentsMargins(0, 0, 0, 0);
   auto* progress = new QProgressBar;
   progress->setRange(0, 0);
-  progress->setFixedWidth(120);
+  progress->setFixedSize(120, 18);
   row->addWidget(progress);
   auto* cancel = new QPushButton(tr("Ca&ncel"));
   cancel->setObjectName("cancel");
+  cancel->setStyleSheet("padding: 1px 12px;");
   connect(cancel, &QPushButton::clicked, &desk_, &Desk::cancel);
   row->addWidget(cancel);
   statusBar()->addPermanentWidget(busy_);

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QDropEvent>
+#include <QMenu>
+#include <QMimeData>
+#include <fstream>
+
+#include "gui/window/window_test.h"
+#include "helicarm/simulation/write_case.h"
+
+namespace helicarm::gui {
+namespace {
+
+void drop(QWidget& onto, const std::vector<fs::path>& paths) {
+  QMimeData data;
+  QList<QUrl> urls;
+  for (const fs::path& path : paths) urls << QUrl::fromLocalFile(QString::fromStdString(path.string()));
+  data.setUrls(urls);
+  QDragEnterEvent enter(QPoint(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(&onto, &enter);
+  QDropEvent event(QPointF(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(&onto, &event);
+}
+
+TEST_F(Window, SilentTrackerShowsWithinASecondAndAHalf) {
+  open_rehearsal();
+  const auto light = [&](const char* name) { return lamp(name).light; };
+  ASSERT_TRUE(wait([&] { return light("tool") == Light::green && light("robot") == Light::amber; }));
+  window_->desk().set_fault("silent", true);
+  EXPECT_TRUE(wait([&] { return light("femur") == Light::red && light("tool") == Light::red; }, 1500));
+  window_->desk().set_fault("silent", false);
+  EXPECT_TRUE(wait([&] { return light("femur") == Light::green; }, 3000));
+}
+
+TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
+  open_rehearsal();
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
+  hold("register");
+  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::moving; }));
+  window_->desk().set_fault("cut_cable", true);
+  ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
+  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_EQ(lamp("robot").light, Light::red);
+  EXPECT_FALSE(lamp("robot").why.isEmpty());
+  for (const char* forbidden : {"register", "planWay", "go", "withdraw"})
+    EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
+  window_->desk().set_fault("cut_cable", false);
+  // Connected again it is still locked: only a person frees it.
+  ASSERT_TRUE(wait([&] { return live().robot.phase != LinkPhase::disconnected; }, 10000));
+  EXPECT_NE(live().robot.phase, LinkPhase::ready);
+  hold("unlock");
+  EXPECT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }, 10000));
+}
+
+TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
+  open_rehearsal();
+  EXPECT_EQ(lamp("C-arm").light, Light::off);
+  window_->desk().set_fault("breaks_off", true);
+  click("shootAP");
+  ASSERT_TRUE(wait([&] { return !state().busy; }));
+  EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
+  EXPECT_TRUE(wait([&] { return lamp("C-arm").light == Light::red; }, 2000));
+  EXPECT_EQ(lamp("C-arm").text, "broke off");
+  window_->desk().set_fault("breaks_off", false);
+  click("shootAP");
+  ASSERT_TRUE(wait([&] { return !state().busy && state().result->views[0].exposure; }));
+  EXPECT_EQ(lamp("C-arm").light, Light::green);
+  EXPECT_NE(card(Phase::acquire).mood, StepMood::refused);
+}
+
+TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
+  open_rehearsal();
+  hold("unlock");
+  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
+  hold("register");
+  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::moving; }));
+  window_->desk().set_fault("silent", true);
+  ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
+  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_EQ(live().robot.phase, LinkPhase::stopped);
+  EXPECT_FALSE(state().hand_eye_rms_mm);
+  window_->desk().set_fault("silent", false);
+}
+
+TEST_F(Window, CancelEndsTheWaitForAPicture) {
+  open_rehearsal();
+  auto* cancel = find("cancel");
+  EXPECT_FALSE(cancel->isVisible());
+  click("shootAP");
+  ASSERT_TRUE(cancel->isVisible());
+  QTest::mouseClick(cancel, Qt::LeftButton);
+  ASSERT_TRUE(wait([&] { return !state().busy; }));
+  EXPECT_FALSE(cancel->isVisible());
+}
+
+TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
+  simulation::SimulationOptions options;
+  options.size = 512;
+  auto simulated = simulation::simulate_case(options).value();
+  for (auto& pixel : simulated.views[1].pixels.pixels()) pixel = 2000;
+  ASSERT_TRUE(simulation::write_case(folder_ / "blank", simulated));
+  drop(*window_, {folder_ / "blank"});
+  ASSERT_TRUE(wait([&] { return state().source == Source::files && !state().busy; }));
+  EXPECT_EQ(card(Phase::rectify).mood, StepMood::refused);
+  EXPECT_THAT(card(Phase::rectify).why.toStdString(), HasSubstr("blank_image"));
+  EXPECT_FALSE(state().measured);
+  window_->desk().export_to(folder_ / "export");
+  ASSERT_TRUE(wait_idle());
+  EXPECT_FALSE(fs::exists(folder_ / "export"));
+}
+
+TEST_F(Window, BadFilesDroppedOnItAreRefusedByName) {
+  std::ofstream(folder_ / "a.dcm") << "no picture";
+  std::ofstream(folder_ / "b.dcm") << "nor this";
+  for (const auto& paths : {std::vector<fs::path>{folder_ / "a.dcm", folder_ / "b.dcm"},
+                            {folder_ / "a.dcm"},
+                            {folder_ / "gone"},
+                            {folder_}}) {
+    drop(*window_, paths);
+    ASSERT_TRUE(wait_idle());
+    EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
+    EXPECT_FALSE(card(Phase::acquire).why.isEmpty());
+  }
+}
+
+TEST_F(Window, ThousandRandomClicksAndKeysFreezeNothing) {
+  open_rehearsal();
+  std::srand(7);
+  const std::array keys{Qt::Key_Tab, Qt::Key_Return, Qt::Key_Space, Qt::Key_L,    Qt::Key_M, Qt::Key_Plus,
+                        Qt::Key_0,   Qt::Key_Up,     Qt::Key_1,     Qt::Key_2,    Qt::Key_R, Qt::Key_Escape,
+                        Qt::Key_W,   Qt::Key_Minus,  Qt::Key_Left,  Qt::Key_Down, Qt::Key_H, Qt::Key_3};
+  qint64 longest = 0;
+  // A dialog runs a loop of its own: somebody puts it away.
+  QTimer away;
+  QObject::connect(&away, &QTimer::timeout, [] {
+    if (QWidget* dialog = QApplication::activeModalWidget()) dialog->close();
+    if (QWidget* popup = QApplication::activePopupWidget()) popup->close();
+  });
+  away.start(20);
+  for (int i = 0; i < 1000; ++i) {
+    QElapsedTimer since;
+    since.start();
+    const QPoint place(std::rand() % window_->width(), 30 + std::rand() % (window_->height() - 30));
+    QWidget* widget = window_->childAt(place);
+    if (widget == nullptr) widget = window_.get();
+    if (std::rand() % 2 == 0)
+      QTest::mouseClick(widget, std::rand() % 4 == 0 ? Qt::RightButton : Qt::LeftButton, Qt::NoModifier,
+                        widget->mapFrom(window_.get(), place));
+    else
+      QTest::keyClick(widget, keys[std::size_t(std::rand()) % keys.size()]);
+    QApplication::processEvents();
+    longest = std::max(longest, since.elapsed());
+  }
+  RecordProperty("longest_ms", int(longest));
+  ASSERT_TRUE(wait_idle());
+  window_->open_rehearsal();
+  ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+}
+
+}  // namespace
+}  // namespace helicarm::gui

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Times and memory, for a person.
+#include <fstream>
+
+#include "gui/window/window_test.h"
+
+namespace helicarm::gui {
+namespace {
+
+double resident_mb() {
+  std::ifstream statm("/proc/self/statm");
+  double pages = 0, resident = 0;
+  statm >> pages >> resident;
+  return resident * double(::sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+/// How old each new pose is when the tool's line by it stands on the screen.
+class PoseToPixels : public QObject {
+ public:
+  explicit PoseToPixels(MainWindow& window) : window_(window) { window.xray(1).installEventFilter(this); }
+  std::vector<double> latencies_ms;
+
+ protected:
+  bool eventFilter(QObject*, QEvent* event) override {
+    const LiveState& shown = window_.live();
+    if (event->type() != QEvent::Paint || !shown.tool || !*shown.tool) return false;
+    const double taken_s = shown.at_s - (*shown.tool)->age_s;
+    if (taken_s - newest_s_ < 1e-4) return false;
+    newest_s_ = taken_s;
+    // Once this paint and its flush are over.
+    QTimer::singleShot(0, this,
+                       [this, taken_s] { latencies_ms.push_back((monotonic_seconds() - taken_s) * 1000); });
+    return false;
+  }
+
+ private:
+  MainWindow& window_;
+  double newest_s_ = 0;
+};
+
+/// Times, for a person: HELICARM_TIMING=1.
+TEST_F(Window, TellsItsTimes) {
+  if (std::getenv("HELICARM_TIMING") == nullptr) GTEST_SKIP() << "only with HELICARM_TIMING";
+  QElapsedTimer since;
+  since.start();
+  MainWindow fresh(folder_ / "fresh");
+  fresh.resize(1280, 800);
+  fresh.show();
+  ASSERT_TRUE(QTest::qWaitForWindowExposed(&fresh));
+  std::printf("window on the screen after %lld ms\n", since.elapsed());
+  fresh.open_rehearsal();
+  ASSERT_TRUE(wait([&] { return fresh.desk().state().source == Source::virtual_room; }));
+  std::printf("rehearsal ready after %lld ms\n", since.elapsed());
+  fresh.close();
+
+  register_in_rehearsal();
+  std::vector<double> redraw, scene;
+  for (int i = 0; i < 200; ++i) {
+    QTest::qWait(7);
+    since.restart();
+    window_->show_live();
+    QApplication::processEvents();
+    redraw.push_back(double(since.nsecsElapsed()) / 1e6);
+    scene.push_back(window_->scene().last_render_ms());
+  }
+  std::vector<double> whole;
+  for (int i = 0; i < 100; ++i) {
+    QTest::qWait(7);
+    since.restart();
+    window_->scene().show_live({});
+    for (int look = 0; look < 4; ++look) window_->show_live();  // the scene comes every fourth time
+    QApplication::processEvents();
+    whole.push_back(double(since.nsecsElapsed()) / 1e6);
+  }
+  PoseToPixels pixels(*window_);
+  QTest::qWait(10000);
+  const auto tell = [](const char* what, std::vector<double>& ms) {
+    std::ranges::sort(ms);
+    std::printf("%s: median %.1f ms, 95 %% below %.1f, worst %.1f (%zu)\n", what, ms[ms.size() / 2],
+                ms[ms.size() * 95 / 100], ms.back(), ms.size());
+  };
+  tell("all that is live shown anew, the scene every fourth time", redraw);
+  tell("both X-rays and the scene redrawn", whole);
+  tell("scene drawn", scene);
+  tell("from the tracker's pose to the tool's line on the screen", pixels.latencies_ms);
+  std::printf("longest hold-up of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
+              WatchedApplication::longest_what.c_str());
+}
+
+/// Operations one after the other for so many minutes: HELICARM_SOAK=30.
+TEST_F(Window, KeepsItsMemoryOverManyOperations) {
+  const char* minutes = std::getenv("HELICARM_SOAK");
+  if (minutes == nullptr) GTEST_SKIP() << "only with HELICARM_SOAK";
+  QElapsedTimer since;
+  since.start();
+  register_in_rehearsal();
+  for (int round = 0; since.elapsed() < std::atof(minutes) * 60000; ++round) {
+    const std::string tunnel = state().tunnels[std::size_t(round % 2)].name;
+    window_->desk().plan_tunnel(tunnel);
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    window_->desk().go();
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    window_->desk().withdraw();
+    ASSERT_TRUE(wait([&] { return !state().busy; }));
+    std::printf("%5.1f min: %.1f MB, %zu outcomes, %zu refusals\n", double(since.elapsed()) / 60000,
+                resident_mb(), state().outcomes.size(), state().refusals.size());
+    std::fflush(stdout);
+  }
+}
+
+}  // namespace
+}  // namespace helicarm::gui
