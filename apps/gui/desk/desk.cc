@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int look_for_pictures_ms = 100;
-constexpr double bone_step_mm = 3;
+constexpr double bone_step_mm = 5;
 
 std::shared_ptr<const Result> only(Pictures pictures) {
   auto result = std::make_shared<Result>();

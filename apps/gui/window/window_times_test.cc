@@ -94,16 +94,21 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
   QElapsedTimer since;
   since.start();
   register_in_rehearsal();
+  const auto done = [&] { ASSERT_TRUE(wait_idle()); };
+  Desk& desk = window_->desk();
+  int outcomes = 0;
   for (int round = 0; since.elapsed() < std::atof(minutes) * 60000; ++round) {
-    const std::string tunnel = state().tunnels[std::size_t(round % 2)].name;
-    window_->desk().plan_tunnel(tunnel);
-    ASSERT_TRUE(wait([&] { return !state().busy; }));
-    window_->desk().go();
-    ASSERT_TRUE(wait([&] { return !state().busy; }));
-    window_->desk().withdraw();
-    ASSERT_TRUE(wait([&] { return !state().busy; }));
-    std::printf("%5.1f min: %.1f MB, %zu outcomes, %zu refusals\n", double(since.elapsed()) / 60000,
-                resident_mb(), state().outcomes.size(), state().refusals.size());
+    if (live().robot.phase != LinkPhase::ready) desk.unlock("soak"), done();
+    if (state().tool_is_out) desk.withdraw(), done();
+    if (round % 10 == 9) {
+      shoot_both();
+      desk.take_offered_picks(), done();
+    }
+    desk.plan_tunnel(state().tunnels[std::size_t(round % 2)].name), done();
+    desk.go(), done();
+    outcomes += state().tool_is_out && state().refusals.empty();
+    std::printf("%5.1f min: %.1f MB, %d outcomes of %d\n", double(since.elapsed()) / 60000, resident_mb(),
+                outcomes, round + 1);
     std::fflush(stdout);
   }
 }
