@@ -30,10 +30,11 @@ target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::
 target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
                           <gmock/gmock.h> <gtest/gtest.h>)
 
-# helicarm_room(NAME [APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
-# A room's files are compiled as one unit; APART: file by file, as they use one name for several things.
+# helicarm_room(NAME [APART] [TESTS_APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
+# A room's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
+# name for several things.
 function(helicarm_room name)
-  cmake_parse_arguments(ARG "APART" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(ARG "APART;TESTS_APART" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
@@ -51,6 +52,9 @@ function(helicarm_room name)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
     target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)
+    if(NOT ARG_TESTS_APART)
+      set_target_properties(${name}_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 6)
+    endif()
     # GCC 12 sees string literals overrun where std::string moves them (GCC bug 105329).
     target_compile_options(${name}_test PRIVATE -Wno-array-bounds -Wno-restrict -Wno-stringop-overflow)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60)

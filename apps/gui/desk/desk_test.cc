@@ -145,7 +145,7 @@ TEST(Lamps, CArmIsGreenByItsLastPictureAndRedByWhatWentWrongSince) {
   EXPECT_EQ(well.light, Light::green);
   EXPECT_EQ(well.text, "7.0 s ago");
   EXPECT_EQ(c_arm_lamp({.last_picture_s = 93, .refused = {}, .broke_off = true}, 100).light, Light::red);
-  const Lamp refused = c_arm_lamp({.last_picture_s = 93, .refused = Failure{Reason::bad_dicom, "cut"}}, 100);
+  const Lamp refused = c_arm_lamp({.last_picture_s = 93, .refused = Failure{Reason::bad_value, "cut"}}, 100);
   EXPECT_EQ(refused.light, Light::red);
   EXPECT_THAT(refused.why.toStdString(), HasSubstr("cut"));
 }

@@ -18,12 +18,12 @@
 namespace helicarm {
 namespace {
 
-const Ranks alone;
+const Ranks by_itself;
 
 std::vector<NumberRow> rows_of(const NumberOptions& options, unsigned threads = 2) {
   EngineOptions engine;
   engine.threads = threads;
-  return study_number(options, engine, alone).value();
+  return study_number(options, engine, by_itself).value();
 }
 
 const NumberRow& row(const std::vector<NumberRow>& rows, int balls, SigmaReading sigma, PixelReading reading,
@@ -111,12 +111,12 @@ TEST(StudyNumber, NoNoiseNoError) {
 TEST(StudyNumber, RefusesTooFewBallsEqualOnesAndNoGroups) {
   NumberOptions options;
   options.balls = {12, 5};
-  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_number(options, {}, by_itself).error().reason, Reason::bad_value);
   options.balls = {12, 8, 12};
-  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_number(options, {}, by_itself).error().reason, Reason::bad_value);
   options.balls = {12};
   options.groups = 0;
-  EXPECT_EQ(study_number(options, {}, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_number(options, {}, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyNumber, FilesOfASingleNumberStandToo) {
@@ -136,8 +136,8 @@ TEST(StudyUniformity, EvennessGoesWithSmallErrors) {
   EngineOptions one, three;
   one.threads = 1;
   three.threads = 3;
-  const StudyFiles files = files_of(study_uniformity(options, one, alone).value(), options);
-  EXPECT_EQ(files.csv, files_of(study_uniformity(options, three, alone).value(), options).csv);
+  const StudyFiles files = files_of(study_uniformity(options, one, by_itself).value(), options);
+  EXPECT_EQ(files.csv, files_of(study_uniformity(options, three, by_itself).value(), options).csv);
   for (const Json& entry : files.json["correlations"]) {
     const std::string tre = entry["tre"];
     if (tre.starts_with("mean_tre_ball")) {
@@ -145,7 +145,7 @@ TEST(StudyUniformity, EvennessGoesWithSmallErrors) {
     }
   }
   options.balls = 5;
-  EXPECT_EQ(study_uniformity(options, one, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_uniformity(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyLocation, TreRisesAwayFromTheBalls) {
@@ -155,8 +155,8 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EngineOptions one, three;
   one.threads = 1;
   three.threads = 3;
-  const LocationMap map = study_location(options, one, alone).value();
-  EXPECT_EQ(files_of(map, options).csv, files_of(study_location(options, three, alone).value(), options).csv);
+  const LocationMap map = study_location(options, one, by_itself).value();
+  EXPECT_EQ(files_of(map, options).csv, files_of(study_location(options, three, by_itself).value(), options).csv);
   ASSERT_EQ(map.side, 7);
   ASSERT_EQ(map.points.size(), 98u);
   const LocationPoint &middle = map.points[24], &corner = map.points[48];
@@ -173,7 +173,7 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EXPECT_THAT(files.csv, ::testing::HasSubstr(",seen_in\n"));
   EXPECT_THAT(files.svg, ::testing::HasSubstr("outside the lateral picture"));
   options.balls = {{0, 0, 0}};
-  EXPECT_EQ(study_location(options, one, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_location(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyBiplane, HasTheOrderOfTable1) {
@@ -182,8 +182,8 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
   EngineOptions one, three;
   one.threads = 1;
   three.threads = 3;
-  const auto rows = study_biplane(options, one, alone).value();
-  EXPECT_EQ(files_of(rows, options).csv, files_of(study_biplane(options, three, alone).value(), options).csv);
+  const auto rows = study_biplane(options, one, by_itself).value();
+  EXPECT_EQ(files_of(rows, options).csv, files_of(study_biplane(options, three, by_itself).value(), options).csv);
   const auto mean = [&](std::string_view calibrator, std::string_view points, std::string_view measure) {
     for (const BiplaneRow& r : rows)
       if (r.calibrator == calibrator && r.points == points && r.measure == measure) return r.figures.mean;
@@ -198,7 +198,7 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
     EXPECT_LT(r.figures.rms, r.figures.max);
   }
   options.far_plate_mm = options.near_plate_mm;
-  EXPECT_EQ(study_biplane(options, one, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_biplane(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
@@ -209,16 +209,16 @@ TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
   EngineOptions one, three;
   one.threads = 1;
   three.threads = 3;
-  const DesignAnswer answer = study_design(options, one, alone).value();
+  const DesignAnswer answer = study_design(options, one, by_itself).value();
   EXPECT_TRUE(answer.design.keeps_rules);
   EXPECT_EQ(answer.design.calibrator.balls.size(), 12u);
   EXPECT_LT(answer.design.tre_mm, 0.95 * answer.udcsc.tre_mm);
   EXPECT_LT(answer.design.tre_mm, answer.median_random_mm);
   const StudyFiles files = files_of(answer, options);
-  EXPECT_EQ(files.csv, files_of(study_design(options, three, alone).value(), options).csv);
+  EXPECT_EQ(files.csv, files_of(study_design(options, three, by_itself).value(), options).csv);
   EXPECT_TRUE(calibrator_from_json(files.json["calibrator"], "design"));
   options.balls = 5;
-  EXPECT_EQ(study_design(options, one, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_design(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
@@ -229,10 +229,10 @@ TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
   EngineOptions engine, by_two;
   engine.threads = 1;
   by_two.threads = 2;
-  const auto tests = study_calibration(options, engine, alone).value();
+  const auto tests = study_calibration(options, engine, by_itself).value();
   ASSERT_EQ(tests.size(), 2u);
   EXPECT_EQ(files_of(tests, options).csv,
-            files_of(study_calibration(options, by_two, alone).value(), options).csv);
+            files_of(study_calibration(options, by_two, by_itself).value(), options).csv);
   EXPECT_EQ(tests[0].best.refused, 0);
   EXPECT_GE(tests[0].best.balls, 10);
   for (const double error : tests[0].best.targets) EXPECT_LT(error, 0.3);
@@ -240,7 +240,7 @@ TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
   EXPECT_TRUE(std::filesystem::is_empty(options.folder));
   std::filesystem::remove_all(options.folder);
   options.groups = 0;
-  EXPECT_EQ(study_calibration(options, engine, alone).error().reason, Reason::bad_value);
+  EXPECT_EQ(study_calibration(options, engine, by_itself).error().reason, Reason::bad_value);
 }
 
 TEST(StudyCalibration, RefusedTestsAreCountedAndLeftOut) {
