@@ -10,6 +10,7 @@
 #include "gui/replay/pdf_report.h"
 #include "helicarm/core/files.h"
 #include "helicarm/navigation/run_case.h"
+#include "helicarm/operation/plan_fields.h"
 #include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
@@ -95,6 +96,7 @@ void Desk::begin(Phase phase, std::string doing, std::function<Change()> work) {
             state_.refusals.insert_or_assign(phase, done.error());
           emit changed();
           if (!done) emit refused(phase, sentence_of(done.error()));
+          if (std::exchange(picks_came_, false)) measure();
         },
         Qt::QueuedConnection);
   });
@@ -140,10 +142,13 @@ void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folde
   room.operation->confirmed_by("the person at the screen");
 }
 
-void Desk::open_room(const operating_room::VirtualRoomOptions& options, const fs::path& folder) {
+void Desk::open_room(const operating_room::VirtualRoomOptions& options, const OperationPlan& wished,
+                     const fs::path& folder) {
   open(Source::virtual_room, folder, "opening the virtual operating room", [=, this](Room& room) -> Change {
     room.virtual_room = value_or_throw(operating_room::VirtualRoom::open(options));
     OperationPlan plan = plan_for(*room.virtual_room, room.virtual_room->tracker().port());
+    for (const auto& field : plan_fields)
+      if (field.get(wished) != field.get(OperationPlan())) field.set(plan, field.get(wished));
     const Json offered = std::exchange(plan.picks, Json::array());
     room.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
     ReceiverOptions receiver;
@@ -262,6 +267,7 @@ Desk::Change Desk::measured(Room& room, const std::vector<Pick>& picks) {
 
 void Desk::measure() {
   if (!room_) return;
+  picks_came_ = state_.busy == Phase::calibrate;
   begin(Phase::calibrate, "measuring", [this, room = room_, picks = state_.picks, options = options_] {
     room->options = options;
     return measured(*room, picks);
@@ -275,12 +281,21 @@ void Desk::picks_changed() {
   if (!next_pick(state_)) measure();
 }
 
+bool Desk::is_whole(const std::string& point) const {
+  return std::ranges::all_of(state_.views,
+                             [&](const std::string& view) { return pick_of(state_, point, view); });
+}
+
+bool Desk::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
+
 void Desk::pick(Pick pick) {
-  if (state_.busy) return;
+  if (!takes_picks()) return;
   std::erase_if(state_.picks,
                 [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
+  const std::string point = pick.name;
   state_.picks.push_back(std::move(pick));
   picks_changed();
+  if (is_whole(point)) measure();  // its place and how far its rays miss show at once
 }
 
 void Desk::take_offered_picks() {
@@ -306,11 +321,14 @@ void Desk::export_to(const fs::path& folder) {
     emit refused(Phase::verify, tr("Nothing is measured yet: there is nothing to export."));
     return;
   }
-  begin(Phase::verify, "writing the report", [this, result = state_.result, folder]() -> Change {
-    value_or_throw(write_report(*result, folder));
-    value_or_throw(write_pdf_report(*result, folder / "report.pdf"));
-    value_or_throw(write_exports(*result, folder));
-    value_or_throw(write_file(folder / "result.json", to_text(to_json(*result)) + "\n"));
+  Result result = *state_.result;
+  for (const auto& [tunnel, outcome] : state_.outcomes)
+    if (outcome.verification) result.verifications.push_back(*outcome.verification);
+  begin(Phase::verify, "writing the report", [this, result = std::move(result), folder]() -> Change {
+    value_or_throw(write_report(result, folder));
+    value_or_throw(write_pdf_report(result, folder / "report.pdf"));
+    value_or_throw(write_exports(result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(result)) + "\n"));
     return [this, folder](DeskState&) { emit exported(QString::fromStdString(folder.string())); };
   });
 }

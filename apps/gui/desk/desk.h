@@ -23,6 +23,7 @@ struct LiveState {
   RobotLinkStatus robot;
   Bone bone = Bone::femur;                    ///< against which the tool is seen
   std::optional<Expected<ToolOverlay>> tool;  ///< nothing before the robot is registered
+  QString tunnel;                             ///< that is followed
   std::optional<Expected<TunnelAim>> aim;     ///< nothing before a tunnel is followed
 };
 
@@ -37,8 +38,10 @@ class Desk : public QObject {
 
   const DeskState& state() const { return state_; }
 
-  /// A virtual operating room in this program, over its real protocols through sockets.
-  void open_room(const operating_room::VirtualRoomOptions& options, const std::filesystem::path& folder);
+  /// A virtual operating room in this program, over its real protocols through sockets; its plan has those
+  /// `plan_fields` of `wished` that are not as usual.
+  void open_room(const operating_room::VirtualRoomOptions& options, const OperationPlan& wished,
+                 const std::filesystem::path& folder);
   /// The devices of a plan.
   void open_devices(const std::filesystem::path& plan, const ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
@@ -51,7 +54,9 @@ class Desk : public QObject {
   void expect(const std::string& view);        ///< the next picture is this view's
   void shoot(const std::string& view);         ///< in the virtual room
   void touch(const std::string& check_point);  ///< with the pointer
+  /// Also while an earlier pick is being measured; then measures again.
   void pick(Pick pick);
+  bool takes_picks() const;
   void take_offered_picks();
   void clear_picks();
   void measure();
@@ -92,6 +97,7 @@ class Desk : public QObject {
   void meanwhile(Change change);
   void take_waiting_picture();
   void picks_changed();
+  bool is_whole(const std::string& point) const;
   Change measured(Room& room, const std::vector<Pick>& picks);
   static Change with_plan(const OperationPlan& plan, const Json& offered);
   Change with_case(Case given, Room& room);
@@ -101,6 +107,7 @@ class Desk : public QObject {
   std::shared_ptr<Room> room_;
   std::optional<LiveTool> live_tool_;
   std::string followed_;
+  bool picks_came_ = false;  ///< while it measured
   RunOptions options_;
   QTimer pictures_;
   QThreadPool errands_;  ///< what must not wait for the worker: the stop above all

@@ -134,7 +134,9 @@ LiveState Desk::live() const {
   const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
   if (tunnel != state_.tunnels.end()) now.bone = tunnel->bone;
   now.tool = live_tool_->overlay(board, now.bone);
-  if (tunnel != state_.tunnels.end()) now.aim = live_tool_->aim(board, followed_);
+  if (tunnel == state_.tunnels.end()) return now;
+  now.tunnel = QString::fromStdString(followed_);
+  now.aim = live_tool_->aim(board, followed_);
   return now;
 }
 

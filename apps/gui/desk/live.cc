@@ -64,8 +64,8 @@ Lamp robot_lamp(const RobotLinkStatus& status) {
       lamp.light = Light::red;
       break;
   }
-  lamp.text = status.phase == LinkPhase::disconnected ? words(name(status.phase))
-                                                      : tr("%1, %2").arg(words(name(status.phase)), age);
+  const QString phase = status.phase == LinkPhase::idle ? tr("locked") : words(name(status.phase));
+  lamp.text = status.phase == LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
   if (status.phase == LinkPhase::idle) lamp.why = tr("locked until a person unlocks it");
   return lamp;
 }

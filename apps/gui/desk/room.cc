@@ -81,6 +81,8 @@ Expected<Case> case_of_pictures(const std::vector<std::filesystem::path>& pictur
   given.calibrator = udcsc();
   given.plate = plate48();
   for (const std::filesystem::path& picture : pictures) {
+    if (!std::filesystem::exists(picture))
+      return fail(Reason::missing_file, fmt::format("{}: no such file or folder", picture.string()));
     CaseView view;
     view.name = picture.stem().string();
     view.image = std::filesystem::absolute(picture);

@@ -98,14 +98,16 @@ void plan(StepCard& card, const DeskState& state) {
 
 void navigate(StepCard& card, const DeskState& state) {
   if (!state.hand_eye_rms_mm) return;
-  card.figure = tr("registered, %1 mm").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
+  card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   if (state.order) card.why = tr("%1: look at the path, then confirm").arg(text(state.order->name));
   if (state.outcomes.empty()) return;
   double worst = 0;
   for (const auto& [name, outcome] : state.outcomes)
     if (!outcome.loop.empty()) worst = std::max(worst, outcome.loop.back().distance_mm);
-  card.figure =
-      tr("%1 mm off, %2/%3").arg(worst, 0, 'f', 2).arg(state.outcomes.size()).arg(state.tunnels.size());
+  card.figure = tr("%1 of %2 tunnels, %3 mm")
+                    .arg(state.outcomes.size())
+                    .arg(state.tunnels.size())
+                    .arg(worst, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 

@@ -6,6 +6,7 @@
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QListWidget>
+#include <QMouseEvent>
 #include <QPlainTextEdit>
 #include <QProgressBar>
 #include <QPushButton>
@@ -27,6 +28,18 @@ QString clock_time(double seconds) {
   const int tenths = int(seconds * 10);
   return QString("%1:%2.%3").arg(tenths / 600).arg(tenths / 10 % 60, 2, 10, QChar('0')).arg(tenths % 10);
 }
+
+/// A click leads where it was.
+class TimeSlider : public QSlider {
+ public:
+  using QSlider::QSlider;
+
+ protected:
+  void mousePressEvent(QMouseEvent* event) override {
+    setValue(QStyle::sliderValueFromPosition(minimum(), maximum(), int(event->position().x()), width()));
+    QSlider::mousePressEvent(event);
+  }
+};
 
 /// Never takes the focus: the space bar is not its key.
 QPushButton* button(const QString& text, const QString& tip, QWidget* parent) {
@@ -70,7 +83,7 @@ void ReplayPanel::build() {
   back_ = button(tr("◀"), tr("One moment back (J or comma)"), this);
   play_ = button(tr("Play"), tr("Play and halt (K)"), this);
   forward_ = button(tr("▶"), tr("One moment on (L or period)"), this);
-  slider_ = new QSlider(Qt::Horizontal, this);
+  slider_ = new TimeSlider(Qt::Horizontal, this);
   slider_->setAccessibleName(tr("Time"));
   time_ = new QLabel(clock_time(0), this);
   speed_ = new QComboBox(this);

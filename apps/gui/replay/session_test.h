@@ -13,9 +13,9 @@
 /// A short operation's record, one of each kind, for tests.
 namespace helicarm::gui {
 
-inline constexpr std::array<std::string_view, 14> session_kinds{
-    "session", "plan",     "refused", "exposure",  "exposure",  "case",    "result",
-    "poses",   "hand_eye", "order",   "confirmed", "navigated", "outcome", "end"};
+inline constexpr std::array<std::string_view, 15> session_kinds{
+    "session",  "plan",  "refused",   "exposure",  "exposure", "case",   "result", "poses",
+    "hand_eye", "order", "confirmed", "navigated", "outcome",  "halted", "end"};
 
 inline Json window_with(double femur_x) {
   PoseWindow window{10, 0.5, {}};
@@ -46,6 +46,7 @@ inline void write_session(const std::filesystem::path& folder) {
                      {{{"distance_mm", 1.5}, {"turn_deg", 1.0}, {"sigma_mm", 0.1}},
                       {{"distance_mm", 0.25}, {"turn_deg", 0.1}, {"sigma_mm", 0.1}}}}});
   add("outcome", {{"tunnel", "femur"}, {"start", end}, {"end", end}});
+  add("halted", {{"order", "tibia"}, {"why", "robot_stopped"}, {"message", "stopped by a person"}});
   add("end", Json::object());
 }
 

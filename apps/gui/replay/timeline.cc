@@ -72,6 +72,8 @@ QString summary_of(const std::string& kind, const Json& content) {
         .arg(text_of(content, "name"), count_of(content.at("waypoints")));
   if (kind == "confirmed")
     return Words::tr("Order %1 confirmed by %2").arg(text_of(content, "order"), text_of(content, "by"));
+  if (kind == "halted")
+    return Words::tr("Order %1 halted: %2").arg(text_of(content, "order"), text_of(content, "message"));
   if (kind == "navigated") return loop_summary(content);
   if (kind == "outcome") return outcome_summary(content);
   if (kind == "end") return Words::tr("End of the operation");

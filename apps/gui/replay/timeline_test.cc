@@ -87,7 +87,7 @@ TEST_F(TimelineTest, RecordWithoutItsContentIsNamed) {
   ASSERT_TRUE(session->append("exposure", {{"view", 7}}));
   const auto timeline = read_timeline(folder_);
   ASSERT_FALSE(timeline);
-  EXPECT_THAT(timeline.error().message, testing::HasSubstr("record 14"));
+  EXPECT_THAT(timeline.error().message, testing::HasSubstr("record 15"));
 }
 
 TEST_F(TimelineTest, CaseOutsideTheSessionIsRefused) {

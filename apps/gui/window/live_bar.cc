@@ -45,12 +45,15 @@ void paint_lamp(QPainter& painter, const QRectF& box, const Lamp& lamp) {
   painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, lamp.text);
 }
 
-QString aim_words(const TunnelAim& aim) {
-  return LiveBar::tr("%1 mm off axis   %2°   %3 mm %4")
-      .arg(aim.distance_mm, 0, 'f', 1)
-      .arg(aim.angle_deg, 0, 'f', 1)
-      .arg(std::abs(aim.depth_mm), 0, 'f', 1)
-      .arg(aim.depth_mm < 0 ? LiveBar::tr("before the entry") : LiveBar::tr("deep"));
+QString aim_words(const QString& tunnel, const TunnelAim& aim) {
+  const QString off = LiveBar::tr("%1: %2 mm off axis   %3°")
+                          .arg(tunnel)
+                          .arg(aim.distance_mm, 0, 'f', 1)
+                          .arg(aim.angle_deg, 0, 'f', 1);
+  if (aim.distance_mm > near_axis_mm) return off;
+  return off + LiveBar::tr("   %1 mm %2")
+                   .arg(std::abs(aim.depth_mm), 0, 'f', 1)
+                   .arg(aim.depth_mm < 0 ? LiveBar::tr("before the entry") : LiveBar::tr("deep"));
 }
 
 void paint_depth(QPainter& painter, const QRectF& box, const TunnelAim& aim) {
@@ -85,7 +88,7 @@ void LiveBar::show_live(const LiveState& live) {
 QString LiveBar::words() const {
   QStringList all;
   for (const Lamp& lamp : live_.lamps) all << QString("%1: %2").arg(lamp.name, lamp.text);
-  if (live_.aim) all << (*live_.aim ? aim_words(**live_.aim) : sentence_of(live_.aim->error()));
+  if (live_.aim) all << (*live_.aim ? aim_words(live_.tunnel, **live_.aim) : sentence_of(live_.aim->error()));
   return all.join("; ");
 }
 
@@ -117,7 +120,8 @@ void LiveBar::paintEvent(QPaintEvent*) {
     return;
   }
   painter.setPen(style::text);
-  painter.drawText(box.adjusted(0, 4, 0, -26), Qt::AlignLeft | Qt::AlignVCenter, aim_words(**live_.aim));
+  painter.drawText(box.adjusted(0, 4, 0, -26), Qt::AlignLeft | Qt::AlignVCenter,
+                   aim_words(live_.tunnel, **live_.aim));
   paint_depth(painter, box.adjusted(0, 36, 0, -6), **live_.aim);
 }
 

@@ -6,6 +6,7 @@
 #include <QTranslator>
 #include <csignal>
 
+#include "gui/window/flat_memory.h"
 #include "gui/window/main_window.h"
 #include "gui/window/style.h"
 
@@ -15,6 +16,7 @@ volatile std::sig_atomic_t told_to_end = 0;
 
 int main(int argc, char** argv) {
   using namespace helicarm::gui;
+  keep_memory_flat();
   QApplication app(argc, argv);
   QApplication::setOrganizationName("helicarm");
   QApplication::setApplicationName("helicarm-gui");
@@ -37,7 +39,11 @@ int main(int argc, char** argv) {
   const QCommandLineOption sessions("sessions", "Keep the records of operations below this folder.", "DIR");
   words.addOptions({plan, sessions});
   words.addPositionalArgument("paths", "A case folder, a session's folder, or X-rays to open.", "[PATH...]");
-  words.process(app);
+  if (!words.parse(QApplication::arguments())) {
+    std::fprintf(stderr, "%s\n", qPrintable(words.errorText()));
+    return 2;
+  }
+  words.process(app);  // --help and --version
 
   const QString place =
       words.isSet(sessions)

@@ -8,6 +8,7 @@
 #include <QMenu>
 #include <QProgressBar>
 #include <QPushButton>
+#include <QScrollArea>
 #include <QSplitter>
 #include <QStatusBar>
 #include <QVBoxLayout>
@@ -29,9 +30,13 @@ constexpr double epipolar_reach_mm = 150;
 QString text(const std::string& words) { return QString::fromStdString(words); }
 
 /// The first step that is not done.
-Phase open_phase(const std::array<StepCard, phases.size()>& cards) {
-  for (const StepCard& card : cards)
-    if (card.mood != StepMood::good && card.mood != StepMood::warning) return card.phase;
+Phase open_phase(const std::array<StepCard, phases.size()>& cards, bool registered) {
+  for (const StepCard& card : cards) {
+    if (card.mood == StepMood::good || (card.mood == StepMood::warning && card.phase != Phase::plan))
+      continue;
+    // A plan to be doubted is looked at before anything moves.
+    if (card.mood != StepMood::warning || !registered) return card.phase;
+  }
   return Phase::verify;
 }
 
@@ -94,15 +99,23 @@ void MainWindow::build() {
   scene_->setObjectName("scene");
   right->addWidget(scene_);
   pages_ = new QStackedWidget;
+  auto* acquire = new AcquirePage(desk_, this);
   auto* rectify = new RectifyPage(desk_, this);
   plan_ = new PlanPage(desk_, this);
   navigate_ = new NavigatePage(desk_, this);
   auto* verify = new VerifyPage(desk_, this);
-  for (Page* page : std::initializer_list<Page*>{new AcquirePage(desk_, this), rectify,
-                                                 new CalibratePage(desk_, this), plan_, navigate_, verify})
-    pages_->addWidget(page);
+  for (Page* page : std::initializer_list<Page*>{acquire, rectify, new CalibratePage(desk_, this), plan_,
+                                                 navigate_, verify}) {
+    auto* scrolled = new QScrollArea;
+    scrolled->setWidgetResizable(true);
+    scrolled->setFrameShape(QFrame::NoFrame);
+    scrolled->setWidget(page);
+    scrolled->setFocusPolicy(Qt::NoFocus);
+    pages_->addWidget(scrolled);
+    all_pages_.push_back(page);
+  }
   right->addWidget(pages_);
-  right->setSizes({330, 330});
+  right->setSizes({280, 380});
   sides->addWidget(right);
   sides->setStretchFactor(2, 3);
   column->addWidget(sides, 1);
@@ -111,6 +124,8 @@ void MainWindow::build() {
   setCentralWidget(middle);
   build_status();
 
+  connect(acquire, &AcquirePage::rehearsal_wanted, this, &MainWindow::open_rehearsal);
+  connect(acquire, &AcquirePage::folder_wanted, this, &MainWindow::ask_folder);
   connect(rectify, &RectifyPage::layer_wanted, this, [this](Layer layer) {
     for (XrayView* xray : xrays_) xray->set_layer(layer);
   });
@@ -152,13 +167,15 @@ void MainWindow::show_state() {
   const DeskState& state = desk_.state();
   const auto cards = steps_of(state);
   strip_->show_steps(cards);
-  if (!state.busy && !moved_on_) show_phase(open_phase(cards));
+  if (!state.busy && !moved_on_) show_phase(open_phase(cards, state.hand_eye_rms_mm.has_value()));
   if (state.busy) moved_on_ = false;
-  for (int i = 0; i < pages_->count(); ++i) static_cast<Page*>(pages_->widget(i))->show_state(state);
+  for (Page* page : all_pages_) page->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
   rehearsal_menu_->setEnabled(state.source == Source::virtual_room);
   busy_->setVisible(state.busy.has_value());
-  recording_->setVisible(state.source == Source::virtual_room || state.source == Source::devices);
+  const bool replays = state.source == Source::files && replay_dock_->isVisible();
+  recording_->setText(replays ? tr("▶ replay") : tr("● recording"));
+  recording_->setVisible(replays || state.source == Source::virtual_room || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
   if (state.busy)
     statusBar()->showMessage(text(state.doing));
@@ -198,7 +215,7 @@ void MainWindow::show_picks() {
     for (const Pick& pick : state.picks)
       if (pick.view == view.name && next_pick(state)) picks.push_back({text(pick.name), pick.uv_raw});
     xrays_[i]->set_picks(std::move(picks));
-    xrays_[i]->set_picking(wanted.has_value() && !state.busy);
+    xrays_[i]->set_picking(wanted.has_value() && desk_.takes_picks());
     const auto path = state.path.by_view.find(view.name);
     xrays_[i]->set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
 
@@ -234,6 +251,7 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   if (plan_->snaps()) pick.snap = Snap::ball;
   if (desk_.state().source != Source::files) pick.moves_with = wanted->bone;
   desk_.pick(std::move(pick));
+  plan_->placed(wanted->point);
 }
 
 void MainWindow::show_live() {

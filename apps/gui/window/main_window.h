@@ -68,6 +68,8 @@ class MainWindow : public QMainWindow {
   void show_tre();
   void show_moment(int index);
   void show_recorded(const SessionState& then);
+  void ask_rehearsal();
+  void ask_folder();
   void ask_and_export();
   void save_screenshot();
   void ask_settings();
@@ -84,6 +86,7 @@ class MainWindow : public QMainWindow {
   SceneView* scene_ = nullptr;
   LiveBar* live_bar_ = nullptr;
   QStackedWidget* pages_ = nullptr;
+  std::vector<Page*> all_pages_;
   PlanPage* plan_ = nullptr;
   NavigatePage* navigate_ = nullptr;
   ReplayPanel* replay_ = nullptr;

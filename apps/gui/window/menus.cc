@@ -25,25 +25,52 @@ constexpr double tre_step_mm = 10;
 QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
 fs::path path_of(const QString& words) { return words.toStdString(); }
 
+/// X-rays that lie in a folder without a case.json, by name.
+std::vector<fs::path> pictures_in(const fs::path& folder) {
+  std::vector<fs::path> pictures;
+  std::error_code unreadable;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
+    if (const fs::path kind = entry.path().extension();
+        kind == ".dcm" || kind == ".png" || kind == ".tif" || kind == ".tiff")
+      pictures.push_back(entry.path());
+  std::ranges::sort(pictures);
+  return pictures;
+}
+
+/// A dialog that leaves the window, and STOP in it, in reach.
+void show_beside(QDialog* dialog) {
+  dialog->setAttribute(Qt::WA_DeleteOnClose);
+  dialog->setModal(false);
+  dialog->show();
+}
+
+template <class Then>
+void ask_files(QWidget* parent, const QString& title, QFileDialog::FileMode mode, const QString& filter,
+               Then then) {
+  auto* dialog = new QFileDialog(parent, title, {}, filter);
+  dialog->setFileMode(mode);
+  QObject::connect(dialog, &QFileDialog::filesSelected, parent, [then](const QStringList& chosen) {
+    std::vector<fs::path> paths;
+    for (const QString& name : chosen) paths.push_back(path_of(name));
+    if (!paths.empty()) then(paths);
+  });
+  show_beside(dialog);
+}
+
 }  // namespace
 
 void MainWindow::build_menus() {
   QMenu* file = menuBar()->addMenu(tr("&File"));
   file->addAction(tr("&New rehearsal in a virtual operating room"), QKeySequence::New, this,
-                  &MainWindow::open_rehearsal);
+                  &MainWindow::ask_rehearsal);
   file->addAction(tr("&Connect the devices of a plan..."), this, [this] {
-    const QString plan = QFileDialog::getOpenFileName(this, tr("Plan"), {}, tr("Plan (*.json)"));
-    if (!plan.isEmpty()) open_plan(path_of(plan));
+    ask_files(this, tr("Plan"), QFileDialog::ExistingFile, tr("Plan (*.json)"),
+              [this](const std::vector<fs::path>& chosen) { open_plan(chosen.front()); });
   });
-  file->addAction(tr("&Open a case or session folder..."), QKeySequence::Open, this, [this] {
-    const QString folder = QFileDialog::getExistingDirectory(this, tr("Case or session"));
-    if (!folder.isEmpty()) open_paths({path_of(folder)});
-  });
+  file->addAction(tr("&Open a case or session folder..."), QKeySequence::Open, this, &MainWindow::ask_folder);
   file->addAction(tr("Open &X-rays..."), this, [this] {
-    std::vector<fs::path> paths;
-    for (const QString& name : QFileDialog::getOpenFileNames(this, tr("X-rays")))
-      paths.push_back(path_of(name));
-    if (!paths.empty()) open_paths(paths);
+    ask_files(this, tr("X-rays"), QFileDialog::ExistingFiles, {},
+              [this](const std::vector<fs::path>& chosen) { open_paths(chosen); });
   });
   recent_menu_ = file->addMenu(tr("&Recent"));
   build_recent();
@@ -65,20 +92,28 @@ void MainWindow::build_menus() {
   view->addAction(replay_dock_->toggleViewAction());
   build_rehearsal_menu();
 
-  menuBar()->addMenu(tr("&Help"))->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [this] {
-    QMessageBox::information(
-        this, tr("Keys"),
-        tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
-           "Enter: press; hold it on a yellow button\n\nOn an X-ray: + - 0 zoom, arrows pan, Shift+arrows "
-           "and "
-           "Enter place a tunnel's end, L layer, M magnifier, W contrast\n\n"
-           "In 3-D: 1 AP, 2 lateral, 3 outside, arrows turn, + - zoom, R back\n\n"
-           "Research instrument, not a medical device."));
+  QMenu* help = menuBar()->addMenu(tr("&Help"));
+  const auto tell = [this](const QString& title, const QString& words) {
+    show_beside(new QMessageBox(QMessageBox::Information, title, words, QMessageBox::Close, this));
+  };
+  help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [tell] {
+    tell(tr("Keys"),
+         tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
+            "Enter: press; hold it on a yellow button\n"
+            "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
+            "On an X-ray: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
+            "M magnifier, W contrast, H marks\n\n"
+            "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R back\n\n"
+            "Replay: J and L step, K plays"));
+  });
+  help->addAction(tr("&About"), this, [tell] {
+    tell(tr("About helicarm"),
+         tr("helicarm %1\nResearch instrument, not a medical device.").arg(HELICARM_VERSION));
   });
 }
 
 void MainWindow::build_rehearsal_menu() {
-  rehearsal_menu_ = menuBar()->addMenu(tr("&Rehearsal"));
+  rehearsal_menu_ = menuBar()->addMenu(tr("Rehears&al"));
   for (const auto& [words, fault] : {std::pair(tr("Hide the &tool's marker"), "hide:tool"),
                                      {tr("Hide the &femur's marker"), "hide:femur"},
                                      {tr("Hide the t&ibia's marker"), "hide:tibia"},
@@ -119,11 +154,28 @@ fs::path MainWindow::new_session() const {
   return sessions_ / now.toStdString();
 }
 
+void MainWindow::ask_rehearsal() {
+  const Source source = desk_.state().source;
+  if (source != Source::virtual_room && source != Source::devices) return open_rehearsal();
+  auto* question = new QMessageBox(QMessageBox::Question, tr("New rehearsal"),
+                                   tr("End this operation? Its record is kept."),
+                                   QMessageBox::Yes | QMessageBox::No, this);
+  connect(question, &QDialog::finished, this, [this](int answer) {
+    if (answer == QMessageBox::Yes) open_rehearsal();
+  });
+  show_beside(question);
+}
+
+void MainWindow::ask_folder() {
+  ask_files(this, tr("Case or session"), QFileDialog::Directory, {},
+            [this](const std::vector<fs::path>& chosen) { open_paths(chosen); });
+}
+
 void MainWindow::open_rehearsal() {
   operating_room::VirtualRoomOptions room = settings_.room;
   room.tracker_port = room.rtde_port = room.dashboard_port = room.script_port = 0;
   const fs::path folder = new_session();
-  desk_.open_room(room, folder);
+  desk_.open_room(room, settings_.plan, folder);
 }
 
 void MainWindow::open_plan(const fs::path& plan) {
@@ -131,10 +183,14 @@ void MainWindow::open_plan(const fs::path& plan) {
 }
 
 void MainWindow::open_paths(const std::vector<fs::path>& paths) {
-  if (paths.size() == 1 && fs::exists(paths.front() / "session.log")) return open_session(paths.front());
-  if (paths.size() == 1 && fs::is_directory(paths.front())) {
-    remember(Folder::cases, paths.front());
-    return desk_.open_case(paths.front());
+  const fs::path& first = paths.front();
+  if (paths.size() == 1 && fs::exists(first / "session.log")) return open_session(first);
+  if (paths.size() == 1 && fs::is_directory(first)) {
+    const std::vector<fs::path> loose =
+        fs::exists(first / "case.json") ? std::vector<fs::path>{} : pictures_in(first);
+    if (!loose.empty()) return desk_.open_pictures(loose);
+    remember(Folder::cases, first);
+    return desk_.open_case(first);
   }
   desk_.open_pictures(paths);
 }
@@ -171,24 +227,28 @@ void MainWindow::show_recorded(const SessionState& then) {
 }
 
 void MainWindow::ask_and_export() {
-  const QString folder = QFileDialog::getExistingDirectory(this, tr("Folder for the report and the results"));
-  if (!folder.isEmpty()) desk_.export_to(path_of(folder));
+  ask_files(this, tr("Folder for the report and the results"), QFileDialog::Directory, {},
+            [this](const std::vector<fs::path>& chosen) { desk_.export_to(chosen.front()); });
 }
 
 void MainWindow::save_screenshot() {
-  const QImage picture = grab().toImage();
-  const QString name =
-      QFileDialog::getSaveFileName(this, tr("Screenshot"), "helicarm.png", tr("PNG (*.png)"));
-  if (!name.isEmpty() && !picture.save(name))
-    say({Reason::cannot_write, name.toStdString() + ": cannot write"});
+  auto* dialog = new QFileDialog(this, tr("Screenshot"), "helicarm.png", tr("PNG (*.png)"));
+  dialog->setAcceptMode(QFileDialog::AcceptSave);
+  connect(dialog, &QFileDialog::fileSelected, this, [this, picture = grab().toImage()](const QString& name) {
+    if (!picture.save(name)) say({Reason::cannot_write, name.toStdString() + ": cannot write"});
+  });
+  show_beside(dialog);
 }
 
 void MainWindow::ask_settings() {
-  SettingsDialog dialog(settings_, this);
-  if (dialog.exec() == QDialog::Accepted) {
-    settings_ = dialog.settings();
+  auto* dialog = new SettingsDialog(settings_, this);
+  connect(dialog, &QDialog::accepted, this, [this, dialog] {
+    settings_ = dialog->settings();
     desk_.set_options(settings_.run);
-  }
+    statusBar()->showMessage(
+        tr("Measurement: from the next one on. The rest: from the next rehearsal or connection on."));
+  });
+  show_beside(dialog);
 }
 
 void MainWindow::show_tre() {

@@ -38,7 +38,12 @@ class AcquirePage : public Page {
   AcquirePage(Desk& desk, QWidget* parent);
   void show_state(const DeskState& state) override;
 
+ signals:
+  void rehearsal_wanted();
+  void folder_wanted();
+
  private:
+  QWidget* ways_in_;
   std::vector<std::string> views_;
   QWidget* shots_;
   QLabel* where_;
@@ -88,6 +93,8 @@ class PlanPage : public Page {
   /// The end that the next click places; the next one to come, or the one chosen in the table.
   std::optional<WantedPick> target() const;
   bool snaps() const { return snap_->isChecked(); }
+  /// Lets go of an end chosen in the table once it has been placed in every view.
+  void placed(const std::string& point);
 
  signals:
   void map_wanted(std::optional<helicarm::gui::TreCut> cut);
@@ -95,12 +102,14 @@ class PlanPage : public Page {
 
  private:
   void add_map();
+  void tell_next();
 
   QLabel* next_;
   QTableWidget* ends_;
   QCheckBox* snap_;
   QPushButton* offered_;
   std::optional<std::string> chosen_;
+  std::size_t placed_of_chosen_ = 0;
 };
 
 class NavigatePage : public Page {
@@ -113,12 +122,14 @@ class NavigatePage : public Page {
 
  private:
   void allow();
+  QString next_step() const;
 
   QLabel *says_, *tour_;
   QComboBox* tunnel_;
   HoldButton *unlock_, *register_, *go_, *withdraw_;
   QPushButton* plan_;
   LinkPhase phase_ = LinkPhase::disconnected;
+  std::optional<Failure> why_;
 };
 
 class VerifyPage : public Page {

@@ -61,11 +61,12 @@ void StepButton::paintEvent(QPaintEvent*) {
   QPainterPath shape;
   shape.addRoundedRect(frame, 6, 6);
   painter.fillPath(shape, isChecked() ? style::raised : style::panel);
-  painter.setPen(QPen(hasFocus()    ? style::text
-                      : isChecked() ? look.colour
-                                    : style::line,
-                      hasFocus() ? 2 : 1));
+  painter.setPen(QPen(isChecked() ? look.colour : style::line, isChecked() ? 3 : 1));
   painter.drawPath(shape);
+  if (hasFocus()) {
+    painter.setPen(QPen(style::text, 1, Qt::DotLine));
+    painter.drawRoundedRect(frame.adjusted(4, 4, -4, -4), 4, 4);
+  }
   painter.fillRect(QRectF(frame.left(), frame.top() + 6, 4, frame.height() - 12), look.colour);
 
   QFont font = this->font();

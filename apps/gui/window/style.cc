@@ -24,6 +24,12 @@ QString sheet() {
       selection-background-color: #35506b; }
     QHeaderView::section { background: #1e242b; color: #96a1ad; border: none; padding: 4px; }
     QMenuBar, QMenu { background: #1e242b; } QMenu::item:selected, QMenuBar::item:selected { background: #35506b; }
+    QCheckBox::indicator, QRadioButton::indicator { width: 15px; height: 15px; border: 2px solid #96a1ad;
+                                                    background: #14181d; }
+    QRadioButton::indicator { border-radius: 9px; }
+    QCheckBox::indicator { border-radius: 3px; }
+    QCheckBox::indicator:checked, QRadioButton::indicator:checked { background: #6cb6ff; border-color: #e8ecf1; }
+    QCheckBox::indicator:disabled, QRadioButton::indicator:disabled { border-color: #46505c; }
     QProgressBar { background: #1e242b; border: 1px solid #46505c; border-radius: 4px; text-align: center; }
     QProgressBar::chunk { background: #35506b; }
     QSplitter::handle { background: #2a323c; }

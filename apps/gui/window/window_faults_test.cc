@@ -33,10 +33,8 @@ TEST_F(Window, SilentTrackerShowsWithinASecondAndAHalf) {
 
 TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
   open_rehearsal();
-  hold("unlock");
-  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
-  hold("register");
-  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::moving; }));
+  begin_to_register();
+  ASSERT_FALSE(HasFatalFailure());
   window_->desk().set_fault("cut_cable", true);
   ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
@@ -69,16 +67,29 @@ TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
 
 TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
   open_rehearsal();
-  hold("unlock");
-  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
-  hold("register");
-  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::moving; }));
+  begin_to_register();
+  ASSERT_FALSE(HasFatalFailure());
   window_->desk().set_fault("silent", true);
   ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_EQ(live().robot.phase, LinkPhase::stopped);
   EXPECT_FALSE(state().hand_eye_rms_mm);
   window_->desk().set_fault("silent", false);
+}
+
+TEST_F(Window, StopWorksBesideEveryDialog) {
+  open_rehearsal();
+  begin_to_register();
+  ASSERT_FALSE(HasFatalFailure());
+  QTest::keyClick(window_.get(), Qt::Key_Comma, Qt::ControlModifier);
+  ASSERT_TRUE(wait([&] { return window_->findChild<SettingsDialog*>() != nullptr; }, 5000));
+  auto* stop = find("stop");
+  // Through the screen's own way in, where a modal dialog would be in between.
+  QTest::mouseClick(window_->windowHandle(), Qt::LeftButton, Qt::NoModifier,
+                    stop->mapTo(window_.get(), stop->rect().center()));
+  EXPECT_TRUE(wait([&] { return live().robot.phase == LinkPhase::stopped; }, 2000));
+  window_->findChild<SettingsDialog*>()->close();
+  wait_idle();
 }
 
 TEST_F(Window, CancelEndsTheWaitForAPicture) {

@@ -124,6 +124,18 @@ class Window : public testing::Test {
     }
     ASSERT_TRUE(done()) << card(Phase::navigate).why.toStdString();
   }
+  /// A busy machine may stop the robot before it has moved.
+  void begin_to_register() {
+    for (int left = 3; left > 0; --left) {
+      hold("unlock");
+      ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
+      hold("register");
+      const auto begun = [&] { return live().robot.phase == LinkPhase::moving || !state().busy; };
+      ASSERT_TRUE(wait(begun));
+      if (live().robot.phase == LinkPhase::moving) return;
+    }
+    FAIL() << card(Phase::navigate).why.toStdString();
+  }
   void register_in_rehearsal() {
     open_rehearsal();
     shoot_both();

@@ -97,6 +97,8 @@ void XrayView::mouseDoubleClickEvent(QMouseEvent* event) {
   if (event->button() == Qt::LeftButton && !picking_) fit();
 }
 
+void XrayView::enterEvent(QEnterEvent*) { setFocus(Qt::MouseFocusReason); }
+
 void XrayView::leaveEvent(QEvent*) {
   mouse_.reset();
   if (!cursor_) hover_over({});

@@ -62,6 +62,14 @@ View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone
   return {view.intrinsics, view.camera_from_world * calibrator_from_bone};
 }
 
+Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, const Poses& poses,
+                               const TrackerNoise& noise) {
+  TracedPoint point{point_in_bone, Eigen::Matrix3d::Zero(), {}, {}};
+  point = enter_tracker(std::move(point), *poses.tracker_from(bone), {marker_of(bone), 0});
+  point = leave_tracker(std::move(point), *poses.tracker_from_calibrator, {Marker::calibrator, 0});
+  return point.total_covariance(noise);
+}
+
 GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
   const Readings readings(noise.samples);
   const Poses then = point.views.empty() ? Poses{} : point.views.front().poses;

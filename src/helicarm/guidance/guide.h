@@ -47,6 +47,11 @@ struct GuidedPoint {
 /// exposures.
 View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone);
 
+/// What the tracker's noise in one exposure's readings does to the place in the calibrator of a point of the
+/// bone, mm^2. The poses must hold calibrator and bone.
+Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, const Poses& poses,
+                               const TrackerNoise& noise);
+
 /// Eq. 16. A point that moves with no bone is taken to rest in the tracker's frame since the first view.
 GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise);
 

@@ -27,6 +27,20 @@ Eigen::MatrixXd pictures_by_calibration(const Eigen::Vector3d& point_in_anchor,
   return jacobian;
 }
 
+/// What the anchors' poses add to the noise of a point's pictures, px^2 (2n x 2n).
+Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
+                                 std::span<const PointPicture> pictures, const Calibration& calibration) {
+  const auto n = 2 * Eigen::Index(pictures.size());
+  Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; 2 * i < n; ++i) {
+    const PointPicture& picture = pictures[std::size_t(i)];
+    const auto slope = projection_jacobian(calibration.views[picture.view].view,
+                                           picture.calibrator_from_anchor * point_in_anchor);
+    noise.block<2, 2>(2 * i, 2 * i) = slope * picture.anchor_covariance * slope.transpose();
+  }
+  return noise;
+}
+
 void enlarge_if_rays_miss(LocatedPoint& located) {
   constexpr double largest_excess = 9;  // three standard deviations
   const double excess = located.chi2 / double(2 * located.views.size() - 3);
@@ -62,7 +76,8 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   auto found = intersect(sights, noise);
   if (found && calibration.joint_covariance.size() > 0) {
     const Eigen::MatrixXd slopes = pictures_by_calibration(found->point, pictures, calibration);
-    found = intersect(sights, noise + slopes * calibration.joint_covariance * slopes.transpose());
+    noise += slopes * calibration.joint_covariance * slopes.transpose();
+    found = intersect(sights, noise);
     if (found) located.by_calibration = -found->by_pixels * slopes;
   }
   if (!found) return tl::unexpected<Failure>(found.error());
@@ -70,7 +85,11 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   located.covariance_in_anchor = found->covariance;
   located.ray_gap_mm = found->ray_gap_mm;
   located.chi2 = found->chi2;
-  if (calibration.joint_covariance.size() > 0) enlarge_if_rays_miss(located);
+  if (calibration.joint_covariance.size() == 0) return located;
+  const Eigen::MatrixXd by_anchors = noise_of_anchors(found->point, pictures, calibration);
+  if (!by_anchors.isZero(0))
+    if (const auto met = intersect(sights, noise + by_anchors)) located.chi2 = met->chi2;
+  enlarge_if_rays_miss(located);
   return located;
 }
 

@@ -20,6 +20,9 @@ struct PointPicture {
   Eigen::Vector2d uv;                          ///< rectified px
   Eigen::Matrix2d covariance_px2;              ///< zero: exact
   RigidTransform calibrator_from_anchor = {};  ///< at the moment of this picture; see LocatedPoint
+  /// What a wrong `calibrator_from_anchor` does to the point's place in the calibrator, mm^2. It counts in
+  /// whether the rays meet; in the point's own covariance it is left to `guide`.
+  Eigen::Matrix3d anchor_covariance = Eigen::Matrix3d::Zero();
 };
 
 enum class PointSource { pick, target };

@@ -104,9 +104,15 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
                         anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
     views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
   }
-  return locate(point.name, point.source, pictures, calibration).map([&](const LocatedPoint& located) {
-    return Located{located, anchor, views};
-  });
+  auto located = locate(point.name, point.source, pictures, calibration);
+  // Readings of their own move each exposure's ray by itself; shared ones move all rays alike.
+  if (located && anchor && given.tracker.samples == Samples::independent) {
+    for (PointPicture& picture : pictures)
+      picture.anchor_covariance =
+          noise_of_poses(located->point_in_anchor, *anchor, given.views[picture.view].poses, given.tracker);
+    located = locate(point.name, point.source, pictures, calibration);
+  }
+  return located.map([&](const LocatedPoint& found) { return Located{found, anchor, views}; });
 }
 
 }  // namespace

@@ -66,6 +66,21 @@ TEST_F(TwoExposures, RaysThatMissAreDoubted) {
   EXPECT_GT(points[0].place->covariance_in_calibrator.trace(), 0.1);
 }
 
+TEST_F(TwoExposures, RaysMayMissByTheNoiseOfTheTracker) {
+  // The second exposure's reading of the femur is 0.7 mm wrong: far more than the pixels explain.
+  given.views[1].poses.tracker_from_femur->translation += Eigen::Vector3d(0.4, 0.4, 0.4);
+  PointResult seen = seen_point(Bone::femur);
+  given.views[1].poses.tracker_from_femur->translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
+  std::vector<PointResult> points = {seen};
+  EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
+  given.tracker.sigma_mm = 0.4;
+  points = {seen};
+  EXPECT_TRUE(locate_points(given, calibration, points).empty());
+  given.tracker.samples = Samples::shared;  // one reading served both: then it cannot have been this noise
+  points = {seen};
+  EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
+}
+
 TEST_F(TwoExposures, BoneWithoutPosesIsTakenAsFixed) {
   given.views[1].poses = given.views[0].poses;
   std::vector<PointResult> points = {seen_point(Bone::femur)};

@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include "helicarm/devices/robot/check_order.h"
+
 namespace helicarm {
 namespace {
 
@@ -46,7 +48,7 @@ RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const Ri
   order.keep_outs = plan.approach.keep_outs;
   order.corrections.tolerance_mm = 0.5;
   order.corrections.tolerance_deg = 0.5;
-  return order;
+  return slowed_for_joints(std::move(order), plan.approach.limits);
 }
 
 }  // namespace helicarm

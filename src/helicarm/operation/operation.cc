@@ -76,7 +76,12 @@ Watch Operation::sees(std::vector<std::string> markers) const {
 std::vector<Miss> Operation::carry_out(const RobotOrder& order, const std::string& token,
                                        const Measure& measure, std::vector<std::string> markers) {
   record("confirmed", {{"order", order.name}, {"digest", digest(to_text(to_json(order)))}, {"by", who_}});
-  return value_or_throw(robot_.execute(order, token, measure, sees(std::move(markers))));
+  auto misses = robot_.execute(order, token, measure, sees(std::move(markers)));
+  if (!misses)
+    record(
+        "halted",
+        {{"order", order.name}, {"why", code(misses.error().reason)}, {"message", misses.error().message}});
+  return value_or_throw(std::move(misses));
 }
 
 Expected<void> Operation::finish() {
@@ -122,7 +127,8 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
     tell_(Step::register_robot, "hand-eye calibration");
     std::vector<HandEyePair> pairs;
     const RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
-    for (const RigidTransform& pose : hand_eye_tour(begin.base_from_tcp)) {
+    const std::vector<RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
+    for (const RigidTransform& pose : tour) {
       const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
       const RobotOrder order = tour_order(plan_.robot, present, pose);
       record("order", to_json(order));
@@ -131,7 +137,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
       const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
           {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
-      tell_(Step::register_robot, fmt::format("pose {}", pairs.size()));
+      tell_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
     hand_eye_ = value_or_throw(calibrate_hand_eye(pairs));
     record("hand_eye", {{"pairs", to_json(pairs)}, {"found", to_json(*hand_eye_)}});
@@ -256,6 +262,7 @@ Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& re
     home.base_from_tcp = rest.base_from_tcp;
     back.waypoints = {stand_off, home};
     back.corrections.most = 0;
+    back = slowed_for_joints(std::move(back), plan_.robot.approach.limits);
     record("order", to_json(back));
     carry_out(back, value_or_throw(confirm(back)), {}, {bone_marker, plan_.tracker.tool});
   });

@@ -156,7 +156,8 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   one.threads = 1;
   three.threads = 3;
   const LocationMap map = study_location(options, one, by_itself).value();
-  EXPECT_EQ(files_of(map, options).csv, files_of(study_location(options, three, by_itself).value(), options).csv);
+  EXPECT_EQ(files_of(map, options).csv,
+            files_of(study_location(options, three, by_itself).value(), options).csv);
   ASSERT_EQ(map.side, 7);
   ASSERT_EQ(map.points.size(), 98u);
   const LocationPoint &middle = map.points[24], &corner = map.points[48];
@@ -183,7 +184,8 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
   one.threads = 1;
   three.threads = 3;
   const auto rows = study_biplane(options, one, by_itself).value();
-  EXPECT_EQ(files_of(rows, options).csv, files_of(study_biplane(options, three, by_itself).value(), options).csv);
+  EXPECT_EQ(files_of(rows, options).csv,
+            files_of(study_biplane(options, three, by_itself).value(), options).csv);
   const auto mean = [&](std::string_view calibrator, std::string_view points, std::string_view measure) {
     for (const BiplaneRow& r : rows)
       if (r.calibrator == calibrator && r.points == points && r.measure == measure) return r.figures.mean;

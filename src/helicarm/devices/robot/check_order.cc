@@ -108,7 +108,7 @@ Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, con
     check_pose(order, model, next, limits);
     if (turned > limits.fastest_joint_rad_s * step_s && turned > 1e-9)
       throw BadInput({Reason::bad_value,
-                      fmt::format("at this speed a joint would turn by {:.2f} rad/s, must be at most {:g}",
+                      fmt::format("at this speed a joint would turn by {:.3f} rad/s, must be at most {:g}",
                                   turned / step_s, limits.fastest_joint_rad_s),
                       {},
                       {{"joint_speed_rad_s", turned / step_s}, {"limit_rad_s", limits.fastest_joint_rad_s}}});
@@ -144,6 +144,20 @@ double angle_deg(const RigidTransform& a, const RigidTransform& b) {
 
 Expected<Joints> check_path(const RobotOrder& order, const RobotLimits& limits) {
   return guarded([&] { return walk_all(order, order.start, limits); });
+}
+
+RobotOrder slowed_for_joints(RobotOrder order, const RobotLimits& limits) {
+  constexpr int most_tries = 8;  // each finds the next joint on the way
+  constexpr double margin = 0.9;
+  for (int i = 0; i < most_tries; ++i) {
+    const auto checked = check_path(order, limits);
+    if (checked) break;
+    const auto speed = checked.error().figures.find("joint_speed_rad_s");
+    if (speed == checked.error().figures.end()) break;
+    for (Waypoint& waypoint : order.waypoints)
+      waypoint.speed_mm_s *= margin * limits.fastest_joint_rad_s / speed->second;
+  }
+  return order;
 }
 
 Expected<void> check_order(const RobotOrder& order, const RobotState& present, const RobotLimits& limits) {

@@ -28,6 +28,9 @@ struct RobotLimits {
 /// `not_finite`, `out_of_reach`, `singular_pose` or `keep_out`. Gives the joints at the end of the path.
 Expected<Joints> check_path(const RobotOrder& order, const RobotLimits& limits = {});
 
+/// The order, slowed down as a whole where a joint would turn faster than it may.
+RobotOrder slowed_for_joints(RobotOrder order, const RobotLimits& limits = {});
+
 /// The order at the moment it would be sent: also the robot may move (`robot_stopped`), and stands and bears
 /// what it did when planned (`robot_moved`). The path is walked from where it stands now.
 Expected<void> check_order(const RobotOrder& order, const RobotState& present,

@@ -122,6 +122,13 @@ TEST(CheckOrder, SpeedThatAJointCannotStopFromInTimeIsRefused) {
   ASSERT_FALSE(checked);
   EXPECT_EQ(checked.error().reason, Reason::bad_value);
   EXPECT_GT(checked.error().figures.at("joint_speed_rad_s"), 0.6);
+  const RobotOrder slowed = slowed_for_joints(order);
+  EXPECT_TRUE(check_path(slowed));
+  EXPECT_LT(slowed.waypoints[0].speed_mm_s, order.waypoints[0].speed_mm_s);
+}
+
+TEST(CheckOrder, OrderThatIsSlowEnoughIsNotSlowedDown) {
+  EXPECT_EQ(slowed_for_joints(planned()).waypoints[0].speed_mm_s, planned().waypoints[0].speed_mm_s);
 }
 
 TEST(CheckOrder, PathIntoAKeepOutRegionIsRefused) {

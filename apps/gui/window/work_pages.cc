@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pages of what is done with it.
+#include <QHBoxLayout>
+#include <QVBoxLayout>
+#include <algorithm>
+
+#include "gui/desk/steps.h"
+#include "gui/window/page_parts.h"
+#include "gui/window/pages.h"
+#include "helicarm/navigation/accuracy.h"
+
+namespace helicarm::gui {
+
+PlanPage::PlanPage(Desk& desk, QWidget* parent)
+    : Page(
+          tr("Click each tunnel end in both X-rays; the dashed line in the second one says where it can be."),
+          desk, parent) {
+  next_ = new QLabel;
+  next_->setObjectName("nextPick");
+  next_->setWordWrap(true);
+  next_->setStyleSheet("color: #ffc400; font-weight: bold;");
+  layout()->addWidget(next_);
+  ends_ =
+      add_table({tr("End"), tr("Drill"), tr("Clicked in"), tr("±mm (95 %)"), tr("Rays miss mm")}, "endTable");
+  connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
+    const int row = ends_->currentRow();
+    chosen_.reset();
+    placed_of_chosen_ = 0;
+    if (ends_->selectionModel()->hasSelection() && row >= 0)
+      chosen_ = ends_->item(row, 0)->text().toStdString();
+    tell_next();
+    emit target_changed();
+  });
+  snap_ = new QCheckBox(tr("Snap to a &ball of 3 mm"));
+  snap_->setChecked(true);
+  layout()->addWidget(snap_);
+  auto* row = new QHBoxLayout;
+  offered_ = add_button(tr("Take the &plan's picks"), "offeredPicks", [this] { desk_.take_offered_picks(); });
+  auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
+    ends_->clearSelection();
+    desk_.clear_picks();
+  });
+  for (QWidget* button : {offered_, clear}) row->addWidget(button);
+  static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  add_map();
+}
+
+void PlanPage::add_map() {
+  auto* row = new QHBoxLayout;
+  auto* map = new QCheckBox(tr("Expected error (&TRE) in 3-D"));
+  map->setObjectName("treMap");
+  auto* axis = new QComboBox;
+  axis->setObjectName("treAxis");
+  axis->addItems({"x", "y", "z"});
+  axis->setCurrentIndex(2);
+  axis->setToolTip(tr("The slice lies across this axis of the calibrator"));
+  auto* place = new QSlider(Qt::Horizontal);
+  place->setObjectName("trePlace");
+  place->setRange(-int(tre_half_mm), int(tre_half_mm));
+  place->setAccessibleName(tr("Place of the slice"));
+  auto* words = new QLabel;
+  for (QWidget* part : std::initializer_list<QWidget*>{map, axis, place, words}) row->addWidget(part);
+  static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  const auto tell = [this, map, axis, place, words] {
+    for (QWidget* part : std::initializer_list<QWidget*>{axis, place}) part->setEnabled(map->isChecked());
+    words->setText(tr("%1 mm").arg(place->value()));
+    emit map_wanted(map->isChecked()
+                        ? std::optional(TreCut{SliceAxis(axis->currentIndex()), double(place->value())})
+                        : std::nullopt);
+  };
+  connect(map, &QCheckBox::toggled, this, tell);
+  connect(axis, &QComboBox::currentIndexChanged, this, tell);
+  connect(place, &QSlider::valueChanged, this, tell);
+  tell();
+}
+
+std::optional<WantedPick> PlanPage::target() const {
+  const DeskState& state = desk_.state();
+  if (!chosen_) return next_pick(state);
+  for (const PlannedTunnel& tunnel : state.tunnels)
+    if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
+  return std::nullopt;
+}
+
+void PlanPage::show_state(const DeskState& state) {
+  std::vector<QStringList> rows;
+  for (const PlannedTunnel& tunnel : state.tunnels)
+    for (const std::string& end : {tunnel.start, tunnel.end}) {
+      QStringList in;
+      for (const std::string& view : state.views)
+        if (pick_of(state, end, view) != nullptr) in << text(view);
+      QString within, gap;
+      if (state.result)
+        for (const PointResult& point : state.result->points)
+          if (point.name == end) {
+            if (point.place) {
+              within = number(length_at_95(point.place->covariance_in_calibrator), 2);
+              gap = number(point.ray_gap_mm, 2);
+            } else if (point.reason) {
+              within = sentence_of(*point.reason);
+            }
+          }
+      const bool enters = (tunnel.enter_at == TunnelEnd::start) == (end == tunnel.start);
+      rows.push_back({text(end), enters ? tr("enters") : tr("ends"), in.join(", "), within, gap});
+    }
+  fill(ends_, rows);
+  offered_->setVisible(!state.offered_picks.empty());
+  tell_next();
+}
+
+void PlanPage::tell_next() {
+  const DeskState& state = desk_.state();
+  if (!state.measured) return next_->setText(tr("The X-rays come first."));
+  if (chosen_)
+    return next_->setText(tr("%1 is chosen: click its new place in each X-ray.").arg(text(*chosen_)));
+  const auto wanted = next_pick(state);
+  if (!wanted)
+    return next_->setText(tr("All ends are placed. To move one, choose it in the table and click."));
+  for (const PlannedTunnel& tunnel : state.tunnels)
+    if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
+      const bool enters = (tunnel.enter_at == TunnelEnd::start) == (wanted->point == tunnel.start);
+      next_->setText((enters ? tr("Click %1 in %2: where the drill enters the %3.")
+                             : tr("Click %1 in %2: where the drill ends in the %3."))
+                         .arg(text(wanted->point), text(wanted->view), text(tunnel.name)));
+    }
+}
+
+void PlanPage::placed(const std::string& point) {
+  if (chosen_ != point || ++placed_of_chosen_ < desk_.state().views.size()) return;
+  ends_->clearSelection();
+}
+
+NavigatePage::NavigatePage(Desk& desk, QWidget* parent)
+    : Page(tr("Nothing moves unless you hold a yellow button until it is full. The space bar stops the "
+              "robot."),
+           desk, parent) {
+  says_ = new QLabel;
+  says_->setObjectName("robotSays");
+  says_->setWordWrap(true);
+  layout()->addWidget(says_);
+  unlock_ = add_hold(tr("1  &Unlock the robot: I have looked, nobody is near"), "unlock",
+                     [this] { desk_.unlock("the person at the screen"); });
+  register_ = add_hold(tr("2  &Register it: about a dozen small moves about its tip"), "register",
+                       [this] { desk_.register_robot(); });
+  tour_ = new QLabel;
+  tour_->setWordWrap(true);
+  tour_->hide();
+  layout()->addWidget(tour_);
+  tunnel_ = new QComboBox;
+  tunnel_->setObjectName("tunnel");
+  tunnel_->setAccessibleName(tr("Tunnel"));
+  layout()->addWidget(tunnel_);
+  connect(tunnel_, &QComboBox::currentTextChanged, this,
+          [this](const QString& name) { desk_.follow(name.toStdString()); });
+  plan_ = add_button(tr("3  Plan the &way and show it in both X-rays"), "planWay",
+                     [this] { desk_.plan_tunnel(tunnel_->currentText().toStdString()); });
+  go_ = add_hold(tr("4  &Go there"), "go", [this] { desk_.go(); });
+  withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { desk_.withdraw(); });
+  static_cast<QVBoxLayout*>(layout())->addStretch();
+}
+
+void NavigatePage::show_state(const DeskState& state) {
+  QStringList names;
+  for (const PlannedTunnel& tunnel : state.tunnels) names << text(tunnel.name);
+  QStringList shown;
+  for (int i = 0; i < tunnel_->count(); ++i) shown << tunnel_->itemText(i);
+  if (names != shown) {
+    tunnel_->clear();
+    tunnel_->addItems(names);
+  }
+  tour_->setText(state.tour);
+  tour_->setVisible(!state.tour.isEmpty() && !state.hand_eye_rms_mm);
+  allow();
+}
+
+void NavigatePage::show_live(const LiveState& live) {
+  if (phase_ == live.robot.phase && !live.robot.why) return;
+  phase_ = live.robot.phase;
+  why_ = live.robot.why;
+  allow();
+}
+
+QString NavigatePage::next_step() const {
+  const DeskState& state = desk_.state();
+  if (state.source == Source::files || state.source == Source::none)
+    return tr("Pictures from files: there is no robot to steer.");
+  if (state.busy) return text(state.doing);
+  const QString why = why_ ? sentence_of(*why_) + ". " : QString();
+  switch (phase_) {
+    case LinkPhase::disconnected:
+      return why + tr("Check the robot's power and cable: it is called again and again.");
+    case LinkPhase::idle:
+      return tr("The robot is locked. Hold 1 when nobody is near it.");
+    case LinkPhase::stopped:
+      return why + tr("It rests until you have looked at it and hold 1.");
+    case LinkPhase::moving:
+      return tr("The robot moves.");
+    case LinkPhase::ready:
+      break;
+  }
+  if (state.tool_is_out) return tr("The tool is out: withdraw it (5) before anything else.");
+  if (state.order) return tr("Look at the way in both X-rays; then hold 4.");
+  if (!state.measured) return tr("The X-rays come first (Alt+1).");
+  if (!state.hand_eye_rms_mm) return tr("Hold 2 to register the robot.");
+  if (next_pick(state)) return tr("The tunnels' ends come first (Alt+4).");
+  return tr("Choose a tunnel and plan the way (3).");
+}
+
+void NavigatePage::allow() {
+  const DeskState& state = desk_.state();
+  const bool free = !state.busy && state.source != Source::files && state.source != Source::none;
+  const bool ready = free && phase_ == LinkPhase::ready;
+  const bool placed = state.measured && !next_pick(state);
+  says_->setText(next_step());
+  unlock_->setEnabled(free && (phase_ == LinkPhase::idle || phase_ == LinkPhase::stopped));
+  register_->setEnabled(ready && !state.tool_is_out);
+  plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.tool_is_out);
+  go_->setEnabled(ready && state.order.has_value());
+  withdraw_->setEnabled(ready && state.tool_is_out);
+}
+
+VerifyPage::VerifyPage(Desk& desk, QWidget* parent)
+    : Page(tr("How far (mm) the tool's axis runs from each end by tracker and X-rays, and how far it may be; "
+              "then "
+              "in the X-rays alone: Eq. 17 in px and mm, and in space."),
+           desk, parent) {
+  table_ = add_table({tr("Tunnel, end"), tr("Off"), tr("Expect"), tr("px"), tr("mm"), tr("Space")},
+                     "outcomeTable");
+  add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
+             [this] { emit report_wanted(); });
+}
+
+void VerifyPage::show_state(const DeskState& state) {
+  std::vector<QStringList> rows;
+  for (const auto& [name, outcome] : state.outcomes)
+    for (const auto& [end, miss, in_xrays] : {std::tuple(tr("start"), &outcome.start, &Verification::start),
+                                              std::tuple(tr("end"), &outcome.end, &Verification::end)}) {
+      QStringList row{QString("%1, %2").arg(text(name), end), number(miss->distance_mm(), 2),
+                      number(miss->predicted_mm(), 2)};
+      if (outcome.verification)
+        if (const auto& seen = (*outcome.verification).*in_xrays)
+          row << number(seen->combined_px, 2) << number(seen->combined_mm, 2) << number(seen->distance_mm, 2);
+      rows.push_back(row);
+    }
+  if (rows.empty() && state.result)
+    for (const Verification& line : state.result->verifications)
+      for (const auto& [end, seen] : {std::pair(tr("start"), &line.start), {tr("end"), &line.end}})
+        if (*seen)
+          rows.push_back({QString("%1, %2").arg(text(line.name), end),
+                          {},
+                          {},
+                          number((*seen)->combined_px, 2),
+                          number((*seen)->combined_mm, 2),
+                          number((*seen)->distance_mm, 2)});
+  fill(table_, rows);
+}
+
+}  // namespace helicarm::gui
