@@ -199,7 +199,8 @@ void MainWindow::show_pictures() {
                        : has ? tr("%1: no picture yet").arg(text(shown_->views[i].name))
                              : tr("No second view"));
   }
-  scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
+  if (std::exchange(shown_bones_, state.bones) != state.bones)
+    scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
   if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
   show_tre();

@@ -106,6 +106,7 @@ class MainWindow : public QMainWindow {
   std::shared_ptr<const Result> recorded_of_;
   std::optional<ToolOverlay> recorded_;  ///< at the replayed moment
   std::shared_ptr<const Result> shown_;
+  std::shared_ptr<const simulation::BoneMeshes> shown_bones_;
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;
   unsigned looks_ = 0;

