@@ -109,6 +109,7 @@ void MainWindow::build() {
     auto* scrolled = new QScrollArea;
     scrolled->setWidgetResizable(true);
     scrolled->setFrameShape(QFrame::NoFrame);
+    scrolled->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
     scrolled->setWidget(page);
     scrolled->setFocusPolicy(Qt::NoFocus);
     pages_->addWidget(scrolled);
@@ -116,6 +117,8 @@ void MainWindow::build() {
   }
   right->addWidget(pages_);
   right->setSizes({280, 380});
+  constexpr int widest_button = 416;
+  right->setMinimumWidth(widest_button);
   sides->addWidget(right);
   sides->setStretchFactor(2, 3);
   column->addWidget(sides, 1);
