@@ -274,11 +274,11 @@ void Desk::measure() {
   });
 }
 
-void Desk::picks_changed() {
+void Desk::picks_changed(bool measurable) {
   state_.order.reset();
   state_.path = {};
   emit changed();
-  if (!next_pick(state_)) measure();
+  if (measurable) measure();
 }
 
 bool Desk::is_whole(const std::string& point) const {
@@ -294,20 +294,19 @@ void Desk::pick(Pick pick) {
                 [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
   const std::string point = pick.name;
   state_.picks.push_back(std::move(pick));
-  picks_changed();
-  if (is_whole(point)) measure();  // its place and how far its rays miss show at once
+  picks_changed(is_whole(point));  // its place and how far its rays miss show at once
 }
 
 void Desk::take_offered_picks() {
   if (state_.busy) return;
   state_.picks = state_.offered_picks;
-  picks_changed();
+  picks_changed(!next_pick(state_));
 }
 
 void Desk::clear_picks() {
   if (state_.busy) return;
   state_.picks.clear();
-  picks_changed();
+  picks_changed(!next_pick(state_));
 }
 
 void Desk::cancel() {

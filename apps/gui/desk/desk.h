@@ -96,7 +96,7 @@ class Desk : public QObject {
   /// From any thread: a change while the work goes on.
   void meanwhile(Change change);
   void take_waiting_picture();
-  void picks_changed();
+  void picks_changed(bool measurable);
   bool is_whole(const std::string& point) const;
   Change measured(Room& room, const std::vector<Pick>& picks);
   static Change with_plan(const OperationPlan& plan, const Json& offered);

@@ -193,6 +193,7 @@ void MainWindow::show_pictures() {
   if (shown_ == state.result && shown_source_ == state.source) return;
   shown_ = state.result;
   shown_source_ = state.source;
+  show_recorded();  // of a case that is open now, never over other pictures
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     const bool has = shown_ && i < shown_->views.size();
     if (has && shown_->views[i].exposure)

@@ -43,6 +43,8 @@ class MainWindow : public QMainWindow {
   void show_live();
   /// What is shown of it.
   const LiveState& live() const { return live_; }
+  /// The tool at the replayed moment; nothing where no case with one is replayed.
+  const std::optional<ToolOverlay>& recorded() const { return recorded_; }
 
  protected:
   void dragEnterEvent(QDragEnterEvent* event) override;
@@ -67,7 +69,7 @@ class MainWindow : public QMainWindow {
   void place_pick(std::size_t view, const QPointF& raw);
   void show_tre();
   void show_moment(int index);
-  void show_recorded(const SessionState& then);
+  void show_recorded();
   void ask_rehearsal();
   void ask_folder();
   void ask_and_export();

@@ -208,22 +208,24 @@ void MainWindow::show_moment(int index) {
   if (!then) return say(then.error());
   if (then->case_folder && then->measured && desk_.state().folder != *then->case_folder)
     desk_.open_case(*then->case_folder);
-  show_recorded(*then);
+  show_recorded();
 }
 
-void MainWindow::show_recorded(const SessionState& then) {
+void MainWindow::show_recorded() {
   recorded_.reset();
+  if (!replay_->timeline() || replay_->moment() < 0) return;
+  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
   const bool is_shown =
-      then.case_folder && desk_.state().folder == *then.case_folder && desk_.state().measured;
-  if (!is_shown || !then.registered_at) return;
-  if (!recorded_tool_ || recorded_at_ != then.registered_at || recorded_of_ != shown_) {
-    const auto tool = tool_of(*replay_->timeline(), then, *shown_);
+      then && then->case_folder && desk_.state().folder == *then->case_folder && desk_.state().measured;
+  if (!is_shown || !then->registered_at) return;
+  if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
+    const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
     if (!tool) return say(tool.error());
     recorded_tool_ = *tool;
-    recorded_at_ = then.registered_at;
+    recorded_at_ = then->registered_at;
     recorded_of_ = shown_;
   }
-  if (const auto overlay = overlay_of(*recorded_tool_, *replay_->timeline(), then)) recorded_ = *overlay;
+  if (const auto overlay = overlay_of(*recorded_tool_, *replay_->timeline(), *then)) recorded_ = *overlay;
 }
 
 void MainWindow::ask_and_export() {

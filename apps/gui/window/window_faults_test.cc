@@ -32,9 +32,7 @@ TEST_F(Window, SilentTrackerShowsWithinASecondAndAHalf) {
 }
 
 TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
-  open_rehearsal();
-  begin_to_register();
-  ASSERT_FALSE(HasFatalFailure());
+  ASSERT_NO_FATAL_FAILURE(begin_to_register());
   window_->desk().set_fault("cut_cable", true);
   ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
@@ -66,9 +64,7 @@ TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
 }
 
 TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
-  open_rehearsal();
-  begin_to_register();
-  ASSERT_FALSE(HasFatalFailure());
+  ASSERT_NO_FATAL_FAILURE(begin_to_register());
   window_->desk().set_fault("silent", true);
   ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
@@ -78,9 +74,7 @@ TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
 }
 
 TEST_F(Window, StopWorksBesideEveryDialog) {
-  open_rehearsal();
-  begin_to_register();
-  ASSERT_FALSE(HasFatalFailure());
+  ASSERT_NO_FATAL_FAILURE(begin_to_register());
   QTest::keyClick(window_.get(), Qt::Key_Comma, Qt::ControlModifier);
   ASSERT_TRUE(wait([&] { return window_->findChild<SettingsDialog*>() != nullptr; }, 5000));
   auto* stop = find("stop");

@@ -42,6 +42,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
         EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
                   fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
       }
+  EXPECT_EQ(state().measurements, 5) << "one for the pictures, one for each of four ends";
   screenshot("4-plan");
 
   hold("unlock");
@@ -82,12 +83,20 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   ASSERT_TRUE(wait_idle());
   for (const char* file : {"report.html", "report.pdf", "result.json"})
     EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
+
+  window_->open_paths({state().folder});
+  auto* replay = window_->findChild<ReplayPanel*>();
+  ASSERT_TRUE(replay->timeline());
+  replay->set_moment(int(replay->timeline()->moments.size()) - 1);
+  ASSERT_TRUE(wait([&] { return window_->recorded().has_value(); }, 30000));
+  EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
+  screenshot("8-replay");
+  open_rehearsal();
+  EXPECT_FALSE(window_->recorded()) << "a tool of former pictures";
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
-  open_rehearsal();
-  begin_to_register();
-  ASSERT_FALSE(HasFatalFailure());
+  ASSERT_NO_FATAL_FAILURE(begin_to_register());
   QTest::keyClick(find("shootAP"), Qt::Key_Space);
   ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::stopped; }, 2000));
   ASSERT_TRUE(wait_idle());

@@ -125,8 +125,9 @@ class Window : public testing::Test {
     }
     ASSERT_TRUE(done()) << card(Phase::navigate).why.toStdString();
   }
-  /// A busy machine may stop the robot before it has moved.
+  /// In a rehearsal of its own. A busy machine may stop the robot before it has moved.
   void begin_to_register() {
+    open_rehearsal();
     for (int left = 3; left > 0; --left) {
       hold("unlock");
       ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
