@@ -56,7 +56,15 @@ void give_map_errors(std::vector<Observation>& observations, const Eigen::Matrix
   }
 }
 
-Expected<ViewProblem> problem_of(const ViewFiducials& view) {
+/// Symmetric square root of a covariance, which may be singular.
+Eigen::Matrix3d root_of(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+Expected<ViewProblem> problem_of(const ViewFiducials& view,
+                                 const std::vector<Eigen::Matrix3d>& ball_covariance_mm2) {
   std::vector<Observation> observations;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (std::size_t ball = 0; ball < view.fiducials.size(); ++ball) {
@@ -66,6 +74,7 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view) {
       return fail(Reason::bad_value,
                   fmt::format("ball {}: sigma {} px must be positive", f.label, f.sigma_px));
     observations.push_back({ball, f.centre_in_calibrator, f.uv, f.sigma_px});
+    if (!ball_covariance_mm2.empty()) observations.back().place_root = root_of(ball_covariance_mm2[ball]);
     centre += f.centre_in_calibrator;
   }
   centre /= std::max(1.0, double(observations.size()));
@@ -151,6 +160,24 @@ void rescale_if_belied(CalibrationResult& result) {
        {{"chi2", result.chi2}, {"dof", double(result.dof)}}});
 }
 
+/// A calibrator larger by a share about the balls' mean c gives the same images from sources that much
+/// farther away: d t = share * (t + R c) in every view. This error is one number, common to all views and
+/// points.
+void add_scale_error(CalibrationResult& result, double scale_sigma) {
+  if (scale_sigma == 0) return;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  const std::vector<Fiducial>& balls = result.fiducials.front();
+  for (const Fiducial& ball : balls) mean += ball.centre_in_calibrator / double(balls.size());
+  constexpr Eigen::Index translation = 7;  // of a view's numbers, see view_parameters
+  Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(result.joint_covariance.rows());
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    by_scale.segment<3>(view_parameters * Eigen::Index(i) + translation) =
+        result.views[i].view.camera_from_world * mean;
+  result.joint_covariance += scale_sigma * scale_sigma * by_scale * by_scale.transpose();
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    result.views[i].covariance = block_of(result.joint_covariance, i);
+}
+
 /// A joint fit that failed names no view: a start that misses its own balls tells which one is at fault.
 tl::unexpected<Failure> blame(const std::vector<ViewFiducials>& views,
                               const std::vector<ViewProblem>& problems, const Failure& failure,
@@ -170,7 +197,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   std::vector<ViewProblem> problems;
   CalibrationResult result;
   for (const ViewFiducials& view : views) {
-    auto problem = problem_of(view);
+    auto problem = problem_of(view, options.common.ball_covariance_mm2);
     if (!problem) return in_view(problem.error(), view.name);
     problems.push_back(*std::move(problem));
     result.fiducials.push_back(view.fiducials);
@@ -208,6 +235,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     result.views.push_back(*std::move(view));
   }
   rescale_if_belied(result);
+  add_scale_error(result, options.common.scale_sigma);
   warn_of_few(result);
   return result;
 }

@@ -52,7 +52,9 @@ TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
     auto views = pair_of_views(0.2, std::uint64_t(trial));
     RandomStream random(13, 0, std::uint64_t(trial));
     const double common = 5 * random.normal();
-    options.common = {{Departure{5, 3}, Departure{8, 4}}, tolerance_mm};
+    options.common = {{Departure{5, 3}, Departure{8, 4}}};
+    const Eigen::Vector3d per_axis_mm = tolerance_mm * Eigen::Vector3d(1, 2, 0.5);
+    if (tolerance_mm > 0) options.common.ball_covariance_mm2.assign(12, per_axis_mm.cwiseAbs2().asDiagonal());
     const auto near = [&](double value, double sigma) { return value + sigma * random.normal(); };
     const Eigen::Vector2d middle(near(512, 8), near(512, 8));
     for (auto& view : views)
@@ -60,7 +62,7 @@ TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
                     Belief{near(1, 1e-3), 1e-3}, Belief{near(0, 1e-3), 1e-3}};
     for (std::size_t k = 0; k < 12; ++k) {
       const Eigen::Vector3d off =
-          tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+          per_axis_mm.cwiseProduct(Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
       for (auto& view : views) view.fiducials[k].centre_in_calibrator += off;
     }
     const auto result = calibrate(views, options);
@@ -81,6 +83,33 @@ TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
   }
   EXPECT_NEAR(distance2, 22, 1.3);
   EXPECT_NEAR(chi2 / dof, 1, 0.04);
+}
+
+TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
+  const double scale_sigma = 0.02, scale = 1 + 1e-4;
+  const auto views = pair_of_views(0.2, 3);
+  const auto exact = calibrate(views, {});
+  CalibrationOptions options;
+  options.common.scale_sigma = scale_sigma;
+  const auto doubtful = calibrate(views, options);
+  ASSERT_TRUE(exact && doubtful);
+  auto larger = views;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Fiducial& f : views[0].fiducials) mean += f.centre_in_calibrator / 12;
+  for (auto& view : larger)
+    for (Fiducial& f : view.fiducials)
+      f.centre_in_calibrator = mean + scale * (f.centre_in_calibrator - mean);
+  const auto scaled = calibrate(larger, {});
+  ASSERT_TRUE(scaled);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(2 * view_parameters);
+  for (int i = 0; i < 2; ++i)
+    change.segment<3>(view_parameters * i + 7) =
+        (scaled->views[std::size_t(i)].view.camera_from_world.translation -
+         exact->views[std::size_t(i)].view.camera_from_world.translation) /
+        (scale - 1);
+  const Eigen::MatrixXd added = doubtful->joint_covariance - exact->joint_covariance;
+  const Eigen::MatrixXd expected = scale_sigma * scale_sigma * change * change.transpose();
+  EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm());
 }
 
 TEST(Calibrate, ErrorsThatTheMapSharesAreInTheCovariance) {
@@ -229,9 +258,28 @@ TEST(CalibratePaper, IsTheDltOfEachView) {
   const auto views = pair_of_views(0.5, 3);
   const auto result = calibrate_paper(views, {});
   ASSERT_TRUE(result.has_value());
-  std::vector<PointPair> pairs;
-  for (const auto& f : views[1].fiducials) pairs.push_back({f.centre_in_calibrator, f.uv});
-  EXPECT_EQ(*result->views[1].dlt, solve_dlt(pairs));
+  // Eq. 7 by its normal equations, in units that keep them well conditioned: least squares do not depend on
+  // these.
+  const auto& balls = views[1].fiducials;
+  Eigen::MatrixXd design(2 * balls.size(), 11);
+  Eigen::VectorXd pixels(design.rows());
+  constexpr double unit_mm = 50, unit_px = 500, middle_px = 512;
+  for (std::size_t k = 0; k < balls.size(); ++k) {
+    const Eigen::Vector3d p = balls[k].centre_in_calibrator / unit_mm;
+    const Eigen::Vector2d uv = (balls[k].uv.array() - middle_px) / unit_px;
+    const auto row = 2 * Eigen::Index(k);
+    design.row(row) << p.transpose(), 1, Eigen::RowVector4d::Zero(), -uv.x() * p.transpose();
+    design.row(row + 1) << Eigen::RowVector4d::Zero(), p.transpose(), 1, -uv.y() * p.transpose();
+    pixels.segment<2>(row) = uv;
+  }
+  const Eigen::VectorXd a = (design.transpose() * design).ldlt().solve(design.transpose() * pixels);
+  for (const Fiducial& ball : balls) {
+    const Eigen::Vector4d p = (ball.centre_in_calibrator / unit_mm).homogeneous();
+    const double w = 1 + a.tail<3>().dot(p.head<3>());
+    const Eigen::Vector2d uv(a.head<4>().dot(p) / w, a.segment<4>(4).dot(p) / w);
+    const Eigen::Vector2d found = result->views[1].view.project(ball.centre_in_calibrator);
+    EXPECT_LT((found - (uv.array() * unit_px + middle_px).matrix()).norm(), 1e-5);
+  }
   EXPECT_EQ(result->views[1].dof, 13);
   EXPECT_EQ(result->joint_covariance.size(), 0);
 }

@@ -36,7 +36,7 @@ TEST(ShotOf, EstimateAndInformationHoldTheTruthWithoutThePrior) {
   const int trials = 200;
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream random(31, 0, std::uint64_t(trial));
-    const auto shot = shot_of(shot_with(truth, trial % 2, random), "a", {unknown, 0});
+    const auto shot = shot_of(shot_with(truth, trial % 2, random), "a", {unknown});
     ASSERT_TRUE(shot.has_value());
     const Vector3d error = shot->estimate_mm - truth;
     distance2 += error.dot(shot->information * error) / trials;
@@ -59,7 +59,7 @@ TEST(KnowledgeOf, PredictsTheNextShotAsWidelyAsItMust) {
     const Vector3d sag(1.4, 4.2, 4.2);
     std::vector<MachineShot> shots;
     for (int k = 0; k < 12; ++k)
-      shots.push_back(*shot_of(shot_with(wander(mean, sag, random), false, random), "a", {unknown, 0}));
+      shots.push_back(*shot_of(shot_with(wander(mean, sag, random), false, random), "a", {unknown}));
     const MachineKnowledge known = knowledge_of(shots, nominal, unknown);
     const Vector3d next = wander(mean, sag, random) - known.mean_mm;
     const double focal = std::hypot(known.prior.focal->common, known.prior.focal->of_view);
@@ -82,7 +82,7 @@ TEST(KnownPrior, TakesTheMeanAndTurnsItWithAMirroredPicture) {
 
 TEST(MachineJson, ComesBackAsItWasWritten) {
   RandomStream random(33, 0);
-  const Machine machine{{*shot_of(shot_with({905, 1, 2}, false, random), "digest", {unknown, 0})}};
+  const Machine machine{{*shot_of(shot_with({905, 1, 2}, false, random), "digest", {unknown})}};
   const auto again = machine_from_json(to_json(machine), "machine.json");
   ASSERT_TRUE(again.has_value()) << again.error().message;
   EXPECT_EQ(again->shots.at(0).picture, "digest");
@@ -92,7 +92,7 @@ TEST(MachineJson, ComesBackAsItWasWritten) {
 
 TEST(MachineJson, RefusesInformationThatIsNone) {
   RandomStream random(34, 0);
-  Json json = to_json(Machine{{*shot_of(shot_with({905, 1, 2}, false, random), "digest", {unknown, 0})}});
+  Json json = to_json(Machine{{*shot_of(shot_with({905, 1, 2}, false, random), "digest", {unknown})}});
   json["shots"][0]["information_per_mm2"][0][0] = -1;
   EXPECT_EQ(machine_from_json(json, "machine.json").error().reason, Reason::bad_value);
 }

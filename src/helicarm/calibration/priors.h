@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -42,7 +43,9 @@ struct MachinePrior {
 /// What all views share.
 struct CommonPrior {
   MachinePrior machine;
-  double ball_tolerance_mm = 0;  ///< standard deviation, per axis, of a ball's place about the drawing's
+  /// Of each ball's place about the file's, mm^2, without the error of the scale; empty: exact.
+  std::vector<Eigen::Matrix3d> ball_covariance_mm2 = {};
+  double scale_sigma = 0;  ///< relative standard deviation of the calibrator's scale about the balls' mean
 };
 
 /// A start whose intrinsics the balls hardly fix, brought to what is known of them; its pictures change

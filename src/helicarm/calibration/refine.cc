@@ -22,6 +22,13 @@ Eigen::Index ball_count(const std::vector<ViewProblem>& problems) {
   return Eigen::Index(count);
 }
 
+bool is_tolerant(const std::vector<ViewProblem>& problems) {
+  return std::ranges::any_of(problems, [](const ViewProblem& problem) {
+    return std::ranges::any_of(problem.observations,
+                               [](const Observation& seen) { return !seen.place_root.isZero(0); });
+  });
+}
+
 Eigen::Index map_modes(const ViewProblem& problem) {
   return problem.observations.empty() ? 0 : problem.observations.front().by_map.size();
 }
@@ -46,7 +53,7 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
   const Eigen::Index own = at.departures.size();
   at.residuals.resize(count + priors.residuals.size() + own);
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
-  const bool tolerant = common.ball_tolerance_mm > 0;
+  const bool tolerant = is_tolerant(problems);
   Eigen::Index row = 0;
   Eigen::Index map = tolerant ? 3 * ball_count(problems) : 0;
   for (std::size_t i = 0; i < problems.size(); ++i) {
@@ -54,7 +61,7 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
     for (const Observation& seen : problems[i].observations) {
       const Eigen::Index ball = 3 * Eigen::Index(seen.ball);
       Eigen::Vector3d place = seen.point_in_world;
-      if (tolerant) place += common.ball_tolerance_mm * at.departures.segment<3>(ball);
+      if (tolerant) place += seen.place_root * at.departures.segment<3>(ball);
       Picture picture = picture_of(at.views[i], place);
       if (!(picture.relative_depth > 0)) return false;
       for (Eigen::Index axis = 0; axis < (modes > 0 ? 2 : 0); ++axis) {
@@ -66,8 +73,7 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
       at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
           picture.by_step / seen.sigma_px;
       if (tolerant)
-        at.jacobian.block<2, 3>(row, steps + ball) =
-            common.ball_tolerance_mm / seen.sigma_px * picture.by_place;
+        at.jacobian.block<2, 3>(row, steps + ball) = picture.by_place * seen.place_root / seen.sigma_px;
       row += 2;
     }
     map += 2 * modes;
@@ -106,7 +112,7 @@ std::optional<Eigen::MatrixXd> covariance_of(const Eigen::MatrixXd& jacobian) {
 
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
   Refinement at;
-  Eigen::Index own = common.ball_tolerance_mm > 0 ? 3 * ball_count(problems) : 0;
+  Eigen::Index own = is_tolerant(problems) ? 3 * ball_count(problems) : 0;
   for (const ViewProblem& problem : problems) {
     at.views.push_back(problem.start);
     own += 2 * map_modes(problem);

@@ -17,6 +17,8 @@ struct Observation {
   Eigen::Vector2d pixel;
   double sigma_px;                 ///< its own, without what the map does
   Eigen::RowVectorXd by_map = {};  ///< what the map's independent errors of one sigma do to either axis
+  /// Square root of the covariance of the ball's place, mm: place = point_in_world + root * departure.
+  Eigen::Matrix3d place_root = Eigen::Matrix3d::Zero();
 };
 
 struct ViewProblem {

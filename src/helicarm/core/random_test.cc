@@ -6,6 +6,13 @@
 namespace helicarm {
 namespace {
 
+/// Known answer of Philox 4x32-10 for counter 0 and key 0 (kat_vectors of Random123, Salmon et al. 2011).
+TEST(RandomStream, FirstBlockIsThePublishedOne) {
+  RandomStream random(0, 0, 0);
+  for (const std::uint32_t word : {0x6627e8d5u, 0xe169c58du, 0xbc57ac4cu, 0x9b00dbd8u})
+    EXPECT_EQ(random.bits(), word);
+}
+
 TEST(RandomStream, SameKeyGivesTheSameNumbers) {
   RandomStream a(7, 1, 42);
   RandomStream b(7, 1, 42);

@@ -22,6 +22,8 @@ constexpr std::size_t most_balls = 1000;
 constexpr Range coordinate_range{-1000, 1000};
 constexpr Range diameter_range{0.5, 30};
 constexpr Range tolerance_range{0, 1};
+constexpr Range variance_range{-100, 100};  // mm^2: a ball off by 10 mm
+constexpr Range scale_sigma_range{0, 0.1};
 constexpr double least_extent_mm = 10;
 constexpr double least_distance_mm = 0.1;
 constexpr double least_flatness = 0.01;
@@ -36,9 +38,25 @@ std::string name_of(JsonReader& reader, const char* key) {
   return name;
 }
 
+/// Symmetric and without negative eigenvalues, both to rounding.
+Eigen::Matrix3d covariance_from(JsonReader& reader) {
+  constexpr double rounding = 1e-6;
+  const Eigen::Matrix3d given =
+      Eigen::Map<const Eigen::Matrix3d>(reader.matrix("covariance_mm2", 3, 3, variance_range).data());
+  const double size = given.cwiseAbs().maxCoeff();
+  if ((given - given.transpose()).cwiseAbs().maxCoeff() > rounding * size)
+    reader.refuse(Reason::bad_value, "covariance_mm2", "is not symmetric");
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(given);
+  if (eigen.eigenvalues()[0] < -rounding * size)
+    reader.refuse(Reason::bad_value, "covariance_mm2",
+                  fmt::format("has the negative eigenvalue {:g}", eigen.eigenvalues()[0]));
+  return (given + given.transpose()) / 2;
+}
+
 CalibratorBall ball_from(JsonReader reader) {
   CalibratorBall ball{name_of(reader, "label"), vector3(reader.numbers("xyz_mm", 3, coordinate_range)),
                       reader.number("diameter_mm", diameter_range)};
+  if (reader.has("covariance_mm2")) ball.covariance_mm2 = covariance_from(reader);
   reader.finish();
   return ball;
 }
@@ -138,6 +156,10 @@ Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& o
     for (JsonReader& target : reader.objects("targets", false, most_balls))
       calibrator.targets.push_back(target_from(target));
     if (reader.has("tolerance_mm")) calibrator.tolerance_mm = reader.number("tolerance_mm", tolerance_range);
+    calibrator.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range).value_or(0);
+    calibrator.measured = reader.raw("measured");
+    if (!calibrator.measured.is_null() && !calibrator.measured.is_object())
+      reader.refuse(Reason::bad_value, "measured", "is not an object");
     reader.finish();
     check_names(calibrator, origin);
     check_places(calibrator.balls, origin);
@@ -159,10 +181,17 @@ Json to_json(const Calibrator& calibrator) {
   constexpr const char* kinds[] = {"ball", "cross", "line_end"};
   Json json{{"name", calibrator.name}, {"balls", Json::array()}, {"targets", Json::array()}};
   if (calibrator.tolerance_mm > 0) json["tolerance_mm"] = calibrator.tolerance_mm;
-  for (const auto& ball : calibrator.balls)
-    json["balls"].push_back({{"label", ball.label},
-                             {"xyz_mm", numbers(ball.centre_in_calibrator)},
-                             {"diameter_mm", ball.diameter_mm}});
+  if (calibrator.scale_sigma > 0) json["scale_sigma"] = calibrator.scale_sigma;
+  if (!calibrator.measured.is_null()) json["measured"] = calibrator.measured;
+  for (const auto& ball : calibrator.balls) {
+    Json entry{{"label", ball.label},
+               {"xyz_mm", numbers(ball.centre_in_calibrator)},
+               {"diameter_mm", ball.diameter_mm}};
+    if (ball.covariance_mm2)
+      for (const auto& row : ball.covariance_mm2->rowwise())
+        entry["covariance_mm2"].push_back(numbers(row.transpose()));
+    json["balls"].push_back(std::move(entry));
+  }
   for (const auto& target : calibrator.targets) {
     Json entry{{"name", target.name},
                {"xyz_mm", numbers(target.point_in_calibrator)},
@@ -179,6 +208,27 @@ Eigen::Vector3d middle_of(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
   return sum / double(calibrator.balls.size());
+}
+
+std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator) {
+  const Eigen::Vector3d middle = middle_of(calibrator);
+  std::vector<Eigen::Matrix3d> covariances;
+  bool exact = true;
+  for (const CalibratorBall& ball : calibrator.balls) {
+    Eigen::Matrix3d covariance =
+        calibrator.tolerance_mm * calibrator.tolerance_mm * Eigen::Matrix3d::Identity();
+    if (ball.covariance_mm2) {
+      const Eigen::Vector3d by_scale = calibrator.scale_sigma * (ball.centre_in_calibrator - middle);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> own(*ball.covariance_mm2 -
+                                                               by_scale * by_scale.transpose());
+      covariance +=
+          own.eigenvectors() * own.eigenvalues().cwiseMax(0).asDiagonal() * own.eigenvectors().transpose();
+    }
+    exact &= covariance.isZero(0);
+    covariances.push_back(covariance);
+  }
+  if (exact) covariances.clear();
+  return covariances;
 }
 
 bool same_places(const Calibrator& a, const Calibrator& b) {

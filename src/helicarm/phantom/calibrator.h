@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ struct CalibratorBall {
   std::string label;
   Eigen::Vector3d centre_in_calibrator;  ///< mm
   double diameter_mm;
+  std::optional<Eigen::Matrix3d> covariance_mm2 = {};  ///< of a measured centre, the scale's error included
 };
 
 enum class TargetKind { ball, cross, line_end };
@@ -37,6 +39,8 @@ struct Calibrator {
   std::vector<CalibratorBall> balls;
   std::vector<CalibratorTarget> targets;
   double tolerance_mm = 0;  ///< of the balls' places: standard deviation per axis
+  double scale_sigma = 0;   ///< relative standard deviation of all lengths together; 0: not stated
+  Json measured = nullptr;  ///< how the file was obtained, as written there
 };
 
 /// The built-in calibrator: twelve 4 mm balls on the conical helix of Eq. 9 at t = pi/6 + k pi/2, k = 0..11.
@@ -56,6 +60,10 @@ Json to_json(const Calibrator& calibrator);
 
 /// Mean place of the balls, mm.
 Eigen::Vector3d middle_of(const Calibrator& calibrator);
+
+/// Covariance (mm^2) of each ball's centre apart from the scale's error, which all balls share: the file's
+/// own less that of the scale about the balls' mean, plus the tolerance. Empty where every ball is exact.
+std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator);
 
 /// The same labels in any order, each ball within 0.01 mm.
 bool same_places(const Calibrator& a, const Calibrator& b);

@@ -137,6 +137,44 @@ TEST(ReadCalibrator, NearlyUnitDirectionIsNormalised) {
   EXPECT_NEAR(calibrator_from_json(json, "c.json")->targets[2].directions[0].norm(), 1, 1e-15);
 }
 
+TEST(ReadCalibrator, MeasuredFileIsReadAndWrittenBack) {
+  Json json = example();
+  json["scale_sigma"] = 0.0005;
+  json["measured"] = {{"date", "2026-11-22"}, {"scale", "one distance"}};
+  json["balls"][2]["covariance_mm2"] = {{4e-4, 1e-4, 0}, {1e-4, 9e-4, 0}, {0, 0, 1e-4}};
+  const auto calibrator = calibrator_from_json(json, "c.json");
+  ASSERT_TRUE(calibrator.has_value()) << calibrator.error().message;
+  EXPECT_EQ(calibrator->scale_sigma, 0.0005);
+  EXPECT_EQ((*calibrator->balls[2].covariance_mm2)(0, 1), 1e-4);
+  const Json written = to_json(*calibrator);
+  EXPECT_EQ(written["measured"], json["measured"]);
+  EXPECT_EQ(written["balls"][2]["covariance_mm2"], json["balls"][2]["covariance_mm2"]);
+}
+
+TEST(ReadCalibrator, CovarianceThatIsNoneIsRefused) {
+  Json json = example();
+  json["balls"][2]["covariance_mm2"] = {{1, 2, 0}, {0, 1, 0}, {0, 0, 1}};
+  EXPECT_NE(refusal(json).message.find("balls[2]: \"covariance_mm2\": is not symmetric"), std::string::npos)
+      << refusal(json).message;
+  json["balls"][2]["covariance_mm2"] = {{1, 2, 0}, {2, 1, 0}, {0, 0, 1}};
+  EXPECT_NE(refusal(json).message.find("negative eigenvalue -1"), std::string::npos) << refusal(json).message;
+}
+
+TEST(BallCovariances, ScaleIsTakenOutAndTheToleranceAdded) {
+  Calibrator calibrator = udcsc();
+  EXPECT_TRUE(ball_covariances(calibrator).empty());
+  calibrator.scale_sigma = 0.01;
+  EXPECT_TRUE(ball_covariances(calibrator).empty());
+  const Eigen::Matrix3d own = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
+  const Eigen::Vector3d by_scale = 0.01 * (calibrator.balls[4].centre_in_calibrator - middle_of(calibrator));
+  calibrator.balls[4].covariance_mm2 = own + by_scale * by_scale.transpose();
+  calibrator.tolerance_mm = 0.1;
+  const auto covariances = ball_covariances(calibrator);
+  ASSERT_EQ(covariances.size(), 12u);
+  EXPECT_LT((covariances[4] - own - 0.01 * Eigen::Matrix3d::Identity()).norm(), 1e-12);
+  EXPECT_LT((covariances[5] - 0.01 * Eigen::Matrix3d::Identity()).norm(), 1e-12);
+}
+
 TEST(SamePlaces, OrderIsFreeAndAShiftIsSeen) {
   Calibrator other = udcsc();
   std::swap(other.balls[0], other.balls[5]);
