@@ -6,9 +6,9 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/detection/find_dots.h"
-#include "helicarm/fiducials/find_fiducials.h"
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/fiducials/label_fiducials.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/write_case.h"
@@ -52,10 +52,11 @@ BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
 /// As the balls are fitted at last: from where the search left them, with the picture's own look.
 void fit_one_ball(benchmark::State& state) {
-  const auto found =
-      value_or_throw(find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+  const Candidates candidates = detect_candidates(exposure(), rectification());
+  const auto found = value_or_throw(
+      label_fiducials(exposure(), rectification(), candidates, simulated_case().calibrator, {}));
   std::vector<Dot> balls;
-  for (const Dot& dot : rectification().other_dots)
+  for (const Dot& dot : candidates.dots)
     for (const Fiducial& ball : found.fiducials)
       if (ball.status == FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
@@ -69,12 +70,13 @@ void rectify_view(benchmark::State& state) {
 }
 BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
-void find_balls(benchmark::State& state) {
+void label_candidates(benchmark::State& state) {
+  const Candidates candidates = detect_candidates(exposure(), rectification());
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        find_fiducials(exposure(), rectification(), simulated_case().calibrator, Method::best));
+        label_fiducials(exposure(), rectification(), candidates, simulated_case().calibrator, {}));
 }
-BENCHMARK(find_balls)->Unit(benchmark::kMillisecond);
+BENCHMARK(label_candidates)->Unit(benchmark::kMillisecond);
 
 void resample_picture(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(resample(exposure(), rectification().map));

@@ -30,16 +30,16 @@ ROOMS = {
     "devices": "core geometry image xray",
     "operating_room": "core geometry image phantom xray volume simulation devices",
     "session": "core",
-    "navigation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
+    "pipeline": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                   " verification volume simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-              " verification volume simulation navigation",
+              " verification volume simulation pipeline",
     "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                 " verification devices session navigation report",
-    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session navigation operation"
+                 " verification devices session pipeline report",
+    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session pipeline operation"
                  " guidance verification report",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-             " verification volume simulation navigation report",
+             " verification volume simulation pipeline report",
 }
 FOR_TESTS = {"core", "simulation"}
 

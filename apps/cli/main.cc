@@ -10,7 +10,7 @@
 #include "command_line.h"
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 namespace {

@@ -2,7 +2,7 @@
 #include "command_line.h"
 #include "detect_command.h"
 #include "export_command.h"
-#include "helicarm/navigation/run_fields.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/exports.h"
 #include "import_command.h"
 #include "locate_command.h"

@@ -11,9 +11,9 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/localization/tre_volume.h"
-#include "helicarm/navigation/accuracy.h"
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/pipeline/calibrate_case.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/report/tre_figure.h"
 #include "run_command.h"
 
@@ -70,19 +70,15 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
                                  arguments.step_mm, arguments.half_mm, most_points_per_edge));
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));
-    Case given = value_or_throw(read_case(arguments.folder));
-    given.picks.clear();
-    given.tunnels.clear();
-    given.tool_lines.clear();
+    const Case given = value_or_throw(read_case(arguments.folder));
     const Eigen::Vector3d middle = middle_of(given.calibrator);
     if (places.empty()) places.push_back(middle);
     RunOptions options;
     options.threads = console.threads;
     if (arguments.machine) options.machine = value_or_throw(read_machine(*arguments.machine));
-    const Result result = value_or_throw(run_case(given, options));
-    if (result.failure) throw BadInput(*result.failure);
-    Calibration calibration{{}, result.joint_covariance};
-    for (const ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
+    const auto calibrated = calibrate_case(given, options);
+    if (!calibrated) throw BadInput(calibrated.error().failure);
+    const Calibration& calibration = *calibrated;
 
     Json points = Json::array();
     for (const Eigen::Vector3d& place : places) points.push_back(prediction(place, calibration, arguments));

@@ -6,7 +6,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
 #include "helicarm/devices/receiver/watched_folder.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {

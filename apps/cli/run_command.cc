@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "command.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 

@@ -9,8 +9,8 @@
 #include "gui/desk/steps.h"
 #include "gui/replay/pdf_report.h"
 #include "helicarm/core/files.h"
-#include "helicarm/navigation/run_case.h"
 #include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
@@ -245,7 +245,7 @@ Desk::Change Desk::came(Pictures pictures) {
     live_tool_.reset();  // its lines belong to the former pictures
     state.result = only(pictures);
     state.next_view = first_missing(state);
-    if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.exposure.has_value(); }))
+    if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.exposure != nullptr; }))
       QMetaObject::invokeMethod(this, &Desk::measure, Qt::QueuedConnection);
   };
 }

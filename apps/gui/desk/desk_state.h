@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "helicarm/navigation/case.h"
 #include "helicarm/operation/operation.h"
+#include "helicarm/pipeline/case.h"
 #include "helicarm/simulation/bone_meshes.h"
 
 namespace helicarm::gui {

@@ -26,7 +26,7 @@ DeskState state_with(std::vector<ViewResult> views) {
 ViewResult exposed(const std::string& name) {
   ViewResult view;
   view.name = name;
-  view.exposure = Exposure();
+  view.exposure = std::make_shared<const Exposure>();
   return view;
 }
 

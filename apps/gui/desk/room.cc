@@ -5,8 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/navigation/run_case.h"
-#include "helicarm/operation/case_of.h"
 #include "helicarm/phantom/plate.h"
 #include "helicarm/xray/read_exposure.h"
 
@@ -29,7 +27,8 @@ Expected<Pictures> take(Room& room, const std::string& view, const DatedArrival&
       ViewResult shown;
       shown.name = name;
       if (const auto file = taken.find(name); file != taken.end())
-        shown.exposure = value_or_throw(read_exposure(file->second, name, 1));
+        shown.exposure =
+            std::make_shared<const Exposure>(value_or_throw(read_exposure(file->second, name, 1)));
       pictures.push_back(std::move(shown));
     }
     return pictures;
@@ -62,18 +61,20 @@ Expected<Pictures> shoot_and_take(Room& room, const std::string& view) {
 Expected<Result> measure(Room& room, const std::vector<Pick>& picks) {
   if (room.given) {
     room.given->picks = picks;
-    return run_case(*room.given, room.options);
+    if (!room.calibration || room.calibrated_by != room.options.method) {
+      auto calibration = calibrate_case(*room.given, room.options);
+      if (!calibration) return result_of_refusal(*room.given, std::move(calibration).error(), room.options);
+      room.calibration = *std::move(calibration);
+      room.calibrated_by = room.options.method;
+    }
+    return locate_case(*room.given, *room.calibration, room.options);
   }
   Json json = Json::array();
   for (const Pick& pick : picks) json.push_back(helicarm::to_json(pick));
   room.operation->pick(std::move(json));
-  if (const auto done = room.operation->measure(); done)
-    return room.operation->result();
-  else if (exit_code(done.error().reason) == 2)
-    return tl::unexpected<Failure>(done.error());
-  return recompute_case(room.operation->newest_case(), room.operation->plan()).map([](CaseRun run) {
-    return std::move(run.result);
-  });
+  const auto done = room.operation->measure();
+  if (const auto& result = room.operation->newest_result()) return *result;
+  return tl::unexpected<Failure>(done.error());
 }
 
 Expected<Case> case_of_pictures(const std::vector<std::filesystem::path>& pictures) {

@@ -6,6 +6,7 @@
 #include "gui/desk/desk_state.h"
 #include "helicarm/operating_room/virtual_room.h"
 #include "helicarm/operation/connections.h"
+#include "helicarm/pipeline/locate_case.h"
 
 namespace helicarm::gui {
 
@@ -17,6 +18,8 @@ struct Room {
   std::unique_ptr<Operation> operation;
   TrackerPlan tracker;  ///< the operation's, for any thread
   std::optional<Case> given;
+  std::optional<CaseCalibration> calibration;  ///< of `given`
+  Method calibrated_by = Method::best;
   RunOptions options;
   std::optional<RobotOrder> last_order;
   RobotState rest;                    ///< where the robot was before it

@@ -4,7 +4,7 @@
 #include <QCoreApplication>
 #include <algorithm>
 
-#include "helicarm/navigation/accuracy.h"
+#include "helicarm/pipeline/accuracy.h"
 
 namespace helicarm::gui {
 namespace {
@@ -38,7 +38,7 @@ void settle(StepCard& card, const QString& doubt) {
 void acquire(StepCard& card, const DeskState& state) {
   const auto& views = state.result->views;
   const auto come =
-      std::ranges::count_if(views, [](const ViewResult& view) { return view.exposure.has_value(); });
+      std::ranges::count_if(views, [](const ViewResult& view) { return view.exposure != nullptr; });
   card.figure = tr("%1 of %2 X-rays").arg(come).arg(state.views.size());
   if (come == std::ssize(state.views)) return settle(card, {});
   card.why = tr("%1 is to come").arg(text(state.next_view));

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::gui {
 

@@ -23,12 +23,13 @@ Result result_of_two_views(std::size_t points) {
   for (const char* name : {"AP", "LAT <&>"}) {
     ViewResult& view = result.views.emplace_back();
     view.name = name;
-    view.exposure = Exposure{name, Image<float>(640, 480, 3000), 0, 4095, {}, {}};
+    Exposure exposure{name, Image<float>(640, 480, 3000), 0, 4095, {}, {}};
     for (int v = 0; v < 480; ++v)
-      for (int u = 0; u < 640; ++u) view.exposure->pixels(u, v) = float(500 + 4 * u);
+      for (int u = 0; u < 640; ++u) exposure.pixels(u, v) = float(500 + 4 * u);
+    view.exposure = std::make_shared<const Exposure>(std::move(exposure));
     view.rectification = Rectification{};
     view.rectification->map = identity_map(640, 480, 0.2);
-    view.found = FoundFiducials{};
+    view.found = LabelledFiducials{};
     Fiducial ball{"P1", Eigen::Vector3d::Zero()};
     ball.status = FiducialStatus::used;
     ball.uv = {320, 240};

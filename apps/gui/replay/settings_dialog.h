@@ -8,9 +8,9 @@
 
 #include "helicarm/core/field.h"
 #include "helicarm/devices/receiver/receiver.h"
-#include "helicarm/navigation/result.h"
 #include "helicarm/operating_room/virtual_room.h"
 #include "helicarm/operation/plan.h"
+#include "helicarm/pipeline/result.h"
 
 class QTabWidget;
 

@@ -13,9 +13,9 @@
 
 #include "gui/replay/application_test.h"
 #include "gui/replay/field_box.h"
-#include "helicarm/navigation/run_fields.h"
 #include "helicarm/operating_room/room_fields.h"
 #include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/run_fields.h"
 
 namespace helicarm::gui {
 namespace {

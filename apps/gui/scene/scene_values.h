@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "helicarm/devices/robot/kinematics.h"
-#include "helicarm/navigation/result.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/mesh.h"
+#include "helicarm/pipeline/result.h"
 
 /// What is to be seen of an operation, as plain values in the calibrator's frame, mm.
 namespace helicarm::gui {

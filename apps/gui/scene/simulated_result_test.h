@@ -7,7 +7,7 @@
 
 #include <unistd.h>
 
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm::gui {

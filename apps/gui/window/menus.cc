@@ -13,7 +13,7 @@
 
 #include "gui/desk/steps.h"
 #include "gui/window/main_window.h"
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/run_case.h"
 
 namespace helicarm::gui {
 namespace fs = std::filesystem;

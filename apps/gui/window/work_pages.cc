@@ -7,7 +7,7 @@
 #include "gui/desk/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
-#include "helicarm/navigation/accuracy.h"
+#include "helicarm/pipeline/accuracy.h"
 
 namespace helicarm::gui {
 

@@ -4,7 +4,7 @@
 #include <QImage>
 
 #include "helicarm/image/grey_window.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::gui {
 

@@ -57,8 +57,9 @@ TEST(LayerOf, InpaintedHidesThePlateAndLeavesTheBalls) {
 }
 
 TEST(LayerOf, AViewThatIsNotRectifiedHasOnlyItsRawLayer) {
-  ViewResult view{"AP", Exposure{}, {}, {}, {}};
-  view.exposure->pixels = Image<float>(4, 3, 7);
+  Exposure exposure;
+  exposure.pixels = Image<float>(4, 3, 7);
+  const ViewResult view{"AP", std::make_shared<const Exposure>(std::move(exposure)), {}, {}, {}};
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
     EXPECT_EQ(layer_at_hand(view, layer), Layer::raw);
     EXPECT_EQ(layer_of(view, layer).width(), 4);

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm::gui {

@@ -67,9 +67,10 @@ TEST_F(XrayViewTest, AClickArrivesAsARawPixelInEveryLayerAtAnyZoom) {
 
 TEST_F(XrayViewTest, WhatIsDrawnStandsWhereAClickOnItGoes) {
   Result bare;
-  bare.views.push_back({"dot", Exposure{}, {}, {}, {}});
-  bare.views[0].exposure->pixels = Image<float>(33, 33, 1);
-  bare.views[0].exposure->pixels(20, 9) = 100;
+  Exposure dot;
+  dot.pixels = Image<float>(33, 33, 1);
+  dot.pixels(20, 9) = 100;
+  bare.views.push_back({"dot", std::make_shared<const Exposure>(std::move(dot)), {}, {}, {}});
   view.show_view(std::make_shared<const Result>(std::move(bare)), 0);
   settle();
   view.set_window({1, 100});

@@ -9,6 +9,9 @@
 namespace helicarm {
 
 enum class Polarity { dark, bright };
+constexpr Polarity opposite(Polarity polarity) {
+  return polarity == Polarity::dark ? Polarity::bright : Polarity::dark;
+}
 
 struct BlobOptions {
   Polarity polarity = Polarity::dark;

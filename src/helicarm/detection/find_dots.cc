@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace helicarm {
@@ -179,6 +180,16 @@ std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& do
   for (const Dot& dot : dots)
     if (const auto better = refit(exposure, dot, look, neighbours)) refitted.push_back(*better);
   return refitted;
+}
+
+std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot>& taken) {
+  std::vector<Dot> rest;
+  std::ranges::copy_if(dots, std::back_inserter(rest), [&](const Dot& dot) {
+    return std::ranges::none_of(taken, [&](const Dot& other) {
+      return (dot.centre_px - other.centre_px).norm() < 0.7 * std::max(dot.radius_px, other.radius_px);
+    });
+  });
+  return rest;
 }
 
 }  // namespace helicarm

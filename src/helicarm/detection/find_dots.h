@@ -35,6 +35,9 @@ DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, s
 /// radius.
 std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options);
 
+/// The dots that are none of `taken`: farther from each than 0.7 of the larger radius.
+std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot>& taken);
+
 /// As `find_dots`, for a reader who wants no doubtful ones: dots of one size are fitted again with a look of
 /// their own, and what then stays uncertain (sigma over `clear_sigma_px`) is left out.
 std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& options,

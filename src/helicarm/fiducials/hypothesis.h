@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -30,6 +31,7 @@ struct Scene {
   double field_radius_px;  ///< of the disc where false blobs may lie
   double radius_bias;      ///< of all radii found, relative
   double radius_bias_sigma;
+  std::optional<bool> mirrored = {};  ///< the only handedness that is tried, where it is known
 };
 
 /// Millimetres that a pixel may span at a candidate, if it is this ball, judged by its radius.

@@ -48,6 +48,7 @@ Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& c
   scene.field_radius_px = r;
   scene.radius_bias = prior.radius_bias;
   scene.radius_bias_sigma = prior.radius_bias_sigma;
+  scene.mirrored = prior.mirrored;
   return scene;
 }
 

@@ -15,11 +15,12 @@ namespace helicarm {
 
 /// What the file says of the camera, in rectified pixels.
 struct LabellingPrior {
-  std::optional<double> focal_px;  ///< source distance over pixel size; empty: from 4 to 24 field radii
-  double focal_sigma = 0.01;       ///< relative
-  Eigen::Vector2d principal_px;    ///< nominal, the image's centre
-  double principal_sigma_px = 30;  ///< per axis
-  double field_radius_px;          ///< of the disc in which candidates may lie
+  std::optional<double> focal_px;     ///< source distance over pixel size; empty: from 4 to 24 field radii
+  double focal_sigma = 0.01;          ///< relative
+  Eigen::Vector2d principal_px;       ///< nominal, the image's centre
+  double principal_sigma_px = 30;     ///< per axis
+  std::optional<bool> mirrored = {};  ///< where it is known
+  double field_radius_px;             ///< of the disc in which candidates may lie
   /// Of all candidates' radii, relative. What another view's labelling has found, with a sigma of 0.008,
   /// tells apart the look-alikes of a helix seen along its axis with an end ball hidden.
   double radius_bias = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/fiducials/find_fiducials.h"
+#include "helicarm/fiducials/label_fiducials.h"
 
 #include <algorithm>
 #include <cmath>
@@ -24,13 +24,14 @@ constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
 
 /// Dots that may be balls of the calibrator, the clearest first.
-std::vector<Dot> plausible_balls(const Rectification& rectification, const Calibrator& calibrator) {
-  const auto& pixel_mm = rectification.map.rectified_pixel_mm;
+std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionMap& map,
+                                 const Calibrator& calibrator) {
+  const auto& pixel_mm = map.rectified_pixel_mm;
   const Range radii = pixel_mm ? ball_radii_px(calibrator, *pixel_mm) : Range{2, 1e9};
   std::vector<Dot> balls;
-  for (const Dot& dot : rectification.other_dots)
+  for (const Dot& dot : dots)
     if (radii.low <= dot.radius_px && dot.radius_px <= radii.high && dot.sigma_px < 0.5 &&
-        rectification.map.rectified_from_raw(dot.centre_px))
+        map.rectified_from_raw(dot.centre_px))
       balls.push_back(dot);
   const auto clarity = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
   std::stable_sort(balls.begin(), balls.end(),
@@ -57,10 +58,11 @@ double predicted_radius(const View& view, const CalibratorBall& ball) {
 /// The named balls fitted with a profile of their own, and the others looked for where the pose puts them.
 class BallFitter {
  public:
-  BallFitter(const Exposure& exposure, const Rectification& rectification, const std::vector<Dot>& named)
+  BallFitter(const Exposure& exposure, const Rectification& rectification, const Candidates& candidates,
+             const std::vector<Dot>& named)
       : exposure_(exposure),
         look_(estimate_look(exposure, rectification.noise, named)),
-        neighbours_(rectification.other_dots) {
+        neighbours_(candidates.dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
     for (const Dot& dot : named) contrasts.push_back(dot.contrast);
@@ -156,27 +158,29 @@ bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contr
          std::abs(fitted.contrast) >= 0.25 * std::abs(typical_contrast);
 }
 
-Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
-                                        const Calibrator& calibrator, Method method,
-                                        std::optional<double> radius_bias) {
+Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rectification& rectification,
+                                            const Candidates& candidates, const Calibrator& calibrator,
+                                            const FiducialOptions& options) {
   const DistortionMap& map = rectification.map;
-  const std::vector<Dot> balls = plausible_balls(rectification, calibrator);
-  std::vector<BallCandidate> candidates;
+  const Method method = options.method;
+  const std::vector<Dot> balls = plausible_balls(candidates.dots, map, calibrator);
+  std::vector<BallCandidate> rectified;
   for (const Dot& ball : balls) {
     const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
-    candidates.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1});
+    rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1});
   }
   LabellingOptions labelling_options;
   if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
   LabellingPrior prior = prior_of(exposure, map);
-  if (radius_bias) {
-    prior.radius_bias = *radius_bias;
+  prior.mirrored = options.mirrored;
+  if (options.radius_bias) {
+    prior.radius_bias = *options.radius_bias;
     prior.radius_bias_sigma = shared_bias_sigma;
   }
-  const auto labelling = label_balls(calibrator, candidates, prior, labelling_options);
+  const auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
   if (!labelling) return tl::unexpected<Failure>(labelling.error());
 
-  FoundFiducials found;
+  LabelledFiducials found;
   found.view = labelling->view;
   found.mirrored = labelling->mirrored;
   found.margin = labelling->margin;
@@ -186,7 +190,7 @@ Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectific
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
-  const BallFitter fitter(exposure, rectification, named);
+  const BallFitter fitter(exposure, rectification, candidates, named);
   const std::vector<Dot> circles =
       method == Method::paper ? hough_circles(exposure, named) : std::vector<Dot>{};
 

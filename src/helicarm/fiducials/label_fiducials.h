@@ -6,6 +6,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/detection/dot.h"
+#include "helicarm/fiducials/candidates.h"
 #include "helicarm/fiducials/fiducial.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
@@ -13,11 +14,11 @@
 
 namespace helicarm {
 
-/// What stage 2 says of one picture.
-struct FoundFiducials {
+/// The calibrator's fiducials in one image.
+struct LabelledFiducials {
   std::vector<Fiducial> fiducials;  ///< one per ball of the calibrator, in its order
-  std::vector<Dot> false_blobs;     ///< of a ball's size, but no ball of the calibrator
-  View view;                        ///< pose estimate from the labelling: a start for the calibration
+  std::vector<Dot> false_blobs;     ///< candidates of a ball's size that are no ball of the calibrator
+  View view;                        ///< estimate from the labelling: a start for the calibration
   bool mirrored = false;
   double margin = 0;          ///< log odds of the labelling against the best other one
   int runner_up_matched = 0;  ///< balls that the best other one names; 0: there is none
@@ -34,12 +35,20 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
 /// polarity and a quarter of the contrast at least that the other balls have.
 bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contrast);
 
-/// Finds and names the calibrator's balls among the dots that are not the plate's, rescues those that the
-/// search missed at their predicted places, and says of each of the others why it is not used. Along the
-/// cone's axis the labels hang on the balls' sizes: `radius_bias`, as another view of the same calibrator
-/// found it, tells them apart.
-Expected<FoundFiducials> find_fiducials(const Exposure& exposure, const Rectification& rectification,
-                                        const Calibrator& calibrator, Method method,
-                                        std::optional<double> radius_bias = {});
+struct FiducialOptions {
+  Method method = Method::best;
+  /// Of all radii in the image, relative, as another view of the same calibrator has it: decides the labels
+  /// in a view along a helix's axis, where they follow from the balls' sizes alone.
+  std::optional<double> radius_bias = {};
+  std::optional<bool> mirrored =
+      {};  ///< where the C-arm's handedness is known, only labellings of it are tried
+};
+
+/// Stage 3 (2.3.4): labels the calibrator's balls among the candidates, fits again those that the search
+/// missed at their predicted places, and gives for each of the others the reason why it is not used. Refuses
+/// as `label_balls`.
+Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rectification& rectification,
+                                            const Candidates& candidates, const Calibrator& calibrator,
+                                            const FiducialOptions& options);
 
 }  // namespace helicarm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/fiducials/find_fiducials.h"
+#include "helicarm/fiducials/label_fiducials.h"
 
 #include <cmath>
 
@@ -29,16 +29,23 @@ const SimulatedCase& faulty_case() {
   return room;
 }
 
-FoundFiducials found_in(const SimulatedCase& room, const SimulatedView& view, Method method = Method::best) {
+Expected<LabelledFiducials> label(const Exposure& exposure, const Rectification& rectification,
+                                  const Calibrator& calibrator, const FiducialOptions& options = {}) {
+  return label_fiducials(exposure, rectification, detect_candidates(exposure, rectification), calibrator,
+                         options);
+}
+
+LabelledFiducials found_in(const SimulatedCase& room, const SimulatedView& view,
+                           Method method = Method::best) {
   const Exposure exposure = exposure_of(view);
   RectificationOptions options;
   options.method = method;
   const Rectification rectification = rectify(exposure, *room.plate, options).value();
-  return find_fiducials(exposure, rectification, room.calibrator, method).value();
+  return label(exposure, rectification, room.calibrator, {method}).value();
 }
 
 /// Every used ball is where it truly is, and every clear one is used.
-void expect_right(const FoundFiducials& found, const SimulatedView& view, double tolerance_px) {
+void expect_right(const LabelledFiducials& found, const SimulatedView& view, double tolerance_px) {
   ASSERT_EQ(found.fiducials.size(), view.balls.size());
   for (std::size_t k = 0; k < view.balls.size(); ++k) {
     const Fiducial& fiducial = found.fiducials[k];
@@ -52,9 +59,9 @@ void expect_right(const FoundFiducials& found, const SimulatedView& view, double
   }
 }
 
-TEST(FindFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
+TEST(LabelFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
   for (const SimulatedView& view : sound_case().views) {
-    const FoundFiducials found = found_in(sound_case(), view);
+    const LabelledFiducials found = found_in(sound_case(), view);
     expect_right(found, view, 0.1);
     EXPECT_FALSE(found.mirrored);
     EXPECT_GT(found.view.intrinsics.fx, 0);
@@ -62,10 +69,10 @@ TEST(FindFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
   }
 }
 
-TEST(FindFiducials, RectifiedPlaceIsTheRawOnesOwn) {
+TEST(LabelFiducials, RectifiedPlaceIsTheRawOnesOwn) {
   const Exposure exposure = exposure_of(sound_case().views[0]);
   const Rectification rectification = rectify(exposure, plate48(), {}).value();
-  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  const auto found = label(exposure, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   for (const Fiducial& fiducial : found->fiducials)
     if (fiducial.status == FiducialStatus::used) {
@@ -73,17 +80,17 @@ TEST(FindFiducials, RectifiedPlaceIsTheRawOnesOwn) {
     }
 }
 
-TEST(FindFiducials, MirroredLateralViewIsSeenToBeMirrored) {
-  const FoundFiducials found = found_in(faulty_case(), faulty_case().views[1]);
+TEST(LabelFiducials, MirroredLateralViewIsSeenToBeMirrored) {
+  const LabelledFiducials found = found_in(faulty_case(), faulty_case().views[1]);
   EXPECT_TRUE(found.mirrored);
   EXPECT_LT(found.view.intrinsics.fx, 0);
   expect_right(found, faulty_case().views[1], 0.1);
   EXPECT_FALSE(found_in(faulty_case(), faulty_case().views[0]).mirrored);
 }
 
-TEST(FindFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
+TEST(LabelFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
   for (const SimulatedView& view : faulty_case().views) {
-    const FoundFiducials found = found_in(faulty_case(), view);
+    const LabelledFiducials found = found_in(faulty_case(), view);
     for (const Fiducial& fiducial : found.fiducials)
       if (fiducial.label == "P4" || fiducial.label == "P9") {
         EXPECT_NE(fiducial.status, FiducialStatus::used) << view.shot.name << " " << fiducial.label;
@@ -97,45 +104,45 @@ TEST(FindFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
   }
 }
 
-TEST(FindFiducials, BallOutOfTheFieldIsOutside) {
+TEST(LabelFiducials, BallOutOfTheFieldIsOutside) {
   Exposure exposure = exposure_of(sound_case().views[0]);
   const auto& lost = sound_case().views[0].balls[5];
   Rectification rectification = rectify(exposure, plate48(), {}).value();
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u)
       if ((Vector2d(u, v) - lost.raw).norm() < 10) exposure.pixels(u, v) = exposure.lowest;
-  std::erase_if(rectification.other_dots,
+  std::erase_if(*rectification.other_dots,
                 [&](const Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
-  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  const auto found = label(exposure, rectification, sound_case().calibrator);
   ASSERT_TRUE(found) << found.error().message;
   for (const Fiducial& fiducial : found->fiducials)
     EXPECT_EQ(fiducial.status == FiducialStatus::outside, fiducial.label == lost.name) << fiducial.label;
 }
 
-TEST(FindFiducials, BallTheSearchMissedIsRescued) {
+TEST(LabelFiducials, BallTheSearchMissedIsRescued) {
   const Exposure exposure = exposure_of(sound_case().views[0]);
   const auto& ball = sound_case().views[0].balls[6];
   ASSERT_EQ(ball.visibility, Visibility::clear);
   Rectification rectification = rectify(exposure, plate48(), {}).value();
-  std::erase_if(rectification.other_dots,
+  std::erase_if(*rectification.other_dots,
                 [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
-  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  const auto found = label(exposure, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->fiducials[6].status, FiducialStatus::used);
   EXPECT_LT((found->fiducials[6].uv_raw - ball.raw).norm(), 0.1);
 }
 
-TEST(FindFiducials, WithoutCandidatesIsRefused) {
+TEST(LabelFiducials, WithoutCandidatesIsRefused) {
   const Exposure exposure = exposure_of(sound_case().views[0]);
   Rectification rectification = rectify(exposure, plate48(), {}).value();
-  rectification.other_dots.clear();
-  const auto found = find_fiducials(exposure, rectification, sound_case().calibrator, Method::best);
+  rectification.other_dots->clear();
+  const auto found = label(exposure, rectification, sound_case().calibrator);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
 }
 
-TEST(FindFiducials, PaperMethodNamesTheBallsWithinAPixelAndAHalf) {
-  const FoundFiducials found = found_in(sound_case(), sound_case().views[0], Method::paper);
+TEST(LabelFiducials, PaperMethodNamesTheBallsWithinAPixelAndAHalf) {
+  const LabelledFiducials found = found_in(sound_case(), sound_case().views[0], Method::paper);
   int used = 0;
   for (std::size_t k = 0; k < found.fiducials.size(); ++k) {
     if (found.fiducials[k].status != FiducialStatus::used) continue;

@@ -58,6 +58,7 @@ bool LabelSearch::try_triple(std::array<int, 3> candidates) {
 void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_px) {
   const Eigen::Vector2d& centre = scene_.camera.principal_px;
   for (const SiftedPose& pose : sieve_.sift(candidates, focal_px, wanted())) {
+    if (scene_.mirrored && pose.mirrored != *scene_.mirrored) continue;
     std::array<Eigen::Vector2d, 3> image;
     std::array<Eigen::Vector3d, 3> points;
     for (int i = 0; i < 3; ++i) {

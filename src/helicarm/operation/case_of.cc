@@ -5,7 +5,6 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
-#include "helicarm/navigation/run_case.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
@@ -79,20 +78,21 @@ Expected<void> write_operation_case(const fs::path& folder, const OperationPlan&
   });
 }
 
-Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan) {
+Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan, CalibrationCache& cache) {
   return guarded([&] {
     const Case given = value_or_throw(read_case(folder));
     RunOptions options;
     options.max_error_mm = plan.max_error_mm;
-    CaseRun run{value_or_throw(run_case(given, options)), {}};
+    CaseRun run{value_or_throw(cache.run(given, options)), {}};
     run.digest = digest(to_text(without(to_json(run.result), "timing_ms")));
     return run;
   });
 }
 
-Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan& plan) {
+Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan& plan,
+                                     CalibrationCache& cache) {
   return guarded([&] {
-    CaseRun run = value_or_throw(recompute_case(folder, plan));
+    CaseRun run = value_or_throw(recompute_case(folder, plan, cache));
     value_or_throw(write_file(folder / "result.json", to_text(to_json(run.result))));
     value_or_throw(write_report(run.result, folder));
     return run;

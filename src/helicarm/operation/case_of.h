@@ -2,8 +2,8 @@
 #pragma once
 
 #include "helicarm/guidance/poses.h"
-#include "helicarm/navigation/result.h"
 #include "helicarm/operation/plan.h"
+#include "helicarm/pipeline/calibration_cache.h"
 
 namespace helicarm {
 
@@ -26,8 +26,10 @@ struct CaseRun {
   std::string digest;
 };
 /// Reads the case and runs it; writes nothing.
-Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan);
+Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan,
+                                 CalibrationCache& cache);
 /// The same, and writes result.json and the report.
-Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan);
+Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
+                                     CalibrationCache& cache);
 
 }  // namespace helicarm

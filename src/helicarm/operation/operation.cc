@@ -88,19 +88,18 @@ Expected<void> Operation::finish() {
   return guarded([&] { record("end", Json::object()); });
 }
 
-fs::path Operation::newest_case() const { return folder_ / fmt::format("case-{}", measurements_); }
-
 Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
-  ++measurements_;
-  const std::string name = newest_case().filename();
+  newest_.reset();
+  const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CasePicture> pictures;
   for (const View& view : views_) pictures.push_back({view.name, view.picture, view.poses});
   value_or_throw(write_operation_case(folder_ / name, plan_, pictures, now, tool_lines));
   record("case", {{"folder", name}, {"case", value_or_throw(read_json(folder_ / name / "case.json"))}});
-  CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_));
+  CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_, cache_));
   record("result", {{"folder", name}, {"digest", run.digest}});
-  if (run.result.failure) throw BadInput(*run.result.failure);
-  return std::move(run.result);
+  newest_ = std::move(run.result);
+  if (newest_->failure) throw BadInput(*newest_->failure);
+  return *newest_;
 }
 
 Expected<void> Operation::measure() {

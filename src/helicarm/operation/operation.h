@@ -13,6 +13,7 @@
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/picture_delays.h"
+#include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/exposure.h"
 
@@ -81,11 +82,14 @@ class Operation {
   /// Picks as in case.json, in place of the plan's.
   void pick(Json picks) { plan_.picks = std::move(picks); }
 
-  /// Rectify, calibrate, locate; fails with what the case was refused for.
+  /// Rectify, calibrate, locate; fails with what the case was refused for. The calibration is held until
+  /// another image is taken.
   Expected<void> measure();
   const Result& result() const { return *result_; }
-  /// The folder of the last measurement, also of one that was refused.
-  std::filesystem::path newest_case() const;
+  /// The last measurement, also one that was refused.
+  const std::optional<Result>& newest_result() const { return newest_; }
+  /// How many times the views were calibrated.
+  int calibrations() const { return cache_.calibrations(); }
   /// What the tracker said at each view's exposure, in the plan's order.
   std::vector<Poses> exposures() const;
 
@@ -159,7 +163,8 @@ class Operation {
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< each check point the first time
   std::set<std::string> in_place_;  ///< check points touched again since the last order
   int measurements_ = 0;
-  std::optional<Result> result_;
+  CalibrationCache cache_;
+  std::optional<Result> result_, newest_;
   std::optional<HandEye> hand_eye_;
   std::map<std::string, RigidTransform> bone_from_target_;  ///< of each planned tunnel
 };

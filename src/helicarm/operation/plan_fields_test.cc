@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/devices/receiver/receiver_fields.h"
-#include "helicarm/navigation/run_fields.h"
+#include "helicarm/pipeline/run_fields.h"
 
 namespace helicarm {
 namespace {

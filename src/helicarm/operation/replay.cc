@@ -102,7 +102,7 @@ class Replay {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
-    const auto run = recompute_case(inside, plan_);
+    const auto run = recompute_case(inside, plan_, cache_);
     if (!run) return differ(origin, run.error().message);
     if (record.content.at("digest") == run->digest) return;
     const auto then = read_json(inside / "result.json");
@@ -120,6 +120,7 @@ class Replay {
 
   std::filesystem::path session_;
   OperationPlan plan_;
+  CalibrationCache cache_;
   std::map<std::string, std::string> picture_digests_;
 };
 

@@ -4,8 +4,8 @@
 #include "helicarm/devices/robot/follow_target.h"
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/tracker/hand_eye.h"
-#include "helicarm/navigation/result.h"
 #include "helicarm/operation/seen_poses.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/verification/picture_line.h"
 
 namespace helicarm {

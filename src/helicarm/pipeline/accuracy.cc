@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/accuracy.h"
+#include "helicarm/pipeline/accuracy.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/case.h"
+#include "helicarm/pipeline/case.h"
 
 #include <algorithm>
 #include <set>
@@ -19,6 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t least_views = 2;
 constexpr std::size_t most_views = 50;
 constexpr std::size_t most_picks = 1000;
+constexpr std::size_t most_note_characters = 100000;
 constexpr Range pixel_range{-0.5, 65535};
 constexpr Range place_range{-10000, 10000};
 constexpr Range pose_range{-100000, 100000};
@@ -80,6 +81,7 @@ CaseView view_from(JsonReader reader, const fs::path& folder) {
   view.map = file_from(reader, "map", folder);
   if (view.plate_image && view.map)
     reader.refuse(Reason::bad_value, "map", "is given beside \"plate_image\"");
+  if (reader.has("mirrored")) view.mirrored = reader.boolean("mirrored", false);
   if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
   reader.finish();
   return view;
@@ -194,6 +196,7 @@ Case case_from(const fs::path& folder) {
   const Json json = value_or_throw(read_json(folder / "case.json"));
   JsonReader reader(json, "case.json");
   reader.choice("format", {"helicarm-case/1"});
+  reader.optional_text("notes", most_note_characters);
   Case read;
   read.folder = folder;
   read.calibrator = value_or_throw(calibrator_named(reader.text("calibrator", 1000), folder));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/case.h"
+#include "helicarm/pipeline/case.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -47,6 +47,17 @@ class CaseFile : public testing::Test {
   std::filesystem::path folder_;
   Json json_;
 };
+
+TEST_F(CaseFile, NotesAreIgnoredAndAKnownHandednessIsKept) {
+  json_["notes"] = "left knee of the phantom";
+  json_["views"][1]["mirrored"] = true;
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_FALSE(read_back->views[0].mirrored);
+  EXPECT_EQ(read_back->views[1].mirrored, true);
+  json_["views"][1]["mirrored"] = "yes";
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+}
 
 const char* const identity = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/outcome.h"
+#include "helicarm/pipeline/outcome.h"
 
 #include <algorithm>
 
@@ -81,7 +81,22 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
   });
 }
 
-std::vector<Warning> doubts_of(const Calibrator& calibrator, const Result& result) {
+std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
+  std::vector<Warning> warnings;
+  const auto uid_of = [](const ViewResult& view) {
+    return view.exposure ? view.exposure->acquisition.uid_key : std::string();
+  };
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (const std::string uid = uid_of(views[i]); !uid.empty() && uid == uid_of(views[j]))
+        warnings.push_back({Reason::uid_reused,
+                            fmt::format("{} and {} differ, but bear the same SOP Instance UID (0008,0018)",
+                                        views[j].name, views[i].name)});
+  return warnings;
+}
+
+std::vector<Warning> diagnose(const Case& given, const Result& result) {
+  const Calibrator& calibrator = given.calibrator;
   constexpr double most_lengths = 3;
   std::vector<Warning> warnings;
   for (const TargetError& target : result.accuracy.targets)
@@ -106,11 +121,13 @@ std::vector<Warning> doubts_of(const Calibrator& calibrator, const Result& resul
            {},
            {{"views", double(rejected)}}});
   }
-  if (std::ranges::all_of(result.views, [](const ViewResult& view) {
-        return view.found->mirrored && !view.exposure->acquisition.flip_hint;
-      }))
+  bool all_mirrored = true;
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    all_mirrored &= result.views[i].found->mirrored && !given.views[i].mirrored &&
+                    !result.views[i].exposure->acquisition.flip_hint;
+  if (all_mirrored)
     warnings.push_back({Reason::tag_disagrees,
-                        "all pictures look mirrored and no file says so: is the calibrator's file mirrored?",
+                        "all images look mirrored and no file says so: is the calibrator's file mirrored?",
                         {},
                         {}});
   return warnings;

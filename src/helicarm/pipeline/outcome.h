@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 
@@ -26,9 +26,12 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
                                                       const std::vector<CalibratedView>& views,
                                                       const Result& result);
 
-/// What an answer that holds together still gives to doubt: check targets far from their places, balls out of
-/// place in several views, a calibrator's file that may be mirrored.
-std::vector<Warning> doubts_of(const Calibrator& calibrator, const Result& result);
+/// Different images with one SOP Instance UID (uid_reused).
+std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
+
+/// Diagnostics of a calibrated case: check targets far from their places, balls out of place in several
+/// views, a calibrator's file that may be mirrored.
+std::vector<Warning> diagnose(const Case& given, const Result& result);
 
 /// `uncertain` where more than 5 % of a located point's errors would exceed the limit: refused over a limit
 /// that is given, warned of over the usual 2 mm.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/points.h"
+#include "helicarm/pipeline/points.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,13 +14,12 @@ namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
 
-Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eigen::Vector3d& centre,
-                             const NoiseCorrelation& noise) {
-  const DistortionMap& map = view.rectification->map;
+Expected<SeenPoint> see_pick(const Pick& pick, const LabelledView& image, const View& camera,
+                             const Eigen::Vector3d& centre) {
+  const DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
-    const View& camera = view.calibrated->view;
-    auto seen =
-        snap_to_ball(*view.exposure, map, camera, camera.depth(centre), pick.uv_raw, pick.diameter_mm, noise);
+    auto seen = snap_to_ball(*image.exposure, map, camera, camera.depth(centre), pick.uv_raw,
+                             pick.diameter_mm, image.rectification.noise);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
@@ -29,23 +28,26 @@ Expected<SeenPoint> see_pick(const Pick& pick, const ViewResult& view, const Eig
 
 void check_inside(const Pick& pick, const DistortionMap& map) {
   if (!map.shows(pick.uv_raw))
-    throw BadInput(
-        {Reason::bad_value,
-         fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the picture of {} x {} pixels",
-                     pick.name, pick.uv_raw.x(), pick.uv_raw.y(), map.width, map.height),
-         pick.view,
-         {}});
+    throw BadInput({Reason::bad_value,
+                    fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the image of {} x {} pixels",
+                                pick.name, pick.uv_raw.x(), pick.uv_raw.y(), map.width, map.height),
+                    pick.view,
+                    {}});
 }
 
 /// The dots of plate and calibrator, for a target's fit to leave out.
-std::vector<Disc> discs_of(const ViewResult& view) {
+std::vector<Disc> discs_of(const LabelledView& image, const View& camera,
+                           const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
+  constexpr double rim_share = 0.1;  // of the radius: the blur of the ball's edge
+  constexpr double rim_px = 1.5;     // of a plate's dot
   std::vector<Disc> discs;
-  for (const Dot& dot : view.rectification->plate_dots) discs.push_back({dot.centre_px, dot.radius_px + 1.5});
-  const View& camera = view.calibrated->view;
-  for (const Fiducial& ball : view.found->fiducials)
-    if (ball.status == FiducialStatus::used)
-      discs.push_back(
-          {ball.uv_raw, 2.2 * std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator)});
+  for (const Dot& dot : image.rectification.plate_dots)
+    discs.push_back({dot.centre_px, dot.radius_px + rim_px});
+  for (std::size_t k = 0; k < fiducials.size(); ++k)
+    if (const Fiducial& ball = fiducials[k]; ball.status == FiducialStatus::used) {
+      const double px_per_mm = std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator);
+      discs.push_back({ball.uv_raw, (1 + rim_share) * 0.5 * calibrator.balls[k].diameter_mm * px_per_mm});
+    }
   return discs;
 }
 
@@ -117,22 +119,26 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
 
 }  // namespace
 
-Expected<std::vector<PointResult>> see_points(const Case& given, const Result& result) {
+Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseCalibration& calibration,
+                                                  unsigned threads) {
   std::vector<PointResult> points;
   const std::vector<Task> tasks = tasks_of(given, points);
   const Eigen::Vector3d centre = middle_of(given.calibrator);
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)
-      if (task.pick) check_inside(*task.pick, result.views[task.view].rectification->map);
+      if (task.pick) check_inside(*task.pick, calibration.images[task.view].rectification.map);
   });
   if (!done) return tl::unexpected<Failure>(done.error());
-  parallel_for(tasks.size(), result.options.threads, [&](std::size_t i) {
+  parallel_for(tasks.size(), threads, [&](std::size_t i) {
     const Task& task = tasks[i];
-    const ViewResult& view = result.views[task.view];
-    const auto seen = task.pick ? see_pick(*task.pick, view, centre, view.rectification->noise)
-                                : find_target(*view.exposure, view.rectification->map, view.calibrated->view,
-                                              *task.target, discs_of(view), view.rectification->noise);
+    const LabelledView& image = calibration.images[task.view];
+    const View& camera = calibration.views[task.view].view;
+    const auto seen =
+        task.pick ? see_pick(*task.pick, image, camera, centre)
+                  : find_target(*image.exposure, image.rectification.map, camera, *task.target,
+                                discs_of(image, camera, calibration.fiducials[task.view], given.calibrator),
+                                image.rectification.noise);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

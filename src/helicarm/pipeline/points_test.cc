@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/points.h"
+#include "helicarm/pipeline/points.h"
 
 #include <numbers>
 

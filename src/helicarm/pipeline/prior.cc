@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/prior.h"
+#include "helicarm/pipeline/prior.h"
 
 #include <optional>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 #include <array>
 #include <cmath>
@@ -243,6 +243,14 @@ Json to_json(const Result& result) {
   json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
   json["warnings"] = Json::array();
   for (const Warning& warning : result.warnings) json["warnings"].push_back(to_json(warning));
+  json["notes"] = Json::array();
+  for (const Warning& note : result.notes) json["notes"].push_back(to_json(note));
+  json["calibrator"] = {
+      {"name", result.calibrator.name},
+      {"tolerance_mm", result.calibrator.tolerance_mm},
+      {"scale_sigma",
+       result.calibrator.scale_sigma > 0 ? Json(result.calibrator.scale_sigma) : Json(nullptr)},
+      {"measured", result.calibrator.measured}};
   json["views"] = list_of(result.views);
   json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
                                                   ? matrix(result.joint_covariance)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,11 +12,11 @@
 #include "helicarm/calibration/machine.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
-#include "helicarm/fiducials/find_fiducials.h"
 #include "helicarm/fiducials/find_target.h"
+#include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
-#include "helicarm/navigation/accuracy.h"
+#include "helicarm/pipeline/accuracy.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/verification/verify.h"
 #include "helicarm/xray/exposure.h"
@@ -33,9 +34,9 @@ struct RunOptions {
 /// All that the stages made of one exposure; what was not reached is absent.
 struct ViewResult {
   std::string name;
-  std::optional<Exposure> exposure;
+  std::shared_ptr<const Exposure> exposure;
   std::optional<Rectification> rectification;
-  std::optional<FoundFiducials> found;  ///< after calibration with its residuals and rejections
+  std::optional<LabelledFiducials> found;  ///< after calibration with its residuals and rejections
   std::optional<CalibratedView> calibrated;
 };
 
@@ -61,11 +62,21 @@ struct Timing {
   std::optional<double> read, rectify, detect, label, calibrate, locate, total;
 };
 
+/// What the calibrator's file says of itself.
+struct CalibratorSource {
+  std::string name;
+  double tolerance_mm = 0;
+  double scale_sigma = 0;
+  Json measured = nullptr;  ///< how its coordinates were obtained, as written there
+};
+
 /// The answer of `helicarm run`. A refused case holds all that was known before the refusal.
 struct Result {
   RunOptions options;
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
+  std::vector<Warning> notes;  ///< what holds for any data of this kind
+  CalibratorSource calibrator;
   std::vector<ViewResult> views;
   Eigen::MatrixXd joint_covariance;         ///< of all views' parameters; as CalibratedView::covariance
   std::optional<MachineKnowledge> machine;  ///< what its history told, where one was given

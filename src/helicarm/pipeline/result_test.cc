@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 #include <gtest/gtest.h>
 
@@ -15,9 +15,9 @@ Result two_views() {
   for (const char* name : {"AP", "LAT"}) {
     ViewResult view;
     view.name = name;
-    view.exposure = Exposure{name, Image<float>(8, 6), 0, 4095, {}, {}};
+    view.exposure = std::make_shared<const Exposure>(Exposure{name, Image<float>(8, 6), 0, 4095, {}, {}});
     view.rectification = Rectification{};
-    view.found = FoundFiducials{};
+    view.found = LabelledFiducials{};
     Fiducial fiducial{"P1", Eigen::Vector3d::Zero()};
     fiducial.status = FiducialStatus::used;
     view.found->fiducials = {fiducial, {"P2", Eigen::Vector3d::Zero()}};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/run_case.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "helicarm/navigation/view_stages.h"
+#include "helicarm/pipeline/calibration_cache.h"
+#include "helicarm/pipeline/outcome.h"
+#include "helicarm/pipeline/stages.h"
 #include "helicarm/simulation/write_case.h"
 
 namespace helicarm {
@@ -53,6 +55,65 @@ TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirErrorBars) {
   EXPECT_TRUE(result->timing_ms.total);
 }
 
+TEST_F(SimulatedNavigation, HeldCalibrationGivesWhatTheWholeRunGives) {
+  CalibrationCache cache;
+  Case picked_later = given_;
+  picked_later.picks.clear();
+  picked_later.tunnels.clear();
+  picked_later.tool_lines.clear();
+  ASSERT_TRUE(cache.run(picked_later, {}));
+  const auto held = cache.run(given_, {});
+  const auto whole = run_case(given_, {});
+  ASSERT_TRUE(held && whole);
+  const auto without_timing = [](const Result& result) {
+    Json json = to_json(result);
+    json.erase("timing_ms");
+    return json;
+  };
+  EXPECT_EQ(without_timing(*held), without_timing(*whole));
+  EXPECT_EQ(cache.calibrations(), 1);
+}
+
+TEST_F(SimulatedNavigation, OtherImageOrCalibratorIsCalibratedAnew) {
+  CalibrationCache cache;
+  ASSERT_TRUE(cache.run(given_, {}));
+  given_.calibrator.tolerance_mm = 0.01;
+  ASSERT_TRUE(cache.run(given_, {}));
+  EXPECT_EQ(cache.calibrations(), 2);
+  std::swap(given_.views[0].image, given_.views[1].image);
+  ASSERT_TRUE(cache.run(given_, {}));
+  EXPECT_EQ(cache.calibrations(), 3);
+}
+
+TEST_F(SimulatedNavigation, KnownHandednessIsTheOnlyOneTried) {
+  for (CaseView& view : given_.views) view.mirrored = false;
+  const auto right = run_case(given_, {});
+  ASSERT_TRUE(right.has_value());
+  EXPECT_FALSE(right->failure);
+  given_.views[0].mirrored = true;
+  const auto wrong = run_case(given_, {});
+  ASSERT_TRUE(wrong.has_value());
+  ASSERT_TRUE(wrong->failure);
+  EXPECT_EQ(wrong->failure->view, "AP");
+}
+
+TEST_F(SimulatedNavigation, ScaleErrorOfTheCalibratorIsInEveryCovariance) {
+  const auto exact = run_case(given_, {});
+  given_.calibrator.scale_sigma = 0.01;
+  const auto scaled = run_case(given_, {});
+  ASSERT_TRUE(exact && scaled);
+  for (std::size_t i = 0; i < exact->points.size(); ++i) {
+    const auto& place = exact->points[i].place;
+    ASSERT_TRUE(place);
+    const Eigen::Vector3d by_scale = 0.01 * (place->in_calibrator - middle_of(given_.calibrator));
+    const Eigen::Matrix3d added =
+        scaled->points[i].place->covariance_in_calibrator - place->covariance_in_calibrator;
+    EXPECT_LT((added - by_scale * by_scale.transpose()).norm(), 0.03 * by_scale.squaredNorm());
+  }
+  const double length = *scaled->tunnels[0].length_mm;
+  EXPECT_GT(*scaled->tunnels[0].length_sigma_mm, 0.0099 * length);
+}
+
 TEST_F(SimulatedNavigation, AnswerDoesNotDependOnTheThreads) {
   const auto one = run_case(given_, {Method::best, {}, 1});
   const auto two = run_case(given_, {Method::best, {}, 2});
@@ -69,28 +130,30 @@ TEST_F(SimulatedNavigation, SamePictureTwiceIsRefused) {
   EXPECT_TRUE(result->views[0].exposure);
 }
 
-TEST_F(SimulatedNavigation, BlankPictureTwiceIsBlankFirst) {
-  ViewResult view{"AP", Exposure{}, {}, {}, {}};
-  view.exposure->pixels = Image<float>(64, 64);
-  view.exposure->highest = 4095;
-  view.exposure->acquisition.instance_key = "one";
-  const auto checked = check_pictures_belong_together({view, view});
+std::shared_ptr<const Exposure> exposure_with(const std::string& instance_key, const std::string& uid_key) {
+  Exposure exposure;
+  exposure.pixels = Image<float>(64, 64);
+  exposure.highest = 4095;
+  exposure.acquisition.instance_key = instance_key;
+  exposure.acquisition.uid_key = uid_key;
+  return std::make_shared<const Exposure>(std::move(exposure));
+}
+
+TEST(CheckImages, BlankImageTwiceIsBlankFirst) {
+  const ReadView view{{"AP"}, exposure_with("one", "")};
+  const auto checked = check_images_belong_together({view, view});
   ASSERT_FALSE(checked.has_value());
   EXPECT_EQ(checked.error().reason, Reason::blank_image);
 }
 
-TEST_F(SimulatedNavigation, DifferentPicturesOfOneUidAreTwoWithAWarning) {
-  ViewResult ap{"AP", Exposure{}, {}, {}, {}}, lat{"LAT", Exposure{}, {}, {}, {}};
-  ap.exposure->acquisition.instance_key = "one";
-  lat.exposure->acquisition.instance_key = "other";
-  ap.exposure->acquisition.uid_key = "same";
-  lat.exposure->acquisition.uid_key = "same";
-  const auto checked = check_pictures_belong_together({ap, lat});
-  ASSERT_TRUE(checked.has_value()) << checked.error().message;
-  ASSERT_EQ(checked->size(), 1u);
-  EXPECT_EQ(checked->front().reason, Reason::uid_reused);
-  lat.exposure->acquisition.uid_key = "another";
-  EXPECT_TRUE(check_pictures_belong_together({ap, lat})->empty());
+TEST(CheckImages, DifferentImagesOfOneUidAreTwoWithAWarning) {
+  const ReadView ap{{"AP"}, exposure_with("one", "same")}, lat{{"LAT"}, exposure_with("other", "same")};
+  EXPECT_TRUE(check_images_belong_together({ap, lat}).has_value());
+  const auto warnings = reused_uids({reported(ap), reported(lat)});
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings.front().reason, Reason::uid_reused);
+  EXPECT_TRUE(
+      reused_uids({reported(ap), reported(ReadView{{"LAT"}, exposure_with("other", "another")})}).empty());
 }
 
 TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "helicarm/core/field.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

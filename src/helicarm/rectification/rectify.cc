@@ -36,17 +36,6 @@ std::optional<double> expected_scale(const Exposure& exposure, const Plate& plat
   return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
 }
 
-Polarity opposite(Polarity polarity) {
-  return polarity == Polarity::dark ? Polarity::bright : Polarity::dark;
-}
-
-DotOptions dot_options(const Exposure& exposure, Polarity polarity) {
-  DotOptions options;
-  options.polarity = polarity;
-  options.max_radius_px = std::max(16.0, max_ball_radius * exposure.pixels.width());
-  return options;
-}
-
 std::vector<Dot> with_radius_near(const std::vector<Dot>& dots, double radius) {
   std::vector<Dot> near;
   for (const Dot& dot : dots)
@@ -144,32 +133,15 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
   }
 }
 
-bool same_place(const Dot& a, const Dot& b) {
-  return (a.centre_px - b.centre_px).norm() < 0.7 * std::max(a.radius_px, b.radius_px);
-}
-
-std::vector<Dot> without(const std::vector<Dot>& dots, const std::vector<Dot>& taken) {
-  std::vector<Dot> rest;
-  for (const Dot& dot : dots)
-    if (std::none_of(taken.begin(), taken.end(), [&](const Dot& other) { return same_place(dot, other); }))
-      rest.push_back(dot);
-  return rest;
-}
-
 std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity polarity, Method method,
                         std::optional<double> scale) {
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * exposure.pixels.width();
   if (method == Method::best) {
-    DotOptions options = dot_options(exposure, polarity);
+    DotOptions options = metal_search(exposure, polarity);
     if (scale) options.min_radius_px = std::max(options.min_radius_px, 0.75 * radius);
     return find_dots(exposure, options);
   }
   return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.7 * radius, 1.35 * radius);
-}
-
-/// What is as dark (or bright) as metal and not of the plate.
-std::vector<Dot> balls_beside(const Exposure& exposure, const Rectification& plate) {
-  return without(find_dots(exposure, dot_options(exposure, plate.metal)), plate.plate_dots);
 }
 
 struct Attempt {
@@ -270,43 +242,38 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
   result.metal = plate.kind == DotKind::balls ? attempt.polarity : opposite(attempt.polarity);
   if (options.method == Method::best && plate.kind == DotKind::balls)
-    result.other_dots = without(attempt.all, result.plate_dots);
-  else
-    result.other_dots = balls_beside(exposure, result);
+    result.other_dots = dots_except(attempt.all, result.plate_dots);
   return result;
 }
 
-Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification) {
-  rectification.metal = opposite(rectification.metal);
-  rectification.other_dots = balls_beside(exposure, rectification);
-  return rectification;
+DistortionMap flat_panel_map(const Exposure& exposure) {
+  const auto& pixel = exposure.acquisition.pixel_mm;
+  return identity_map(exposure.pixels.width(), exposure.pixels.height(),
+                      pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
 }
 
-Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px) {
-  const auto& pixel = exposure.acquisition.pixel_mm;
-  return with_map(exposure,
-                  identity_map(exposure.pixels.width(), exposure.pixels.height(),
-                               pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt),
-                  {}, least_radius_px);
+DotOptions metal_search(const Exposure& exposure, Polarity metal) {
+  DotOptions options;
+  options.polarity = metal;
+  options.max_radius_px = std::max(16.0, max_ball_radius * exposure.pixels.width());
+  return options;
 }
 
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
-                                 const std::optional<Plate>& plate, double least_radius_px) {
+                                 const std::optional<Plate>& plate) {
   if (map.width != exposure.pixels.width() || map.height != exposure.pixels.height())
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
                             exposure.pixels.width(), exposure.pixels.height()));
   if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
-  DotOptions dot_search = dot_options(exposure, Polarity::dark);
-  dot_search.min_radius_px = std::max(dot_search.min_radius_px, least_radius_px);
   Rectification result;
   result.map = map;
   result.noise = noise_correlation(exposure);
-  result.other_dots = find_dots(exposure, dot_search);
+  result.other_dots = find_dots(exposure, metal_search(exposure, result.metal));
   const Plate sought = plate.value_or(any_plate);
   if (sought.kind == DotKind::holes) return result;
   // A plate in the picture tells whether the map still holds: rectified, its dots must stand on a lattice.
-  const SeenLattice seen = seen_lattice(result.other_dots, sought, expected_scale(exposure, sought));
+  const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(exposure, sought));
   if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
   std::vector<Dot> members;
@@ -329,7 +296,7 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
             map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
-  result.other_dots = without(result.other_dots, members);
+  result.other_dots = dots_except(*result.other_dots, members);
   return result;
 }
 

@@ -6,6 +6,7 @@
 
 #include "helicarm/detection/blobs.h"
 #include "helicarm/detection/dot.h"
+#include "helicarm/detection/find_dots.h"
 #include "helicarm/detection/noise.h"
 #include "helicarm/phantom/plate.h"
 #include "helicarm/rectification/distortion_map.h"
@@ -26,8 +27,9 @@ struct Rectification {
   double raw_mean_px = 0;  ///< distance from raw to rectified over the dots used: the distortion itself
   double raw_max_px = 0;
   Polarity metal = Polarity::dark;  ///< how metal shows in this picture
-  std::vector<Dot> other_dots;      ///< metal dots that are not the plate's: ball candidates
-  NoiseCorrelation noise;           ///< of the picture
+  /// Metal dots found on the way that are not the plate's; nothing where metal was not searched for.
+  std::optional<std::vector<Dot>> other_dots;
+  NoiseCorrelation noise;  ///< of the picture
   std::vector<Warning> warnings;
 };
 
@@ -41,17 +43,16 @@ struct RectificationOptions {
 Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
                                 const RectificationOptions& options);
 
-/// The same, had the plate balls for holes or holes for balls: the balls' candidates are then of the other
-/// polarity.
-Rectification with_metal_inverted(const Exposure& exposure, Rectification rectification);
-
-/// For a flat panel: the identity as a known map, and all dots from a radius on. plate_mismatch where a plate
-/// in the picture is bent.
-Expected<Rectification> without_plate(const Exposure& exposure, double least_radius_px);
-
-/// For a map known already (from a plate shot apart or a file); plate_mismatch where it leaves a plate bent.
+/// For a map known already (from a plate image taken apart, a file, or `flat_panel_map`). plate_mismatch
+/// where it is for another image size, or where a plate in the picture does not stand on a lattice after it.
 Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
-                                 const std::optional<Plate>& plate, double least_radius_px = 0);
+                                 const std::optional<Plate>& plate);
+
+/// The identity, with the file's pixel size.
+DistortionMap flat_panel_map(const Exposure& exposure);
+
+/// How a dot search looks for metal of any size up to the largest ball's.
+DotOptions metal_search(const Exposure& exposure, Polarity metal);
 
 /// The picture resampled to rectified pixels (Eq. 3), same size; outside the raw picture it is `lowest`.
 Image<float> resample(const Exposure& exposure, const DistortionMap& map);

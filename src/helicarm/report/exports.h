@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

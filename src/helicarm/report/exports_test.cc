@@ -32,7 +32,7 @@ class Exports : public testing::Test {
     for (const auto& [view, turn, fx] : {std::tuple{"AP", 0.1, 4000.5}, std::tuple{"LAT", 1.7, -4100.75}}) {
       ViewResult& of = result_.views.emplace_back();
       of.name = view;
-      of.exposure = Exposure{view, Image<float>(64, 48), 0, 4095, {}, {}};
+      of.exposure = std::make_shared<const Exposure>(Exposure{view, Image<float>(64, 48), 0, 4095, {}, {}});
       of.calibrated = CalibratedView{};
       of.calibrated->view = view_at(turn, fx);
     }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/raw_path.h"
 
 namespace helicarm {

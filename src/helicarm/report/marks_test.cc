@@ -26,7 +26,7 @@ Result one_view() {
   view.rectification = Rectification{};
   view.rectification->map = doubling_map();
   view.rectification->plate_dots = {Dot{.centre_px = {100, 40}, .radius_px = 3}};
-  view.found = FoundFiducials{};
+  view.found = LabelledFiducials{};
   view.found->false_blobs = {Dot{.centre_px = {20, 60}, .radius_px = 5}};
   Fiducial used{"P1", {0, 0, 0}}, rejected{"P2", {0, 0, 0}}, hidden{"P3", {0, 0, 0}};
   used.status = FiducialStatus::used;

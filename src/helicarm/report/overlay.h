@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

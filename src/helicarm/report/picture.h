@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "helicarm/image/image.h"
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

@@ -19,16 +19,17 @@ Result full_result() {
   for (const char* name : {"AP", nasty}) {
     ViewResult view;
     view.name = name;
-    view.exposure = Exposure{name, Image<float>(64, 48, 7), 0, 4095, {}, {}};
-    view.exposure->acquisition.patient_key = "CANARY";
-    view.exposure->pixels(3, 3) = 900;
+    Exposure exposure{name, Image<float>(64, 48, 7), 0, 4095, {}, {}};
+    exposure.acquisition.patient_key = "CANARY";
+    exposure.pixels(3, 3) = 900;
+    view.exposure = std::make_shared<const Exposure>(std::move(exposure));
     view.rectification = Rectification{};
     view.rectification->map = identity_map(64, 48, 0.2);
     Fiducial ball{nasty, Eigen::Vector3d::Zero()};
     ball.status = FiducialStatus::used;
     ball.uv = {20, 20};
     ball.residual_px = 0.1;
-    view.found = FoundFiducials{};
+    view.found = LabelledFiducials{};
     view.found->fiducials = {ball, {"P2", Eigen::Vector3d::Zero()}};
     view.calibrated = CalibratedView{};
     view.calibrated->view = {{400, 400, 20, 20.1, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "helicarm/navigation/result.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm {
 

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/random.h"
-#include "helicarm/navigation/case.h"
-#include "helicarm/navigation/run_case.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/run_case.h"
 #include "helicarm/report/chart.h"
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/write_case.h"

@@ -7,7 +7,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
-#include "helicarm/fiducials/find_fiducials.h"
+#include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/simulation/simulate_case.h"
 
 namespace helicarm {
@@ -182,9 +182,9 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
     Exposure exposure = exposure_of(view.pixels, view.shot.imaging);
     exposure.acquisition.pixel_mm = Vector2d::Constant(view.shot.pixel_mm());
     exposure.acquisition.source_detector_mm = view.shot.nominal_f_mm;
-    const Range radii = ball_radii_px(room.calibrator, view.shot.pixel_mm());
-    const Rectification plain = value_or_throw(without_plate(exposure, 0.5 * radii.low));
-    const auto found = find_fiducials(exposure, plain, room.calibrator, Method::best);
+    const Rectification plain = value_or_throw(with_map(exposure, flat_panel_map(exposure), {}));
+    const auto found =
+        label_fiducials(exposure, plain, detect_candidates(exposure, plain), room.calibrator, {});
     for (std::size_t k = 0; k < view.balls.size(); ++k) {
       const simulation::TruePoint& truth = view.balls[k];
       if (truth.visibility == simulation::Visibility::outside) continue;

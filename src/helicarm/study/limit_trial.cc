@@ -13,8 +13,8 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
-#include "helicarm/navigation/prior.h"
 #include "helicarm/phantom/conical_helix.h"
+#include "helicarm/pipeline/prior.h"
 #include "helicarm/study/cramer_rao.h"
 #include "helicarm/study/records.h"
 

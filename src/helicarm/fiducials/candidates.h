@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/detection/dot.h"
+#include "helicarm/rectification/rectify.h"
+
+namespace helicarm {
+
+/// The metal dots of one image that are not the plate's: each may be a fiducial.
+struct Candidates {
+  std::vector<Dot> dots;  ///< raw pixels, with their standard deviations and radii
+};
+
+/// Stage 2 (2.1): what the rectification found on its way is not searched for again.
+Candidates detect_candidates(const Exposure& exposure, const Rectification& rectification);
+
+}  // namespace helicarm

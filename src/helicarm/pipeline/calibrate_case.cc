@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/calibrate_case.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "helicarm/pipeline/prior.h"
+#include "helicarm/pipeline/stopwatch.h"
+
+namespace helicarm {
+namespace {
+
+using LabelledViews = std::vector<LabelledView>;
+
+ViewFiducials fiducials_of(const LabelledView& view) {
+  const DistortionMap& map = view.rectification.map;
+  std::vector<Eigen::Vector2d> used;
+  for (const Fiducial& ball : view.fiducials.fiducials)
+    if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
+  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.exposure, map), view.fiducials.view,
+          map.covariance_px2(used)};
+}
+
+CommonPrior common_prior(const Calibrator& calibrator) {
+  return {unknown_machine(), ball_covariances(calibrator), calibrator.scale_sigma};
+}
+
+/// What a C-arm's history says of these views; images that are in it already do not count.
+Expected<MachineKnowledge> recall_machine(const LabelledViews& views, const Machine& machine) {
+  const IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
+  for (const LabelledView& view : views)
+    if (!fiducials_of(view).prior.focal_px)
+      return fail(Reason::bad_value,
+                  "a machine's history serves only images whose pixel size and source distance are known");
+  std::vector<MachineShot> earlier;
+  std::ranges::copy_if(machine.shots, std::back_inserter(earlier), [&](const MachineShot& shot) {
+    return std::ranges::none_of(views, [&](const LabelledView& view) {
+      return view.exposure->acquisition.instance_key == shot.picture;
+    });
+  });
+  return knowledge_of(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_machine());
+}
+
+/// What these views add to their C-arm's history; nothing where their residuals contradict the noise model.
+std::vector<MachineShot> new_shots(const CaseCalibration& calibration, const CommonPrior& common) {
+  std::vector<MachineShot> shots;
+  if (calibration.variance_scale != 1) return shots;
+  for (std::size_t i = 0; i < calibration.images.size(); ++i) {
+    ViewFiducials view = fiducials_of(calibration.images[i]);
+    view.fiducials = calibration.fiducials[i];
+    if (const auto shot = shot_of(view, calibration.images[i].exposure->acquisition.instance_key, common))
+      shots.push_back(*shot);
+  }
+  return shots;
+}
+
+/// Mean place of the balls that serve in any view.
+Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const auto& of_view : calibration.fiducials)
+    for (const Fiducial& ball : of_view)
+      if (ball.status == FiducialStatus::used) {
+        sum += ball.centre_in_calibrator;
+        ++count;
+      }
+  return sum / count;
+}
+
+Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
+                                     const RunOptions& options) {
+  std::optional<MachineKnowledge> machine;
+  if (options.machine) {
+    const auto recalled = recall_machine(views, *options.machine);
+    if (!recalled) return tl::unexpected<Failure>(recalled.error());
+    machine = *recalled;
+  }
+  std::vector<ViewFiducials> fiducials;
+  for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
+  CalibrationOptions how;
+  how.common = common_prior(given.calibrator);
+  if (machine) {
+    how.common.machine = machine->prior;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      fiducials[i].prior = known_prior(fiducials[i].prior, *machine, views[i].fiducials.mirrored);
+  }
+  return (options.method == Method::paper ? calibrate_paper(fiducials, how) : calibrate(fiducials, how))
+      .and_then([&](CalibrationResult result) {
+        return check_views_apart(result.views, centre_of(result)).map([&] {
+          return CaseCalibration{std::move(result), {}, machine, {}, {}};
+        });
+      });
+}
+
+/// 2.2, Eq. 4-7: all views together, or each alone by the published recipe.
+OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
+                                           const RunOptions& options) {
+  auto calibration = calibrated(views, given, options);
+  if (!calibration) {
+    Refusal refusal{calibration.error(), {}};
+    for (const LabelledView& view : views) refusal.views.push_back(reported(view));
+    return tl::unexpected(std::move(refusal));
+  }
+  calibration->images = std::move(views);
+  if (options.machine) calibration->shots = new_shots(*calibration, common_prior(given.calibrator));
+  return *std::move(calibration);
+}
+
+}  // namespace
+
+OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options) {
+  Timing time;
+  const auto stage = [&](std::optional<double>& ms, auto work) {
+    return [&, work](auto views) {
+      const Stopwatch watch(ms);
+      return work(std::move(views), given, options);
+    };
+  };
+  return timed(time.read, [&] { return read_views(given, options); })
+      .and_then(stage(time.rectify, rectify_views))      // 2.1, Eq. 1-3
+      .and_then(stage(time.detect, detect_in_views))     // 2.1
+      .and_then(stage(time.label, label_views))          // 2.3.4
+      .and_then(stage(time.calibrate, calibrate_views))  // 2.2, Eq. 4-7
+      .map([&](CaseCalibration calibration) {
+        calibration.timing_ms = time;
+        return calibration;
+      })
+      .map_error([&](Refusal refusal) {
+        refusal.timing_ms = time;
+        return refusal;
+      });
+}
+
+}  // namespace helicarm

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/locate_case.h"
+
+#include "helicarm/pipeline/outcome.h"
+#include "helicarm/pipeline/points.h"
+#include "helicarm/pipeline/stopwatch.h"
+
+namespace helicarm {
+namespace {
+
+void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, const std::string& view = {}) {
+  for (Warning warning : more) {
+    if (warning.view.empty()) warning.view = view;
+    warnings.push_back(std::move(warning));
+  }
+}
+
+/// What was warned of while the views were read, rectified and labelled.
+std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
+  std::vector<Warning> warnings;
+  for (const ViewResult& view : views) {
+    if (view.exposure) append(warnings, view.exposure->warnings, view.name);
+    if (view.rectification) append(warnings, view.rectification->warnings, view.name);
+    if (view.found) append(warnings, view.found->warnings, view.name);
+  }
+  return warnings;
+}
+
+Result begun(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
+  Result result;
+  result.options = options;
+  result.calibrator = {given.calibrator.name, given.calibrator.tolerance_mm, given.calibrator.scale_sigma,
+                       given.calibrator.measured};
+  result.views = std::move(views);
+  result.tool_lines = given.tool_lines;
+  result.warnings = given.warnings;
+  append(result.warnings, warnings_of(result.views));
+  append(result.warnings, reused_uids(result.views));
+  return result;
+}
+
+Result begun(const Case& given, const CaseCalibration& calibration, const RunOptions& options) {
+  std::vector<ViewResult> views;
+  for (std::size_t i = 0; i < calibration.images.size(); ++i) {
+    views.push_back(reported(calibration.images[i]));
+    views[i].found->fiducials = calibration.fiducials[i];
+    views[i].calibrated = calibration.views[i];
+  }
+  Result result = begun(given, options, std::move(views));
+  append(result.warnings, calibration.warnings);
+  result.joint_covariance = calibration.joint_covariance;
+  result.machine = calibration.machine;
+  result.shots = calibration.shots;
+  result.timing_ms = calibration.timing_ms;
+  return result;
+}
+
+}  // namespace
+
+Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
+                             const RunOptions& options) {
+  Result result = begun(given, calibration, options);
+  const auto located = timed(result.timing_ms.locate, [&] {
+    return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
+      append(result.warnings, locate_points(given, calibration, points));  // Eq. 8, Eq. 16
+      result.points = std::move(points);
+    });
+  });
+  if (!located) return tl::unexpected<Failure>(located.error());
+  result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
+  append(result.warnings, diagnose(given, result));
+  result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
+  const auto done =
+      plan_tunnels(given, result)  // Eq. 16
+          .and_then([&](std::vector<Tunnel> tunnels) {
+            result.tunnels = std::move(tunnels);
+            return verify_tool_lines(given, calibration.views, result);  // Eq. 17
+          })
+          .and_then([&](std::vector<Verification> verifications) {
+            result.verifications = std::move(verifications);
+            return check_certain(result.points, options.max_error_mm);
+          })
+          .map([&](const std::vector<Warning>& warnings) { append(result.warnings, warnings); });
+  if (!done) result.failure = done.error();
+  return result;
+}
+
+Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options) {
+  if (exit_code(refusal.failure.reason) == 2) return tl::unexpected<Failure>(refusal.failure);
+  Result result = begun(given, options, std::move(refusal.views));
+  result.failure = std::move(refusal.failure);
+  result.timing_ms = refusal.timing_ms;
+  return result;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/stages.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/parallel.h"
+#include "helicarm/rectification/usable.h"
+#include "helicarm/xray/read_exposure.h"
+
+namespace helicarm {
+namespace {
+
+/// What a stage gives for each view, or why not.
+template <class Work>
+auto of_each(std::size_t count, unsigned threads, Work&& work) {
+  using Given = std::invoke_result_t<Work, std::size_t>;
+  std::vector<Given> given(count, Given(tl::unexpect, Failure{Reason::interrupted, {}}));
+  parallel_for(count, threads, [&](std::size_t i) { given[i] = work(i); });
+  return given;
+}
+
+/// Every view with what the stage gave for it; or, where it failed for one, what there is of all.
+template <class Next, class View, class Added>
+OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expected<Added>> added) {
+  std::vector<Next> next;
+  const auto failed = std::ranges::find_if(added, [](const auto& one) { return !one; });
+  if (failed != added.end()) {
+    Refusal refusal{failed->error(), {}};
+    refusal.failure.view = views[std::size_t(failed - added.begin())].name;
+    for (std::size_t i = 0; i < views.size(); ++i)
+      refusal.views.push_back(added[i] ? reported(Next{std::move(views[i]), *std::move(added[i])})
+                                       : reported(views[i]));
+    return tl::unexpected(std::move(refusal));
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) next.push_back({std::move(views[i]), *std::move(added[i])});
+  return next;
+}
+
+Expected<DistortionMap> map_of(const Exposure& exposure, const CaseView& from,
+                               const std::optional<Plate>& plate, Method method) {
+  if (from.map)
+    return read_json(*from.map).and_then(
+        [&](const Json& json) { return distortion_map_from_json(json, from.map->filename().string()); });
+  if (from.plate_image)
+    return read_exposure(*from.plate_image, from.name, std::nullopt)
+        .and_then([&](const Exposure& apart) {
+          return rectify(apart, *plate, {method, {}});
+        })
+        .map([](const Rectification& apart) { return apart.map; });
+  return flat_panel_map(exposure);
+}
+
+Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
+                                     const std::optional<Plate>& plate, Method method) {
+  if (plate && !from.map && !from.plate_image) return rectify(exposure, *plate, {method, {}});
+  return map_of(exposure, from, plate, method).and_then([&](const DistortionMap& map) {
+    return with_map(exposure, map, plate);
+  });
+}
+
+bool is_ambiguous(const Expected<LabelledFiducials>& labels) {
+  return !labels && labels.error().reason == Reason::ambiguous_labels;
+}
+
+/// The plate's kind says how metal shows. Where metal of the other polarity shows the calibrator, the kind is
+/// wrong.
+bool is_plate_of_other_kind(const DetectedView& view, const Calibrator& calibrator,
+                            const FiducialOptions& options) {
+  if (view.rectification.dots_found == 0) return false;
+  Rectification inverted = view.rectification;
+  inverted.metal = opposite(inverted.metal);
+  inverted.other_dots.reset();
+  const auto labels = label_fiducials(*view.exposure, inverted, detect_candidates(*view.exposure, inverted),
+                                      calibrator, options);
+  return labels || is_ambiguous(labels);
+}
+
+/// The relative bias of the balls' radii in the view whose labels are surest; nothing where no view has any.
+std::optional<double> common_radius_bias(const std::vector<Expected<LabelledFiducials>>& views) {
+  const LabelledFiducials* surest = nullptr;
+  for (const auto& view : views)
+    if (view && (!surest || view->margin > surest->margin)) surest = &*view;
+  return surest ? std::optional(surest->radius_bias) : std::nullopt;
+}
+
+}  // namespace
+
+ViewResult reported(const NamedView& view) { return {view.name, {}, {}, {}, {}}; }
+
+ViewResult reported(const ReadView& view) { return {view.name, view.exposure, {}, {}, {}}; }
+
+ViewResult reported(const RectifiedView& view) {
+  return {view.name, view.exposure, view.rectification, {}, {}};
+}
+
+ViewResult reported(const LabelledView& view) {
+  return {view.name, view.exposure, view.rectification, view.fiducials, {}};
+}
+
+Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Acquisition& a = views[j].exposure->acquisition;
+      const Acquisition& b = views[i].exposure->acquisition;
+      if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
+        return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
+                                                          views[j].name, views[i].name));
+      if (!a.instance_key.empty() && a.instance_key == b.instance_key)
+        return check_usable(*views[i].exposure).and_then([&]() -> Expected<void> {
+          return fail(Reason::views_too_close,
+                      fmt::format("{} and {} are the same image", views[j].name, views[i].name));
+        });
+    }
+  return {};
+}
+
+OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options) {
+  std::vector<NamedView> views;
+  for (const CaseView& view : given.views) views.push_back({view.name});
+  auto images = of_each(views.size(), options.threads, [&](std::size_t i) {
+    const CaseView& from = given.views[i];
+    return read_exposure(from.image, from.name, from.frame).map([](Exposure exposure) {
+      return std::make_shared<const Exposure>(std::move(exposure));
+    });
+  });
+  return joined<ReadView>(std::move(views), std::move(images))
+      .and_then([](std::vector<ReadView> read) -> OrRefusal<std::vector<ReadView>> {
+        const auto together = check_images_belong_together(read);
+        if (together) return read;
+        Refusal refusal{together.error(), {}};
+        for (const ReadView& view : read) refusal.views.push_back(reported(view));
+        return tl::unexpected(std::move(refusal));
+      });
+}
+
+OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
+                                                    const RunOptions& options) {
+  auto rectified = of_each(views.size(), options.threads, [&](std::size_t i) {
+    return rectify_view(*views[i].exposure, given.views[i], given.plate, options.method);
+  });
+  return joined<RectifiedView>(std::move(views), std::move(rectified));
+}
+
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case&,
+                                                     const RunOptions& options) {
+  auto candidates = of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<Candidates> {
+    return detect_candidates(*views[i].exposure, views[i].rectification);
+  });
+  return joined<DetectedView>(std::move(views), std::move(candidates));
+}
+
+OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
+                                                 const RunOptions& options) {
+  const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
+    const FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
+    auto labels = label_fiducials(*views[i].exposure, views[i].rectification, views[i].candidates,
+                                  given.calibrator, how);
+    if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given.calibrator, how))
+      labels = fail(
+          Reason::plate_mismatch,
+          "the calibrator is visible if the plate's dots are taken for holes instead of balls or for balls "
+          "instead of holes");
+    return labels;
+  };
+  auto labels = of_each(views.size(), options.threads, [&](std::size_t i) { return label(i, {}); });
+  if (const auto radius_bias = common_radius_bias(labels))
+    labels = of_each(views.size(), options.threads, [&](std::size_t i) {
+      return is_ambiguous(labels[i]) ? label(i, radius_bias) : std::move(labels[i]);
+    });
+  return joined<LabelledView>(std::move(views), std::move(labels));
+}
+
+}  // namespace helicarm
