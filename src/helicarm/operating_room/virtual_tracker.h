@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "helicarm/devices/tracker/igtl_server.h"
+#include "helicarm/simulation/navigation_truth.h"
 #include "helicarm/simulation/tracker_model.h"
 
 namespace helicarm::operating_room {

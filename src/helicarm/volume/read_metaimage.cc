@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <map>
 
 #include <fmt/format.h>
@@ -134,7 +135,7 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
   const VoxelFormat format = format_of(header);
   const std::string file = header.text("ElementDataFile");
   std::string data;
-  if (file == "LIST" || file.find('%') != std::string::npos)
+  if (file == "LIST" || std::ranges::count(file, '%') > 0)
     throw BadInput(Reason::unsupported, header.field("ElementDataFile") + " is a list of files, must be one");
   if (file != "LOCAL") {
     data = read_data_file(path, file);
