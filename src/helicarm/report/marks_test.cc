@@ -78,7 +78,7 @@ TEST(RawMarks, LieWhereTheMapPutsThem) {
 
 TEST(MarksOf, AnExposureAloneHasNone) {
   Result result;
-  result.views.push_back({"AP", Exposure{}, {}, {}, {}});
+  result.views.push_back({"AP", std::make_shared<const Exposure>(), {}, {}, {}});
   const ViewMarks marks = marks_of(result, 0);
   EXPECT_TRUE(marks.balls.empty() && marks.plate_dots.empty() && marks.points.empty());
 }

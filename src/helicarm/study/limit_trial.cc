@@ -101,7 +101,7 @@ KnownMachine machine_with_history(const LimitSetting& setting, const std::vector
     for (const View& view : views_of(stiff, known.mean_departure_mm, aspect_sigma, random)) {
       ViewFiducials seen = pictured("", view, balls, setting.sigma_px, random);
       seen.prior.aspect = Belief{1, aspect_sigma};
-      if (const auto shot = shot_of(seen, "", {make, 0})) shots.push_back(*shot);
+      if (const auto shot = shot_of(seen, "", {make})) shots.push_back(*shot);
     }
   known.knowledge = knowledge_of(shots, {focal_mm, 0, 0}, make);
   return known;
