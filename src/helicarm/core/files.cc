@@ -23,9 +23,39 @@ bool sync_to_disk(const fs::path& path, int flags) {
   return good;
 }
 
+using Write = std::function<Expected<void>(const fs::path& aside)>;
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
 fs::path name_aside(const fs::path& path) {
   static std::atomic<unsigned> serial{0};
-  return path.parent_path() / fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), serial++);
+  return folder_of(path) / fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), serial++);
+}
+
+Expected<void> write_bytes(const fs::path& aside, const fs::path& path, std::string_view bytes) {
+  std::ofstream out(aside, std::ios::binary | std::ios::trunc);
+  out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)));
+  return {};
+}
+
+/// Written aside, synced, renamed, the folder synced.
+Expected<void> replace_file(const fs::path& path, const Write& write) {
+  std::error_code ec;
+  const fs::path aside = name_aside(path);
+  auto written = write(aside);
+  const auto refuse = [&](Failure failure) {
+    fs::remove(aside, ec);
+    return tl::unexpected<Failure>(std::move(failure));
+  };
+  if (!written) return refuse(written.error());
+  if (!sync_to_disk(aside, O_RDONLY) || ::rename(aside.c_str(), path.c_str()) != 0)
+    return refuse({Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)), {}, {}});
+  sync_to_disk(folder_of(path), O_RDONLY | O_DIRECTORY);
+  return {};
 }
 
 }  // namespace
@@ -47,33 +77,20 @@ Expected<std::string> read_file(const fs::path& path, std::uintmax_t max_bytes) 
 }
 
 Expected<void> write_file(const fs::path& path, std::string_view bytes) {
-  return write_file_with(path, [&](const fs::path& aside) -> Expected<void> {
-    std::ofstream out(aside, std::ios::binary | std::ios::trunc);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)));
-    return {};
-  });
+  return write_file_with(path, [&](const fs::path& aside) { return write_bytes(aside, path, bytes); });
 }
 
-Expected<void> write_file_with(const fs::path& path,
-                               const std::function<Expected<void>(const fs::path& aside)>& write) {
+Expected<void> write_file_in_folder(const fs::path& path, std::string_view bytes) {
+  return replace_file(path, [&](const fs::path& aside) { return write_bytes(aside, path, bytes); });
+}
+
+Expected<void> write_file_with(const fs::path& path, const Write& write) {
   std::error_code ec;
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  const fs::path folder = folder_of(path);
   fs::create_directories(folder, ec);
   if (!fs::is_directory(folder, ec))
     return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be made", folder.string()));
-  const fs::path aside = name_aside(folder / path.filename());
-  auto written = write(aside);
-  const auto refuse = [&](Failure failure) {
-    fs::remove(aside, ec);
-    return tl::unexpected<Failure>(std::move(failure));
-  };
-  if (!written) return refuse(written.error());
-  if (!sync_to_disk(aside, O_RDONLY) || ::rename(aside.c_str(), path.c_str()) != 0)
-    return refuse({Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)), {}, {}});
-  sync_to_disk(folder, O_RDONLY | O_DIRECTORY);
-  return {};
+  return replace_file(path, write);
 }
 
 Expected<fs::path> path_inside(const fs::path& folder, const std::string& relative) {

@@ -16,6 +16,9 @@ Expected<std::string> read_file(const std::filesystem::path& path, std::uintmax_
 /// Replaces `path` as a whole or not at all: written aside, fsynced, renamed, folder fsynced.
 Expected<void> write_file(const std::filesystem::path& path, std::string_view bytes);
 
+/// As `write_file`, but the folder must be there: it is not made.
+Expected<void> write_file_in_folder(const std::filesystem::path& path, std::string_view bytes);
+
 /// As `write_file`, for a library that insists on writing the file itself: `write` fills the name it is
 /// given.
 Expected<void> write_file_with(

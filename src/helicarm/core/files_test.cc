@@ -35,6 +35,13 @@ TEST_F(Files, FailedWriteLeavesTheOldFileAndNothingElse) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
 }
 
+TEST_F(Files, FolderThatIsNotThereIsNotMadeWhereItMustBe) {
+  EXPECT_EQ(write_file_in_folder(folder_ / "a" / "b.txt", "hello").error().reason, Reason::cannot_write);
+  EXPECT_FALSE(fs::exists(folder_ / "a"));
+  ASSERT_TRUE(write_file_in_folder(folder_ / "b.txt", "hello"));
+  EXPECT_EQ(*read_file(folder_ / "b.txt", 10), "hello");
+}
+
 TEST_F(Files, FileOverTheLimitIsNotRead) {
   ASSERT_TRUE(write_file(folder_ / "b.txt", "hello"));
   EXPECT_EQ(read_file(folder_ / "b.txt", 4).error().reason, Reason::bad_size);

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
@@ -20,6 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr const char* lock_name = ".lock";
 constexpr int most_versions = 100;
 constexpr std::uintmax_t most_file_bytes = std::uintmax_t{1} << 30;
 
@@ -51,7 +53,7 @@ Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
   if (ec || !fs::is_directory(folder))
     return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be made", folder.string()));
   if (made) fs::permissions(folder, fs::perms::owner_all, ec);
-  const int lock = ::open((folder / ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
     return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), std::strerror(errno)));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
@@ -64,6 +66,16 @@ Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
 
 Inbox::~Inbox() { ::close(lock_); }
 
+void Inbox::check_folder(const std::string& origin) const {
+  struct stat ours, named;
+  if (::fstat(lock_, &ours) == 0 && ::stat((folder_ / lock_name).c_str(), &named) == 0 &&
+      ours.st_dev == named.st_dev && ours.st_ino == named.st_ino)
+    return;
+  throw BadInput(Reason::cannot_write,
+                 fmt::format("{}: the inbox {} was deleted or replaced in operation: start the program again",
+                             origin, folder_.string()));
+}
+
 Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin) {
   return guarded([&] {
     check_picture(file, origin);
@@ -72,6 +84,7 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
       throw BadInput(Reason::bad_value, fmt::format("{}: SOP Instance UID is not valid", origin));
     Arrival arrival{{}, digest(file), false, {}};
     const std::lock_guard naming(naming_);
+    check_folder(origin);
     for (int version = 1; version <= most_versions; ++version) {
       arrival.path = folder_ / (version == 1 ? uid + ".dcm" : fmt::format("{}~{}.dcm", uid, version));
       std::error_code ec;
@@ -89,7 +102,7 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
              fmt::format("{}: another picture with the same SOP Instance UID is here already; both are kept",
                          origin)});
     }
-    value_or_throw(write_file(arrival.path, file));
+    value_or_throw(write_file_in_folder(arrival.path, file));
     std::error_code ec;
     fs::permissions(arrival.path, fs::perms::owner_read | fs::perms::owner_write, ec);
     return arrival;

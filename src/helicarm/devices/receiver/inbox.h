@@ -21,7 +21,8 @@ struct Arrival {
 };
 
 /// A folder of received DICOM X-rays, kept as they came and readable by the owner alone: they hold what the
-/// C-arm knows of the patient. One program at a time uses it. Safe to call from several threads.
+/// C-arm knows of the patient. One program at a time uses it: a lock file says so. Safe to call from several
+/// threads.
 class Inbox {
  public:
   /// Makes the folder where there is none and clears away what an earlier program left half written. Refuses
@@ -33,13 +34,16 @@ class Inbox {
 
   /// Checks a whole DICOM file as `read_dicom` does, writes it aside, syncs and renames it to
   /// SOP-INSTANCE-UID.dcm. Other bytes under a known UID keep both files, the new one as UID~2.dcm, with the
-  /// warning uid_reused. `origin` begins each message; no message holds patient data.
+  /// warning uid_reused. A folder that was deleted or replaced in operation, or whose lock was, is
+  /// cannot_write from then on: it is not made again. `origin` begins each message; no message holds patient
+  /// data.
   Expected<Arrival> store(std::string_view file, const std::string& origin);
 
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
   Inbox(std::filesystem::path folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
+  void check_folder(const std::string& origin) const;
 
   std::filesystem::path folder_;
   int lock_;

@@ -75,6 +75,26 @@ TEST_F(InboxOnDisk, IsOneProgramsAtATime) {
   EXPECT_TRUE(Inbox::open(folder_));
 }
 
+TEST_F(InboxOnDisk, FolderDeletedInOperationIsAnErrorAndNotMadeAnew) {
+  fs::remove_all(folder_);
+  const auto refused = inbox_->store(DicomBuilder().bytes(), "test");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::cannot_write);
+  EXPECT_FALSE(fs::exists(folder_));
+}
+
+TEST_F(InboxOnDisk, FolderReplacedInOperationIsAnErrorAndStaysEmpty) {
+  fs::remove_all(folder_);
+  fs::create_directory(folder_);
+  EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(InboxOnDisk, LockDeletedInOperationIsAnError) {
+  fs::remove(folder_ / ".lock");
+  EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
+}
+
 TEST_F(InboxOnDisk, HalfWrittenPicturesOfAKilledProgramAreClearedAway) {
   inbox_.reset();
   std::ofstream(folder_ / ".2.25.17.dcm.123.0.part") << "half";
