@@ -19,7 +19,9 @@ class Tale {
       : console_(console), left_(count), stop_(stop) {}
 
   ReceiverHooks hooks() {
-    return {[this](const Arrival& arrival) { tell(arrival); }, [this](const Failure& f) { tell(f); }};
+    return {[this](const Arrival& arrival) { tell(arrival); },
+            [this](const Failure& why) { tell("refused", why); },
+            [this](const Failure& why) { tell("cut", why); }};
   }
 
  private:
@@ -41,9 +43,9 @@ class Tale {
     }
     if (left_ && --*left_ == 0) stop_.raise();
   }
-  void tell(const Failure& failure) {
+  void tell(const char* what, const Failure& failure) {
     const std::lock_guard lock(mutex_);
-    console_.progress << fmt::format("refused: {}: {}\n", code(failure.reason),
+    console_.progress << fmt::format("{}: {}: {}\n", what, code(failure.reason),
                                      without_control_characters(failure.message))
                       << std::flush;
   }

@@ -3,12 +3,14 @@
 
 #include <asio/co_spawn.hpp>
 #include <asio/detached.hpp>
+#include <asio/redirect_error.hpp>
+#include <asio/steady_timer.hpp>
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
 #include <asio/use_awaitable.hpp>
 #include <fmt/format.h>
 
-#include "helicarm/devices/receiver/association.h"
+#include "helicarm/devices/receiver/serve.h"
 
 namespace helicarm {
 namespace {
@@ -17,8 +19,8 @@ using asio::ip::tcp;
 
 // Checking and writing a picture takes one of them for some milliseconds.
 constexpr std::size_t crew = 4;
-// Connections beyond the association limit are told so, but not without end.
-constexpr unsigned most_unheard = 4;
+// Without descriptors, say: trying again at once would take all of a processor.
+constexpr std::chrono::milliseconds breath{100};
 
 asio::ssl::context tls_context(const TlsFiles& files) {
   asio::ssl::context context(asio::ssl::context::tls_server);
@@ -49,7 +51,7 @@ struct DicomReceiver::Engine {
   tcp::acceptor acceptor{pool};
 
   Engine(const ReceiverOptions& options, Inbox& inbox, ReceiverHooks hooks)
-      : shared{options, inbox, std::move(hooks), {}, {}, {}, {}} {}
+      : shared(options, inbox, std::move(hooks)) {}
   ~Engine() {
     pool.stop();
     pool.join();
@@ -74,18 +76,23 @@ struct DicomReceiver::Engine {
   }
 
   asio::awaitable<void> accept() {
-    while (true) {
-      auto strand = asio::make_strand(pool);
-      tcp::socket socket(strand);
-      try {
-        co_await acceptor.async_accept(socket, asio::use_awaitable);
-      } catch (const asio::system_error& error) {
-        if (error.code() == asio::error::operation_aborted) co_return;
+    asio::steady_timer timer(pool);
+    for (bool well = true;;) {
+      tcp::socket socket(asio::make_strand(pool));
+      asio::error_code error;
+      co_await acceptor.async_accept(socket, asio::redirect_error(asio::use_awaitable, error));
+      if (error == asio::error::operation_aborted) co_return;
+      if (!error) {
+        ++shared.counters.connections;
+        serve(std::move(socket), tls ? &*tls : nullptr, shared);
+        well = true;
         continue;
       }
-      ++shared.counters.connections;
-      if (shared.open >= most_unheard * shared.options.most_associations) continue;
-      asio::co_spawn(strand, serve(std::move(socket), tls ? &*tls : nullptr, shared), asio::detached);
+      ++shared.counters.accept_failures;
+      if (std::exchange(well, false))
+        shared.hooks.cut({Reason::not_connected, "connections cannot be accepted: " + error.message()});
+      timer.expires_after(breath);
+      co_await timer.async_wait(asio::use_awaitable);
     }
   }
 };
