@@ -81,7 +81,7 @@ void IgtlClient::Impl::connect() {
 }
 
 void IgtlClient::Impl::connected(asio::ip::tcp::socket socket) {
-  const auto fresh = std::make_shared<IgtlConnection>(std::move(socket), SendLimits{});
+  const auto fresh = std::make_shared<IgtlConnection>(std::move(socket), ConnectionLimits{});
   {
     const std::lock_guard lock(mutex);
     connection = fresh;

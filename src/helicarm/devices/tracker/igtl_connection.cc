@@ -2,6 +2,7 @@
 #include "helicarm/devices/tracker/igtl_connection.h"
 
 #include <fmt/format.h>
+#include <netinet/tcp.h>
 
 #include "helicarm/devices/tracker/pose_board.h"
 
@@ -19,13 +20,29 @@ void add_counters(Counters& to, const Counters& more) {
   for (const auto& [name, count] : more) to[name] += count;
 }
 
+namespace {
+
+/// A peer that went without a word, as by a pulled cable, is given up after half a minute.
+void expect_signs_of_life(asio::ip::tcp::socket& socket) {
+  using Idle = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPIDLE>;
+  using Interval = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPINTVL>;
+  using Probes = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPCNT>;
+  asio::error_code ignored;
+  socket.set_option(asio::socket_base::keep_alive(true), ignored);
+  socket.set_option(Idle(15), ignored);
+  socket.set_option(Interval(5), ignored);
+  socket.set_option(Probes(3), ignored);
+}
+
+}  // namespace
+
 void IgtlConnection::start(Handlers handlers) {
   handlers_ = std::move(handlers);
   open_ = true;
   heard_s_ = monotonic_seconds();
   asio::error_code ignored;
   socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
-  socket_.set_option(asio::socket_base::keep_alive(true), ignored);
+  expect_signs_of_life(socket_);
   read();
 }
 
@@ -43,14 +60,14 @@ void IgtlConnection::take(std::size_t size) {
   bytes_ += size;
   const auto fed = stream_.feed({segment_.data(), size}, handlers_.on_message);
   publish();
-  if (!fed) return close(fed.error().message);
+  if (!fed) return cut(fed.error().message);
   if (open_) read();
 }
 
 void IgtlConnection::send(std::shared_ptr<const std::string> bytes) {
   if (!open_) return;
   if (!in_flight_.empty() && monotonic_seconds() - writing_since_ > limits_.stall_s)
-    return close("the peer does not read");
+    return cut("the peer does not read");
   queued_bytes_ += bytes->size();
   queue_.push_back(std::move(bytes));
   while (queue_.size() > limits_.messages || queued_bytes_ > limits_.bytes) {
@@ -75,13 +92,22 @@ void IgtlConnection::write() {
     if (error) return self->close(error.message());
     self->sent_ += self->in_flight_.size();
     self->in_flight_.clear();
+    self->taken_s_ = monotonic_seconds();
     self->publish();
     self->write();
   });
 }
 
+void IgtlConnection::cut(const std::string& why) {
+  if (!open_) return;
+  cut_ = true;
+  publish();
+  close(why);
+}
+
 void IgtlConnection::close(const std::string& why) {
   if (!std::exchange(open_, false)) return;
+  queue_.clear();
   asio::error_code ignored;
   socket_.close(ignored);
   if (handlers_.on_closed) handlers_.on_closed(why);
@@ -93,6 +119,7 @@ void IgtlConnection::publish() {
   published_["bytes"] = bytes_;
   published_["sent"] = sent_;
   published_["dropped"] = dropped_;
+  if (cut_) published_["cut"] = 1;
 }
 
 Counters IgtlConnection::counters() const {

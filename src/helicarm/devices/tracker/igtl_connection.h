@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <functional>
@@ -15,11 +16,12 @@
 
 namespace helicarm {
 
-/// What one direction of a connection may hold back for a peer that does not read.
-struct SendLimits {
-  std::size_t messages = 256;  ///< the oldest are dropped beyond
+/// What a connection may hold for a peer.
+struct ConnectionLimits {
+  std::size_t messages = 256;  ///< to send; the oldest are dropped beyond
   std::size_t bytes = std::size_t{64} << 20;
-  double stall_s = 5;  ///< a peer that takes nothing for so long is cut off
+  double stall_s = 5;                                  ///< a peer that takes nothing for so long is cut off
+  std::uint64_t body_bytes = std::uint64_t{64} << 20;  ///< of a message that comes
 };
 
 /// A numeric address; names are not looked up, as that may hang for seconds. "localhost" is 127.0.0.1.
@@ -36,16 +38,21 @@ class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
     std::function<void(const std::string& why)> on_closed;
   };
 
-  IgtlConnection(asio::ip::tcp::socket socket, const SendLimits& limits)
-      : socket_(std::move(socket)), limits_(limits) {}
+  IgtlConnection(asio::ip::tcp::socket socket, const ConnectionLimits& limits)
+      : socket_(std::move(socket)), limits_(limits), stream_(limits.body_bytes) {}
 
   void start(Handlers handlers);
   void send(std::shared_ptr<const std::string> bytes);
   void close(const std::string& why);
+  /// Closes over what the peer did, or did not do; counted as "cut".
+  void cut(const std::string& why);
+  bool was_cut() const { return cut_; }
 
   /// When the newest bytes came, or the connection began; monotonic_seconds().
   double heard_s() const { return heard_s_; }
-  /// Those of the stream, "bytes", "sent" and "dropped" messages. From any thread.
+  /// When the peer last sent or took anything.
+  double active_s() const { return std::max(heard_s_, taken_s_); }
+  /// Those of the stream, "bytes", "sent" and "dropped" messages, "cut" connections. From any thread.
   Counters counters() const;
 
  private:
@@ -55,7 +62,7 @@ class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
   void publish();
 
   asio::ip::tcp::socket socket_;
-  SendLimits limits_;
+  ConnectionLimits limits_;
   Handlers handlers_;
   IgtlStream stream_;
   std::array<char, 65536> segment_;
@@ -63,9 +70,9 @@ class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
   std::vector<std::shared_ptr<const std::string>> in_flight_;
   std::size_t queued_bytes_ = 0;
   double writing_since_ = 0;
-  double heard_s_ = 0;
+  double heard_s_ = 0, taken_s_ = 0;
   std::uint64_t bytes_ = 0, sent_ = 0, dropped_ = 0;
-  bool open_ = false;
+  bool open_ = false, cut_ = false;
 
   mutable std::mutex mutex_;
   Counters published_;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/tracker/igtl_server.h"
 
+#include <algorithm>
+#include <atomic>
 #include <list>
 #include <mutex>
 #include <thread>
 
 #include <fmt/format.h>
 
+#include "helicarm/core/line_limit.h"
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
 
@@ -37,6 +40,8 @@ struct IgtlServer::Impl {
 
   struct Client {
     std::shared_ptr<IgtlConnection> connection;
+    std::string address;
+    bool leaves = false;  ///< closed, and about to be taken off the list; of the server's thread
     std::map<std::string, Subscription> tracking;  ///< by TDATA and QTDATA
   };
 
@@ -45,6 +50,10 @@ struct IgtlServer::Impl {
   Expected<void> listen(const asio::ip::tcp::endpoint& endpoint);
   void accept();
   void welcome(asio::ip::tcp::socket socket);
+  bool make_room();
+  void count(const char* what);
+  void leave(std::list<Client>::iterator client, const std::string& why);
+  void note(const std::string& line);
   void answer(Client& client, const IgtlMessage& message);
   void distribute(const std::string& type, const std::shared_ptr<const std::string>& bytes);
 
@@ -54,6 +63,8 @@ struct IgtlServer::Impl {
   asio::ip::tcp::acceptor acceptor{io};
   asio::steady_timer breath{io};
   std::list<Client> clients;
+  std::atomic<std::size_t> unsent = 0;
+  LineLimit lines{20};
   std::uint16_t port = 0;
 
   mutable std::mutex mutex;  ///< of the clients' list and the totals
@@ -91,30 +102,62 @@ void IgtlServer::Impl::accept() {
   });
 }
 
-void IgtlServer::Impl::welcome(asio::ip::tcp::socket socket) {
+void IgtlServer::Impl::note(const std::string& line) {
+  if (const auto left_out = lines.pass())
+    options.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines left out)", line, *left_out));
+}
+
+/// Whether there is room for one more; where there is none, the client that has sent and taken nothing for
+/// longest is ended.
+bool IgtlServer::Impl::make_room() {
+  const auto staying = std::ranges::count(clients, false, &Client::leaves);
+  if (static_cast<std::size_t>(staying) < options.max_clients) return true;
+  const double before = monotonic_seconds() - options.stall_s;
+  const auto active = [](const Client& client) { return client.connection->active_s(); };
+  auto longest = clients.end();
+  for (auto it = clients.begin(); it != clients.end(); ++it)
+    if (!it->leaves && active(*it) < before && (longest == clients.end() || active(*it) < active(*longest)))
+      longest = it;
+  const bool found = longest != clients.end();
+  count(found ? "evicted" : "refused");
+  if (found) longest->connection->cut("makes room for another client");
+  return found;
+}
+
+void IgtlServer::Impl::count(const char* what) {
   const std::lock_guard lock(mutex);
-  if (clients.size() >= options.max_clients) {
-    ++totals["refused"];
-    return;
-  }
-  ++totals["connections"];
-  SendLimits limits;
-  limits.messages = options.queue_messages;
-  limits.stall_s = options.stall_s;
-  const auto client =
-      clients.insert(clients.end(), {std::make_shared<IgtlConnection>(std::move(socket), limits), {}});
+  ++totals[what];
+}
+
+void IgtlServer::Impl::leave(std::list<Client>::iterator client, const std::string& why) {
+  client->leaves = true;
+  if (client->connection->was_cut()) note(fmt::format("client {}: cut off: {}", client->address, why));
+  // The list is walked when a connection closes while it is sent to.
+  asio::post(io, [this, client] {
+    const std::lock_guard lock(mutex);
+    add_counters(totals, client->connection->counters());
+    clients.erase(client);
+  });
+}
+
+void IgtlServer::Impl::welcome(asio::ip::tcp::socket socket) {
+  asio::error_code gone;
+  const auto peer = socket.remote_endpoint(gone);
+  if (gone) return;
+  const std::string address = fmt::format("{}:{}", peer.address().to_string(), peer.port());
+  if (!make_room())
+    return note(fmt::format("client {}: turned away: {} clients are here", address, options.max_clients));
+  count("connections");
+  const ConnectionLimits limits{options.queue_messages, options.queue_bytes, options.stall_s,
+                                options.body_bytes};
+  const std::lock_guard lock(mutex);
+  const auto client = clients.insert(
+      clients.end(), {std::make_shared<IgtlConnection>(std::move(socket), limits), address, false, {}});
   client->connection->start({[this, client](IgtlMessage&& message) {
                                answer(*client, message);
                                if (on_message) on_message(message);
                              },
-                             [this, client](const std::string&) {
-                               // The list is walked when a connection closes while it is sent to.
-                               asio::post(io, [this, client] {
-                                 const std::lock_guard leaving(mutex);
-                                 add_counters(totals, client->connection->counters());
-                                 clients.erase(client);
-                               });
-                             }});
+                             [this, client](const std::string& why) { leave(client, why); }});
 }
 
 void IgtlServer::Impl::answer(Client& client, const IgtlMessage& message) {
@@ -156,7 +199,12 @@ Expected<std::unique_ptr<IgtlServer>> IgtlServer::start(const IgtlServerOptions&
 std::uint16_t IgtlServer::port() const { return impl_->port; }
 
 void IgtlServer::send(const IgtlMessage& message) {
+  if (++impl_->unsent > impl_->options.unsent_messages) {
+    --impl_->unsent;
+    return impl_->count("unsent");
+  }
   asio::post(impl_->io, [impl = impl_.get(), type = type_of(message.content), bytes = encoded(message)] {
+    --impl->unsent;
     impl->distribute(type, bytes);
   });
 }

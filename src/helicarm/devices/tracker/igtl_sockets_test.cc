@@ -302,6 +302,7 @@ TEST(IgtlSockets, ServerSurvivesAStormOfConnections) {
 TEST(IgtlSockets, ClientsOverTheLimitAreTurnedAway) {
   IgtlServerOptions options;
   options.max_clients = 2;
+  options.stall_s = 3600;
   const auto server = a_server(options);
   RawPeer first, second, third;
   first.dial(server->port());
@@ -344,6 +345,89 @@ TEST(IgtlSockets, ClientThatTakesNothingIsCutOff) {
     server->send(large);
     return server->status().clients == 0;
   }));
+}
+
+TEST(IgtlSockets, ClientThatIsCutOffIsCountedAndNoted) {
+  IgtlServerOptions options;
+  options.stall_s = 0.05;
+  std::atomic<int> notes = 0;
+  options.on_notice = [&](const std::string& line) {
+    notes += line.find("client 127.0.0.1:") == 0 && line.find("does not read") != line.npos;
+  };
+  const auto server = a_server(options);
+  RawPeer sleeper;
+  sleeper.dial(server->port());
+  ASSERT_TRUE(all_connected(*server, 1));
+  const IgtlMessage large{"large", 0, IgtlUnknown{"LARGE", std::string(1000000, 'x')}};
+  EXPECT_TRUE(eventually([&] {
+    server->send(large);
+    return server->status().clients == 0;
+  }));
+  EXPECT_EQ(notes, 1);
+  EXPECT_EQ(count_of(server->status().counters, "cut"), 1u);
+}
+
+TEST(IgtlSockets, BytesHeldForAClientAreBounded) {
+  IgtlServerOptions options;
+  options.queue_bytes = 1000000;
+  options.stall_s = 3600;
+  const auto server = a_server(options);
+  RawPeer sleeper;
+  sleeper.dial(server->port());
+  ASSERT_TRUE(all_connected(*server, 1));
+  const IgtlMessage large{"large", 0, IgtlUnknown{"LARGE", std::string(400000, 'x')}};
+  for (int i = 0; i < 100; ++i) server->send(large);
+  // 40 MB against what the system's sockets hold, one million bytes on their way and one that wait.
+  EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "dropped") > 50; }));
+}
+
+TEST(IgtlSockets, MessageOverTheServersLimitEndsTheConnection) {
+  const auto server = a_server();
+  RawPeer peer;
+  peer.dial(server->port());
+  std::string header = encode({"x", 0, IgtlImage{}}).substr(0, IgtlHeader::size);
+  header[45] = 16;  // a body of over 1 MiB
+  peer.write(header);
+  EXPECT_TRUE(peer.is_hung_up_on());
+  EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "cut") == 1; }));
+}
+
+TEST(IgtlSockets, WhatAServerThatIsHeldUpCannotSendIsDropped) {
+  IgtlServerOptions options;
+  options.unsent_messages = 10;
+  std::atomic<bool> held = false, free = false;
+  auto server = IgtlServer::start(options, [&](const IgtlMessage&) {
+                  held = true;
+                  while (!free) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                }).value();
+  RawPeer peer;
+  peer.dial(server->port());
+  peer.write(encode({"x", 0, IgtlString{"hold"}}));
+  ASSERT_TRUE(eventually([&] { return held.load(); }));
+  for (int i = 0; i < 1000; ++i) server->send({"pose", 0, IgtlTransform{}});
+  EXPECT_EQ(count_of(server->status().counters, "unsent"), 990u);
+  free = true;
+  EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "sent") == 10; }));
+}
+
+TEST(IgtlSockets, ClientIdleForLongestMakesRoomOnAFullServer) {
+  IgtlServerOptions options;
+  options.max_clients = 2;
+  options.stall_s = 0.05;
+  const auto server = a_server(options);
+  RawPeer oldest, old;
+  oldest.dial(server->port());
+  ASSERT_TRUE(all_connected(*server, 1));
+  old.dial(server->port());
+  ASSERT_TRUE(all_connected(*server, 2));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  Listener listener(server->port());
+  EXPECT_TRUE(oldest.is_hung_up_on());
+  ASSERT_TRUE(eventually([&] {
+    server->send({"still here", 0, IgtlTransform{}});
+    return listener.last_device() == "still here";
+  }));
+  EXPECT_EQ(count_of(server->status().counters, "evicted"), 1u);
 }
 
 }  // namespace

@@ -4,6 +4,11 @@
 #include <fmt/format.h>
 
 namespace helicarm {
+namespace {
+
+constexpr std::size_t usual_message = std::size_t{64} << 10;
+
+}  // namespace
 
 Expected<void> IgtlStream::feed(std::string_view bytes, const Sink& sink) {
   const bool whole = held_.empty();
@@ -15,6 +20,7 @@ Expected<void> IgtlStream::feed(std::string_view bytes, const Sink& sink) {
     held_ = all.substr(*used);
   else
     held_.erase(0, *used);
+  if (held_.capacity() > usual_message && held_.size() <= usual_message && *used > 0) held_.shrink_to_fit();
   return {};
 }
 
@@ -26,6 +32,9 @@ Expected<std::size_t> IgtlStream::consume(std::string_view bytes, const Sink& si
       if (bytes.size() - used < IgtlHeader::size) return used;
       auto header = decode_header(bytes.substr(used, IgtlHeader::size));
       if (!header) return tl::unexpected(header.error());
+      if (header->body_size > most_body_bytes_)
+        return fail(Reason::bad_size, fmt::format("{}: body of {} bytes, limit {}", header->type,
+                                                  header->body_size, most_body_bytes_));
       header_ = *std::move(header);
       used += IgtlHeader::size;
     }

@@ -56,6 +56,23 @@ TEST(IgtlStream, AnnouncedLengthTakesNoMemory) {
   EXPECT_LT(collector.stream.held(), 100u);
 }
 
+TEST(IgtlStream, MemoryOfALargeMessageIsGivenBack) {
+  Collector collector;
+  const std::string large = encode({"i", 0, IgtlUnknown{"LARGE", std::string(1 << 20, 'x')}});
+  for (std::size_t at = 0; at < large.size(); at += 1000)
+    ASSERT_TRUE(collector.feed(std::string_view(large).substr(at, 1000)));
+  EXPECT_EQ(collector.again, large);
+  EXPECT_LT(collector.stream.memory(), std::size_t{1} << 17);
+}
+
+TEST(IgtlStream, BodyOverItsOwnLimitEndsTheStream) {
+  IgtlStream stream(100);
+  const auto ignore = [](IgtlMessage&&) {};
+  EXPECT_TRUE(stream.feed(encode({"i", 0, IgtlUnknown{"LARGE", std::string(100, 'x')}}), ignore));
+  EXPECT_EQ(stream.feed(encode({"i", 0, IgtlUnknown{"LARGE", std::string(101, 'x')}}), ignore).error().reason,
+            Reason::bad_size);
+}
+
 TEST(IgtlStream, SpoiledMessageIsDroppedAndTheNextOneRead) {
   const std::string sound = encode(sample_messages()[0]);
   std::string spoiled = sound, newer = sound;

@@ -2,6 +2,8 @@
 #include "helicarm/devices/tracker/pose_board.h"
 
 #include <chrono>
+#include <map>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -45,9 +47,10 @@ void PoseBoard::take_pose(const std::string& name, RawPose raw, const IgtlMessag
 template <class Tools, class MatrixOf>
 void PoseBoard::take_all(const Tools& tools, const IgtlMessage& message, double arrival_s,
                          MatrixOf matrix_of) {
+  std::map<std::string_view, int> times;
+  for (const auto& one : tools) ++times[one.name];
   for (const auto& one : tools) {
-    const auto same = [&](const auto& other) { return other.name == one.name; };
-    if (std::ranges::count_if(tools, same) == 1)
+    if (times.at(one.name) == 1)
       take_pose(one.name, {matrix_of(one), 0, arrival_s}, message);
     else if (Tool* const to = tool(one.name))
       to->gate.reject(PoseFault::name_twice);

@@ -95,6 +95,16 @@ TEST(PoseBoard, FloodOfNamesIsBounded) {
   EXPECT_EQ(board.names_refused(), 1000u - 64u);
 }
 
+TEST(PoseBoard, MessageOfAsManyToolsAsItHoldsIsBounded) {
+  constexpr int most = 14979;  // of 70 bytes in 1 MiB
+  IgtlTracking tracking;
+  for (int i = 0; i < most; ++i) tracking.tools.push_back({fmt::format("tool {}", i), 1, pose_at(1)});
+  PoseBoard board;
+  for (int i = 1; i <= 20; ++i) board.take(stamped(tracking, i, "tracker"), i);
+  EXPECT_EQ(board.tools(1).size(), 64u);
+  EXPECT_EQ(board.names_refused(), 20 * (most - 64u));
+}
+
 TEST(PoseBoard, RestartedDeviceWithAnEarlierClockIsBelievedAtOnce) {
   PoseBoard board;
   board.take(stamped(IgtlTransform{pose_at(1)}, 5000, "tool"), 10);

@@ -43,6 +43,14 @@ SequenceFrame frame_of(const IgtlMessage& message, double arrival_s) {
   return frame;
 }
 
+bool SequenceRecorder::take(SequenceFrame frame) {
+  if (frame.poses.empty()) return true;
+  if (poses_ + frame.poses.size() > most_poses_) return false;
+  poses_ += frame.poses.size();
+  frames_.push_back(std::move(frame));
+  return true;
+}
+
 std::vector<IgtlMessage> messages_of(const SequenceFrame& frame, bool as_tracking, double time_s) {
   const std::uint64_t stamp = stamp_from_seconds(time_s);
   std::vector<IgtlMessage> messages;

@@ -19,6 +19,22 @@ SequenceFrame frame_of(const IgtlMessage& message, double arrival_s);
 /// A frame as one TDATA, or as a TRANSFORM for each tool; hidden tools are absent.
 std::vector<IgtlMessage> messages_of(const SequenceFrame& frame, bool as_tracking, double time_s);
 
+/// Frames as they come, up to so many poses: 4 million take about 1 GiB.
+class SequenceRecorder {
+ public:
+  explicit SequenceRecorder(std::size_t most_poses = 4'000'000) : most_poses_(most_poses) {}
+
+  /// Whether there was room for it; a frame without poses needs none.
+  bool take(SequenceFrame frame);
+  const std::vector<SequenceFrame>& frames() const { return frames_; }
+  std::size_t most_poses() const { return most_poses_; }
+
+ private:
+  const std::size_t most_poses_;
+  std::size_t poses_ = 0;
+  std::vector<SequenceFrame> frames_;
+};
+
 struct GatedPoses {
   std::vector<RigidTransform> tracker_from_tool;
   Counters rejected;  ///< by code of PoseFault

@@ -24,6 +24,15 @@ TEST(SequenceStream, MessageBecomesAFrameAndBack) {
   EXPECT_TRUE(frame_of({"x", 0, IgtlString{"text"}}, 3).poses.empty());
 }
 
+TEST(SequenceStream, RecorderTakesNoMorePosesThanItsLimit) {
+  SequenceRecorder recorder(4);
+  EXPECT_TRUE(recorder.take(frame_at(1)));
+  EXPECT_TRUE(recorder.take({}));
+  EXPECT_TRUE(recorder.take(frame_at(2)));
+  EXPECT_FALSE(recorder.take(frame_at(3)));
+  EXPECT_EQ(recorder.frames().size(), 2u);
+}
+
 TEST(SequenceStream, HiddenToolsAreAbsent) {
   EXPECT_EQ(messages_of(frame_at(1), false, 1).size(), 1u);
   const auto tracking = messages_of(frame_at(1), true, 1);
