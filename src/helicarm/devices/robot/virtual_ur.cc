@@ -11,54 +11,21 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/big_endian.h"
+#include "helicarm/core/line_limit.h"
 #include "helicarm/devices/robot/rtde_message.h"
+#include "helicarm/devices/robot/virtual_ur_client.h"
 
 namespace helicarm {
 namespace {
 
 using asio::ip::tcp;
 
-constexpr std::size_t longest_backlog = 1 << 20;
+// Without descriptors, say: trying again at once would take all of a processor.
+constexpr std::chrono::milliseconds breath{100};
 constexpr std::uint8_t state_recipe = 1, heartbeat_recipe = 2;
 constexpr std::string_view empty_robot_state("\0\0\0\5\x10", 5);
 
 }  // namespace
-
-/// One client of one of the ports.
-struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
-  explicit VirtualUrClient(tcp::socket given) : socket(std::move(given)) {}
-
-  void send(std::string_view bytes) {
-    waiting += bytes;
-    if (waiting.size() > longest_backlog) return close();  // a client that does not read is dropped
-    if (sending.empty()) send_waiting();
-  }
-  void close() {
-    std::error_code ignored;
-    socket.close(ignored);
-  }
-
-  tcp::socket socket;
-  std::array<char, 4096> buffer{};
-  std::string waiting, sending;
-  std::string text;  ///< dashboard and script: what has come
-  RtdeStream stream;
-  std::vector<std::string> names;  ///< RTDE: what it asked for
-  bool started = false;
-  bool commands = false;
-  int unanswered = 0;  ///< states that it has not answered, in lockstep
-
- private:
-  void send_waiting() {
-    sending.swap(waiting);
-    asio::async_write(socket, asio::buffer(sending),
-                      [self = shared_from_this()](const std::error_code& error, std::size_t) {
-                        self->sending.clear();
-                        if (error) return self->close();
-                        if (!self->waiting.empty()) self->send_waiting();
-                      });
-  }
-};
 
 class VirtualUr::Server {
  public:
@@ -87,7 +54,7 @@ class VirtualUr::Server {
         return fail(
             error == asio::error::address_in_use ? Reason::port_taken : Reason::bad_value,
             fmt::format("cannot listen on {}:{}: {}", options_.address, wanted[i].first, error.message()));
-      accept(acceptor, wanted[i].second);
+      accept(i, wanted[i].second);
     }
     if (!options_.lockstep) tick(std::chrono::steady_clock::now());
     thread_ = std::thread([this] { io_.run(); });
@@ -130,23 +97,58 @@ class VirtualUr::Server {
   }
 
   const VirtualUrOptions& options() const { return options_; }
+  VirtualUrCounters counters() const {
+    VirtualUrCounters counters = counters_;
+    counters.clients = clients_.size();
+    return counters;
+  }
 
  private:
   template <class Handle>
-  void accept(tcp::acceptor& acceptor, Handle handle) {
-    acceptor.async_accept([this, &acceptor, handle](const std::error_code& error, tcp::socket socket) {
+  void accept(std::size_t port, Handle handle) {
+    acceptors_[port].async_accept([this, port, handle](const std::error_code& error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
       if (!error) {
-        std::error_code ignored;
-        socket.set_option(tcp::no_delay(true), ignored);
-        auto client = std::make_shared<VirtualUrClient>(std::move(socket));
-        std::erase_if(clients_, [](const auto& one) { return !one->socket.is_open(); });
-        clients_.push_back(client);
-        if (&acceptor == &acceptors_[1]) client->send("Connected: Universal Robots Dashboard Server\n");
-        if (&acceptor == &acceptors_[2]) client->send(empty_robot_state);
-        read(client, handle);
+        welcome(port, std::move(socket), handle);
+        return accept(port, handle);
       }
-      accept(acceptor, handle);
+      ++counters_.accept_failures;
+      breaths_[port].expires_after(breath);
+      breaths_[port].async_wait([this, port, handle](const std::error_code& stopped) {
+        if (!stopped) accept(port, handle);
+      });
     });
+  }
+
+  template <class Handle>
+  void welcome(std::size_t port, tcp::socket socket, Handle handle) {
+    ++counters_.connections;
+    make_room(port);
+    std::error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    auto client = std::make_shared<VirtualUrClient>(std::move(socket), port, [this](const std::string& line) {
+      ++counters_.cut;
+      note(line);
+    });
+    clients_.push_back(client);
+    if (port == 1) client->send("Connected: Universal Robots Dashboard Server\n");
+    if (port == 2) client->send(empty_robot_state);
+    read(client, handle);
+  }
+
+  /// Of a full port the oldest client that does not command is ended.
+  void make_room(std::size_t port) {
+    std::erase_if(clients_, [](const auto& one) { return !one->socket.is_open(); });
+    if (std::ranges::count(clients_, port, &VirtualUrClient::port) < most_clients_of_port) return;
+    const auto oldest = std::ranges::find_if(
+        clients_, [port](const auto& one) { return one->port == port && !one->commands; });
+    (*oldest)->cut("makes room for another");
+    clients_.erase(oldest);
+  }
+
+  void note(const std::string& line) {
+    if (const auto left_out = lines_.pass())
+      options_.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines left out)", line, *left_out));
   }
 
   template <class Handle>
@@ -156,6 +158,7 @@ class VirtualUr::Server {
                                      if (error) {
                                        client->close();
                                        client->started = client->commands = false;
+                                       std::erase(clients_, client);
                                        return;
                                      }
                                      if (!controller_.has(RobotFault::cut_cable))
@@ -182,7 +185,7 @@ class VirtualUr::Server {
       client.text.erase(0, end + 1);
       client.send(controller_.dashboard(line) + "\n");
     }
-    if (client.text.size() > 1000) client.close();
+    if (client.text.size() > 1000) client.cut("line over 1000 bytes");
   }
 
   void hear_script(VirtualUrClient& client, std::string_view bytes) {
@@ -192,7 +195,7 @@ class VirtualUr::Server {
       controller_.run_script(client.text.substr(0, end + last.size()));
       client.text.erase(0, end + last.size());
     }
-    if (client.text.size() > 1 << 17) client.close();
+    if (client.text.size() > 1 << 17) client.cut("script over 128 KiB");
   }
 
   void hear_rtde(VirtualUrClient& client, std::string_view bytes) {
@@ -292,7 +295,11 @@ class VirtualUr::Server {
   asio::io_context io_;
   std::array<tcp::acceptor, 3> acceptors_{tcp::acceptor(io_), tcp::acceptor(io_), tcp::acceptor(io_)};
   asio::steady_timer timer_{io_};
+  std::array<asio::steady_timer, 3> breaths_{asio::steady_timer(io_), asio::steady_timer(io_),
+                                             asio::steady_timer(io_)};
   std::list<std::shared_ptr<VirtualUrClient>> clients_;
+  VirtualUrCounters counters_;
+  LineLimit lines_{20};
   std::thread thread_;
 };
 
@@ -322,6 +329,10 @@ void VirtualUr::advance(double seconds) {
     const auto steps = static_cast<int>(std::ceil(seconds * server_->options().controller.rate_hz));
     for (int i = 0; i < steps; ++i) server_->step();
   });
+}
+
+VirtualUrCounters VirtualUr::counters() {
+  return server_->there([&] { return server_->counters(); });
 }
 
 VirtualTruth VirtualUr::truth() {

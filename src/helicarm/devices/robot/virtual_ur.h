@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +24,18 @@ struct VirtualUrOptions {
   /// The clock goes on by one period with each heartbeat's message and by `advance`, not with the time of
   /// day: what happens then depends on no machine's speed.
   bool lockstep = false;
+  /// A line for a log on each client that was cut off, at most 20 a second; on the robot's thread.
+  std::function<void(const std::string&)> on_notice = [](const std::string&) {};
+};
+
+/// Clients of each port at once; then the oldest that does not command makes room.
+inline constexpr int most_clients_of_port = 16;
+
+struct VirtualUrCounters {
+  std::size_t clients = 0;  ///< now
+  std::uint64_t connections = 0;
+  std::uint64_t cut = 0;              ///< clients that did not read, sent too much or made room for another
+  std::uint64_t accept_failures = 0;  ///< out of descriptors, say
 };
 
 /// What only the virtual robot knows.
@@ -52,6 +65,7 @@ class VirtualUr {
   /// In lockstep: lets this much time pass on the robot's clock, whether anybody beats or not.
   void advance(double seconds);
   VirtualTruth truth();
+  VirtualUrCounters counters();
 
  private:
   class Server;

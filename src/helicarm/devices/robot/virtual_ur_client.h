@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <asio.hpp>
+#include <fmt/format.h>
+
+#include "helicarm/devices/robot/rtde_message.h"
+
+namespace helicarm {
+
+/// One client of one of the virtual robot's ports, on the thread of its socket.
+struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
+  static constexpr std::size_t longest_backlog = 1 << 20;
+
+  VirtualUrClient(asio::ip::tcp::socket given, std::size_t of_port,
+                  std::function<void(const std::string& line)> on_cut)
+      : socket(std::move(given)), port(of_port), told(std::move(on_cut)) {
+    std::error_code gone;
+    const auto peer = socket.remote_endpoint(gone);
+    name = fmt::format("client {}:{}", peer.address().to_string(), peer.port());
+  }
+
+  void send(std::string_view bytes) {
+    if (!socket.is_open()) return;
+    waiting += bytes;
+    if (waiting.size() > longest_backlog) return cut("does not read");
+    if (sending.empty()) send_waiting();
+  }
+  /// Closes over what the client did, or did not do.
+  void cut(const std::string& why) {
+    if (!socket.is_open()) return;
+    close();
+    told(fmt::format("{}: cut off: {}", name, why));
+  }
+  void close() {
+    std::error_code ignored;
+    socket.close(ignored);
+    waiting = {};
+    text = {};
+    started = commands = false;
+  }
+
+  asio::ip::tcp::socket socket;
+  const std::size_t port;  ///< 0 RTDE, 1 dashboard, 2 script
+  std::string name;        ///< of its address
+  std::array<char, 4096> buffer{};
+  std::string waiting, sending;
+  std::string text;  ///< dashboard and script: what has come
+  RtdeStream stream;
+  std::vector<std::string> names;  ///< RTDE: what it asked for
+  bool started = false;
+  bool commands = false;
+  int unanswered = 0;  ///< states that it has not answered, in lockstep
+
+ private:
+  void send_waiting() {
+    sending.swap(waiting);
+    asio::async_write(socket, asio::buffer(sending),
+                      [self = shared_from_this()](const std::error_code& error, std::size_t) {
+                        self->sending.clear();
+                        if (error) return self->close();
+                        if (!self->waiting.empty()) self->send_waiting();
+                      });
+  }
+
+  std::function<void(const std::string& line)> told;
+};
+
+}  // namespace helicarm
