@@ -31,21 +31,37 @@ def check(name, good):
 
 class Receiver:
     def __init__(self, program, inbox, *options):
-        self.process = subprocess.Popen([program, "receive", "--out", inbox, "--port", "0", *options],
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        self.port = self.process.stderr.readline().split("port ")[1].split()[0].rstrip(",;")
+        # A file: a pipe that nobody reads would hold the receiver up once its log has filled it.
+        self.log = tempfile.NamedTemporaryFile("r")
+        with open(self.log.name, "w") as log:
+            self.process = subprocess.Popen([program, "receive", "--out", inbox, "--port", "0", *options],
+                                            stdout=subprocess.DEVNULL, stderr=log)
+        while "port " not in self.lines():
+            if self.process.poll() is not None:
+                sys.exit("cannot start: " + self.lines())
+            time.sleep(0.01)
+        self.port = self.lines().split("port ")[1].split()[0].rstrip(",;")
+
+    def lines(self):
+        return pathlib.Path(self.log.name).read_text()
+
+    def told(self, words):
+        """Whether a line of the log holds these words, within ten seconds."""
+        for _ in range(100):
+            if words in self.lines():
+                return True
+            time.sleep(0.1)
+        return False
 
     def stop(self):
         begin = time.monotonic()
         self.process.send_signal(signal.SIGTERM)
         code = self.process.wait(10)
-        self.process.stderr.close()
         return code, time.monotonic() - begin
 
     def kill(self):
         self.process.kill()
         self.process.wait()
-        self.process.stderr.close()
 
 
 @contextlib.contextmanager
@@ -105,6 +121,7 @@ def drill_plain(program, folder, pictures):
         check("wrong called title is rejected", not echo(receiver.port, called="OTHER"))
         check("unknown calling title is rejected", not echo(receiver.port, "-aet", "STRANGER"))
         store(receiver.port, pictures[1], "--abort")
+        check("an abort is told", receiver.told("cut: ") and receiver.told("aborted by the peer"))
         check("alive after an abort", echo(receiver.port))
         senders = [subprocess.Popen(["storescu", "-aec", "HELICARM", "127.0.0.1", receiver.port, picture],
                                     stderr=subprocess.DEVNULL) for picture in pictures[:20]]
@@ -124,7 +141,9 @@ def drill_tls(program, folder, picture):
         check("TLS echo", echo(receiver.port, *tls("client")))
         check("TLS store", store(receiver.port, picture, *tls("client")))
         check("certificate of another authority is refused", not echo(receiver.port, *tls("stranger")))
+        check("and told", receiver.told("TLS handshake: certificate: "))
         check("expired certificate is refused", not echo(receiver.port, *tls("expired")))
+        check("and told", receiver.told("TLS handshake: certificate: certificate has expired"))
         for version, spoken in (("-tls1", False), ("-tls1_1", False), ("-tls1_2", True)):
             shaken = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{receiver.port}", version, "-cipher",
                                      "ALL:@SECLEVEL=0", "-cert", folder / "client.pem", "-key", folder / "client.key"],

@@ -19,6 +19,7 @@
 #include "helicarm/operation/operation.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
+#include "line_input.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
@@ -184,14 +185,13 @@ void tell_tour(const std::vector<RobotOrder>& orders, Console& console) {
 }
 
 /// Until the pointer is held still where the tracker sees it.
-void touch(Operation& operation, const std::string& name, const Ending& ending, Console& console) {
+void touch(Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
+           Console& console) {
   console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
                                   without_control_characters(name))
                    << std::flush;
   for (;;) {
-    ending.wait_until(input_waits);
-    std::string line;
-    if (!std::getline(std::cin, line)) throw BadInput(Reason::interrupted, "the input ended");
+    ending.wait_until([&] { return input.next(0).has_value(); });
     const auto off = operation.touch(name);
     if (off) {
       console.progress << fmt::format("{}: taken, {:.2f} mm off\n", without_control_characters(name), *off)
@@ -234,7 +234,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     const Ending ending(stop, devices.robot(), *operation);
     operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
     wait_for_devices(plan, devices, ending, console);
-    for (const PlannedCheck& each : plan.check_points) touch(*operation, each.name, ending, console);
+    LineInput input(STDIN_FILENO);
+    for (const PlannedCheck& each : plan.check_points) touch(*operation, each.name, input, ending, console);
     while (!operation->views_to_come().empty()) {
       const std::string view = operation->views_to_come().front();
       if (!console.quiet)
@@ -266,7 +267,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     for (const PlannedTunnel& tunnel : plan.tunnels) {
       const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
       for (const std::string& name : operation->checks_to_come(tunnel.bone))
-        touch(*operation, name, ending, console);
+        touch(*operation, name, input, ending, console);
       const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
       console.progress << fmt::format("look at {}\n",
                                       (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())

@@ -117,15 +117,21 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
   if (!options) return tl::unexpected(options.error());
   StopSignal interrupt;
   std::mutex mutex;
-  std::vector<SequenceFrame> frames;
+  SequenceRecorder recorder;
+  bool full = false;
   const auto client = IgtlClient::start(*options, [&](const IgtlMessage& message, double arrival_s) {
     SequenceFrame frame = frame_of(message, arrival_s);
     const std::lock_guard lock(mutex);
-    if (!frame.poses.empty()) frames.push_back(std::move(frame));
+    if (!full && !recorder.take(std::move(frame))) full = true, interrupt.raise();
   });
   if (!client) return tl::unexpected(client.error());
   wait_telling(interrupt, arguments.seconds, [] {});
   (*client)->stop();
+  const std::vector<SequenceFrame>& frames = recorder.frames();
+  if (full)
+    console.progress << fmt::format("recording ended: {} poses are the most that one file takes\n",
+                                    recorder.most_poses())
+                     << std::flush;
   if (frames.empty()) {
     const std::string trouble = (*client)->status().trouble;
     return fail(Reason::no_pose, fmt::format("{}: no pose came, nothing is written{}{}", arguments.peer,

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "virtual_or_command.h"
 
-#include <iostream>
+#include <mutex>
 #include <sstream>
 #include <thread>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/rehearsal/rehearse.h"
+#include "line_input.h"
 #include "stop_signal.h"
 
 namespace helicarm::cli {
@@ -93,15 +93,18 @@ std::string obey(const std::string& line, VirtualRoom& room,
 /// Until its input ends, "quit", or the stop token.
 void listen(const std::stop_token& stop, VirtualRoom& room, const VirtualOrArguments& arguments,
             Console& console, StopSignal& end) {
-  std::string line;
+  constexpr int look_again_ms = 100;
+  LineInput input(STDIN_FILENO);
   while (!stop.stop_requested()) {
-    pollfd input{STDIN_FILENO, POLLIN, 0};
-    constexpr int look_again_ms = 100;
-    if (::poll(&input, 1, look_again_ms) <= 0) continue;
-    if (!std::getline(std::cin, line)) return;
-    if (line == "quit") return end.raise();
-    if (line.empty()) continue;
-    const auto answer = guarded([&] { return obey(line, room, arguments.receiver); });
+    const auto line = guarded([&] { return input.next(look_again_ms); });
+    if (!line) {
+      if (line.error().reason != Reason::interrupted)
+        console.progress << fmt::format("{}; no more is read\n", line.error().message) << std::flush;
+      return;
+    }
+    if (!*line || (*line)->empty()) continue;
+    if (**line == "quit") return end.raise();
+    const auto answer = guarded([&] { return obey(**line, room, arguments.receiver); });
     if (answer)
       console.out << *answer << std::endl;
     else
@@ -118,6 +121,11 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     StopSignal end;
     operating_room::VirtualRoomOptions options = arguments.room;
     options.seed = console.seed;
+    std::mutex telling;
+    options.on_notice = [&](const std::string& line) {
+      const std::lock_guard lock(telling);
+      if (!console.quiet) console.progress << line + "\n" << std::flush;
+    };
     const auto room = value_or_throw(VirtualRoom::open(options));
     if (!arguments.plan.empty()) {
       OperationPlan plan = plan_for(*room, room->tracker().port());

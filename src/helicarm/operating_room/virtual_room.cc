@@ -42,6 +42,7 @@ Expected<std::unique_ptr<VirtualRoom>> VirtualRoom::open(const VirtualRoomOption
     robot.rtde_port = options.rtde_port;
     robot.dashboard_port = options.dashboard_port;
     robot.script_port = options.script_port;
+    robot.on_notice = [notice = options.on_notice](const std::string& line) { notice("robot: " + line); };
     room->robot_ = value_or_throw(VirtualUr::start(robot));
 
     std::vector<FollowedBody> bodies;
@@ -60,6 +61,9 @@ Expected<std::unique_ptr<VirtualRoom>> VirtualRoom::open(const VirtualRoomOption
         {pointer_marker, simulation::marker_array(), [&theatre] { return theatre.tracker_from_pointer(); }});
     VirtualTrackerOptions tracker;
     tracker.server.port = options.tracker_port;
+    tracker.server.on_notice = [notice = options.on_notice](const std::string& line) {
+      notice("tracker: " + line);
+    };
     tracker.rate_hz = options.tracker_rate_hz;
     tracker.seed = options.seed;
     room->tracker_ = value_or_throw(VirtualTracker::start(tracker, std::move(bodies)));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -18,6 +19,8 @@ struct VirtualRoomOptions {
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
+  /// A line for a log on each client of tracker or robot that was cut off; from their threads.
+  std::function<void(const std::string&)> on_notice = [](const std::string&) {};
 };
 
 /// A theatre with tracker and robot switched on; the C-arm shoots by `shoot`. Everything listens on this

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace helicarm::cli {
+
+/// Lines of a descriptor, such as a terminal or a pipe, of bounded length.
+class LineInput {
+ public:
+  static constexpr std::size_t longest = 1000;
+
+  explicit LineInput(int descriptor) : descriptor_(descriptor) {}
+
+  /// The next line without its end; nothing where none came within this time. Throws BadInput: `interrupted`
+  /// once the input has ended, `bad_size` for a line over 1000 bytes.
+  std::optional<std::string> next(int patience_ms);
+
+ private:
+  int descriptor_;
+  std::string held_;
+  bool ended_ = false;
+};
+
+}  // namespace helicarm::cli
