@@ -56,6 +56,8 @@ RobotLink::RobotLink(RobotConfig config)
 RobotLink::~RobotLink() = default;
 
 void RobotLink::hear(const RobotState& state) {
+  track_.take(state.time_s, state.base_from_tcp,
+              std::chrono::duration<double>(Clock::now().time_since_epoch()).count());
   const std::lock_guard lock(guard_);
   if (phase_ == LinkPhase::disconnected) {
     phase_ = LinkPhase::idle;
@@ -71,6 +73,7 @@ void RobotLink::hear(const RobotState& state) {
 }
 
 void RobotLink::lose(const Failure& failure) {
+  track_.forget();
   const std::lock_guard lock(guard_);
   latch(failure);
   phase_ = LinkPhase::disconnected;

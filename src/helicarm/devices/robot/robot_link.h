@@ -13,6 +13,7 @@
 #include "helicarm/devices/robot/follow_target.h"
 #include "helicarm/devices/robot/rtde_client.h"
 #include "helicarm/devices/robot/timed_socket.h"
+#include "helicarm/devices/robot/tool_track.h"
 
 namespace helicarm {
 
@@ -39,7 +40,7 @@ enum class LinkPhase {
 };
 std::string_view name(LinkPhase phase);
 
-/// Whether a motion may go on. Asked with each state, and must not ask the link itself.
+/// Whether a motion may go on. Asked with each state, and must not ask the link itself but for `track`.
 using Watch = std::function<Expected<void>()>;
 
 struct RobotLinkStatus {
@@ -62,6 +63,8 @@ class RobotLink {
   RobotLinkStatus status() const;
   /// Waits until it is connected and has a state; the reason why not after this time.
   Expected<RobotState> wait_connected(std::chrono::steady_clock::duration patience) const;
+  /// Where the robot had its tool lately.
+  const ToolTrack& track() const { return track_; }
 
   /// A person has looked at the robot and allows motion. Releases a protective stop, which the robot itself
   /// allows 5 s after it; refuses while the robot says that it may not move (`robot_stopped`), in local mode
@@ -96,6 +99,7 @@ class RobotLink {
 
   RobotConfig config_;
   Confirmations confirmations_;
+  ToolTrack track_;
   std::mutex executing_;
   mutable std::mutex guard_;
   mutable std::condition_variable news_;
