@@ -98,6 +98,15 @@ Expected<PoseSample> PoseBoard::latest(const std::string& name, double now_s, do
   return newest;
 }
 
+std::optional<PoseSample> PoseBoard::elsewhere(const std::string& name, double now_s,
+                                               double max_age_s) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = tools_.find(name);
+  if (found == tools_.end()) return std::nullopt;
+  const auto seen = found->second.gate.elsewhere();
+  return seen && now_s - seen->time_s <= max_age_s ? seen : std::nullopt;
+}
+
 std::vector<PoseSample> PoseBoard::between(const std::string& name, double from_s, double to_s) const {
   const std::lock_guard lock(mutex_);
   const auto tool = known(name);

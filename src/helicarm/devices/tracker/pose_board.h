@@ -46,6 +46,9 @@ class PoseBoard {
   /// Fails with `no_pose`, or `stale_pose` for one older than `max_age_s`: 0.1 s is the time in which a
   /// drill must stop.
   Expected<PoseSample> latest(const std::string& tool, double now_s, double max_age_s = 0.1) const;
+  /// Where the tool seems to be since a jump whose poses are not believed yet: three of them agree, and the
+  /// newest is no older than `max_age_s`. A reason to stop, never to move.
+  std::optional<PoseSample> elsewhere(const std::string& tool, double now_s, double max_age_s = 0.1) const;
   /// As `exposure_pose`.
   Expected<ExposurePose> at(const std::string& tool, double time_s,
                             const ExposurePoseOptions& options = {}) const;

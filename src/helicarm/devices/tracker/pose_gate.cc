@@ -77,8 +77,12 @@ bool PoseGate::jumped(const PoseSample& sample) {
     rival_.reset();
     return false;
   }
-  if (!rival_ || !within_reach(rival_->tracker_from_tool, pose, dt)) rival_since_ = sample.time_s;
+  if (!rival_ || !within_reach(rival_->tracker_from_tool, pose, dt)) {
+    rival_since_ = sample.time_s;
+    rival_poses_ = 0;
+  }
   rival_ = sample;
+  ++rival_poses_;
   if (sample.time_s - rival_since_ < options_.settle_s) return true;
   rival_.reset();
   return false;

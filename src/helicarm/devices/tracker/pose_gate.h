@@ -41,6 +41,12 @@ class PoseGate {
   /// To be called when the connection is new.
   void forget_time() { clock_.forget(); }
 
+  /// Where it is seen since a jump, once three poses agree; nothing where it is where it was.
+  std::optional<PoseSample> elsewhere() const {
+    constexpr int enough = 3;
+    return rival_poses_ >= enough ? rival_ : std::nullopt;
+  }
+
   const Counters& rejected() const { return rejected_; }  ///< by code of PoseFault
   void reject(PoseFault fault);
 
@@ -56,6 +62,7 @@ class PoseGate {
   std::optional<PoseSample> last_;
   std::optional<PoseSample> rival_;  ///< newest of those since a jump
   double rival_since_ = 0;
+  int rival_poses_ = 0;  ///< since then
   Counters rejected_;
 };
 

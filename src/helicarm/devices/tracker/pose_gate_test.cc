@@ -116,6 +116,20 @@ TEST(PoseGate, NewPlaceIsBelievedWhenItLasts) {
   }
 }
 
+TEST(PoseGate, ThirdPoseAtANewPlaceTellsOfItBeforeItIsBelieved) {
+  Scene scene;
+  scene.rejected_of(10);
+  scene.place.x() += 40;
+  for (int i = 1; i <= 3; ++i) {
+    EXPECT_EQ(scene.next(), "jump");
+    EXPECT_EQ(scene.gate.elsewhere().has_value(), i == 3);
+  }
+  EXPECT_NEAR(scene.gate.elsewhere()->tracker_from_tool.translation.x(), scene.place.x(), 0.3);
+  scene.place.x() -= 40;
+  EXPECT_EQ(scene.next(), "passed");
+  EXPECT_FALSE(scene.gate.elsewhere());
+}
+
 TEST(PoseGate, HandsMovePasses) {
   Scene scene;
   for (int i = 0; i < 200; ++i) {
