@@ -2,6 +2,7 @@
 #include "virtual_or_command.h"
 
 #include <mutex>
+#include <numbers>
 #include <sstream>
 #include <thread>
 
@@ -25,8 +26,10 @@ constexpr double notch_limit_mm = 1.5;
 
 std::string words() {
   return fmt::format(
-      "shoot VIEW | shoot VIEW {} | fault NAME on|off ({}) | move femur|tibia X Y Z (mm) | bump femur|tibia "
-      "X Y Z (mm: its marker) | touch femur|tibia|nothing | power on | where "
+      "shoot VIEW | shoot VIEW {} | fault NAME on|off ({}) | move femur|tibia|base X Y Z (mm) | turn "
+      "femur|tibia "
+      "DEG (about its tunnel's outer end) | bump femur|tibia X Y Z (mm: its marker) | touch "
+      "femur|tibia|nothing | power on | where "
       "| quit",
       operating_room::c_arm_fault_names(), operating_room::room_fault_names());
 }
@@ -58,13 +61,24 @@ std::string obey(const std::string& line, VirtualRoom& room,
   const bool bone = what == "femur" || what == "tibia";
   if (verb == "move" || verb == "bump") {
     Eigen::Vector3d shift;
-    if (!(said >> shift.x() >> shift.y() >> shift.z()) || !bone)
+    const bool base = verb == "move" && what == "base";
+    if (!(said >> shift.x() >> shift.y() >> shift.z()) || !(bone || base))
       throw BadInput(Reason::usage, verb + " femur|tibia X Y Z");
     if (verb == "bump")
       room.theatre().bump_marker(what, shift);
+    else if (base)
+      room.theatre().move_base(shift);
     else
       room.theatre().move_bone(what, {Eigen::Matrix3d::Identity(), shift});
     return (verb == "bump" ? "bumped " : "moved ") + what;
+  }
+  if (verb == "turn") {
+    double degrees = 0;
+    if (!(said >> degrees) || !bone) throw BadInput(Reason::usage, "turn femur|tibia DEG");
+    room.theatre().turn_bone(
+        what, room.theatre().point_in_tracker(what == "femur" ? "FE" : "TS"),
+        Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitX()).toRotationMatrix());
+    return "turned " + what;
   }
   if (verb == "touch") {
     if (!bone && what != "nothing") throw BadInput(Reason::usage, "touch femur|tibia|nothing");

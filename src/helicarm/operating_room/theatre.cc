@@ -78,6 +78,22 @@ void Theatre::move_bone(const std::string& bone, const RigidTransform& motion_in
   pose = {motion_in_tracker.rotation * pose.rotation, pose.translation + motion_in_tracker.translation};
 }
 
+void Theatre::turn_bone(const std::string& bone, const Vector3d& about, const Eigen::Matrix3d& turn) {
+  const std::lock_guard lock(mutex_);
+  RigidTransform& pose = tracker_from_.at(bone);
+  pose = {turn * pose.rotation, about + turn * (pose.translation - about)};
+}
+
+RigidTransform Theatre::tracker_from_base() const {
+  const std::lock_guard lock(mutex_);
+  return tracker_from_base_;
+}
+
+void Theatre::move_base(const Vector3d& shift_mm) {
+  const std::lock_guard lock(mutex_);
+  tracker_from_base_.translation += shift_mm;
+}
+
 Vector3d Theatre::point_in_tracker(const std::string& name) const {
   const auto point = std::ranges::find(room_.navigation->points, name, &simulation::TunnelPoint::name);
   if (point == room_.navigation->points.end()) throw std::invalid_argument("no point " + name);

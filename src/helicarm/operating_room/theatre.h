@@ -31,6 +31,9 @@ class Theatre {
   /// Moves a bone with its marker, about the marker (tracker's axes).
   void move_bone(const std::string& bone, const RigidTransform& motion_in_tracker);
 
+  /// The same about this point (tracker's frame).
+  void turn_bone(const std::string& bone, const Eigen::Vector3d& about, const Eigen::Matrix3d& turn);
+
   /// A ball at a tunnel's end (FS, FE, TS, TE) where it is now.
   Eigen::Vector3d point_in_tracker(const std::string& name) const;
 
@@ -38,7 +41,9 @@ class Theatre {
   RigidTransform tracker_from_pointer() const;
   void touch(const std::string& bone);
 
-  RigidTransform tracker_from_base() const { return tracker_from_base_; }
+  RigidTransform tracker_from_base() const;
+  /// As if somebody had pushed the robot's table (tracker's axes).
+  void move_base(const Eigen::Vector3d& shift_mm);
   /// Of the drill in the robot's hand: tip and axis (z).
   RobotTool tool() const;
   /// The robot's marker: a crown of facets, of which some face the tracker whatever the hand does.

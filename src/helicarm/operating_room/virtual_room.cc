@@ -19,8 +19,8 @@ RobotModel arm_as_built() {
 }
 
 /// In the order of TrackerFault.
-constexpr std::array<std::string_view, 6> tracker_fault_words = {"frozen",    "identity", "not_finite_poses",
-                                                                 "time_jump", "silent",   "swapped_bones"};
+constexpr std::array<std::string_view, 7> tracker_fault_words = {
+    "frozen", "identity", "not_finite_poses", "time_jump", "silent", "swapped_bones", "swapped_calibrator"};
 
 std::string hide_names(const VirtualTracker& tracker) {
   std::string names;

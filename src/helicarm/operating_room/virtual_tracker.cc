@@ -24,6 +24,13 @@ std::string other_bone(const std::string& name) {
   return name == "femur" ? "tibia" : name == "tibia" ? "femur" : name;
 }
 
+void swap_with_calibrator(std::vector<IgtlTool>& tools) {
+  const auto femur = std::ranges::find(tools, "femur", &IgtlTool::name);
+  const auto facet =
+      std::ranges::find_if(tools, [](const IgtlTool& tool) { return tool.name.starts_with("calibrator/"); });
+  if (femur != tools.end() && facet != tools.end()) std::swap(femur->name, facet->name);
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<VirtualTracker>> VirtualTracker::start(const VirtualTrackerOptions& options,
@@ -98,6 +105,7 @@ void VirtualTracker::tell(std::uint64_t number) {
     }
     if (has(TrackerFault::not_finite))
       for (IgtlTool& tool : tracking.tools) tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
+    if (has(TrackerFault::swapped_calibrator)) swap_with_calibrator(tracking.tools);
     last_.device = "virtual";
     last_.content = std::move(tracking);
   }

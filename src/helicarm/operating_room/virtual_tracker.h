@@ -31,12 +31,13 @@ struct VirtualTrackerOptions {
 };
 
 enum class TrackerFault {
-  frozen,      ///< repeats its last poses
-  identity,    ///< sends the identity for what it does not see
-  not_finite,  ///< sends NaN
-  time_jump,   ///< its clock goes an hour wrong
-  silent,      ///< connected, but says nothing
-  swapped,     ///< takes the femur's marker for the tibia's, and the other way round
+  frozen,              ///< repeats its last poses
+  identity,            ///< sends the identity for what it does not see
+  not_finite,          ///< sends NaN
+  time_jump,           ///< its clock goes an hour wrong
+  silent,              ///< connected, but says nothing
+  swapped,             ///< takes the femur's marker for the tibia's, and the other way round
+  swapped_calibrator,  ///< takes the femur's marker for one of the calibrator's, and the other way round
 };
 
 /// An OpenIGTLink server that tells the bodies' poses (TDATA) with the noise of a real tracker; what is not
