@@ -133,6 +133,47 @@ def drill_motion(program, folder):
         theatre.expect_replay("disk full")
 
 
+def drill_stale(program, folder):
+    """What the plan was made on moves: on the way along the axis, and while the confirmation is open."""
+    # Each: what is said how often (s apart), and after how many of them a limit is exceeded.
+    motions = {"creep 12 mm/s": ("move femur 2 0 0", 15, 1 / 6, 1), "drift 0.5 mm/s": ("move femur 0 0.05 0", 80, 0.1, 21),
+               "jump": ("move femur 3 0 0", 1, 0, 1), "turn": ("turn femur 0.4", 8, 0.05, 3),
+               "base": ("move base 0 3 0", 1, 0, 1)}
+    for name, (words, times, apart_s, beyond) in motions.items():
+        with Theatre(program, folder / name.split()[0]) as theatre:
+            theatre.expose()
+            theatre.navigation.wait_for("navigate: femur", 120)
+            theatre.wait_moving()
+            for number in range(1, times + 1):
+                theatre.say(words, words.split()[1])
+                if number == beyond:
+                    begun = time.monotonic()
+                if number > beyond and theatre.rested_s() is not None:
+                    break
+                time.sleep(apart_s)
+            stop_s = theatre.stop_s(begun)
+            check(f"{name} on the way: at rest after {stop_s * 1000:.0f} ms, {number} of {times} motions", stop_s <= 0.5)
+            theatre.expect_end(name, "plan_stale")
+            theatre.expect_replay(name)
+    for name, plan, words in (("femur 40 mm off", {}, "move femur 40 0 0"), ("plan too old", {"plan_stale_s": 10}, None)):
+        with Theatre(program, folder / name.split()[-1], terminal=True, plan=plan) as theatre:
+            theatre.expose()
+            theatre.navigation.wait_for("^ *9: tip", 120)
+            for pose in range(1, 10):
+                theatre.confirm()
+                theatre.navigation.wait_for(f"register: pose {pose}")
+            theatre.navigation.wait_for("^look at")
+            rest = theatre.say("where", "^tip ").split(",")[0]
+            if words:
+                theatre.say(words, "moved")
+            begun = time.monotonic()
+            theatre.navigation.process.wait(30)
+            check(f"{name} while the confirmation is open: told after {time.monotonic() - begun:.1f} s", True)
+            theatre.expect_end(name, "plan_stale")
+            check("     the robot has not moved", theatre.say("where", "^tip ").split(",")[0] == rest)
+            theatre.expect_replay(name)
+
+
 def drill_ends(program, folder):
     """SIGTERM in each step, SIGKILL while the arm moves."""
     steps = {"waiting for AP": None, "waiting for LAT": "AP", "^measure: ": "both", "^register: pose 2": "both",
@@ -244,8 +285,8 @@ def footprint(process):
 
 
 def main():
-    drills = {"whole": drill_whole, "pictures": drill_pictures, "checks": drill_checks, "motion": drill_motion, "ends": drill_ends,
-              "system": drill_system}
+    drills = {"whole": drill_whole, "pictures": drill_pictures, "checks": drill_checks, "motion": drill_motion,
+              "stale": drill_stale, "ends": drill_ends, "system": drill_system}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
     parser.add_argument("--only", choices=drills)

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """For drill_operation.py: programs whose lines can be waited for, and a virtual room with a navigation in it."""
 
+import json
+import os
+import pty
 import queue
 import re
 import signal
@@ -29,8 +32,9 @@ class Program:
     """A running helicarm whose lines can be waited for."""
 
     def __init__(self, program, *words, **options):
-        self.process = subprocess.Popen([program, *map(str, words)], text=True, stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, **options)
+        self.process = subprocess.Popen([program, *map(str, words)], text=True,
+                                        **{"stdin": subprocess.PIPE, **options}, stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE)
         self.lines, self.heard = queue.Queue(), []
         for stream in (self.process.stdout, self.process.stderr):
             threading.Thread(target=self._read, args=(stream,), daemon=True).start()
@@ -70,23 +74,31 @@ class Program:
 
 
 class Theatre:
-    """A virtual room and a navigation in it."""
+    """A virtual room and a navigation in it; at a terminal where orders are to be confirmed by typing."""
 
-    def __init__(self, program, folder, *options, room=(), begins="waiting for AP"):
+    def __init__(self, program, folder, *options, room=(), begins="waiting for AP", terminal=False, plan=None):
         self.program, self.folder = program, folder
         folder.mkdir()
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
         self.room = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan, "--receiver-port",
                             self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0, *room)
         self.room.wait_for("^say:")
+        if plan:
+            self.plan.write_text(json.dumps(json.loads(self.plan.read_text()) | plan))
+        self.terminal = pty.openpty() if terminal else None
         self.navigation = self.navigate(*options)
         self.navigation.wait_for(begins)
         time.sleep(EXPOSURE_S)
 
     def navigate(self, *options):
         # So that SIGXFSZ stays ignored, as Python has it, and a limit on files is like a full disk.
-        return Program(self.program, "navigate", self.plan, "--out", self.session, "--port", self.port, "--yes", *options,
-                       restore_signals=False)
+        words = ["navigate", self.plan, "--out", self.session, "--port", self.port, *options]
+        if self.terminal:
+            return Program(self.program, *words, stdin=self.terminal[1], restore_signals=False)
+        return Program(self.program, *words, "--yes", restore_signals=False)
+
+    def confirm(self):
+        os.write(self.terminal[0], b"go\n")
 
     def __enter__(self):
         return self
@@ -96,6 +108,8 @@ class Theatre:
             check(f"virtual-or ended with {self.room.process.poll()}", False)
         for each in (self.navigation, self.room):
             each.end(signal.SIGKILL)
+        for end in self.terminal or ():
+            os.close(end)
 
     def say(self, line, answer):
         self.room.process.stdin.write(line + "\n")

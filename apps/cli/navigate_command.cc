@@ -69,15 +69,18 @@ class Consent {
   Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
       : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
 
-  Expected<std::string> operator()(const RobotOrder& order) {
+  /// Throws BadInput (plan_stale) once the plan no longer holds, without waiting for the answer.
+  Expected<std::string> operator()(
+      const RobotOrder& order,
+      const std::function<Expected<void>()>& holds = [] { return Expected<void>(); }) {
     ending_.check();
-    if (!yes_ && !agreed(order))
+    if (!yes_ && !agreed(order, holds))
       return fail(Reason::order_not_confirmed, fmt::format("{}: nobody confirmed it", order.name));
     return robot_.confirm(order);
   }
 
  private:
-  bool agreed(const RobotOrder& order) {
+  bool agreed(const RobotOrder& order, const std::function<Expected<void>()>& holds) {
     if (!::isatty(STDIN_FILENO)) return false;
     const RigidTransform& last = order.waypoints.back().base_from_tcp;
     console_.progress
@@ -87,7 +90,12 @@ class Consent {
                without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
                last.translation.y(), last.translation.z())
         << std::flush;
-    ending_.wait_until(input_waits);
+    ending_.wait_until([&] {
+      // Poses may be missing for a while, as when somebody stands before the tracker.
+      if (const auto held = holds(); !held && held.error().reason == Reason::plan_stale)
+        throw BadInput(held.error());
+      return input_waits();
+    });
     std::string answer;
     return std::getline(std::cin, answer) && answer == "go";
   }
@@ -272,7 +280,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       console.progress << fmt::format("look at {}\n",
                                       (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())
                        << std::flush;
-      tell_outcome(value_or_throw(operation->go(order, value_or_throw(consent(order)))), console);
+      const std::string token = value_or_throw(consent(order, [&] { return operation->check_plan(order); }));
+      tell_outcome(value_or_throw(operation->go(order, token)), console);
       value_or_throw(operation->withdraw(order, rest, confirm));
     }
     value_or_throw(operation->finish());

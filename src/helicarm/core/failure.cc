@@ -85,6 +85,8 @@ std::string_view code(Reason reason) {
       return "keep_out";
     case Reason::robot_moved:
       return "robot_moved";
+    case Reason::plan_stale:
+      return "plan_stale";
     case Reason::robot_locked:
       return "robot_locked";
     case Reason::robot_stopped:

@@ -56,6 +56,7 @@ enum class Reason {
   singular_pose,
   keep_out,
   robot_moved,
+  plan_stale,
   robot_locked,
   robot_stopped,
   order_not_confirmed,

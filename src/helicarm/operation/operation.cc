@@ -22,6 +22,15 @@ constexpr std::chrono::seconds robot_patience{5};
 /// The tip is drawn into the X-rays every so many mm.
 constexpr double preview_step_mm = 5;
 
+/// A path is planned by where the robot was registered.
+Expected<void> refuse_moved_base(const HandEye& registered, const PlanBasis& basis, const RobotState& present,
+                                 const PlanLimits& limits) {
+  return check_motion(
+      "robot base or tool",
+      motion_of(present.base_from_tcp.translation, registered.tracker_from_base, basis.tracker_from_base),
+      limits, "registration", "register the robot again");
+}
+
 }  // namespace
 
 std::string_view name_of(Step step) {
@@ -63,24 +72,17 @@ PoseWindow Operation::look(const char* why) {
   return window;
 }
 
-/// The robot moves only while the tracker sees these.
-Watch Operation::sees(std::vector<std::string> markers) const {
-  return [this, markers = std::move(markers)]() -> Expected<void> {
-    for (const std::string& marker : markers)
-      if (const auto seen = board_.latest(marker, monotonic_seconds()); !seen)
-        return tl::unexpected<Failure>(seen.error());
-    return {};
-  };
+void Operation::record_halt(const RobotOrder& order, const Failure& why) {
+  record(
+      "halted",
+      {{"order", order.name}, {"why", code(why.reason)}, {"message", why.message}, {"figures", why.figures}});
 }
 
 std::vector<Miss> Operation::carry_out(const RobotOrder& order, const std::string& token,
-                                       const Measure& measure, std::vector<std::string> markers) {
+                                       const Measure& measure, const Watch& watch) {
   record("confirmed", {{"order", order.name}, {"digest", digest(to_text(to_json(order)))}, {"by", who_}});
-  auto misses = robot_.execute(order, token, measure, sees(std::move(markers)));
-  if (!misses)
-    record(
-        "halted",
-        {{"order", order.name}, {"why", code(misses.error().reason)}, {"message", misses.error().message}});
+  auto misses = robot_.execute(order, token, measure, watch);
+  if (!misses) record_halt(order, misses.error());
   return value_or_throw(std::move(misses));
 }
 
@@ -130,8 +132,11 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
     for (const RigidTransform& pose : tour) {
       const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
       const RobotOrder order = tour_order(plan_.robot, present, pose);
+      const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = monotonic_seconds()});
       record("order", to_json(order));
-      carry_out(order, value_or_throw(confirm(order)), {}, {plan_.tracker.tool});
+      const std::string token = value_or_throw(confirm(order));
+      value_or_throw(age.young(monotonic_seconds()));
+      carry_out(order, token, {}, sees_tool());
       const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
       const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
@@ -159,14 +164,20 @@ Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
     if (!result_) throw BadInput(Reason::usage, "nothing is measured yet");
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered yet");
     tell_(Step::plan, name);
-    const Poses now = value_or_throw(poses_now(look("plan"), plan_.tracker));
+    const PoseWindow window = look("plan");
+    const Poses now = value_or_throw(poses_now(window, plan_.tracker));
     const TunnelAxis axis = axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
     const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const PlanBasis basis = basis_of(tunnel, window, present);
+    value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
     RobotOrder order =
         value_or_throw(plan_approach(name, value_or_throw(robot_model(plan_.robot.model)), plan_.robot.tool,
                                      present.joints, axis, plan_.robot.approach));
-    bone_from_target_[name] = now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
-                              order.waypoints.back().base_from_tcp;
+    planned_.insert_or_assign(
+        name, Planned{to_text(to_json(order)),
+                      now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
+                          order.waypoints.back().base_from_tcp,
+                      {plan_.limits, plan_.tracker, basis}});
     record("order", to_json(order));
     draw_preview(order);
     return order;
@@ -203,7 +214,7 @@ Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
     PathPreview preview;
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     const RigidTransform bone_from_base =
-        bone_from_target_.at(order.name) * order.waypoints.back().base_from_tcp.inverse();
+        planned_.at(order.name).bone_from_target * order.waypoints.back().base_from_tcp.inverse();
     std::vector<Eigen::Vector3d> tips_in_bone;
     for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
       const Eigen::Vector3d from = order.waypoints[i - 1].base_from_tcp.translation;
@@ -230,40 +241,23 @@ Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
 Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string& token) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(order.name);
-    const auto target = bone_from_target_.find(order.name);
-    if (target == bone_from_target_.end())
-      throw BadInput(Reason::usage, fmt::format("{}: was not planned in this operation", order.name));
+    value_or_throw(check_plan(order));
+    Planned& plan = planned_.at(order.name);
     in_place_.clear();
     tell_(Step::navigate, order.name);
     const Measure measure = [&] {
       return guarded([&] {
-        return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, target->second));
+        return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
       });
     };
-    const std::vector<Miss> loop =
-        carry_out(order, token, measure, {plan_.tracker.marker_of(tunnel.bone), plan_.tracker.tool});
-    record("navigated", {{"tunnel", order.name}, {"loop", to_json(loop)}});
+    const auto loop = guarded([&] { return carry_out(order, token, measure, in_place(plan.watch)); });
+    if (!loop && loop.error().reason == Reason::plan_stale) plan.stale = loop.error();
+    value_or_throw(loop);
+    record("navigated", {{"tunnel", order.name}, {"loop", to_json(*loop)}});
     tell_(Step::verify, order.name);
     TunnelOutcome outcome = check(tunnel);
-    outcome.loop = loop;
+    outcome.loop = *loop;
     return outcome;
-  });
-}
-
-Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
-  return guarded([&] {
-    tell_(Step::navigate, order.name + ": withdraw");
-    const std::string& bone_marker = plan_.tracker.marker_of(tunnel_named(order.name).bone);
-    RobotOrder back = order;
-    back.start = value_or_throw(robot_.wait_connected(robot_patience)).joints;
-    Waypoint stand_off = order.waypoints.front(), home = stand_off;
-    stand_off.speed_mm_s = order.waypoints.back().speed_mm_s;
-    home.base_from_tcp = rest.base_from_tcp;
-    back.waypoints = {stand_off, home};
-    back.corrections.most = 0;
-    back = slowed_for_joints(std::move(back), plan_.robot.approach.limits);
-    record("order", to_json(back));
-    carry_out(back, value_or_throw(confirm(back)), {}, {bone_marker, plan_.tracker.tool});
   });
 }
 

@@ -13,6 +13,7 @@
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/picture_delays.h"
+#include "helicarm/operation/plan_watch.h"
 #include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/exposure.h"
@@ -103,18 +104,27 @@ class Operation {
 
   /// The order that brings the tool to the tunnel, and what it will look like: also as
   /// preview-TUNNEL-VIEW.png in the session's folder. Nothing moves. Refuses (usage) a bone whose check
-  /// points were not touched since the last order.
+  /// points were not touched since the last order, and (plan_stale) a robot whose base or tool moved since it
+  /// was registered.
   Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
+  /// Whether this order may still be carried out, by the newest poses: to be asked while its confirmation is
+  /// open. Refuses as `PlanWatch::holds`, and (plan_stale) an order that is not its tunnel's last plan. A
+  /// plan that was found stale once remains so.
+  Expected<void> check_plan(const RobotOrder& order);
+  /// What answers the same in any thread, without a record. Refuses (usage) an order that was not planned.
+  Expected<PlanWatch> plan_watch(const RobotOrder& order) const;
   Expected<PathPreview> preview(const RobotOrder& order) const;
 
   /// What follows the tool from now on, in any thread. Refuses (usage) before measuring and registering.
   Expected<LiveTool> live_tool() const;
 
   /// Carries the confirmed order out, corrected by the tracker, and checks the result in the X-rays. Refuses
-  /// (uncertain) an end whose predicted error is over the plan's limit.
+  /// as `check_plan`, which stops the robot on its way, too, and (uncertain) an end whose predicted error is
+  /// over the plan's limit.
   Expected<TunnelOutcome> go(const RobotOrder& order, const std::string& token);
 
-  /// Back along the tunnel's axis to the stand-off, and from there to where the tool was (`rest`).
+  /// Back along the tool's axis until it is as far as the stand-off, and from there to where the tool was
+  /// (`rest`). Planned on the poses of now: also after a stop, once a person has unlocked the robot.
   Expected<void> withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm);
 
  private:
@@ -124,6 +134,13 @@ class Operation {
     Acquisition acquisition;
     double arrival_s;
     Poses poses;
+  };
+
+  struct Planned {
+    std::string order;  ///< its text: what is confirmed must be this
+    RigidTransform bone_from_target;
+    PlanWatch watch;
+    std::optional<Failure> stale = {};  ///< once it was found so
   };
 
   Operation(OperationPlan plan, std::filesystem::path folder, const PoseBoard& board, RobotLink& robot,
@@ -142,10 +159,14 @@ class Operation {
   void weigh_delay(const std::string& view, const Acquisition& shown, double arrival_s);
   double held_s(const Acquisition& shown, double arrival_s) const;
   void told_once(const std::string& warning);
-  Watch sees(std::vector<std::string> markers) const;
+  Watch sees_tool() const;
+  Watch in_place(PlanWatch watch) const;
+  PlanBasis basis_of(const PlannedTunnel& tunnel, const PoseWindow& window, const RobotState& present) const;
+  const Planned& planned(const RobotOrder& order) const;
+  void record_halt(const RobotOrder& order, const Failure& why);
   Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
   std::vector<Miss> carry_out(const RobotOrder& order, const std::string& token, const Measure& measure,
-                              std::vector<std::string> markers);
+                              const Watch& watch);
   TunnelOutcome check(const PlannedTunnel& tunnel);
   void draw_preview(const RobotOrder& order) const;
 
@@ -166,7 +187,7 @@ class Operation {
   CalibrationCache cache_;
   std::optional<Result> result_, newest_;
   std::optional<HandEye> hand_eye_;
-  std::map<std::string, RigidTransform> bone_from_target_;  ///< of each planned tunnel
+  std::map<std::string, Planned> planned_;  ///< by tunnel
 };
 
 }  // namespace helicarm

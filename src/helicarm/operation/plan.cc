@@ -199,8 +199,13 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
     if (!plan.check_points.empty() && !plan.tracker.pointer)
       reader.refuse(Reason::bad_value, "check_points", "need \"pointer\" in \"tracker\"");
     if (const Json& picks = reader.raw("picks"); picks.is_array()) plan.picks = picks;
-    if (reader.has("max_error_mm")) plan.max_error_mm = planned_number(reader, "max_error_mm");
-    reader.raw("max_error_mm");
+    for (const auto& [key, number] : {std::pair{"max_error_mm", &plan.max_error_mm},
+                                      {"plan_stale_mm", &plan.limits.distance_mm},
+                                      {"plan_stale_deg", &plan.limits.turn_deg},
+                                      {"plan_stale_s", &plan.limits.age_s}}) {
+      if (reader.has(key)) *number = planned_number(reader, key);
+      reader.raw(key);
+    }
     reader.finish();
     return plan;
   });
@@ -226,7 +231,10 @@ Json to_json(const OperationPlan& plan) {
           {"tunnels", std::move(tunnels)},
           {"check_points", std::move(check_points)},
           {"picks", plan.picks},
-          {"max_error_mm", plan.max_error_mm}};
+          {"max_error_mm", plan.max_error_mm},
+          {"plan_stale_mm", plan.limits.distance_mm},
+          {"plan_stale_deg", plan.limits.turn_deg},
+          {"plan_stale_s", plan.limits.age_s}};
 }
 
 }  // namespace helicarm

@@ -63,6 +63,13 @@ struct PlannedTunnel {
   TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill comes in
 };
 
+/// Beyond these an order is not carried out, or stopped on its way: plan_stale.
+struct PlanLimits {
+  double distance_mm = 1;  ///< that bone, robot base or tool may have moved since planning
+  double turn_deg = 1;
+  double age_s = 60;  ///< from planning until the order is sent
+};
+
 /// All that an operation needs to know beforehand (plan.json, docs/formats.md).
 struct OperationPlan {
   std::string calibrator = "udcsc";  ///< a built-in's name or a file beside the plan
@@ -74,6 +81,7 @@ struct OperationPlan {
   std::vector<PlannedCheck> check_points;
   Json picks = Json::array();  ///< as in case.json; may come later, once the pictures are seen
   double max_error_mm = 2;     ///< at 95 %: the robot goes by no point that may be further off
+  PlanLimits limits;
 };
 
 /// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when

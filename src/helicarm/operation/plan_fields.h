@@ -9,13 +9,30 @@
 namespace helicarm {
 
 /// The plan's numbers that a person may set; plan.json's limits are these.
-inline constexpr std::array<Field<OperationPlan>, 10> plan_fields{
+inline constexpr std::array<Field<OperationPlan>, 13> plan_fields{
     bound<&OperationPlan::max_error_mm>(
         {.name = "max_error_mm",
          .label = "Limit of a point's error",
          .unit = "mm",
          .range = {1e-6, 1000},
          .help = "The robot goes by no point that may be further off (95 %)"}),
+    bound<&OperationPlan::limits, &PlanLimits::distance_mm>(
+        {.name = "plan_stale_mm",
+         .label = "Motion since planning",
+         .unit = "mm",
+         .range = {0.3, 10},
+         .help = "The robot does not move, or stops, once bone, robot base or tool have moved further"}),
+    bound<&OperationPlan::limits, &PlanLimits::turn_deg>({.name = "plan_stale_deg",
+                                                          .label = "Turn since planning",
+                                                          .unit = "deg",
+                                                          .range = {0.3, 10},
+                                                          .help = "The same of their turn"}),
+    bound<&OperationPlan::limits, &PlanLimits::age_s>(
+        {.name = "plan_stale_s",
+         .label = "Age of a plan",
+         .unit = "s",
+         .range = {1, 600},
+         .help = "A plan that was not confirmed so long after it was made must be made again"}),
     bound<&OperationPlan::tracker, &TrackerPlan::sigma_mm>(
         {.name = "sigma_mm",
          .label = "Tracker's noise of place",

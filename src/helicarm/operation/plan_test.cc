@@ -53,6 +53,22 @@ TEST(Plan, SpeedBeyondTheLimitIsRefusedNamingIt) {
   EXPECT_NE(read.error().message.find("250"), std::string::npos);
 }
 
+TEST(Plan, LimitsOfAStalePlanMayBeLeftOutAndAreBounded) {
+  for (const auto& [key, beyond] :
+       {std::pair{"plan_stale_mm", 20.0}, {"plan_stale_deg", 0.1}, {"plan_stale_s", 0.5}}) {
+    Json json = to_json(plan());
+    json[key] = beyond;
+    const auto read = plan_from(json, "plan.json");
+    ASSERT_FALSE(read) << key;
+    EXPECT_EQ(read.error().reason, Reason::bad_value);
+    EXPECT_NE(read.error().message.find(key), std::string::npos);
+    json.erase(key);
+    const auto left_out = plan_from(json, "plan.json");
+    ASSERT_TRUE(left_out) << left_out.error().message;
+    EXPECT_EQ(to_json(*left_out), to_json(plan()));
+  }
+}
+
 TEST(Plan, FacetThatIsNoRigidMotionIsRefused) {
   Json json = to_json(plan());
   json["tracker"]["facets"][0]["calibrator_from_facet"][0][0] = 2;

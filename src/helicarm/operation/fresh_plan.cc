@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Orders move the robot only while what they were planned on holds.
+#include <algorithm>
+
+#include "helicarm/operation/operation.h"
+
+namespace helicarm {
+namespace {
+
+constexpr std::chrono::seconds robot_patience{5};
+
+/// Straight back along the tool's axis until it is as far as the stand-off; nothing where it is already.
+std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTransform& base_from_tcp) {
+  Waypoint back = order.waypoints.front();
+  const Eigen::Vector3d axis = base_from_tcp.rotation.col(2);
+  const double along_mm = axis.dot(base_from_tcp.translation - back.base_from_tcp.translation);
+  constexpr double near_mm = 1;
+  if (along_mm < near_mm) return std::nullopt;
+  back.base_from_tcp = {base_from_tcp.rotation, base_from_tcp.translation - along_mm * axis};
+  back.speed_mm_s = order.waypoints.back().speed_mm_s;
+  return back;
+}
+
+}  // namespace
+
+/// Before the robot is registered nothing tells where its tool should be.
+Watch Operation::sees_tool() const {
+  return [this]() -> Expected<void> {
+    return board_.latest(plan_.tracker.tool, monotonic_seconds()).map([](const PoseSample&) {});
+  };
+}
+
+Watch Operation::in_place(PlanWatch watch) const {
+  return [this, watch = std::move(watch)] {
+    return watch.in_place(board_, robot_.track(), monotonic_seconds());
+  };
+}
+
+PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& window,
+                              const RobotState& present) const {
+  const auto see = [&](const std::string& marker) {
+    return value_or_throw(see_tool(window, plan_.tracker, marker)).tracker_from_marker;
+  };
+  const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));
+  const std::string& bone = plan_.tracker.marker_of(tunnel.bone);
+  const RigidTransform from_tcp = marker_from_tcp(*hand_eye_, plan_.robot.tool);
+  return {window.middle_s, bone,
+          see(bone),       {ends.enter, ends.leave},
+          from_tcp,        base_by_tool(see(plan_.tracker.tool), from_tcp, present.base_from_tcp)};
+}
+
+const Operation::Planned& Operation::planned(const RobotOrder& order) const {
+  const auto found = planned_.find(order.name);
+  if (found == planned_.end())
+    throw BadInput(Reason::usage, order.name + ": was not planned in this operation");
+  return found->second;
+}
+
+Expected<PlanWatch> Operation::plan_watch(const RobotOrder& order) const {
+  return guarded([&] { return planned(order).watch; });
+}
+
+Expected<void> Operation::check_plan(const RobotOrder& order) {
+  return guarded([&] {
+    const Planned& plan = planned(order);
+    if (plan.order != to_text(to_json(order)))
+      throw BadInput(Reason::plan_stale,
+                     order.name + ": is not the last plan to this tunnel: confirm that, or plan again");
+    if (plan.stale) throw BadInput(*plan.stale);
+    const auto holds = plan.watch.holds(board_, robot_.track(), monotonic_seconds());
+    if (!holds && holds.error().reason == Reason::plan_stale) {
+      planned_.at(order.name).stale = holds.error();
+      record_halt(order, holds.error());
+    }
+    value_or_throw(holds);
+  });
+}
+
+Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
+  return guarded([&] {
+    tell_(Step::navigate, order.name + ": withdraw");
+    const PlannedTunnel& tunnel = tunnel_named(order.name);
+    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "nothing is measured or registered yet");
+    const PoseWindow window = look("withdraw");
+    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
+    RobotOrder back = order;
+    back.start = present.joints;
+    Waypoint home = order.waypoints.front();
+    home.base_from_tcp = rest.base_from_tcp;
+    back.waypoints = {home};
+    if (const auto stand_off = back_to_stand_off(order, present.base_from_tcp))
+      back.waypoints.insert(back.waypoints.begin(), *stand_off);
+    back.corrections.most = 0;
+    back = slowed_for_joints(std::move(back), plan_.robot.approach.limits);
+    record("order", to_json(back));
+    const std::string token = value_or_throw(confirm(back));
+    value_or_throw(watch.holds(board_, robot_.track(), monotonic_seconds()));
+    carry_out(back, token, {}, in_place(watch));
+  });
+}
+
+}  // namespace helicarm

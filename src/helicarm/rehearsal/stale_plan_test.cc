@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/operation/connections.h"
+#include "helicarm/operation/replay.h"
+#include "helicarm/rehearsal/rehearse.h"
+
+namespace helicarm {
+namespace {
+
+using namespace std::chrono_literals;
+using operating_room::VirtualRoom;
+
+constexpr int most_attempts = 25;
+
+/// What a busy machine does to tracker and robot: a person tries again.
+bool came_late(const Failure& failure) {
+  return failure.reason == Reason::stale_pose || failure.reason == Reason::stale_state ||
+         failure.reason == Reason::robot_stopped || failure.reason == Reason::robot_locked ||
+         failure.reason == Reason::order_not_confirmed;
+}
+
+/// An operation over sockets whose robot is registered.
+class StalePlan : public testing::Test {
+ protected:
+  void SetUp() override {
+    operating_room::VirtualRoomOptions options;
+    options.picture_size = 512;
+    options.tracker_rate_hz = 60;
+    options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
+    room_ = VirtualRoom::open(options).value();
+    plan_ = plan_for(*room_, room_->tracker().port());
+    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_.path() / "inbox").value());
+    ReceiverOptions receiving;
+    receiving.port = 0;
+    ASSERT_TRUE(devices_->listen(receiving));
+    operation_ = Operation::begin(plan_, folder_.path() / "session", devices_->board(), robot()).value();
+    for (const std::string& view : plan_.views) expose(view);
+    ASSERT_TRUE(operation_->measure());
+    ASSERT_TRUE(robot().wait_connected(20s));
+    try_to([&] { return operation_->register_robot(nod_); });
+  }
+  void TearDown() override { operation_.reset(); }
+
+  RobotLink& robot() { return devices_->robot(); }
+
+  void expose(const std::string& view) {
+    Expected<void> taken = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_attempts && !taken; ++i) {
+      std::this_thread::sleep_for(1800ms);  // the window of an exposure's poses
+      ASSERT_TRUE(operating_room::shoot(room_->theatre(), view, {"127.0.0.1", devices_->receiver_port()}));
+      const DatedArrival picture = devices_->next_picture(20).value();
+      taken = operation_->take(view, picture.arrival, picture.time_s);
+    }
+    ASSERT_TRUE(taken) << taken.error().message;
+  }
+  template <class Act>
+  void try_to(const Act& act) {
+    Expected<void> done = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_attempts && !done; ++i) {
+      if (robot().status().phase != LinkPhase::ready) {
+        ASSERT_TRUE(robot().unlock("tester"));
+      }
+      done = act();
+      if (!done) {
+        ASSERT_TRUE(came_late(done.error())) << done.error().message;
+      }
+    }
+    ASSERT_TRUE(done) << done.error().message;
+  }
+  RobotOrder plan() {
+    std::optional<RobotOrder> order;
+    try_to([&]() -> Expected<void> {
+      return operation_->plan_tunnel("femur").map([&](RobotOrder planned) { order = std::move(planned); });
+    });
+    return order.value();
+  }
+  /// Until it is found stale, as while a confirmation is open.
+  Failure wait_until_stale(const RobotOrder& order) {
+    Expected<void> held;
+    for (int i = 0; i < 2000; ++i) {
+      held = operation_->check_plan(order);
+      if (!held && held.error().reason == Reason::plan_stale) return held.error();
+      std::this_thread::sleep_for(10ms);
+    }
+    ADD_FAILURE() << "the plan still holds: " << (held ? "" : held.error().message);
+    return {Reason::usage, "", {}, {{"distance_mm", 0}}};
+  }
+  void expect_nothing_moves(const RobotOrder& order) {
+    if (robot().status().phase != LinkPhase::ready) {
+      ASSERT_TRUE(robot().unlock("tester"));
+    }
+    const Joints before = room_->robot().truth().state.joints;
+    const auto gone = operation_->go(order, robot().confirm(order));
+    ASSERT_FALSE(gone);
+    EXPECT_EQ(gone.error().reason, Reason::plan_stale) << gone.error().message;
+    EXPECT_EQ(room_->robot().truth().state.joints, before);
+  }
+  void move_femur(double mm) {
+    room_->theatre().move_bone("femur", {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
+  }
+
+  TemporaryFolder folder_;
+  std::unique_ptr<VirtualRoom> room_;
+  OperationPlan plan_;
+  std::unique_ptr<Connections> devices_;
+  std::unique_ptr<Operation> operation_;
+  const Operation::Confirm nod_ = [this](const RobotOrder& order) -> Expected<std::string> {
+    return robot().confirm(order);
+  };
+};
+
+TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
+  // The leg is moved while the confirmation is open, and even if it comes back.
+  RobotOrder order = plan();
+  move_femur(40);
+  const Failure moved = wait_until_stale(order);
+  EXPECT_NEAR(moved.figures.at("distance_mm"), 40, 1);
+  EXPECT_THAT(moved.message, testing::HasSubstr("femur moved"));
+  expect_nothing_moves(order);
+  move_femur(-40);
+  std::this_thread::sleep_for(1s);
+  expect_nothing_moves(order);
+  // Another plan to the same tunnel takes its place.
+  const RobotOrder former = plan();
+  order = plan();
+  if (to_json(former) != to_json(order)) expect_nothing_moves(former);
+  // The tracker takes the calibrator for the femur.
+  ASSERT_TRUE(room_->set_fault("swapped_calibrator", true));
+  EXPECT_GT(wait_until_stale(order).figures.at("distance_mm"), 10);
+  ASSERT_TRUE(room_->set_fault("swapped_calibrator", false));
+  expect_nothing_moves(order);
+  // The robot's table is pushed: seen since planning, and planned anew only where it was registered.
+  std::this_thread::sleep_for(1s);
+  order = plan();
+  room_->theatre().move_base({3, 0, 0});
+  EXPECT_THAT(wait_until_stale(order).message, testing::HasSubstr("robot base or tool moved"));
+  expect_nothing_moves(order);
+  std::this_thread::sleep_for(1s);
+  Expected<RobotOrder> again = operation_->plan_tunnel("femur");
+  for (int i = 0; i < most_attempts && !again && came_late(again.error()); ++i)
+    again = operation_->plan_tunnel("femur");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().reason, Reason::plan_stale) << again.error().message;
+  EXPECT_THAT(again.error().message, testing::HasSubstr("since registration"));
+  operation_.reset();
+  const auto replayed = replay(folder_.path() / "session");
+  ASSERT_TRUE(replayed) << replayed.error().message;
+  EXPECT_TRUE(replayed->differences.empty());
+}
+
+TEST_F(StalePlan, OrderToABoneAtRestIsCarriedOutWithinTheLimits) {
+  double most_mm = 0, most_deg = 0;
+  bool done = false;
+  for (int attempt = 0; attempt < most_attempts && !done; ++attempt) {
+    const RobotState rest = robot().wait_connected(5s).value();
+    const RobotOrder order = plan();
+    const PlanWatch watch = operation_->plan_watch(order).value();
+    std::jthread look([&](const std::stop_token& over) {
+      for (; !over.stop_requested(); std::this_thread::sleep_for(15ms))
+        if (const auto moved = watch.base_motion(devices_->board(), robot().track(), monotonic_seconds())) {
+          most_mm = std::max(most_mm, moved->distance_mm);
+          most_deg = std::max(most_deg, moved->turn_deg);
+        }
+    });
+    const auto gone = operation_->go(order, robot().confirm(order));
+    look.request_stop();
+    look.join();
+    done = gone.has_value();
+    if (!done) {
+      ASSERT_TRUE(came_late(gone.error())) << gone.error().message;
+    }
+    try_to([&] { return operation_->withdraw(order, rest, nod_); });
+  }
+  EXPECT_TRUE(done) << "this machine is too busy";
+  RecordProperty("most_um", int(most_mm * 1000));
+  RecordProperty("most_mdeg", int(most_deg * 1000));
+}
+
+TEST_F(StalePlan, BoneThatCreepsStopsTheToolWhichIsThenWithdrawn) {
+  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    const RobotState rest = robot().wait_connected(5s).value();
+    const RobotOrder order = plan();
+    const std::string token = robot().confirm(order);
+    std::jthread creep([&](const std::stop_token& over) {
+      while (!room_->robot().truth().moving && !over.stop_requested()) std::this_thread::sleep_for(5ms);
+      for (int i = 0; i < 15 && !over.stop_requested(); ++i) {
+        move_femur(2);
+        std::this_thread::sleep_for(170ms);
+      }
+    });
+    const auto gone = operation_->go(order, token);
+    creep.request_stop();
+    creep.join();
+    ASSERT_FALSE(gone);
+    EXPECT_EQ(robot().status().phase, LinkPhase::stopped);
+    EXPECT_FALSE(room_->robot().truth().moving);
+    const Failure refused = gone.error();
+    try_to([&] { return operation_->withdraw(order, rest, nod_); });
+    const RobotState back = robot().wait_connected(5s).value();
+    EXPECT_LT((back.base_from_tcp.translation - rest.base_from_tcp.translation).norm(), 0.5);
+    if (came_late(refused)) continue;  // nothing to do with the bone
+    EXPECT_EQ(refused.reason, Reason::plan_stale) << refused.message;
+    return;
+  }
+  FAIL() << "this machine is too busy";
+}
+
+}  // namespace
+}  // namespace helicarm
