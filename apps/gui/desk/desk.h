@@ -25,6 +25,7 @@ struct LiveState {
   std::optional<Expected<ToolOverlay>> tool;  ///< nothing before the robot is registered
   QString tunnel;                             ///< that is followed
   std::optional<Expected<TunnelAim>> aim;     ///< nothing before a tunnel is followed
+  std::optional<Failure> stale;               ///< why the path on show is no longer to be confirmed
 };
 
 /// Everything the window can ask for. Work goes on in a thread of its own; what came of it arrives as
@@ -64,6 +65,8 @@ class Desk : public QObject {
   void unlock(const std::string& who);
   void register_robot();
   void plan_tunnel(const std::string& tunnel);
+  /// The path on show is taken away, on record, and the refusal shown: it must be planned again.
+  void drop_plan(const Failure& why);
   void go();
   void withdraw();
   /// Stops the robot, at once and whatever else goes on.
@@ -106,6 +109,7 @@ class Desk : public QObject {
   DeskState state_;
   std::shared_ptr<Room> room_;
   std::optional<LiveTool> live_tool_;
+  std::optional<PlanWatch> plan_watch_;  ///< of the path on show
   std::string followed_;
   bool picks_came_ = false;  ///< while it measured
   RunOptions options_;

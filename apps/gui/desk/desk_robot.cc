@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the desk does with robot and pointer, and what is live.
 #include <algorithm>
+#include <utility>
 
 #include "gui/desk/desk.h"
 #include "gui/desk/room.h"
@@ -72,13 +73,25 @@ void Desk::register_robot() {
 void Desk::plan_tunnel(const std::string& tunnel) {
   if (!room_ || !room_->operation) return;
   follow(tunnel);
-  begin(Phase::navigate, "planning the way to " + tunnel, [room = room_, tunnel]() -> Change {
+  begin(Phase::navigate, "planning the way to " + tunnel, [this, room = room_, tunnel]() -> Change {
     const RobotOrder order = value_or_throw(room->operation->plan_tunnel(tunnel));
     const PathPreview path = value_or_throw(room->operation->preview(order));
-    return [order, path](DeskState& state) {
+    const PlanWatch watch = value_or_throw(room->operation->plan_watch(order));
+    return [this, order, path, watch](DeskState& state) {
       state.order = order;
       state.path = path;
+      plan_watch_ = watch;
     };
+  });
+}
+
+void Desk::drop_plan(const Failure& why) {
+  if (state_.busy || !state_.order) return;
+  const RobotOrder order = *std::exchange(state_.order, std::nullopt);
+  state_.path = {};
+  begin(Phase::navigate, "taking the path away", [room = room_, order, why]() -> Change {
+    static_cast<void>(room->operation->check_plan(order));
+    throw BadInput(why);
   });
 }
 
@@ -130,6 +143,10 @@ LiveState Desk::live() const {
   now.robot = room_->devices->robot().status();
   now.lamps.push_back(robot_lamp(now.robot));
   now.lamps.push_back(c_arm_lamp(room_->devices->c_arm(), now.at_s));
+  if (state_.order && !state_.busy && plan_watch_) {
+    const auto holds = plan_watch_->holds(board, room_->devices->robot().track(), now.at_s);
+    if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
+  }
   if (!live_tool_) return now;
   const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
   if (tunnel != state_.tunnels.end()) now.bone = tunnel->bone;

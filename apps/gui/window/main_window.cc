@@ -261,6 +261,7 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
 
 void MainWindow::show_live() {
   live_ = desk_.live();
+  if (live_.stale) desk_.drop_plan(*live_.stale);
   live_bar_->show_live(live_);
   navigate_->show_live(live_);
   const ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;

@@ -104,6 +104,22 @@ TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
   EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
 }
 
+TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
+  ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
+  find<QComboBox>("tunnel")->setCurrentText("femur");
+  click("planWay");
+  ASSERT_TRUE(wait_for_robot([&] { return state().order.has_value(); }));
+  auto* go = find<HoldButton>("go");
+  ASSERT_TRUE(go->isEnabled());
+  QTest::keyPress(go, Qt::Key_Return);  // and held
+  window_->desk().move_bone("femur", {3, 0, 0});
+  ASSERT_TRUE(wait([&] { return !state().order && !state().busy; }));
+  EXPECT_FALSE(go->isEnabled());
+  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));
+  EXPECT_NE(window_->desk().live().robot.phase, LinkPhase::moving);
+}
+
 TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   open_rehearsal();
   auto* unlock = find<HoldButton>("unlock");

@@ -203,6 +203,9 @@ QString NavigatePage::next_step() const {
   if (!state.measured) return tr("The X-rays come first (Alt+1).");
   if (!state.hand_eye_rms_mm) return tr("Hold 2 to register the robot.");
   if (next_pick(state)) return tr("The tunnels' ends come first (Alt+4).");
+  if (const auto refusal = state.refusals.find(Phase::navigate);
+      refusal != state.refusals.end() && refusal->second.reason == Reason::plan_stale)
+    return sentence_of(refusal->second) + tr(". Nothing moves by that path.");
   return tr("Choose a tunnel and plan the way (3).");
 }
 
