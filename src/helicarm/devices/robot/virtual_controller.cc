@@ -8,11 +8,11 @@
 namespace helicarm {
 namespace {
 
-constexpr std::array<std::string_view, 18> fault_names = {
+constexpr std::array<std::string_view, 20> fault_names = {
     "emergency_stop",     "protective_stop", "safeguard_stop", "violation",   "local_mode",
     "brake_not_released", "zero_speed",      "moved_by_hand",  "other_tool",  "clock_jump",
     "frozen_states",      "cut_cable",       "half_packet",    "huge_packet", "wrong_version",
-    "unknown_output",     "input_in_use",    "not_finite"};
+    "unknown_output",     "input_in_use",    "not_finite",     "late_script", "script_twice"};
 
 // UR5 user manual 5.3: braking begins within 24 ms and ends within 500 ms from full speed.
 constexpr double brake_delay_s = 0.024;
@@ -21,6 +21,8 @@ constexpr double safety_stop_rad_s2 = 3.1416 / (0.5 - brake_delay_s);
 constexpr double unlock_after_s = 5;
 // At a program's end the controller halts the arm with its default.
 constexpr double end_rad_s2 = 10;
+/// Of a script that starts late: longer than a heartbeat may be silent, shorter than its sender waits for it.
+constexpr double late_script_s = 0.3;
 
 UrPose six(const UrValue& value) {
   if (value.size() != 6) throw BadInput(Reason::bad_value, "six numbers are due");
@@ -84,6 +86,8 @@ void VirtualController::stop(SafetyMode mode) {
 void VirtualController::step() {
   const double period_s = 1 / model_.rate_hz;
   time_s_ += period_s;
+  while (!waiting_scripts_.empty() && waiting_scripts_.begin()->first <= time_s_)
+    start_script(waiting_scripts_.extract(waiting_scripts_.begin()).mapped());
   if (script_) {
     const auto runs = script_->step(*this);
     if (!runs) script_error_ = runs.error().message;
@@ -110,6 +114,7 @@ void VirtualController::step() {
 void VirtualController::set(RobotFault fault, bool on) {
   if (!on) {
     faults_.erase(fault);
+    if (fault == RobotFault::late_script || fault == RobotFault::script_twice) script_delays_s_ = {0};
     if (fault == RobotFault::emergency_stop && safety_ == SafetyMode::robot_emergency_stop) {
       safety_ = SafetyMode::normal;  // the button is out again, but the arm has no power
       mode_ = RobotMode::power_off;
@@ -133,6 +138,10 @@ void VirtualController::set(RobotFault fault, bool on) {
       return end_program();
     case RobotFault::moved_by_hand:
       return arm_.push(Joints::Unit(0) * 0.02);
+    case RobotFault::late_script:
+      return delay_scripts({late_script_s});
+    case RobotFault::script_twice:
+      return delay_scripts({0, late_script_s});
     case RobotFault::clock_jump:
       time_s_ = 0;
       return;
@@ -142,6 +151,14 @@ void VirtualController::set(RobotFault fault, bool on) {
 }
 
 void VirtualController::run_script(const std::string& text) {
+  for (const double delay_s : script_delays_s_)
+    if (delay_s > 0)
+      waiting_scripts_.emplace(time_s_ + delay_s, text);
+    else
+      start_script(text);
+}
+
+void VirtualController::start_script(const std::string& text) {
   if (has(RobotFault::local_mode)) return;
   end_program();
   auto script = UrScript::parse(text);

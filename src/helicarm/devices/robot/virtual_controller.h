@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "helicarm/devices/robot/robot_order.h"
 #include "helicarm/devices/robot/robot_state.h"
@@ -12,7 +14,7 @@
 
 namespace helicarm {
 
-/// What can go wrong with a virtual robot, by name: the last eight with its network.
+/// What can go wrong with a virtual robot, by name.
 enum class RobotFault {
   emergency_stop,
   protective_stop,
@@ -32,6 +34,8 @@ enum class RobotFault {
   unknown_output,
   input_in_use,
   not_finite,
+  late_script,   ///< each script starts 0.3 s after it came
+  script_twice,  ///< at once, and again 0.3 s later
 };
 
 /// Its name as in the list above, e.g. "cut_cable"; bad_value lists them all.
@@ -48,8 +52,12 @@ class VirtualController : public UrScriptHost {
   void step();
   void set(RobotFault fault, bool on);
   bool has(RobotFault fault) const { return faults_.contains(fault); }
-  /// Starts a program, ending the one that runs; not heard in local mode.
+  /// Starts a program, ending the one that runs, after each of the delays; not heard in local mode.
   void run_script(const std::string& text);
+  /// From now on a script starts so long after it came, s: late, several times, or with no delay in the list
+  /// never.
+  void delay_scripts(std::vector<double> delays_s) { script_delays_s_ = std::move(delays_s); }
+  std::size_t waiting_scripts() const { return waiting_scripts_.size(); }
   /// The answer to one command of the dashboard, without its end of line.
   std::string dashboard(std::string_view command);
   void set_heartbeat(std::int32_t beat) { heartbeat_ = beat; }
@@ -65,6 +73,7 @@ class VirtualController : public UrScriptHost {
   void start_motion(const std::string& command, const std::vector<UrValue>& arguments,
                     const std::map<std::string, double>& named) override;
   UrValue call(const std::string& name, const std::vector<UrValue>& arguments) override;
+  void start_script(const std::string& text);
   void stop(SafetyMode mode);
   void end_program();
 
@@ -74,6 +83,8 @@ class VirtualController : public UrScriptHost {
   std::set<RobotFault> faults_;
   std::optional<UrScript> script_;
   std::string script_error_;
+  std::vector<double> script_delays_s_ = {0};
+  std::multimap<double, std::string> waiting_scripts_;  ///< by the time when they start, s
   RobotMode mode_ = RobotMode::running;
   SafetyMode safety_ = SafetyMode::normal;
   double time_s_ = 0;

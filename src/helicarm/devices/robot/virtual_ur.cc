@@ -85,13 +85,18 @@ class VirtualUr::Server {
   }
 
   std::string dashboard(const std::string& command) { return controller_.dashboard(command); }
+  void delay_scripts(std::vector<double> delays_s) { controller_.delay_scripts(std::move(delays_s)); }
+
+  void hold_dashboard(bool on) {
+    dashboard_held_ = on;
+    for (const auto& [client, line] : std::exchange(held_questions_, {})) answer_dashboard(client, line);
+  }
 
   VirtualTruth truth() const {
-    VirtualTruth truth{controller_.state(),
-                       {},
-                       controller_.moving(),
-                       controller_.rest_since_s(),
-                       controller_.script_error()};
+    VirtualTruth truth{controller_.state(),        {},
+                       controller_.moving(),       controller_.rest_since_s(),
+                       controller_.script_error(), controller_.waiting_scripts(),
+                       held_questions_.size()};
     truth.base_from_tip = base_from_flange(options_.arm, truth.state.joints) * options_.tool.flange_from_tcp;
     return truth;
   }
@@ -183,9 +188,16 @@ class VirtualUr::Server {
     for (std::size_t end = client.text.find('\n'); end != std::string::npos; end = client.text.find('\n')) {
       const std::string line = client.text.substr(0, end);
       client.text.erase(0, end + 1);
-      client.send(controller_.dashboard(line) + "\n");
+      answer_dashboard(client.shared_from_this(), line);
     }
     if (client.text.size() > 1000) client.cut("line over 1000 bytes");
+  }
+
+  void answer_dashboard(const std::shared_ptr<VirtualUrClient>& client, const std::string& line) {
+    if (dashboard_held_)
+      held_questions_.emplace_back(client, line);
+    else if (client->socket.is_open())
+      client->send(controller_.dashboard(line) + "\n");
   }
 
   void hear_script(VirtualUrClient& client, std::string_view bytes) {
@@ -300,6 +312,8 @@ class VirtualUr::Server {
   std::list<std::shared_ptr<VirtualUrClient>> clients_;
   VirtualUrCounters counters_;
   LineLimit lines_{20};
+  bool dashboard_held_ = false;
+  std::vector<std::pair<std::shared_ptr<VirtualUrClient>, std::string>> held_questions_;
   std::thread thread_;
 };
 
@@ -322,6 +336,14 @@ void VirtualUr::set(RobotFault fault, bool on) {
 
 std::string VirtualUr::dashboard(const std::string& command) {
   return server_->there([&] { return server_->dashboard(command); });
+}
+
+void VirtualUr::delay_scripts(std::vector<double> delays_s) {
+  server_->there([&] { server_->delay_scripts(std::move(delays_s)); });
+}
+
+void VirtualUr::hold_dashboard(bool on) {
+  server_->there([&] { server_->hold_dashboard(on); });
 }
 
 void VirtualUr::advance(double seconds) {

@@ -45,6 +45,8 @@ struct VirtualTruth {
   bool moving = false;
   std::optional<double> rest_since_s;  ///< on the robot's clock
   std::string script_error;
+  std::size_t waiting_scripts = 0;    ///< have come, but do not start yet
+  std::size_t waiting_questions = 0;  ///< at the dashboard, while it is held
 };
 
 /// A UR5 or UR5e on this machine: RTDE, dashboard and secondary port, and an arm that moves. It runs on a
@@ -62,6 +64,10 @@ class VirtualUr {
   void set(RobotFault fault, bool on = true);
   /// As if somebody had asked at the dashboard.
   std::string dashboard(const std::string& command);
+  /// As `VirtualController::delay_scripts`.
+  void delay_scripts(std::vector<double> delays_s);
+  /// While it is held the dashboard answers nothing; then it answers all that was asked.
+  void hold_dashboard(bool on);
   /// In lockstep: lets this much time pass on the robot's clock, whether anybody beats or not.
   void advance(double seconds);
   VirtualTruth truth();
