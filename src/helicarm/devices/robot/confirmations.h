@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <map>
-#include <mutex>
 #include <string>
 
 #include "helicarm/devices/robot/robot_order.h"
@@ -33,7 +32,6 @@ class Confirmations {
     Clock::time_point until;
   };
   Clock::duration valid_for_;
-  std::mutex guard_;
   std::map<std::string, Entry> entries_;
 };
 

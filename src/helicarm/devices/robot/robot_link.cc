@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/robot_link.h"
 
-#include <array>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,24 +21,20 @@ constexpr double correction_mm_s2 = 100;
 constexpr Milliseconds held_up{50};
 /// Then states and poses that wait in their sockets are read first.
 constexpr Milliseconds catch_up{20};
-/// The robot's clock may leap so far between two states before it counts as another clock.
-constexpr double clock_leap_s = 1;
+/// Within these the kernel has taken a script over: it fits into the buffer of a new socket.
+constexpr Milliseconds handing_over{50};
 
 std::chrono::steady_clock::duration duration_of(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
 }
 
-Failure stopped(std::string message) { return {Reason::robot_stopped, std::move(message)}; }
-
 }  // namespace
-
-std::string_view name(LinkPhase phase) {
-  constexpr std::array<std::string_view, 5> names = {"disconnected", "idle", "ready", "moving", "stopped"};
-  return names.at(static_cast<std::size_t>(phase));
-}
 
 RobotLink::RobotLink(RobotConfig config)
     : config_(std::move(config)),
+      machine_({.stale_s = config_.stale_s,
+                .program_silence_s = config_.program_silence_s,
+                .start_s = config_.start_s}),
       client_({.address = config_.address,
                .port = config_.rtde_port,
                .rate_hz = config_.model.rate_hz,
@@ -50,55 +45,39 @@ RobotLink::RobotLink(RobotConfig config)
                      const std::lock_guard lock(guard_);
                      version_ = version;
                    },
-               .state = [this](const RobotState& state) { hear(state); },
-               .lost = [this](const Failure& failure) { lose(failure); }}) {}
+               .state =
+                   [this](const RobotState& state) {
+                     track_.take(state.time_s, state.base_from_tcp,
+                                 std::chrono::duration<double>(Clock::now().time_since_epoch()).count());
+                     const std::lock_guard lock(guard_);
+                     const Heartbeat answer = machine_.heard(state, Clock::now());
+                     changed();
+                     return answer;
+                   },
+               .lost =
+                   [this](const Failure& failure) {
+                     track_.forget();
+                     const std::lock_guard lock(guard_);
+                     machine_.lost(failure);
+                     changed();
+                   }}) {}
 
 RobotLink::~RobotLink() = default;
 
-void RobotLink::hear(const RobotState& state) {
-  track_.take(state.time_s, state.base_from_tcp,
-              std::chrono::duration<double>(Clock::now().time_since_epoch()).count());
-  const std::lock_guard lock(guard_);
-  if (phase_ == LinkPhase::disconnected) {
-    phase_ = LinkPhase::idle;
-  } else if (state_) {
-    const double passed_s = state.time_s - state_->time_s;
-    if (passed_s < 0 || passed_s > clock_leap_s)
-      latch({Reason::stale_state, fmt::format("the robot's clock leapt by {:.3f} s", passed_s)});
-  }
-  if (auto why = why_stopped(state)) latch(*std::move(why));
-  state_ = state;
-  heard_ = Clock::now();
+/// To be called under the guard. The socket stays open while its order may move, as a robot may throw away a
+/// script whose sender leaves at once; closing it withdraws a script that the robot has not read yet.
+void RobotLink::changed() {
+  if (!machine_.permits()) script_socket_.reset();
   news_.notify_all();
 }
-
-void RobotLink::lose(const Failure& failure) {
-  track_.forget();
-  const std::lock_guard lock(guard_);
-  latch(failure);
-  phase_ = LinkPhase::disconnected;
-  state_.reset();
-}
-
-/// The first reason stays: what follows is its consequence. To be called under the guard.
-void RobotLink::latch(Failure failure) {
-  if (phase_ == LinkPhase::moving)
-    client_.halt();
-  else
-    client_.beat_for({});
-  confirmations_.forget_all();
-  if (phase_ != LinkPhase::stopped) why_ = std::move(failure);
-  phase_ = LinkPhase::stopped;
-  news_.notify_all();
-}
-
-double RobotLink::age_s() const { return std::chrono::duration<double>(Clock::now() - heard_).count(); }
 
 RobotLinkStatus RobotLink::status() const {
   const std::lock_guard lock(guard_);
-  RobotLinkStatus status{phase_, why_, state_, state_ ? age_s() : 0, version_, {}};
-  if (!state_) return status;
-  const double mismatch = kinematic_mismatch_mm(config_.model, *state_);
+  const auto& state = machine_.state();
+  RobotLinkStatus status{
+      machine_.phase(), machine_.why(), state, state ? machine_.age_s(Clock::now()) : 0, version_, {}};
+  if (!state) return status;
+  const double mismatch = kinematic_mismatch_mm(config_.model, *state);
   if (mismatch > config_.mismatch_mm)
     status.warnings.push_back({Reason::off_target,
                                fmt::format("the arm is {:.2f} mm off the {}'s drawing: go by the tracker",
@@ -116,9 +95,10 @@ RobotLinkStatus RobotLink::status() const {
 
 Expected<RobotState> RobotLink::wait_connected(Clock::duration patience) const {
   std::unique_lock lock(guard_);
-  news_.wait_for(lock, patience, [&] { return state_.has_value(); });
-  if (state_) return *state_;
-  return tl::unexpected<Failure>(why_.value_or(Failure{Reason::not_connected, "the robot does not answer"}));
+  news_.wait_for(lock, patience, [&] { return machine_.state().has_value(); });
+  if (machine_.state()) return *machine_.state();
+  return tl::unexpected<Failure>(
+      machine_.why().value_or(Failure{Reason::not_connected, "the robot does not answer"}));
 }
 
 Expected<void> RobotLink::refuse_local_mode() const {
@@ -133,6 +113,10 @@ Expected<void> RobotLink::refuse_local_mode() const {
 Expected<void> RobotLink::unlock(const std::string& who) {
   if (who.empty() || who.size() > 100 || holds_control_character(who))
     return fail(Reason::bad_value, "who unlocks the robot must be said");
+  const Stops since = [&] {
+    const std::lock_guard lock(guard_);
+    return machine_.stops();
+  }();
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
   if (auto remote = refuse_local_mode(); !remote) return remote;
@@ -141,108 +125,75 @@ Expected<void> RobotLink::unlock(const std::string& who) {
         ask_dashboard(config_.address, config_.dashboard_port, DashboardCommand::unlock_protective_stop);
     if (!answer) return fail(Reason::robot_stopped, answer.error().message);
     std::unique_lock lock(guard_);
-    news_.wait_for(lock, duration_of(config_.start_s), [&] { return state_ && !why_stopped(*state_); });
+    news_.wait_for(lock, duration_of(config_.start_s),
+                   [&] { return machine_.state() && !why_stopped(*machine_.state()); });
   }
   const std::lock_guard lock(guard_);
-  if (!state_ || age_s() > config_.stale_s)
-    return fail(Reason::stale_state, "the robot's state is not known");
-  if (const auto why = why_stopped(*state_)) return tl::unexpected<Failure>(*why);
-  if (phase_ == LinkPhase::moving) return fail(Reason::robot_locked, "an order is being carried out");
-  phase_ = LinkPhase::ready;
-  why_.reset();
-  return {};
+  return machine_.unlock(since, Clock::now());
 }
 
 void RobotLink::stop() {
   const std::lock_guard lock(guard_);
-  latch(stopped("stopped by this program's user"));
+  machine_.stop({Reason::robot_stopped, "stopped by this program's user"});
+  changed();
 }
 
-/// To be called under the guard.
-Expected<void> RobotLink::refuse_unless_ready() const {
-  if (phase_ == LinkPhase::disconnected)
-    return fail(Reason::not_connected, "there is no connection" + (why_ ? ": " + why_->message : ""));
-  if (phase_ != LinkPhase::ready)
-    return fail(Reason::robot_locked, fmt::format("the robot is {}{}", name(phase_),
-                                                  why_ ? ": " + why_->message : ": nobody has unlocked it"));
-  if (age_s() > config_.stale_s) return fail(Reason::stale_state, "the robot's last state is too old");
+std::string RobotLink::confirm(const RobotOrder& order) {
+  const std::lock_guard lock(guard_);
+  return machine_.confirm(order, Clock::now());
+}
+
+Expected<RobotState> RobotLink::run(const RobotOrder& order, Stops since, const Watch& watch) {
+  if (auto remote = refuse_local_mode(); !remote) return tl::unexpected<Failure>(remote.error());
+  if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
+  if (auto sent = send(order, since); !sent) return tl::unexpected<Failure>(sent.error());
+  return supervise(since, watch);
+}
+
+/// The checks, the permission and the sending are one critical section: no stop falls between them.
+Expected<void> RobotLink::send(const RobotOrder& order, Stops since) {
+  auto socket = TimedSocket::connect(config_.address, config_.script_port, Milliseconds(1000));
+  if (!socket) return tl::unexpected<Failure>(socket.error());
+  const std::lock_guard lock(guard_);
+  if (auto ready = machine_.ready(since, Clock::now()); !ready) return ready;
+  if (auto sound = check_order(order, *machine_.state(), config_.limits); !sound) return sound;
+  const auto number = machine_.begin(since, 1.5 * duration_s(order), Clock::now());
+  if (!number) return tl::unexpected<Failure>(number.error());
+  script_socket_ = *std::move(socket);
+  if (auto sent = script_socket_->send(script_of(order, config_.model, *number), handing_over); !sent) {
+    machine_.stop(sent.error());
+    changed();
+    return sent;
+  }
   return {};
 }
 
-Expected<RobotState> RobotLink::run(const RobotOrder& order, const Watch& watch) {
-  if (auto remote = refuse_local_mode(); !remote) return tl::unexpected<Failure>(remote.error());
-  if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
-  std::int32_t number = 0;
-  {
-    const std::lock_guard lock(guard_);
-    if (auto ready = refuse_unless_ready(); !ready) return tl::unexpected<Failure>(ready.error());
-    if (auto sound = check_order(order, *state_, config_.limits); !sound)
-      return tl::unexpected<Failure>(sound.error());
-    number = (std::max(0, state_->progress) / 100 + 1) % 20000;
-    phase_ = LinkPhase::moving;
-    client_.beat_for(duration_of(config_.program_silence_s));
-  }
-  auto ended = supervise(order, number, watch);
-  const std::lock_guard lock(guard_);
-  client_.beat_for({});
-  if (phase_ == LinkPhase::moving) {
-    if (ended)
-      phase_ = LinkPhase::ready;
-    else
-      latch(ended.error());
-  }
-  return ended;
-}
-
-Expected<RobotState> RobotLink::supervise(const RobotOrder& order, std::int32_t number, const Watch& watch) {
-  auto socket = TimedSocket::connect(config_.address, config_.script_port, Milliseconds(1000));
-  if (!socket) return tl::unexpected<Failure>(socket.error());
-  if (auto sent = socket->send(script_of(order, config_.model, number), Milliseconds(1000)); !sent)
-    return tl::unexpected<Failure>(sent.error());
-  // Kept open: a script whose sender leaves at once may be thrown away.
-  script_socket_ = *std::move(socket);
-
-  const auto sent_at = Clock::now();
-  std::unique_lock lock(guard_);
-  const double begun_s = state_ ? state_->time_s : 0;
-  const double foreseen_s = 1.5 * duration_s(order) + config_.start_s;
-  const auto at_least = [&](ScriptStage stage) {
-    return state_->progress / 100 == number && state_->progress >= progress_of(number, stage);
-  };
-  bool begun = false;
+Expected<RobotState> RobotLink::supervise(Stops since, const Watch& watch) {
   auto looked = Clock::now();
+  std::unique_lock lock(guard_);
   for (;;) {
     if (Clock::now() - std::exchange(looked, Clock::now()) > held_up)  // the beat is not renewed meanwhile
-      news_.wait_for(lock, catch_up, [&] { return phase_ != LinkPhase::moving; });
-    if (phase_ != LinkPhase::moving) return tl::unexpected<Failure>(why_.value_or(stopped("it was stopped")));
-    if (age_s() > config_.stale_s)
-      return fail(Reason::stale_state, "the robot's states have stopped coming: where it is now is unknown",
-                  {{"age_s", age_s()}});
-    if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
-    client_.beat_for(duration_of(config_.program_silence_s));
-    const bool plays = state_->runtime == RuntimeState::playing;
-    begun = begun || at_least(ScriptStage::begun);
-    if (begun && at_least(ScriptStage::done) && !plays) return *state_;
-    if (begun && state_->progress == progress_of(number, ScriptStage::silent))
-      return tl::unexpected<Failure>(stopped("the robot heard no heartbeat and stopped by itself"));
-    if (begun && !plays) return tl::unexpected<Failure>(stopped("the robot's program ended early"));
-    if (!begun && Clock::now() - sent_at > duration_of(config_.start_s))
-      return tl::unexpected<Failure>(stopped("the robot did not begin the order"));
-    if (state_->time_s - begun_s > foreseen_s)
-      return fail(Reason::off_target, "the robot did not reach its target in time",
-                  {{"foreseen_s", foreseen_s}});
+      news_.wait_for(lock, catch_up, [&] { return machine_.stops() != since; });
+    lock.unlock();  // a stop does not wait for the watch
+    const auto watched = watch();
+    lock.lock();
+    const auto done = watched ? machine_.look(since, Clock::now())
+                              : tl::unexpected<Failure>(machine_.stop_order(since, watched.error()));
+    if (!done || *done) changed();
+    if (!done) return tl::unexpected<Failure>(done.error());
+    if (*done) return *machine_.state();
     news_.wait_for(lock, Milliseconds(20));
   }
 }
 
-Expected<void> RobotLink::correct(const RobotOrder& order, const RigidTransform& tcp_from_new,
+Expected<void> RobotLink::correct(const RobotOrder& order, Stops since, const RigidTransform& tcp_from_new,
                                   const Watch& watch) {
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
   RobotOrder small = order;
   small.start = present->joints;
   small.waypoints = {{present->base_from_tcp * tcp_from_new, correction_mm_s, correction_mm_s2}};
-  const auto ended = run(small, watch);
+  const auto ended = run(small, since, watch);
   if (!ended) return tl::unexpected<Failure>(ended.error());
   return {};
 }
@@ -251,25 +202,29 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
                                                const Measure& measure, const Watch& watch) {
   const std::unique_lock one_at_a_time(executing_, std::try_to_lock);
   if (!one_at_a_time) return fail(Reason::robot_locked, "another order is being carried out");
-  if (auto confirmed = confirmations_.redeem(token, order); !confirmed)
-    return tl::unexpected<Failure>(confirmed.error());
+  const auto since = [&] {
+    const std::lock_guard lock(guard_);
+    return machine_.redeem(token, order, Clock::now());
+  }();
+  if (!since) return tl::unexpected<Failure>(since.error());
   if (order.model != config_.model.name)
     return fail(Reason::bad_value,
                 "the order is for a " + order.model + ", the robot is a " + config_.model.name);
   if (order.corrections.most > 0 && !measure)
     return fail(Reason::bad_value, "an order with corrections needs a tracker that measures");
   const Watch watched = watch ? watch : [] { return Expected<void>(); };
-  const auto ended = run(order, watched);
+  const auto ended = run(order, *since, watched);
   if (!ended) return tl::unexpected<Failure>(ended.error());
   const auto by_robot = [&]() -> Expected<Sighting> {
     return Sighting{ended->base_from_tcp, order.waypoints.back().base_from_tcp};
   };
   auto misses = follow_target(
       order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),
-      [&](const RigidTransform& tcp_from_new) { return correct(order, tcp_from_new, watched); });
+      [&](const RigidTransform& tcp_from_new) { return correct(order, *since, tcp_from_new, watched); });
   if (!misses) {
     const std::lock_guard lock(guard_);
-    latch(misses.error());
+    machine_.stop_order(*since, misses.error());
+    changed();
   }
   return misses;
 }

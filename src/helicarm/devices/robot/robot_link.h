@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "helicarm/devices/robot/check_order.h"
-#include "helicarm/devices/robot/confirmations.h"
 #include "helicarm/devices/robot/follow_target.h"
+#include "helicarm/devices/robot/link_machine.h"
 #include "helicarm/devices/robot/rtde_client.h"
 #include "helicarm/devices/robot/timed_socket.h"
 #include "helicarm/devices/robot/tool_track.h"
@@ -26,21 +26,12 @@ struct RobotConfig {
   double stale_s = 0.1;            ///< a state older than this is no state
   double program_silence_s = 0.1;  ///< the heartbeat ends so long after this program last looked
   double lost_s = 1;               ///< without an answer or a state for so long, it is connected anew
-  double start_s = 2;              ///< patience with a script to begin
+  double start_s = 2;              ///< limit for a script to begin
   double mismatch_mm = 0.5;        ///< of the arm's kinematics, from which on it is told
   RobotLimits limits = {};
 };
 
-enum class LinkPhase {
-  disconnected,  ///< where the robot is now is unknown
-  idle,          ///< connected; nobody has unlocked it since
-  ready,         ///< unlocked: an order with its token may be sent
-  moving,
-  stopped,  ///< latched, with the reason, until a person unlocks
-};
-std::string_view name(LinkPhase phase);
-
-/// Whether a motion may go on. Asked with each state, and must not ask the link itself but for `track`.
+/// Whether a motion may go on. Asked before the script is sent and then with each state.
 using Watch = std::function<Expected<void>()>;
 
 struct RobotLinkStatus {
@@ -52,9 +43,9 @@ struct RobotLinkStatus {
   std::vector<Warning> warnings;
 };
 
-/// A robot over its three ports, and the lock on its motion. Nothing moves but by `execute`; whatever stops
-/// the robot, or ends the connection, is latched and undone by `unlock` alone. All members may be called from
-/// any thread.
+/// A robot over its three ports, and the lock on its motion: sockets and threads around a `LinkMachine`,
+/// which decides. Nothing moves but by `execute`; whatever stops the robot, or ends the connection, is
+/// latched and undone by `unlock` alone. All members may be called from any thread.
 class RobotLink {
  public:
   explicit RobotLink(RobotConfig config);
@@ -68,16 +59,17 @@ class RobotLink {
 
   /// A person has looked at the robot and allows motion. Releases a protective stop, which the robot itself
   /// allows 5 s after it; refuses while the robot says that it may not move (`robot_stopped`), in local mode
-  /// (`robot_locked`), or without a connection.
+  /// (`robot_locked`), without a connection, or after a stop during the call.
   Expected<void> unlock(const std::string& who);
 
   /// A token for this order, for the person who has seen its preview.
-  std::string confirm(const RobotOrder& order) { return confirmations_.confirm(order); }
+  std::string confirm(const RobotOrder& order);
 
   /// Carries a confirmed order out and returns when the tool is where it should be. With corrections it then
   /// follows the target by `measure`, and gives every miss; without, by the robot's own pose. Refuses,
   /// without any motion, as `check_order`, `order_not_confirmed` and `robot_locked`. What goes wrong on the
-  /// way, or `watch` has against it, stops the robot and is latched.
+  /// way, or `watch` has against it, stops the robot and is latched. A stop ends it for good, also when the
+  /// robot is unlocked before this returns.
   Expected<std::vector<Miss>> execute(const RobotOrder& order, const std::string& token,
                                       const Measure& measure = {}, const Watch& watch = {});
 
@@ -87,26 +79,21 @@ class RobotLink {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void hear(const RobotState& state);
-  void lose(const Failure& failure);
-  void latch(Failure failure);
-  Expected<void> refuse_unless_ready() const;
-  Expected<RobotState> run(const RobotOrder& order, const Watch& watch);
-  Expected<RobotState> supervise(const RobotOrder& order, std::int32_t number, const Watch& watch);
-  Expected<void> correct(const RobotOrder& order, const RigidTransform& tcp_from_new, const Watch& watch);
+  using Stops = LinkMachine::Stops;
+
+  Expected<RobotState> run(const RobotOrder& order, Stops since, const Watch& watch);
+  Expected<void> send(const RobotOrder& order, Stops since);
+  Expected<RobotState> supervise(Stops since, const Watch& watch);
+  Expected<void> correct(const RobotOrder& order, Stops since, const RigidTransform& tcp_from_new,
+                         const Watch& watch);
   Expected<void> refuse_local_mode() const;
-  double age_s() const;
+  void changed();
 
   RobotConfig config_;
-  Confirmations confirmations_;
-  ToolTrack track_;
   std::mutex executing_;
-  mutable std::mutex guard_;
+  mutable std::mutex guard_;  ///< of all that follows
   mutable std::condition_variable news_;
-  LinkPhase phase_ = LinkPhase::disconnected;
-  std::optional<Failure> why_;
-  std::optional<RobotState> state_;
-  Clock::time_point heard_{};
+  LinkMachine machine_;
   ControllerVersion version_;
   std::optional<TimedSocket> script_socket_;
   RtdeClient client_;  ///< last: its thread uses all the others

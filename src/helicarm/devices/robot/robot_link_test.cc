@@ -232,8 +232,10 @@ TEST(RobotDrill, StopByTheProgramStopsTheRobot) {
   Drill drill;
   double told_s = 0;
   const Failure failure = drill.fault_on_the_way([&] {
+    drill.robot->set(RobotFault::frozen_states);  // the robot's clock stands until it has been told
     told_s = drill.robot->truth().state.time_s;
     drill.link.stop();
+    drill.robot->set(RobotFault::frozen_states, false);
   });
   EXPECT_EQ(failure.reason, Reason::robot_stopped);
   EXPECT_LT(drill.stop_s_from(told_s), 0.1);
@@ -244,15 +246,14 @@ TEST(RobotDrill, TrackerLostOnTheWayStopsTheRobotAndIsLatched) {
   Drill drill;
   std::atomic<bool> seen{true};
   drill.watch = [&]() -> Expected<void> {
-    if (!seen) return fail(Reason::stale_pose, "the tool is not seen");
-    return {};
+    if (seen) return {};
+    drill.robot->set(RobotFault::frozen_states);  // the robot's clock stands until it has been told
+    return fail(Reason::stale_pose, "the tool is not seen");
   };
-  double lost_s = 0;
-  const Failure failure = drill.fault_on_the_way([&] {
-    lost_s = drill.robot->truth().state.time_s;
-    seen = false;
-  });
+  const Failure failure = drill.fault_on_the_way([&] { seen = false; });
   EXPECT_EQ(failure.reason, Reason::stale_pose);
+  const double lost_s = drill.robot->truth().state.time_s;
+  drill.robot->set(RobotFault::frozen_states, false);
   EXPECT_LT(drill.stop_s_from(lost_s), 0.1);
   EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
   drill.expect_locked();

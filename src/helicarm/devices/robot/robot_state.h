@@ -8,6 +8,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/devices/robot/kinematics.h"
+#include "helicarm/devices/robot/order_registers.h"
 
 namespace helicarm {
 
@@ -56,7 +57,7 @@ struct RobotState {
   std::uint32_t safety_bits = 1;
   RuntimeState runtime = RuntimeState::stopped;
   double speed_scaling = 1;
-  std::int32_t progress = 0;  ///< output register 0, which our scripts write
+  ScriptReport script;  ///< of the script that came last
 };
 
 /// Why this robot must not move (`robot_stopped`): its mode, a stop, an emergency stop, an open brake, a

@@ -4,7 +4,6 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
 namespace helicarm {
@@ -18,8 +17,6 @@ Clock::duration seconds(double s) {
 
 /// How long a wait lasts before it looks whether it should end.
 constexpr auto glance = std::chrono::milliseconds(20);
-/// Two may fall into one of the robot's periods; the next order must not find one.
-constexpr int halt_messages = 4;
 
 /// A connection that gives whole messages.
 struct Line {
@@ -57,13 +54,6 @@ RtdeClient::RtdeClient(RtdeOptions options, RtdeListener listener)
 
 RtdeClient::~RtdeClient() = default;
 
-void RtdeClient::beat_for(Clock::duration time) { beat_until_ = Clock::now() + time; }
-
-void RtdeClient::halt() {
-  beat_for({});
-  halts_ = halt_messages;
-}
-
 void RtdeClient::run(const std::stop_token& stop) {
   std::mutex guard;
   std::condition_variable_any ended;
@@ -72,7 +62,6 @@ void RtdeClient::run(const std::stop_token& stop) {
     const auto begun = Clock::now();
     const auto served = serve(stop);
     if (stop.stop_requested()) return;
-    beat_for({});
     if (!served) listener_.lost(served.error());
     retry_s = Clock::now() - begun > seconds(10) ? 0.1 : std::min(2 * retry_s, options_.longest_retry_s);
     std::unique_lock lock(guard);
@@ -97,23 +86,19 @@ Expected<void> RtdeClient::serve(const std::stop_token& stop) {
     std::uint8_t heartbeats = 0;
     if (options_.commands)
       heartbeats = value_or_throw(read_recipe(line.ask(request_inputs(), RtdeKind::inputs, patience, stop),
-                                              {heartbeat_name}, {heartbeat_type}));
+                                              heartbeat_names, heartbeat_types));
     if (!granted(request_start(), RtdeKind::start))
       throw BadInput(Reason::not_connected, "RTDE: this controller does not start");
     listener_.connected(version);
 
-    std::int32_t beat = 0;
     auto heard = Clock::now();
     while (!stop.stop_requested()) {
       const auto message = value_or_throw(line.receive(glance));
       if (message && message->kind == RtdeKind::data) {
-        listener_.state(value_or_throw(read_state(*message, states)));
+        const Heartbeat heartbeat = listener_.state(value_or_throw(read_state(*message, states)));
         heard = Clock::now();
-        if (heard < beat_until_.load()) beat = (beat + 1) & 0x7FFFFFFF;
-        const bool halting = halts_ > 0 && halts_-- > 0;
         if (options_.commands)
-          value_or_throw(
-              line.socket.send(heartbeat_message(heartbeats, halting ? stop_beat : beat), patience));
+          value_or_throw(line.socket.send(heartbeat_message(heartbeats, heartbeat), patience));
       } else if (Clock::now() - heard > seconds(options_.silence_s)) {
         throw BadInput(Reason::stale_state, "RTDE: the robot's states have stopped coming");
       }

@@ -56,13 +56,28 @@ std::string packed(const Eigen::Matrix<double, 6, 1>& six) {
 
 }  // namespace
 
-const std::vector<std::string> state_names = {"timestamp",       "actual_q",      "actual_qd",
-                                              "actual_TCP_pose", "tcp_offset",    "payload",
-                                              "robot_mode",      "safety_mode",   "safety_status_bits",
-                                              "runtime_state",   "speed_scaling", "output_int_register_0"};
-const std::vector<std::string> state_types = {"DOUBLE",   "VECTOR6D", "VECTOR6D", "VECTOR6D",
-                                              "VECTOR6D", "DOUBLE",   "INT32",    "INT32",
-                                              "UINT32",   "UINT32",   "DOUBLE",   "INT32"};
+const std::vector<std::string> state_names = {"timestamp",
+                                              "actual_q",
+                                              "actual_qd",
+                                              "actual_TCP_pose",
+                                              "tcp_offset",
+                                              "payload",
+                                              "robot_mode",
+                                              "safety_mode",
+                                              "safety_status_bits",
+                                              "runtime_state",
+                                              "speed_scaling",
+                                              "output_int_register_0",
+                                              "output_int_register_1",
+                                              "output_int_register_2",
+                                              "output_int_register_3"};
+const std::vector<std::string> state_types = {"DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D", "VECTOR6D",
+                                              "DOUBLE", "INT32",    "INT32",    "UINT32",   "UINT32",
+                                              "DOUBLE", "INT32",    "INT32",    "INT32",    "INT32"};
+// 24 to 47 are for RTDE's clients.
+const std::vector<std::string> heartbeat_names = {"input_int_register_24", "input_int_register_25",
+                                                  "input_int_register_26"};
+const std::vector<std::string> heartbeat_types = {"INT32", "INT32", "INT32"};
 
 std::string to_bytes(const RtdeMessage& message) {
   return BigEndianWriter()
@@ -91,10 +106,15 @@ std::string request_controller_version() { return to_bytes({RtdeKind::controller
 std::string request_outputs(double rate_hz) {
   return to_bytes({RtdeKind::outputs, BigEndianWriter().put(rate_hz).put(joined(state_names)).bytes()});
 }
-std::string request_inputs() { return to_bytes({RtdeKind::inputs, heartbeat_name}); }
+std::string request_inputs() { return to_bytes({RtdeKind::inputs, joined(heartbeat_names)}); }
 std::string request_start() { return to_bytes({RtdeKind::start, {}}); }
-std::string heartbeat_message(std::uint8_t recipe, std::int32_t beat) {
-  return to_bytes({RtdeKind::data, BigEndianWriter().put(recipe).put(beat).bytes()});
+std::string heartbeat_message(std::uint8_t recipe, const Heartbeat& heartbeat) {
+  return to_bytes({RtdeKind::data, BigEndianWriter()
+                                       .put(recipe)
+                                       .put(heartbeat.beat)
+                                       .put(heartbeat.order.session)
+                                       .put(heartbeat.order.count)
+                                       .bytes()});
 }
 
 Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<std::string>& names,
@@ -168,7 +188,10 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
     state.safety_bits = reader.take<std::uint32_t>();
     state.runtime = static_cast<RuntimeState>(reader.take<std::uint32_t>());
     state.speed_scaling = reader.take<double>();
-    state.progress = reader.take<std::int32_t>();
+    state.script.stage = static_cast<ScriptStage>(reader.take<std::int32_t>());
+    state.script.order.session = reader.take<std::int32_t>();
+    state.script.order.count = reader.take<std::int32_t>();
+    state.script.tick = reader.take<std::int32_t>();
     expect_end(reader);
     const bool finite = std::isfinite(state.time_s) && state.joints.allFinite() &&
                         state.joint_speeds.allFinite() && tcp.allFinite() && offset.allFinite() &&
@@ -182,7 +205,7 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
 
 RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
                           const std::vector<std::string>& names) {
-  const std::array<std::string, 12> fields = {packed(state.time_s),
+  const std::array<std::string, 15> fields = {packed(state.time_s),
                                               packed(state.joints),
                                               packed(state.joint_speeds),
                                               packed(ur_pose(state.base_from_tcp)),
@@ -193,7 +216,10 @@ RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
                                               packed(state.safety_bits),
                                               packed(static_cast<std::uint32_t>(state.runtime)),
                                               packed(state.speed_scaling),
-                                              packed(state.progress)};
+                                              packed(static_cast<std::int32_t>(state.script.stage)),
+                                              packed(state.script.order.session),
+                                              packed(state.script.order.count),
+                                              packed(state.script.tick)};
   std::string content(1, static_cast<char>(recipe));
   for (const std::string& name : names)
     for (std::size_t i = 0; i < fields.size(); ++i)

@@ -44,18 +44,18 @@ class RtdeStream {
   std::string bytes_;
 };
 
-/// Names and types of what the robot is asked to send, and of the one register it is given: the heartbeat.
+/// Names and types of what the robot is asked to send, and of the registers it is given: the heartbeat.
 extern const std::vector<std::string> state_names;
 extern const std::vector<std::string> state_types;
-inline constexpr const char* heartbeat_name = "input_int_register_24";  // 24 to 47 are for RTDE's clients
-inline constexpr const char* heartbeat_type = "INT32";
+extern const std::vector<std::string> heartbeat_names;
+extern const std::vector<std::string> heartbeat_types;
 
 std::string request_version();
 std::string request_controller_version();
 std::string request_outputs(double rate_hz);
 std::string request_inputs();
 std::string request_start();
-std::string heartbeat_message(std::uint8_t recipe, std::int32_t beat);
+std::string heartbeat_message(std::uint8_t recipe, const Heartbeat& heartbeat);
 
 /// The recipe's number. A type other than the one wanted is refused: NOT_FOUND as `unsupported`, IN_USE as
 /// `robot_locked` (another program commands), both with the name of what is missing.

@@ -21,7 +21,7 @@ RobotState some_state() {
   state.safety_mode = SafetyMode::reduced;
   state.runtime = RuntimeState::playing;
   state.speed_scaling = 0.5;
-  state.progress = 301;
+  state.script = {ScriptStage::begun, {301, 302}, 303};
   return state;
 }
 
@@ -35,10 +35,12 @@ TEST(RtdeMessage, RequestsHaveTheGuidesBytes) {
   EXPECT_EQ(request_version(), "\x00\x05\x56\x00\x02"s);
   EXPECT_EQ(request_controller_version(), "\x00\x03\x76"s);
   EXPECT_EQ(request_start(), "\x00\x03\x53"s);
-  EXPECT_EQ(request_inputs(), "\x00\x18\x49input_int_register_24"s);
+  EXPECT_EQ(request_inputs(),
+            "\x00\x44\x49input_int_register_24,input_int_register_25,input_int_register_26"s);
   EXPECT_THAT(request_outputs(125),
-              testing::StartsWith("\x00\xa6\x4f\x40\x5f\x40\x00\x00\x00\x00\x00timestamp,actual_q,"s));
-  EXPECT_EQ(heartbeat_message(1, 258), "\x00\x08\x55\x01\x00\x00\x01\x02"s);
+              testing::StartsWith("\x00\xe8\x4f\x40\x5f\x40\x00\x00\x00\x00\x00timestamp,actual_q,"s));
+  EXPECT_EQ(heartbeat_message(1, {258, {3, 4}}),
+            "\x00\x10\x55\x01\x00\x00\x01\x02\x00\x00\x00\x03\x00\x00\x00\x04"s);
 }
 
 TEST(RtdeMessage, GrantIsRead) {
@@ -77,7 +79,9 @@ TEST(RtdeMessage, StateIsReadAsItWasWritten) {
   EXPECT_TRUE(read->base_from_tcp.matrix().isApprox(given.base_from_tcp.matrix(), 1e-12));
   EXPECT_TRUE(read->flange_from_tcp.matrix().isApprox(given.flange_from_tcp.matrix(), 1e-12));
   EXPECT_EQ(read->safety_mode, SafetyMode::reduced);
-  EXPECT_EQ(read->progress, 301);
+  EXPECT_EQ(read->script.stage, ScriptStage::begun);
+  EXPECT_EQ(read->script.order, (OrderNumber{301, 302}));
+  EXPECT_EQ(read->script.tick, 303);
   EXPECT_EQ(read->time_s, 12.5);
 }
 
@@ -96,14 +100,14 @@ TEST(RtdeMessage, StateOfAnyOtherLengthOrRecipeIsRefused) {
 TEST(RtdeMessage, RecipeSaysWhatIsMissing) {
   const auto reply = [](const std::string& types) { return RtdeMessage{RtdeKind::inputs, "\2" + types}; };
   const auto read = [&](const std::string& types) {
-    return read_recipe(reply(types), {heartbeat_name}, {heartbeat_type});
+    return read_recipe(reply(types), {heartbeat_names[0]}, {heartbeat_types[0]});
   };
   EXPECT_EQ(*read("INT32"), 2);
   EXPECT_EQ(read("IN_USE").error().reason, Reason::robot_locked);
   EXPECT_EQ(read("NOT_FOUND").error().reason, Reason::unsupported);
   EXPECT_EQ(read("DOUBLE").error().reason, Reason::unsupported);
   EXPECT_EQ(read("INT32,INT32").error().reason, Reason::bad_size);
-  EXPECT_THAT(read("NOT_FOUND").error().message, testing::HasSubstr(heartbeat_name));
+  EXPECT_THAT(read("NOT_FOUND").error().message, testing::HasSubstr(heartbeat_names[0]));
 }
 
 TEST(RtdeMessage, TextOfTheRobotCannotMoveTheCursor) {

@@ -25,45 +25,63 @@ std::string moves_of(const RobotOrder& order) {
 
 }  // namespace
 
-std::string script_of(const RobotOrder& order, const RobotModel& model, std::int32_t number) {
+std::string script_of(const RobotOrder& order, const RobotModel& model, OrderNumber number) {
+  const auto periods = [&](double s) { return static_cast<int>(std::lround(s * model.rate_hz)); };
   return fmt::format(
       R"(def helicarm_order():
-  set_tcp({tool})
-  set_payload({payload:.6f})
-  write_output_integer_register(0, {begun})
   thread move():
 {moves}    write_output_integer_register(0, {done})
   end
-  mover = run move()
-  beat = read_input_integer_register(24)
-  silent = 0
+  if read_output_integer_register(1) == {session} and read_output_integer_register(2) == {count}:
+    halt
+  end
+  if read_input_integer_register(25) != {session} or read_input_integer_register(26) != {count}:
+    halt
+  end
+  write_output_integer_register(0, {none})
+  write_output_integer_register(1, {session})
+  write_output_integer_register(2, {count})
+  write_output_integer_register(3, 0)
+  write_output_integer_register(0, {waiting})
+  tick = 0
+  moving = False
   while read_output_integer_register(0) != {done}:
     sync()
+    tick = tick + 1
+    write_output_integer_register(3, tick)
     heard = read_input_integer_register(24)
-    if heard == beat:
-      silent = silent + 1
+    ours = read_input_integer_register(25) == {session} and read_input_integer_register(26) == {count}
+    live = heard > 0 and heard <= tick and tick - heard < {patience}
+    if ours and live:
+      if not moving:
+        moving = True
+        set_tcp({tool})
+        set_payload({payload:.6f})
+        write_output_integer_register(0, {begun})
+        mover = run move()
+      end
     else:
-      beat = heard
-      silent = 0
-    end
-    if heard < 0:
-      silent = {patience}
-    end
-    if silent >= {patience}:
-      kill mover
-      stopj({deceleration:.6f})
-      write_output_integer_register(0, {too_silent})
-      halt
+      if moving:
+        kill mover
+        stopj({deceleration:.6f})
+        write_output_integer_register(0, {stopped})
+        halt
+      end
+      if not ours or tick > {longest_wait}:
+        halt
+      end
     end
   end
 end
 )",
-      fmt::arg("tool", written(order.tool.flange_from_tcp)), fmt::arg("payload", order.tool.payload_kg),
-      fmt::arg("begun", progress_of(number, ScriptStage::begun)), fmt::arg("moves", moves_of(order)),
-      fmt::arg("done", progress_of(number, ScriptStage::done)),
-      fmt::arg("patience", static_cast<int>(std::lround(silence_s * model.rate_hz))),
-      fmt::arg("deceleration", stop_rad_s2),
-      fmt::arg("too_silent", progress_of(number, ScriptStage::silent)));
+      fmt::arg("moves", moves_of(order)), fmt::arg("session", number.session),
+      fmt::arg("count", number.count), fmt::arg("none", static_cast<int>(ScriptStage::none)),
+      fmt::arg("waiting", static_cast<int>(ScriptStage::waiting)),
+      fmt::arg("begun", static_cast<int>(ScriptStage::begun)),
+      fmt::arg("stopped", static_cast<int>(ScriptStage::stopped)),
+      fmt::arg("done", static_cast<int>(ScriptStage::done)), fmt::arg("patience", periods(silence_s)),
+      fmt::arg("longest_wait", periods(longest_wait_s)), fmt::arg("deceleration", stop_rad_s2),
+      fmt::arg("tool", written(order.tool.flange_from_tcp)), fmt::arg("payload", order.tool.payload_kg));
 }
 
 }  // namespace helicarm

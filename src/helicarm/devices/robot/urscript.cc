@@ -40,14 +40,14 @@ struct Call {
   std::map<std::string, double> named;
 };
 
-/// Recursive descent over one expression: comparison, sum, product, sign, primary.
+/// Recursive descent over one expression: or, and, not, comparison, sum, product, sign, primary.
 class Expression {
  public:
   Expression(std::string_view text, const std::map<std::string, UrValue>& variables, UrScriptHost& host)
       : rest_(trimmed(text)), variables_(variables), host_(host) {}
 
   UrValue whole() {
-    UrValue value = comparison();
+    UrValue value = either();
     if (!rest_.empty()) refuse();
     return value;
   }
@@ -74,6 +74,27 @@ class Expression {
   static double number(const UrValue& value) {
     if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due, not a list");
     return value[0];
+  }
+  bool taken_word(std::string_view word) {
+    std::string_view ahead = rest_;
+    if (take_word(ahead) != word) return false;
+    rest_ = ahead;
+    return true;
+  }
+  UrValue either() {
+    UrValue value = both();
+    while (taken_word("or")) value = {both() != UrValue{0} || value != UrValue{0} ? 1.0 : 0.0};
+    return value;
+  }
+  UrValue both() {
+    UrValue value = negation();
+    while (taken_word("and")) value = {negation() != UrValue{0} && value != UrValue{0} ? 1.0 : 0.0};
+    return value;
+  }
+  UrValue negation() {
+    if (!taken_word("not")) return comparison();
+    if (++parts_ > longest_expression) throw BadInput(Reason::bad_value, "expression is too long");
+    return {negation() == UrValue{0} ? 1.0 : 0.0};
   }
   UrValue comparison() {
     const UrValue left = sum();
@@ -110,7 +131,7 @@ class Expression {
     if (++parts_ > longest_expression) throw BadInput(Reason::bad_value, "expression is too long");
     if (taken("-")) return {-number(primary())};
     if (taken("(")) {
-      UrValue value = comparison();
+      UrValue value = either();
       expect(")");
       return value;
     }
@@ -138,7 +159,7 @@ class Expression {
   UrValue list(std::string_view close) {
     UrValue values;
     if (taken(close)) return values;
-    do values.push_back(number(comparison()));
+    do values.push_back(number(either()));
     while (taken(","));
     expect(close);
     return values;
@@ -152,9 +173,9 @@ class Expression {
       const std::string word = take_word(ahead);
       if (!word.empty() && ahead.starts_with("=") && !ahead.starts_with("==")) {
         rest_ = trimmed(ahead.substr(1));
-        call.named[word] = number(comparison());
+        call.named[word] = number(either());
       } else {
-        call.arguments.push_back(comparison());
+        call.arguments.push_back(either());
       }
     } while (taken(","));
     expect(")");

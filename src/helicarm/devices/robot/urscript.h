@@ -27,7 +27,8 @@ class UrScriptHost {
 };
 
 /// Runs the part of URScript that our own scripts use: one program with threads, while, if and else,
-/// assignments, run, kill, halt, sync, numbers, comparisons, lists and calls. For the virtual robot.
+/// assignments, run, kill, halt, sync, numbers, comparisons, and, or, not, lists and calls. For the virtual
+/// robot.
 class UrScript {
  public:
   /// Refuses `unsupported` and `bad_value` with the line.

@@ -16,13 +16,14 @@ struct Notebook : UrScriptHost {
     moving_ = true;
   }
   UrValue call(const std::string& name, const std::vector<UrValue>& arguments) override {
-    if (name == "note") return note = arguments.at(0), UrValue{};
+    if (name == "note") return notes.push_back(note = arguments.at(0)), UrValue{};
     if (name == "input") return {input};
     throw BadInput(Reason::unsupported, "function " + name + " is not defined");
   }
   bool moving_ = false;
   double speed = 0, input = 0;
   UrValue note;
+  std::vector<UrValue> notes;
   std::string log;
 };
 
@@ -42,6 +43,17 @@ TEST(UrScript, ArithmeticAndBranches) {
   Notebook notebook;
   EXPECT_FALSE(*script->step(notebook));
   EXPECT_EQ(notebook.note, (UrValue{9, 8, 0.5}));
+}
+
+TEST(UrScript, AndBindsCloserThanOrAndNotClosest) {
+  auto script = UrScript::parse(
+      "def f():\n  no = False\n  note([1 == 1 or no and no, not no and 2 > 1, not (1 == 1 or no), no or not "
+      "1 < 2])\n"
+      "  order = 3\n  android = 4\n  note([order + android, 0])\nend\n");
+  ASSERT_TRUE(script) << script.error().message;
+  Notebook notebook;
+  EXPECT_FALSE(*script->step(notebook));
+  EXPECT_EQ(notebook.notes, (std::vector<UrValue>{{1, 1, 0, 0}, {7, 0}}));
 }
 
 TEST(UrScript, ThreadMovesWhileTheProgramWatches) {

@@ -86,6 +86,8 @@ void VirtualController::stop(SafetyMode mode) {
 void VirtualController::step() {
   const double period_s = 1 / model_.rate_hz;
   time_s_ += period_s;
+  while (!coming_faults_.empty() && coming_faults_.begin()->first <= time_s_)
+    set(coming_faults_.extract(coming_faults_.begin()).mapped(), true);
   while (!waiting_scripts_.empty() && waiting_scripts_.begin()->first <= time_s_)
     start_script(waiting_scripts_.extract(waiting_scripts_.begin()).mapped());
   if (script_) {
@@ -225,6 +227,12 @@ UrValue VirtualController::call(const std::string& name, const std::vector<UrVal
   const auto expect = [&](std::size_t count) {
     if (arguments.size() != count) throw BadInput(Reason::bad_value, name + ": wrong number of arguments");
   };
+  const auto place = [&](double first, std::size_t count) {
+    const double index = one(arguments[0]) - first;
+    if (!(index >= 0 && index < static_cast<double>(count)))
+      throw BadInput(Reason::unsupported, name + ": our scripts do not use this register");
+    return static_cast<std::size_t>(index);
+  };
   if (name == "set_tcp") {
     expect(1);
     tool_.flange_from_tcp = transform_from(six(arguments[0]));
@@ -233,13 +241,15 @@ UrValue VirtualController::call(const std::string& name, const std::vector<UrVal
     tool_.payload_kg = one(arguments[0]);
   } else if (name == "read_input_integer_register") {
     expect(1);
-    return {one(arguments[0]) == 24 ? double(heartbeat_) : 0.0};
+    const std::array<std::int32_t, 3> inputs = {heartbeat_.beat, heartbeat_.order.session,
+                                                heartbeat_.order.count};
+    return {double(inputs.at(place(24, inputs.size())))};
   } else if (name == "read_output_integer_register") {
     expect(1);
-    return {double(progress_)};
+    return {double(outputs_.at(place(0, outputs_.size())))};
   } else if (name == "write_output_integer_register") {
     expect(2);
-    if (one(arguments[0]) == 0) progress_ = static_cast<std::int32_t>(one(arguments[1]));
+    outputs_.at(place(0, outputs_.size())) = static_cast<std::int32_t>(one(arguments[1]));
   } else {
     throw BadInput(Reason::unsupported, "function " + name + " is not defined");
   }
@@ -260,7 +270,7 @@ RobotState VirtualController::state() const {
   state.safety_bits = bits_of(safety_);
   state.runtime = script_ ? RuntimeState::playing : RuntimeState::stopped;
   state.speed_scaling = has(RobotFault::zero_speed) ? 0 : 1;
-  state.progress = progress_;
+  state.script = {static_cast<ScriptStage>(outputs_[0]), {outputs_[1], outputs_[2]}, outputs_[3]};
   return state;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <set>
@@ -51,6 +52,8 @@ class VirtualController : public UrScriptHost {
 
   void step();
   void set(RobotFault fault, bool on);
+  /// At this time of its own clock.
+  void set_at(RobotFault fault, double time_s) { coming_faults_.emplace(time_s, fault); }
   bool has(RobotFault fault) const { return faults_.contains(fault); }
   /// Starts a program, ending the one that runs, after each of the delays; not heard in local mode.
   void run_script(const std::string& text);
@@ -60,7 +63,7 @@ class VirtualController : public UrScriptHost {
   std::size_t waiting_scripts() const { return waiting_scripts_.size(); }
   /// The answer to one command of the dashboard, without its end of line.
   std::string dashboard(std::string_view command);
-  void set_heartbeat(std::int32_t beat) { heartbeat_ = beat; }
+  void set_heartbeat(const Heartbeat& heartbeat) { heartbeat_ = heartbeat; }
 
   RobotState state() const;
   double time_s() const { return time_s_; }
@@ -81,6 +84,7 @@ class VirtualController : public UrScriptHost {
   RobotTool tool_;
   VirtualArm arm_;
   std::set<RobotFault> faults_;
+  std::multimap<double, RobotFault> coming_faults_;
   std::optional<UrScript> script_;
   std::string script_error_;
   std::vector<double> script_delays_s_ = {0};
@@ -91,8 +95,8 @@ class VirtualController : public UrScriptHost {
   double stopped_at_s_ = 0;
   std::optional<double> brake_at_s_;
   std::optional<double> rest_since_s_;
-  std::int32_t heartbeat_ = 0;
-  std::int32_t progress_ = 0;
+  Heartbeat heartbeat_;                    ///< input registers 24 to 26
+  std::array<std::int32_t, 4> outputs_{};  ///< output registers 0 to 3
 };
 
 }  // namespace helicarm

@@ -13,12 +13,20 @@ namespace {
 
 VirtualController robot(const RobotModel& model = ur5()) { return {model, drill(), resting_joints()}; }
 
+constexpr OrderNumber number{7, 1};
+
+/// As the link would answer the controller's state.
+void beat(VirtualController& controller) {
+  const ScriptReport script = controller.state().script;
+  controller.set_heartbeat({script.order == number && script.tick > 0 ? script.tick : stop_beat, number});
+}
+
 /// Runs the script with a heartbeat until it ends or `until` says so; gives the time passed.
 double run_until(
     VirtualController& controller, const std::function<bool()>& until = [] { return false; }) {
   const double start_s = controller.time_s();
-  for (int beat = 1; beat < 20000; ++beat) {
-    controller.set_heartbeat(beat);
+  for (int i = 0; i < 20000; ++i) {
+    beat(controller);
     controller.step();
     if (until() || controller.state().runtime == RuntimeState::stopped) break;
   }
@@ -32,9 +40,9 @@ void rest(VirtualController& controller) {
 TEST(Script, HoldsNumbersOnly) {
   RobotOrder order = planned();
   order.name = "knee\")\nmovej([0, 0, 0, 0, 0, 0])\n";
-  EXPECT_EQ(script_of(order, ur5(), 7), script_of(planned(), ur5(), 7));
-  EXPECT_THAT(script_of(order, ur5(), 7), testing::HasSubstr("if silent >= 10:"));
-  EXPECT_THAT(script_of(order, ur5e(), 7), testing::HasSubstr("if silent >= 40:"));
+  EXPECT_EQ(script_of(order, ur5(), number), script_of(planned(), ur5(), number));
+  EXPECT_THAT(script_of(order, ur5(), number), testing::HasSubstr("tick - heard < 10\n"));
+  EXPECT_THAT(script_of(order, ur5e(), number), testing::HasSubstr("tick - heard < 40\n"));
 }
 
 TEST(VirtualController, OrderBringsTheTipToItsEndInTheTimeForeseen) {
@@ -44,10 +52,11 @@ TEST(VirtualController, OrderBringsTheTipToItsEndInTheTimeForeseen) {
     const TunnelAxis axis{here * Eigen::Vector3d(10, 20, 90), here * Eigen::Vector3d(10, 22, 120)};
     const auto order = plan_approach("femur", model, drill(), resting_joints(), axis);
     ASSERT_TRUE(order) << order.error().message;
-    controller.run_script(script_of(*order, model, 3));
+    controller.run_script(script_of(*order, model, number));
     const double took_s = run_until(controller);
     EXPECT_EQ(controller.script_error(), "");
-    EXPECT_EQ(controller.state().progress, progress_of(3, ScriptStage::done));
+    EXPECT_EQ(controller.state().script.stage, ScriptStage::done);
+    EXPECT_EQ(controller.state().script.order, number);
     const RigidTransform& end = order->waypoints.back().base_from_tcp;
     EXPECT_LT((controller.state().base_from_tcp.translation - end.translation).norm(), 1e-5);
     EXPECT_NEAR(took_s, duration_s(*order), 0.2);
@@ -65,15 +74,15 @@ TEST(VirtualController, SilenceStopsTheFastestOrderWithin200Milliseconds) {
       order.waypoints = {{aside, 250, 1200}};
       ASSERT_TRUE(check_order(order, controller.state()))
           << check_order(order, controller.state()).error().message;
-      controller.run_script(script_of(order, model, 1));
+      controller.run_script(script_of(order, model, number));
       const double begun_s = controller.time_s();
       run_until(controller, [&] { return controller.time_s() - begun_s > 0.016 * moment; });
       ASSERT_TRUE(controller.moving());
       const double silent_since_s = controller.time_s();
       rest(controller);
-      EXPECT_EQ(controller.state().progress, progress_of(1, ScriptStage::begun));
+      EXPECT_EQ(controller.state().script.stage, ScriptStage::begun);
       controller.step();
-      EXPECT_EQ(controller.state().progress, progress_of(1, ScriptStage::silent));
+      EXPECT_EQ(controller.state().script.stage, ScriptStage::stopped);
       longest_s = std::max(longest_s, *controller.rest_since_s() - silent_since_s);
     }
     EXPECT_LE(longest_s, 0.2);
@@ -84,7 +93,7 @@ TEST(VirtualController, SilenceStopsTheFastestOrderWithin200Milliseconds) {
 
 TEST(VirtualController, EmergencyStopBrakesAndNeedsPowerAndBrakesAfterwards) {
   VirtualController controller = robot();
-  controller.run_script(script_of(planned(), ur5(), 1));
+  controller.run_script(script_of(planned(), ur5(), number));
   run_until(controller, [&] { return controller.time_s() > 1; });
   const double pressed_s = controller.time_s();
   controller.set(RobotFault::emergency_stop, true);
@@ -127,7 +136,7 @@ TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
   controller.step();
   EXPECT_THAT(controller.script_error(), testing::HasSubstr("os_command"));
   controller.set(RobotFault::local_mode, true);
-  controller.run_script(script_of(planned(), ur5(), 1));
+  controller.run_script(script_of(planned(), ur5(), number));
   controller.step();
   EXPECT_EQ(controller.state().runtime, RuntimeState::stopped);
   EXPECT_FALSE(controller.moving());

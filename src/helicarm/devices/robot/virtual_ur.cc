@@ -25,6 +25,13 @@ constexpr std::chrono::milliseconds breath{100};
 constexpr std::uint8_t state_recipe = 1, heartbeat_recipe = 2;
 constexpr std::string_view empty_robot_state("\0\0\0\5\x10", 5);
 
+Heartbeat take_heartbeat(BigEndianReader& reader) {
+  Heartbeat heartbeat;
+  for (std::int32_t* part : {&heartbeat.beat, &heartbeat.order.session, &heartbeat.order.count})
+    *part = reader.take<std::int32_t>();
+  return heartbeat;
+}
+
 }  // namespace
 
 class VirtualUr::Server {
@@ -85,6 +92,7 @@ class VirtualUr::Server {
   }
 
   std::string dashboard(const std::string& command) { return controller_.dashboard(command); }
+  void set_at(RobotFault fault, double time_s) { controller_.set_at(fault, time_s); }
   void delay_scripts(std::vector<double> delays_s) { controller_.delay_scripts(std::move(delays_s)); }
 
   void hold_dashboard(bool on) {
@@ -243,11 +251,10 @@ class VirtualUr::Server {
       case RtdeKind::inputs: {
         const bool taken = controller_.has(RobotFault::input_in_use) ||
                            std::ranges::any_of(clients_, [](const auto& one) { return one->commands; });
-        const bool known = reader.take(reader.left()) == heartbeat_name;
+        const bool known = reader.take(reader.left()) == fmt::format("{}", fmt::join(heartbeat_names, ","));
         client.commands = known && !taken;
-        return reply(static_cast<char>(heartbeat_recipe) + std::string(!known  ? "NOT_FOUND"
-                                                                       : taken ? "IN_USE"
-                                                                               : heartbeat_type));
+        const std::string type = !known ? "NOT_FOUND" : taken ? "IN_USE" : "INT32";
+        return reply(fmt::format("{}{},{},{}", static_cast<char>(heartbeat_recipe), type, type, type));
       }
       case RtdeKind::start:
         client.started = !client.names.empty();
@@ -259,7 +266,7 @@ class VirtualUr::Server {
         return reply("\1");
       case RtdeKind::data:
         if (!client.commands || reader.take<std::uint8_t>() != heartbeat_recipe) return;
-        controller_.set_heartbeat(reader.take<std::int32_t>());
+        controller_.set_heartbeat(take_heartbeat(reader));
         if (client.unanswered > 0) --client.unanswered;
         if (options_.lockstep && client.unanswered == 0) step();
         return;
@@ -332,6 +339,10 @@ std::uint16_t VirtualUr::script_port() const { return server_->port(2); }
 
 void VirtualUr::set(RobotFault fault, bool on) {
   server_->there([&] { server_->set(fault, on); });
+}
+
+void VirtualUr::set_at(RobotFault fault, double time_s) {
+  server_->there([&] { server_->set_at(fault, time_s); });
 }
 
 std::string VirtualUr::dashboard(const std::string& command) {

@@ -62,6 +62,8 @@ class VirtualUr {
   std::uint16_t script_port() const;
 
   void set(RobotFault fault, bool on = true);
+  /// On the robot's clock: what happens does not depend on any machine's speed.
+  void set_at(RobotFault fault, double time_s);
   /// As if somebody had asked at the dashboard.
   std::string dashboard(const std::string& command);
   /// As `VirtualController::delay_scripts`.

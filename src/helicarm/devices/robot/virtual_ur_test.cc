@@ -45,9 +45,11 @@ struct RawClient {
   void start() {
     EXPECT_EQ(ask("\x00\x05\x56\x00\x02"s).content, "\1");
     EXPECT_EQ(ask("\x00\x03\x76"s).content.substr(0, 8), "\0\0\0\3\0\0\0\17"s);
-    EXPECT_EQ(ask(request_outputs(125)).content,
-              "\1DOUBLE,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,DOUBLE,INT32,INT32,UINT32,UINT32,DOUBLE,INT32");
-    EXPECT_EQ(ask(request_inputs()).content, "\2INT32");
+    EXPECT_EQ(
+        ask(request_outputs(125)).content,
+        "\1DOUBLE,VECTOR6D,VECTOR6D,VECTOR6D,VECTOR6D,DOUBLE,INT32,INT32,UINT32,UINT32,DOUBLE,INT32,INT32,"
+        "INT32,INT32");
+    EXPECT_EQ(ask(request_inputs()).content, "\2INT32,INT32,INT32");
     EXPECT_EQ(ask("\x00\x03\x53"s).content, "\1");
   }
 };
@@ -59,10 +61,12 @@ TEST(VirtualUr, ProcessThatDiesOnTheWayLeavesARobotThatStops) {
     RawClient client(*robot);
     client.start();
     auto script = TimedSocket::connect("127.0.0.1", robot->script_port(), 10s).value();
-    ASSERT_TRUE(script.send(script_of(planned(), ur5(), 1), 10s));
-    for (int beat = 1; robot->truth().state.joint_speeds.norm() < 0.05 && beat < 5000; ++beat) {
-      client.next();
-      ASSERT_TRUE(client.socket.send(heartbeat_message(2, beat), 10s));
+    ASSERT_TRUE(script.send(script_of(planned(), ur5(), {7, 1}), 10s));
+    while (robot->truth().state.joint_speeds.norm() < 0.05) {
+      const RobotState state = read_state(client.next(), 1).value();
+      ASSERT_LT(state.time_s, 40);
+      const std::int32_t beat = state.script.tick > 0 ? state.script.tick : stop_beat;
+      ASSERT_TRUE(client.socket.send(heartbeat_message(2, {beat, {7, 1}}), 10s));
     }
     ASSERT_TRUE(robot->truth().moving);
     alive_s = robot->truth().state.time_s;
@@ -70,7 +74,7 @@ TEST(VirtualUr, ProcessThatDiesOnTheWayLeavesARobotThatStops) {
   robot->advance(0.5);
   EXPECT_FALSE(robot->truth().moving);
   EXPECT_LE(*robot->truth().rest_since_s - alive_s, 0.2);
-  EXPECT_EQ(robot->truth().state.progress, progress_of(1, ScriptStage::silent));
+  EXPECT_EQ(robot->truth().state.script.stage, ScriptStage::stopped);
 }
 
 TEST(VirtualUr, NonsenseClosesTheConnectionAndMovesNothing) {
@@ -95,7 +99,7 @@ TEST(VirtualUr, FieldsAskedForComeInTheirOrderAndUnknownOnesAreNotFound) {
   EXPECT_EQ(client.ask(to_bytes({RtdeKind::outputs, hz + "robot_mode,timestamp"})).content, "\1INT32,DOUBLE");
   EXPECT_EQ(client.ask(request_start()).content, "\1");
   EXPECT_EQ(client.next().content, "\1\0\0\0\7"s + std::string(8, '\0'));
-  EXPECT_EQ(client.ask(to_bytes({RtdeKind::inputs, "wish"})).content, "\2NOT_FOUND");
+  EXPECT_EQ(client.ask(to_bytes({RtdeKind::inputs, "wish"})).content, "\2NOT_FOUND,NOT_FOUND,NOT_FOUND");
 }
 
 TEST(VirtualUr, PortThatIsTakenIsTold) {
