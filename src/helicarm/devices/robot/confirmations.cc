@@ -8,7 +8,7 @@
 namespace helicarm {
 
 std::string Confirmations::confirm(const RobotOrder& order, Clock::time_point now) {
-  std::random_device random;
+  thread_local std::random_device random;
   const std::string token = fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
   entries_[token] = {to_json(order).dump(), now + valid_for_};
   return token;
