@@ -57,6 +57,7 @@ Lamp robot_lamp(const RobotLinkStatus& status) {
     case LinkPhase::ready:
       lamp.light = Light::green;
       break;
+    case LinkPhase::starting:
     case LinkPhase::moving:
       lamp.light = Light::green;
       break;

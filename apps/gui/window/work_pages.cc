@@ -193,6 +193,7 @@ QString NavigatePage::next_step() const {
       return tr("The robot is locked. Hold 1 when nobody is near it.");
     case LinkPhase::stopped:
       return why + tr("It rests until you have looked at it and hold 1.");
+    case LinkPhase::starting:
     case LinkPhase::moving:
       return tr("The robot moves.");
     case LinkPhase::ready:

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <atomic>
 #include <future>
+#include <thread>
 
 #include <gmock/gmock.h>
 
@@ -15,25 +17,27 @@ using namespace std::chrono_literals;
 
 /// A link to a robot in lockstep, whose clock stands while its states are frozen.
 struct StopDrill {
-  StopDrill() : robot(VirtualUr::start(options()).value()), link(config(*robot)) {
+  /// The limit for a script to begin goes by the time of day: long, for a machine that is busy.
+  explicit StopDrill(double start_s = 60, bool lockstep = true)
+      : robot(VirtualUr::start(options(lockstep)).value()), link(config(*robot, start_s)) {
     EXPECT_TRUE(link.wait_connected(10s));
     EXPECT_TRUE(link.unlock("tester"));
   }
-  static VirtualUrOptions options() {
+  static VirtualUrOptions options(bool lockstep) {
     VirtualUrOptions options;
     options.tool = drill();
     options.joints = resting_joints();
     options.rtde_port = options.dashboard_port = options.script_port = 0;
-    options.lockstep = true;
+    options.lockstep = lockstep;
     return options;
   }
-  static RobotConfig config(const VirtualUr& robot) {
+  static RobotConfig config(const VirtualUr& robot, double start_s) {
     RobotConfig config;
     config.rtde_port = robot.rtde_port();
     config.dashboard_port = robot.dashboard_port();
     config.script_port = robot.script_port();
-    config.stale_s = config.program_silence_s = config.lost_s = 10;
-    config.start_s = 1;
+    config.stale_s = config.program_silence_s = config.lost_s = 60;
+    config.start_s = start_s;
     return config;
   }
 
@@ -118,8 +122,33 @@ TEST(StoppedOrder, MovesNoFurtherThanItsBrakingNeeds) {
   }
 }
 
+/// By the time of day: a busy machine holds a stop up, so only that it rests is asked.
+TEST(StoppedOrder, RestsOnTheRealClockToo) {
+  for (const double acceleration : {250.0, 1200.0}) {
+    StopDrill drill(60, false);
+    const RobotOrder order = order_with(acceleration);
+    auto done =
+        std::async(std::launch::async, [&] { return drill.link.execute(order, drill.link.confirm(order)); });
+    const Eigen::Vector3d rested = resting_state().base_from_tcp.translation;
+    while ((drill.tip() - rested).norm() < 40 && done.wait_for(1ms) != std::future_status::ready) {
+    }
+    const VirtualTruth told = drill.robot->truth();
+    const auto told_at = std::chrono::steady_clock::now();
+    drill.link.stop();
+    while (drill.robot->truth().moving) std::this_thread::sleep_for(100us);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - told_at;
+    EXPECT_EQ(done.get().error().reason, Reason::robot_stopped);
+    const Eigen::Vector3d stopped_at = drill.tip();
+    drill.pass(0.2);
+    EXPECT_EQ((drill.tip() - stopped_at).norm(), 0);
+    RecordProperty(fmt::format("real_moved_um_{}", acceleration),
+                   static_cast<int>(1000 * (stopped_at - told.base_from_tip.translation).norm()));
+    RecordProperty(fmt::format("real_stop_ms_{}", acceleration), static_cast<int>(took.count()));
+  }
+}
+
 TEST(StoppedOrder, IsNotFedByTheOrderConfirmedAfterwards) {
-  StopDrill drill;
+  StopDrill drill(1);
   const Eigen::Vector3d rested = drill.tip();
   drill.stop_while_script_waits(order_with(1200), {0.5, 0.8});
   ASSERT_TRUE(drill.link.unlock("tester"));
@@ -204,6 +233,41 @@ TEST(StoppedOrder, UnlockDoesNotLetItsCorrectionsGoOn) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
   EXPECT_EQ((drill.tip() - rested).norm(), 0);
+}
+
+TEST(StoppedOrder, CallsOfManyThreadsEndWithTheLastStop) {
+  StopDrill drill;
+  drill.robot->delay_scripts({0.016, 0.2});
+  RobotOrder order = order_with(1200);
+  order.waypoints[0].base_from_tcp.translation.y() -= 99;  // 1 mm: there, and there again
+  std::atomic<int> stops{0};
+  std::atomic<bool> over{false};
+  std::jthread person([&] {
+    while (!over) (void)drill.link.unlock("tester");
+  });
+  std::jthread other([&] {
+    while (!over) {
+      drill.link.stop();
+      std::this_thread::sleep_for(5ms + ++stops % 5 * 20ms);
+    }
+  });
+  std::jthread reader([&] {
+    while (!over) EXPECT_GE(drill.link.status().age_s, 0);
+  });
+  int refused = 0, carried_out = 0;
+  const auto limit = std::chrono::steady_clock::now() + 60s;
+  while ((refused < 10 || stops < 10 || carried_out == 0) && std::chrono::steady_clock::now() < limit)
+    ++(drill.link.execute(order, drill.link.confirm(order)) ? carried_out : refused);
+  over = true;
+  other.join();
+  person.join();
+  drill.link.stop();
+  drill.pass(0.2);
+  const Eigen::Vector3d rested = drill.tip();
+  drill.pass(0.5);
+  EXPECT_EQ((drill.tip() - rested).norm(), 0);
+  EXPECT_EQ(drill.link.status().phase, LinkPhase::stopped);
+  RecordProperty("carried_out", carried_out);
 }
 
 }  // namespace
