@@ -14,7 +14,7 @@ inline constexpr int step_ms = 4, steps_per_period = 2;  // a UR5 has periods of
 
 /// The rules of the script, each of which a test may break.
 struct ScriptRules {
-  bool number_before = true;  ///< it ends at once when its number is not in the registers
+  bool number_before = true;  ///< it waits until its number is in the registers
   bool number_during = true;
   bool once = true;  ///< it ends at once when it has begun before
   bool stop_beat = true;
@@ -67,14 +67,19 @@ class ScriptModel {
 
  private:
   void come(const Heartbeat& in, ScriptReport& out) {
+    ended_ = rules_.once && waited_ == 0 && out.order == number_;
+    if (!ended_ && rules_.number_before && in.order != number_) {
+      ended_ = waited_++ > rules_.longest_wait;
+      return;
+    }
     come_ = true;
-    ended_ = (rules_.once && out.order == number_) || (rules_.number_before && in.order != number_);
     if (!ended_) out = {ScriptStage::waiting, number_, 0};
   }
 
   OrderNumber number_;
   ScriptRules rules_;
   std::int32_t tick_ = 0;
+  int waited_ = 0;
   bool come_ = false, moving_ = false, begins_ = false, braking_ = false, ended_ = false;
 };
 

@@ -86,7 +86,7 @@ TEST(StoppedOrder, ScriptThatStartsLateMovesNothing) {
       StopDrill drill;
       const Eigen::Vector3d rested = drill.tip();
       drill.stop_while_script_waits(order_with(acceleration), {delay_s});
-      drill.pass(delay_s + 0.5);
+      drill.pass(delay_s + longest_wait_s + 0.5);
       EXPECT_EQ(drill.robot->truth().script_error, "");
       EXPECT_EQ((drill.tip() - rested).norm(), 0) << acceleration << " mm/s^2, " << delay_s << " s late";
     }

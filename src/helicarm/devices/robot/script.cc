@@ -35,8 +35,13 @@ std::string script_of(const RobotOrder& order, const RobotModel& model, OrderNum
   if read_output_integer_register(1) == {session} and read_output_integer_register(2) == {count}:
     halt
   end
-  if read_input_integer_register(25) != {session} or read_input_integer_register(26) != {count}:
-    halt
+  waited = 0
+  while read_input_integer_register(25) != {session} or read_input_integer_register(26) != {count}:
+    if waited > {longest_wait}:
+      halt
+    end
+    waited = waited + 1
+    sync()
   end
   write_output_integer_register(0, {none})
   write_output_integer_register(1, {session})

@@ -13,12 +13,12 @@ namespace helicarm {
 /// have, and a period each for sending and reading, it rests within 200 ms.
 inline constexpr double silence_s = 0.08;
 inline constexpr double stop_rad_s2 = 8;
-/// A script that has come and hears no beat for so long ends.
+/// A script that has come ends when it finds another number for so long, or then hears no beat for so long.
 inline constexpr double longest_wait_s = 1;
 
 /// The URScript that carries an order out: a thread moves from waypoint to waypoint while the program watches
-/// the heartbeat. It ends without motion when its number is not the one in the registers, or has begun
-/// before. Holds numbers only: no text from the order goes into it.
+/// the heartbeat. It moves only while its number is the one in the registers, and never begins twice. Holds
+/// numbers only: no text from the order goes into it.
 std::string script_of(const RobotOrder& order, const RobotModel& model, OrderNumber number);
 
 }  // namespace helicarm
