@@ -90,6 +90,7 @@ class RobotLink {
   void changed();
 
   RobotConfig config_;
+  ToolTrack track_;
   std::mutex executing_;
   mutable std::mutex guard_;  ///< of all that follows
   mutable std::condition_variable news_;

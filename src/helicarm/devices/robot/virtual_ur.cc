@@ -202,7 +202,10 @@ class VirtualUr::Server {
   }
 
   void answer_dashboard(const std::shared_ptr<VirtualUrClient>& client, const std::string& line) {
-    if (dashboard_held_)
+    constexpr std::size_t most_held = 1000;
+    if (dashboard_held_ && held_questions_.size() >= most_held)
+      client->cut("over 1000 questions while the dashboard is held");
+    else if (dashboard_held_)
       held_questions_.emplace_back(client, line);
     else if (client->socket.is_open())
       client->send(controller_.dashboard(line) + "\n");
