@@ -106,18 +106,21 @@ struct Scene {
   Outcome carry_out(const RobotOrder& order, const Moves& femur, const Moves& base = {},
                     const Moves& tool = {}) {
     const PlanWatch plan = watch();
-    robot.run_script(script_of(order, ur5(), 1));
+    constexpr OrderNumber number{7, 1};
+    robot.run_script(script_of(order, ur5(), number));
     const double begun_s = time_s;
     Outcome outcome;
     std::optional<double> astray_s;
     Vector3d tip_then = tip().translation;
-    for (int beat = 1; beat < 20000; ++beat) {
+    for (int period = 0; period < 20000; ++period) {
       const double since_s = time_s - begun_s;
       if (femur) femur_moves = femur(since_s);
       if (base) base_moves = base(since_s);
       if (tool) tool_moves = tool(since_s);
       if (!astray_s && astray()) astray_s = time_s, tip_then = tip().translation;
-      robot.set_heartbeat(outcome.stopped ? stop_beat : beat);
+      const ScriptReport script = robot.state().script;
+      const bool may_move = !outcome.stopped && script.order == number && script.tick > 0;
+      robot.set_heartbeat({may_move ? script.tick : stop_beat, number});
       step();
       if (robot.state().runtime == RuntimeState::stopped && !robot.moving()) break;
       if (outcome.stopped) continue;
