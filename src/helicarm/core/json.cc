@@ -16,7 +16,9 @@ namespace helicarm {
 namespace {
 
 constexpr std::uintmax_t max_json_bytes = 64u << 20;
-constexpr int max_depth = 64;
+constexpr std::size_t max_depth = 64;
+/// The library looks a key up by going through all keys of its object: their number must be bounded.
+constexpr std::size_t max_keys = 1000;
 
 bool names_non_finite(std::string_view rest) {
   for (std::string_view word : {"NaN", "nan", "Infinity", "inf", "-NaN", "-nan", "-Infinity", "-inf"})
@@ -30,40 +32,73 @@ std::string shorten(const Json& value) {
   return text;
 }
 
+/// Reads a text without building its values: so nesting and keys are bounded before anything grows with them.
+class StructureCheck : public nlohmann::json_sax<Json> {
+ public:
+  StructureCheck(std::string_view text, const std::string& origin) : text_(text), origin_(origin) {}
+
+  const Failure& failure() const { return failure_; }
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(std::size_t) override { return deeper(); }
+  bool end_object() override { return shallower(); }
+  bool start_array(std::size_t) override { return deeper(); }
+  bool end_array() override { return shallower(); }
+
+  bool key(string_t& name) override {
+    if (!keys_.back().insert(name).second)
+      return refuse(Reason::bad_json, fmt::format("key {} is given twice", shorten(name)));
+    if (keys_.back().size() > max_keys)
+      return refuse(Reason::bad_json, fmt::format("an object of more than {} keys", max_keys));
+    return true;
+  }
+
+  bool parse_error(std::size_t position, const std::string&,
+                   const nlohmann::json::exception& error) override {
+    constexpr int out_of_range = 406;
+    if (error.id == out_of_range)
+      return refuse(Reason::not_finite, "a number is beyond the range of a double");
+    const std::size_t at = std::min(position, text_.size());
+    for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
+      if (names_non_finite(text_.substr(start)))
+        return refuse(Reason::not_finite, fmt::format("a number is not finite (byte {})", start + 1));
+    return refuse(Reason::bad_json, fmt::format("not valid JSON at byte {}", position));
+  }
+
+ private:
+  bool refuse(Reason reason, const std::string& problem) {
+    failure_ = {reason, fmt::format("{}: {}", origin_, problem), {}, {}};
+    return false;
+  }
+  bool deeper() {
+    if (keys_.size() == max_depth)
+      return refuse(Reason::bad_json, fmt::format("nested deeper than {}", max_depth));
+    keys_.emplace_back();
+    return true;
+  }
+  bool shallower() {
+    keys_.pop_back();
+    return true;
+  }
+
+  std::string_view text_;
+  const std::string& origin_;
+  std::vector<std::set<std::string>> keys_;  ///< of each object around the place; an array has none
+  Failure failure_{Reason::bad_json, origin_, {}, {}};
+};
+
 }  // namespace
 
 Expected<Json> parse_json(std::string_view text, const std::string& origin) {
-  std::vector<std::set<std::string>> keys;
-  std::string twice;
-  bool too_deep = false;
-  const auto watch = [&](int depth, Json::parse_event_t event, Json& parsed) {
-    if (depth > max_depth) {
-      too_deep = true;
-      throw BadInput(Reason::bad_json, fmt::format("{}: nested deeper than {}", origin, max_depth));
-    }
-    if (event == Json::parse_event_t::object_start) keys.emplace_back();
-    if (event == Json::parse_event_t::object_end) keys.pop_back();
-    if (event == Json::parse_event_t::key && !keys.back().insert(parsed.get<std::string>()).second)
-      twice = parsed.get<std::string>();
-    return true;
-  };
-  try {
-    Json value = Json::parse(text.begin(), text.end(), watch);
-    if (!twice.empty())
-      return fail(Reason::bad_json, fmt::format("{}: key {} is given twice", origin, shorten(twice)));
-    return value;
-  } catch (const BadInput& bad) {
-    return tl::unexpected<Failure>(bad.failure());
-  } catch (const Json::parse_error& error) {
-    std::size_t at = std::min<std::size_t>(error.byte, text.size());
-    for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
-      if (names_non_finite(text.substr(start)))
-        return fail(Reason::not_finite,
-                    fmt::format("{}: a number is not finite (byte {})", origin, start + 1));
-    return fail(Reason::bad_json, fmt::format("{}: not valid JSON at byte {}", origin, error.byte));
-  } catch (const Json::out_of_range& error) {
-    return fail(Reason::not_finite, fmt::format("{}: a number is beyond the range of a double", origin));
-  }
+  StructureCheck check(text, origin);
+  if (!Json::sax_parse(text.begin(), text.end(), &check)) return tl::unexpected<Failure>(check.failure());
+  return Json::parse(text.begin(), text.end());
 }
 
 Expected<Json> read_json(const std::filesystem::path& path) {

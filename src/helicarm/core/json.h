@@ -24,8 +24,9 @@ extern template class nlohmann::basic_json<nlohmann::ordered_map>;
 
 namespace helicarm {
 
-/// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a key given twice and every
-/// other fault are `bad_json`; nesting is bounded. `origin` (a file name) begins each message.
+/// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a key given twice, nesting
+/// deeper than 64, an object of more than 1000 keys and every other fault are `bad_json`. `origin` (a file
+/// name) begins each message. All JSON that comes from outside is read by this function.
 Expected<Json> parse_json(std::string_view text, const std::string& origin);
 Expected<Json> read_json(const std::filesystem::path& path);
 

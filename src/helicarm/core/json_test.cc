@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/core/json.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace helicarm {
@@ -30,7 +31,28 @@ TEST(ParseJson, SameKeyInTwoObjectsIsFine) {
   EXPECT_TRUE(parse_json(R"([{"a": 1}, {"a": 2}])", "x").has_value());
 }
 
-TEST(ParseJson, DeepNestingIsRefused) { EXPECT_EQ(reason_of(std::string(100000, '[')), Reason::bad_json); }
+TEST(ParseJson, DeepNestingIsRefused) {
+  EXPECT_EQ(reason_of(std::string(100000, '[')), Reason::bad_json);
+  const auto nested = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+  EXPECT_TRUE(parse_json(nested(64), "x").has_value());
+  EXPECT_EQ(reason_of(nested(65)), Reason::bad_json);
+}
+
+TEST(ParseJson, ManyObjectsInAListTakeTimeByTheirNumberNotItsSquare) {
+  std::string list = "[{}";
+  for (int i = 0; i < 2000000; ++i) list += ",{}";
+  EXPECT_EQ(parse_json(list + "]", "x").value().size(), 2000001u);
+}
+
+TEST(ParseJson, ObjectOfTooManyKeysIsRefused) {
+  const auto object = [](int keys) {
+    std::string text = "{";
+    for (int i = 0; i < keys; ++i) text += fmt::format("{}\"{}\": 0", i > 0 ? "," : "", i);
+    return text + "}";
+  };
+  EXPECT_TRUE(parse_json(object(1000), "x").has_value());
+  EXPECT_EQ(reason_of(object(1001)), Reason::bad_json);
+}
 
 template <class F>
 Failure failure_of(const std::string& text, F&& read) {

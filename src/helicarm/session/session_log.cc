@@ -24,6 +24,7 @@ namespace {
 constexpr std::string_view format_name = "helicarm-session/1";
 constexpr std::size_t chain_digits = 64;  // SHA-256
 constexpr std::uintmax_t most_log_bytes = std::uintmax_t{1} << 30;
+constexpr int most_records = 100'000'000;
 
 std::string link(std::string_view chain, std::string_view text) {
   const std::string both = std::string(chain) + std::string(text);
@@ -37,9 +38,19 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-SessionRecord record_of(const Json& json) {
-  return {json.at("n").get<std::uint64_t>(), json.at("time_s").get<double>(),
-          json.at("kind").get<std::string>(), json.at("content")};
+SessionRecord record_of(std::string_view text, const std::string& where) {
+  const Json json = value_or_throw(parse_json(text, where));
+  JsonReader reader(json, where);
+  SessionRecord record{static_cast<std::uint64_t>(reader.integer("n", 0, most_records)),
+                       reader.number("time_s", {0, 1e12}), reader.text("kind"), reader.raw("content")};
+  if (!json.contains("content")) reader.refuse(Reason::bad_value, "content", "is missing");
+  reader.finish();
+  return record;
+}
+
+bool begins_log(const SessionRecord& record) {
+  return record.kind == "session" && record.content.is_object() && record.content.contains("format") &&
+         record.content["format"] == format_name;
 }
 
 struct Progress {
@@ -58,8 +69,9 @@ Progress read(const fs::path& log, std::string_view bytes) {
     }
     const std::string_view line = bytes.substr(at, end - at);
     const std::uint64_t number = progress.history.records.size();
+    const std::string where = fmt::format("{}: line {}", log.string(), number + 1);
     const auto refuse = [&](Reason reason, std::string_view problem) {
-      throw BadInput(reason, fmt::format("{}: line {}: {}", log.string(), number + 1, problem));
+      throw BadInput(reason, fmt::format("{}: {}", where, problem));
     };
     if (line.size() < chain_digits + 1 || line[chain_digits] != ' ')
       refuse(Reason::bad_value, "is no record");
@@ -67,14 +79,10 @@ Progress read(const fs::path& log, std::string_view bytes) {
     progress.chain = link(progress.chain, text);
     if (line.substr(0, chain_digits) != progress.chain)
       refuse(Reason::bad_value, "its checksum does not fit: it or an earlier line was changed");
-    try {
-      progress.history.records.push_back(record_of(Json::parse(text)));
-    } catch (const nlohmann::json::exception&) {
-      refuse(Reason::bad_value, "is no record");
-    }
+    progress.history.records.push_back(record_of(text, where));
     const SessionRecord& record = progress.history.records.back();
     if (record.number != number) refuse(Reason::bad_value, "its number is wrong");
-    if (number == 0 && (record.kind != "session" || record.content.value("format", "") != format_name))
+    if (number == 0 && !begins_log(record))
       refuse(Reason::unsupported, fmt::format("is not the beginning of a {} log", format_name));
     at = end + 1;
   }
@@ -117,6 +125,8 @@ Expected<void> SessionLog::append(const std::string& kind, Json content) {
   const std::string text =
       Json{{"n", next_}, {"time_s", now_s()}, {"kind", kind}, {"content", std::move(content)}}.dump(
           -1, ' ', false, Json::error_handler_t::replace);
+  if (auto read_back = parse_json(text, log_.string()); !read_back)
+    return tl::unexpected<Failure>(read_back.error());
   std::string chain = link(chain_, text);
   const std::string line = chain + ' ' + text + '\n';
   const ssize_t written = ::write(file_, line.data(), line.size());

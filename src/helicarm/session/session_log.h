@@ -29,7 +29,7 @@ struct SessionHistory {
 
 /// Reads a log. Each line is the record's JSON after the SHA-256 of the digits before and this JSON, so
 /// that nothing can be changed, lost or exchanged in between unseen. Refuses: missing_file, unsupported
-/// (another format), bad_value (names the line that does not belong).
+/// (another format), bad_value (names the line that does not belong), and as `parse_json`.
 Expected<SessionHistory> read_session(const std::filesystem::path& log);
 
 /// The record of an operation: lines are only ever appended, and each is on disk when `append` returns. Safe
@@ -43,7 +43,8 @@ class SessionLog {
   SessionLog(const SessionLog&) = delete;
   SessionLog& operator=(const SessionLog&) = delete;
 
-  /// Refuses cannot_write, and then leaves the log as it was: what cannot be recorded must not be done.
+  /// Refuses cannot_write, and bad_json for content that `parse_json` would not read again; then it leaves
+  /// the log as it was: what cannot be recorded must not be done.
   Expected<void> append(const std::string& kind, Json content);
 
   /// What the log held when it was opened.

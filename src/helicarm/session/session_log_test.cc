@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/session/session_log.h"
 
+#include <array>
 #include <csignal>
 #include <fstream>
 
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
+#include <openssl/evp.h>
 #include <sys/resource.h>
 
 #include "helicarm/core/files.h"
@@ -26,6 +29,13 @@ class Session : public testing::Test {
   }
 
   TemporaryFolder temporary_;
+  /// A log whose first record is this text, with the checksum that belongs to it.
+  void overwrite_with_record(const std::string& text) const {
+    std::array<unsigned char, 32> hash{};
+    EVP_Digest(text.data(), text.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
+    overwrite(fmt::format("{:02x} {}\n", fmt::join(hash, ""), text));
+  }
+
   fs::path log_ = temporary_.path() / "session.log";
 };
 
@@ -92,6 +102,48 @@ TEST_F(Session, AnotherFormatIsRefused) {
   EXPECT_EQ(read_session(log_).error().reason, Reason::bad_value);
   EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::bad_value);
   EXPECT_EQ(bytes(), "hello\n");
+}
+
+TEST_F(Session, RecordNestedTooDeeplyIsRefused) {
+  const std::string deep(200000, '[');
+  overwrite_with_record(R"({"n":0,"time_s":1,"kind":"session","content":)" + deep +
+                        std::string(deep.size(), ']') + "}");
+  EXPECT_EQ(read_session(log_).error().reason, Reason::bad_json);
+}
+
+TEST_F(Session, ContentThatCouldNotBeReadAgainIsNotAppended) {
+  const auto session = SessionLog::open(log_).value();
+  Json deep;
+  for (int i = 0; i < 100; ++i) deep = Json::array({deep});
+  EXPECT_EQ(session->append("plan", deep).error().reason, Reason::bad_json);
+  EXPECT_TRUE(session->append("pose", {{"x_mm", 1}}));
+  EXPECT_EQ(read_session(log_).value().records.size(), 2u);
+}
+
+TEST_F(Session, FormatOfAnotherTypeIsRefused) {
+  for (const char* content : {R"({"format":1})", R"({"format":null})", R"({})", "[]", "7", "null"}) {
+    overwrite_with_record(fmt::format(R"({{"n":0,"time_s":1,"kind":"session","content":{}}})", content));
+    EXPECT_EQ(read_session(log_).error().reason, Reason::unsupported) << content;
+    EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::unsupported) << content;
+  }
+}
+
+TEST_F(Session, RecordWithFieldsOfAnotherTypeIsRefused) {
+  for (const char* record :
+       {R"({"n":0.5,"time_s":1,"kind":"session","content":{"format":"helicarm-session/1"}})",
+        R"({"n":0,"time_s":"1","kind":"session","content":{"format":"helicarm-session/1"}})",
+        R"({"n":0,"time_s":1,"kind":["session"],"content":{"format":"helicarm-session/1"}})",
+        R"({"n":0,"time_s":1,"kind":"session"})"}) {
+    overwrite_with_record(record);
+    EXPECT_EQ(read_session(log_).error().reason, Reason::bad_value) << record;
+  }
+}
+
+TEST_F(Session, RecordThatIsNoObjectIsRefused) {
+  for (const char* record : {"[]", "1", "null", "{", ""}) {
+    overwrite_with_record(record);
+    EXPECT_EQ(read_session(log_).error().reason, Reason::bad_json) << record;
+  }
 }
 
 TEST_F(Session, IsOneProgramsAtATime) {
