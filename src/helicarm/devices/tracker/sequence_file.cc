@@ -86,13 +86,12 @@ std::vector<SequenceFrame> parse_sequence(std::string_view text) {
   std::map<int, ReadFrame> read;
   for (std::size_t line = 1;; ++line) {
     const auto end = text.find('\n');
-    if (end == text.npos && !text.starts_with("ElementDataFile"))
-      throw BadInput(Reason::truncated, "the header ends without ElementDataFile");
     const std::string_view whole = text.substr(0, end);
     const auto equals = whole.find('=');
-    if (equals == whole.npos) refuse_line(line, "no \"key = value\"");
     const std::string_view key = trimmed(whole.substr(0, equals));
-    if (key == "ElementDataFile") break;
+    if (equals != whole.npos && key == "ElementDataFile") break;
+    if (end == text.npos) throw BadInput(Reason::truncated, "the header ends without ElementDataFile");
+    if (equals == whole.npos) refuse_line(line, "no \"key = value\"");
     if (const auto field = frame_field(key))
       take_field(read[field->frame], field->name, trimmed(whole.substr(equals + 1)), line);
     text.remove_prefix(end + 1);

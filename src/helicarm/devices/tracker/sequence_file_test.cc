@@ -80,6 +80,13 @@ TEST_F(SequenceFile, BrokenFilesAreRefused) {
   EXPECT_EQ(read_sequence(path_ / "absent").error().reason, Reason::missing_file);
 }
 
+TEST_F(SequenceFile, HeaderThatEndsInALongerKeyThanElementDataFileIsTruncated) {
+  EXPECT_EQ(read("ElementDataFileX=").error().reason, Reason::truncated);
+  EXPECT_EQ(read("ElementDataFile").error().reason, Reason::truncated);
+}
+
+TEST_F(SequenceFile, ElementDataFileNeedsNoNewline) { EXPECT_TRUE(read("ElementDataFile=LOCAL")); }
+
 TEST_F(SequenceFile, NameThatWouldBreakTheHeaderIsRefused) {
   SequenceFrame frame;
   frame.poses["a = 1\nb"] = {};
