@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include <math.h>  // lgamma_r is of POSIX
+
 namespace helicarm {
 namespace {
 
@@ -53,6 +55,12 @@ RadiusVerdict radius_verdict(const Scene& scene, const Hypothesis& h) {
   return {first / weight, std::max(0.0, peak - 0.5 * std::log1p(weight / bias_weight)) - 0.5 * chi2};
 }
 
+/// ln n!. std::lgamma writes the global `signgam`, which views that are labelled in parallel share.
+double log_factorial(double n) {
+  int sign = 0;
+  return ::lgamma_r(n + 1, &sign);
+}
+
 /// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the
 /// field, ln depth even over its span, any number of balls visible and then any of them, mirrored or not.
 double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, const PoseFit& fit) {
@@ -63,8 +71,8 @@ double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, cons
   const double field_area = std::numbers::pi * scene.field_radius_px * scene.field_radius_px;
   double odds = -0.5 * fit.chi2;
   for (const auto& s : sightings) odds += std::log(field_area / (s.sigma_px * s.sigma_px)) - log_2pi;
-  odds += std::lgamma(n - m + 1) - std::lgamma(n + 1);  // which candidates, in order
-  odds += std::lgamma(m + 1) + std::lgamma(b - m + 1) - std::lgamma(b + 1) - std::log(b + 1);  // which balls
+  odds += log_factorial(n - m) - log_factorial(n);  // which candidates, in order
+  odds += log_factorial(m) + log_factorial(b - m) - log_factorial(b) - std::log(b + 1);  // which balls
   const double z = fit.view.camera_from_world.translation.z();
   const double per_mm = scene.camera.focal_px / z;
   odds += std::log(per_mm * per_mm / field_area / (z * depth_span));

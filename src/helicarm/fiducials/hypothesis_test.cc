@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <math.h>
 
 #include "helicarm/fiducials/label_scene_test.h"
 
@@ -58,6 +59,15 @@ TEST(Hypothesis, DoubtIsTheDistanceFromAFitToTheOthers) {
     EXPECT_EQ(beyond, !balls.empty() && balls.front() == 4) << off_px;
     EXPECT_EQ(beyond, off_px > 2.5);
   }
+}
+
+TEST(Hypothesis, OddsWriteNoGlobalVariable) {
+  const auto [scene, view] = drawn();
+  Hypothesis h = settle(scene, view);
+  constexpr int untouched = 42;
+  signgam = untouched;
+  weigh(scene, h);
+  EXPECT_EQ(signgam, untouched);
 }
 
 TEST(Hypothesis, AFalseDiscInAHiddenBallsSteadIsARivalsLoss) {
