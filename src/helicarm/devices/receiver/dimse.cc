@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/receiver/dimse.h"
 
+#include <optional>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/text.h"
