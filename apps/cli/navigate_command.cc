@@ -164,7 +164,11 @@ void wait_for_devices(const OperationPlan& plan, Connections& devices, const End
   ending.wait_until([&] { return std::chrono::steady_clock::now() > full; });
 }
 
-Json picks_of(const fs::path& file) { return value_or_throw(read_json(file)).value("picks", Json::array()); }
+Json picks_of(const fs::path& file) {
+  const Json json = value_or_throw(read_json(file));
+  JsonReader reader(json, file.string());
+  return reader.has("picks") ? reader.raw("picks") : Json::array();
+}
 
 void tell_points(const Result& result, Console& console) {
   for (const PointResult& point : result.points)
