@@ -193,12 +193,14 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
     state.script.order.count = reader.take<std::int32_t>();
     state.script.tick = reader.take<std::int32_t>();
     expect_end(reader);
-    const bool finite = std::isfinite(state.time_s) && state.joints.allFinite() &&
-                        state.joint_speeds.allFinite() && tcp.allFinite() && offset.allFinite() &&
-                        std::isfinite(state.payload_kg) && std::isfinite(state.speed_scaling);
-    if (!finite) throw BadInput(Reason::not_finite, "RTDE: a number of the state is not finite");
     state.base_from_tcp = transform_from(tcp);
     state.flange_from_tcp = transform_from(offset);
+    // Finite metres may be infinite millimetres, and a rotation vector too long for its norm.
+    const bool finite = std::isfinite(state.time_s) && state.joints.allFinite() &&
+                        state.joint_speeds.allFinite() && state.base_from_tcp.matrix().allFinite() &&
+                        state.flange_from_tcp.matrix().allFinite() && std::isfinite(state.payload_kg) &&
+                        std::isfinite(state.speed_scaling);
+    if (!finite) throw BadInput(Reason::not_finite, "RTDE: a number of the state is not finite");
     return state;
   });
 }

@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include "helicarm/core/big_endian.h"
+
 namespace helicarm {
 namespace {
 
@@ -95,6 +97,15 @@ TEST(RtdeMessage, StateOfAnyOtherLengthOrRecipeIsRefused) {
   RobotState state = some_state();
   state.joints[3] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(read_state(state_message(7, state), 7).error().reason, Reason::not_finite);
+}
+
+TEST(RtdeMessage, StateWhosePoseOverflowsIsNotFinite) {
+  constexpr std::size_t pose_at = 1 + 8 + 6 * 8 + 6 * 8, turn_at = pose_at + 3 * 8;
+  for (const std::size_t at : {pose_at, turn_at}) {
+    RtdeMessage message = state_message(7, some_state());
+    message.content.replace(at, 8, BigEndianWriter().put(1e307).bytes());
+    EXPECT_EQ(read_state(message, 7).has_value(), false) << at;
+  }
 }
 
 TEST(RtdeMessage, RecipeSaysWhatIsMissing) {
