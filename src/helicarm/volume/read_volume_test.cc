@@ -289,5 +289,12 @@ TEST_F(ReadVolume, EveryCutAndEveryChangedByteIsAnsweredWithoutACrash) {
     }
 }
 
+TEST(Inflate, MoreBytesThanThirtyTwoBitsCountIsRefused) {
+  for (const std::size_t size : {std::size_t{1} << 32, (std::size_t{1} << 32) + 352}) {
+    const auto bytes = guarded([&] { return inflate("packed", size, "x"); });
+    EXPECT_EQ(bytes.error().reason, Reason::bad_size);
+  }
+}
+
 }  // namespace
 }  // namespace helicarm

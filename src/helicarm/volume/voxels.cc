@@ -38,6 +38,9 @@ void decode(std::string_view bytes, bool swap, std::vector<float>& voxels, const
 
 // One byte of deflate gives at most 1032 (RFC 1951: 258 bytes for two bits).
 constexpr std::size_t most_from_a_byte = 1032;
+// As many bytes of voxels as a file that is not packed may have, after the longest header. zlib counts in 32
+// bits.
+constexpr std::size_t most_unpacked = max_volume_bytes + 1'000'000;
 
 }  // namespace
 
@@ -106,6 +109,9 @@ std::string inflate(std::string_view packed, std::size_t size, const std::string
     return BadInput(Reason::truncated, fmt::format("{}: {} packed bytes hold at most {}, {} are needed",
                                                    origin, packed.size(), found, size));
   };
+  if (size > most_unpacked)
+    throw BadInput(Reason::bad_size,
+                   fmt::format("{}: {} bytes when unpacked, limit {}", origin, size, most_unpacked));
   if (size / most_from_a_byte > packed.size()) throw short_of(packed.size() * most_from_a_byte);
   z_stream stream{};
   constexpr int zlib_or_gzip = 15 + 32;

@@ -24,7 +24,8 @@ std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, cons
                                  const std::string& origin);
 
 /// The first `size` bytes of what zlib's or gzip's deflate has packed; not a byte more is unpacked, and no
-/// memory is taken that so small a file could not fill. Throws BadInput: truncated, bad_value (damaged).
+/// memory is taken that so small a file could not fill. Throws BadInput: truncated, bad_value (damaged),
+/// bad_size (more than a file that is not packed may have).
 std::string inflate(std::string_view packed, std::size_t size, const std::string& origin);
 
 /// `count` finite numbers parted by blanks or `separators`. Throws BadInput: bad_value, not_finite.
