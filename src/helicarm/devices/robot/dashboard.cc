@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/dashboard.h"
 
+#include <algorithm>
 #include <array>
+
+#include <fmt/format.h>
 
 #include "helicarm/core/text.h"
 #include "helicarm/devices/robot/timed_socket.h"
@@ -35,13 +38,9 @@ constexpr std::size_t longest_line = 1000;
 Expected<std::string> next_line(TimedSocket& socket, std::string& rest, std::chrono::milliseconds patience) {
   const auto until = std::chrono::steady_clock::now() + patience;
   for (;;) {
-    if (const std::size_t end = rest.find('\n'); end != std::string::npos) {
-      std::string line = rest.substr(0, end);
-      rest.erase(0, end + 1);
-      if (!line.empty() && line.back() == '\r') line.pop_back();
-      return without_control_characters(std::move(line));
-    }
-    if (rest.size() > longest_line) return fail(Reason::bad_size, "dashboard: a line does not end");
+    auto line = take_dashboard_line(rest);
+    if (!line) return tl::unexpected<Failure>(line.error());
+    if (*line) return **std::move(line);
     const auto left = until - std::chrono::steady_clock::now();
     if (left <= left.zero()) return fail(Reason::not_connected, "dashboard: no answer in time");
     const auto bytes = socket.receive(left);
@@ -52,6 +51,25 @@ Expected<std::string> next_line(TimedSocket& socket, std::string& rest, std::chr
 
 }  // namespace
 
+Expected<std::optional<std::string>> take_dashboard_line(std::string& received) {
+  const std::size_t end = received.find('\n');
+  if (std::min(end, received.size()) > longest_line)
+    return fail(Reason::bad_size, fmt::format("dashboard: a line is over {} characters", longest_line));
+  if (end == std::string::npos) return std::nullopt;
+  std::string line = received.substr(0, end);
+  received.erase(0, end + 1);
+  if (line.ends_with('\r')) line.pop_back();
+  return without_control_characters(std::move(line));
+}
+
+Expected<std::string> checked_answer(DashboardCommand command, std::string answer) {
+  const Exchange& exchange = exchanges.at(static_cast<std::size_t>(command));
+  if (answer.starts_with(exchange.answer) ||
+      (!exchange.or_else.empty() && answer.starts_with(exchange.or_else)))
+    return answer;
+  return fail(Reason::bad_value, "dashboard: " + answer);
+}
+
 Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t port, DashboardCommand command,
                                     std::chrono::milliseconds patience) {
   const Exchange& exchange = exchanges.at(static_cast<std::size_t>(command));
@@ -61,11 +79,9 @@ Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t po
   if (auto greeting = next_line(*socket, rest, patience); !greeting) return greeting;
   if (auto sent = socket->send(exchange.command, patience); !sent)
     return tl::unexpected<Failure>(sent.error());
-  auto answer = next_line(*socket, rest, patience);
-  if (answer && !answer->starts_with(exchange.answer) &&
-      !(exchange.or_else.size() && answer->starts_with(exchange.or_else)))
-    return fail(Reason::bad_value, "dashboard: " + *answer);
-  return answer;
+  return next_line(*socket, rest, patience).and_then([&](std::string answer) {
+    return checked_answer(command, std::move(answer));
+  });
 }
 
 }  // namespace helicarm

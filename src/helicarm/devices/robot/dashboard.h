@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "helicarm/core/failure.h"
@@ -27,5 +28,12 @@ enum class DashboardCommand {
 /// is `bad_value` with the answer as message; silence is `not_connected`.
 Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t port, DashboardCommand command,
                                     std::chrono::milliseconds patience = std::chrono::milliseconds(1000));
+
+/// The first whole line of what has come, taken off it, without control characters; nothing while it is not
+/// there. Over 1000 characters without an end are `bad_size`.
+Expected<std::optional<std::string>> take_dashboard_line(std::string& received);
+
+/// The answer's line as it came, or `bad_value` where it does not belong to the command.
+Expected<std::string> checked_answer(DashboardCommand command, std::string answer);
 
 }  // namespace helicarm
