@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/tracker/pose_buffer.h"
 
-#include <algorithm>
-#include <ranges>
 #include <stdexcept>
 
 namespace helicarm {
@@ -24,12 +22,21 @@ std::optional<PoseSample> PoseBuffer::latest() const {
 }
 
 std::vector<PoseSample> PoseBuffer::between(double from_s, double to_s) const {
-  const auto indices = std::views::iota(std::size_t{0}, samples_.size());
-  const auto time = [this](std::size_t i) { return at(i).time_s; };
-  const auto first = std::ranges::lower_bound(indices, from_s, {}, time);
-  const auto last = std::ranges::upper_bound(indices, to_s, {}, time);
+  const auto first_where = [this](auto&& reached) {
+    std::size_t low = 0, high = samples_.size();
+    while (low < high) {
+      const std::size_t middle = low + (high - low) / 2;
+      if (reached(at(middle).time_s))
+        high = middle;
+      else
+        low = middle + 1;
+    }
+    return low;
+  };
+  const std::size_t first = first_where([&](double time_s) { return time_s >= from_s; });
+  const std::size_t last = first_where([&](double time_s) { return time_s > to_s; });
   std::vector<PoseSample> found;
-  for (auto i = first; i < last; ++i) found.push_back(at(*i));
+  for (std::size_t i = first; i < last; ++i) found.push_back(at(i));
   return found;
 }
 
