@@ -118,7 +118,10 @@ bool is_tiff(std::string_view bytes) {
 Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin) {
   return guarded([&] {
     Source from{bytes};
-    return static_cast<int>(TIFFNumberOfDirectories(open(from, origin).get()));
+    const int pages = static_cast<int>(TIFFNumberOfDirectories(open(from, origin).get()));
+    // libtiff opens a file whose first directory is cut off, and counts none.
+    if (pages < 1) throw BadInput(Reason::bad_value, fmt::format("{}: TIFF: damaged or cut off", origin));
+    return pages;
   });
 }
 

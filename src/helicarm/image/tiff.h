@@ -11,6 +11,7 @@ namespace helicarm {
 
 bool is_tiff(std::string_view bytes);
 
+/// At least 1. Refuses bad_value (damaged or cut off).
 Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin);
 
 /// One page (0-based) of an unsigned 8 or 16-bit grey TIFF in strips, or RGB whose three channels are equal;

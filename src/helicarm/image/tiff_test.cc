@@ -102,5 +102,13 @@ TEST(Tiff, MutationsAndTruncationsNeverCrash) {
   }
 }
 
+TEST(Tiff, FileCutWithinItsDirectoryHasNoPages) {
+  const std::string whole = encoded({});
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const auto pages = count_tiff_pages(whole.substr(0, size), "x.tif");
+    EXPECT_TRUE(!pages || *pages == 1) << size;
+  }
+}
+
 }  // namespace
 }  // namespace helicarm
