@@ -16,6 +16,11 @@ if(HELICARM_SANITIZE)
                          -fno-omit-frame-pointer)
   target_link_options(helicarm_flags INTERFACE -fsanitize=address,undefined)
 endif()
+if(HELICARM_FUZZ)
+  target_compile_options(helicarm_flags INTERFACE -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow
+                         -fno-sanitize-recover=all -fno-omit-frame-pointer -Wno-unknown-warning-option)
+  target_link_options(helicarm_flags INTERFACE -fsanitize=address,undefined)
+endif()
 
 # Eigen, JSON and fmt are most of what the compiler reads: it reads them once.
 add_library(helicarm_precompiled OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)

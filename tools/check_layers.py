@@ -77,7 +77,7 @@ def breaches():
             continue
         for path in sorted(p for p in folder.rglob("*") if p.suffix in SOURCES):
             yield from breaches_of_layers(folder.name, path)
-    for top in ("src", "apps", "tools", "tests", "benchmarks", "python"):
+    for top in ("src", "apps", "tools", "tests", "benchmarks", "fuzz", "python"):
         for path in sorted(p for p in (ROOT / top).rglob("*") if p.suffix in SOURCES):
             if LICENCE not in "\n".join(path.read_text(encoding="utf-8").splitlines()[:2]):
                 yield f"{path.relative_to(ROOT)}:1: the line \"{LICENCE}\" is missing"

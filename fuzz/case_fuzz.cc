@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <set>
+
+#include "helicarm/navigation/case.h"
+#include "json_target.h"
+
+namespace helicarm::fuzz {
+namespace {
+
+void check_pose(const std::optional<RigidTransform>& pose) {
+  if (!pose) return;
+  check(pose->matrix().allFinite(), "poses are finite");
+  check((pose->rotation.transpose() * pose->rotation).isIdentity(1e-9), "poses are rigid");
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  put_file("calibrator.json", to_json(udcsc()).dump());
+  put_file("plate.json", to_json(plate48()).dump());
+  put_file("case.json", bytes);
+  const auto read = read_case(folder());
+  if (!read) return;
+  check(read->views.size() >= 2 && read->calibrator.balls.size() >= 6, "a case has views and a calibrator");
+  std::set<std::string> names;
+  for (const CaseView& view : read->views) {
+    check(names.insert(view.name).second, "names are given once");
+    check(view.image.lexically_relative(folder()).begin()->string() != "..", "images lie in the folder");
+    check_pose(view.poses.tracker_from_calibrator);
+    check_pose(view.poses.tracker_from_femur);
+  }
+  check_pose(read->poses_now.tracker_from_tool);
+  for (const Pick& pick : read->picks)
+    check(pick.uv_raw.allFinite() && names.contains(pick.view), "picks are places in views");
+  for (const ToolLine& line : read->tool_lines)
+    check((line.p2_in_calibrator - line.p1_in_calibrator).norm() >= 1, "lines have a direction");
+  check(std::isfinite(read->tracker.sigma_mm), "the tracker's noise is finite");
+}
+
+std::vector<std::string> seeds() {
+  return {R"({"format": "helicarm-case/1", "calibrator": "udcsc", "plate": "plate48",
+      "views": [{"name": "AP", "image": "AP.dcm", "poses": {
+                   "tracker_from_calibrator": [[0,-1,0,5],[1,0,0,6],[0,0,1,7]],
+                   "tracker_from_femur": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]], "tracker_from_tibia": null}},
+                {"name": "LAT", "image": "LAT.dcm", "frame": 2, "plate_image": "plate.dcm"}],
+      "poses_now": {"tracker_from_femur": null, "tracker_from_tibia": null,
+                    "tracker_from_tool": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]},
+      "tracker": {"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"},
+      "picks": [{"name": "FS", "view": "AP", "uv": [500.5, 401], "snap": "ball", "moves_with": "femur"},
+                {"name": "FS", "view": "LAT", "uv": [512, 400], "moves_with": "femur", "sigma_px": 0},
+                {"name": "FE", "view": "AP", "uv": [300, 401]}],
+      "tunnels": [{"name": "femur", "start": "FS", "end": "FE"}],
+      "tool_lines": [{"name": "drill", "tunnel": "femur", "p1_in_calibrator": [0, 0, 0],
+                      "p2_in_calibrator": [0, 0, 30]}]})",
+          R"({"format": "helicarm-case/1", "calibrator": "calibrator.json", "plate": "plate.json",
+      "views": [{"name": "AP", "image": "a/AP.png", "map": "map.json"}, {"name": "LAT", "image": "LAT.dcm"}]})"};
+}
+
+}  // namespace helicarm::fuzz

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstring>
+
+#include "target.h"
+#include "volume_target.h"
+
+namespace helicarm::fuzz {
+namespace {
+
+template <class T>
+void set(std::string& bytes, std::size_t at, T value) {
+  std::memcpy(bytes.data() + at, &value, sizeof value);
+}
+
+/// 2 x 1 x 2 voxels of 16 bits, placed by the sform (1), the qform (2) or neither (0).
+std::string volume(int form) {
+  std::string bytes(352, '\0');
+  set<std::int32_t>(bytes, 0, 348);
+  for (const auto& [at, value] : {std::pair{40, 3}, {42, 2}, {44, 1}, {46, 2}, {70, 4}, {72, 16}})
+    set(bytes, std::size_t(at), static_cast<std::int16_t>(value));
+  set<std::int16_t>(bytes, 254, form == 1);
+  set<std::int16_t>(bytes, 252, form == 2);
+  for (const auto& [at, value] : {std::pair{80, 1.F},
+                                  {84, 2.F},
+                                  {88, 3.F},
+                                  {108, 352.F},
+                                  {112, 2.F},
+                                  {116, -1000.F},
+                                  {260, 0.5F},
+                                  {268, 7.F},
+                                  {280, 1.F},
+                                  {292, 10.F},
+                                  {300, 2.F},
+                                  {320, 3.F}})
+    set(bytes, std::size_t(at), value);
+  bytes.replace(344, 4, std::string("n+1\0", 4));
+  return bytes + voxels16(4);
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  // Half of the inputs are packed here: hardly any change of packed bytes can be unpacked.
+  const bool pack = Choices(bytes).byte() % 2 == 1;
+  run_volume(pack ? gzipped(std::string(bytes)) : std::string(bytes));
+}
+
+std::vector<std::string> seeds() {
+  std::vector<std::string> all;
+  for (const int form : {0, 1, 2})
+    for (const char packed : {'\0', '\1'}) all.push_back(packed + volume(form));
+  all.push_back('\0' + gzipped(volume(1)));
+  return all;
+}
+
+}  // namespace helicarm::fuzz

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/receiver/dimse.h"
+#include "helicarm/devices/receiver/negotiation.h"
+#include "helicarm/devices/receiver/pdu.h"
+#include "helicarm/devices/receiver/peer.h"
+#include "target.h"
+
+namespace helicarm::fuzz {
+namespace {
+
+void run_request(std::string_view body) {
+  const auto request = dicom::read_association_request(body);
+  if (!request) return;
+  check(dicom::is_title(request->called) && dicom::is_title(request->calling), "titles are titles");
+  check(request->contexts.size() <= 128, "no more contexts than can be numbered");
+  for (const auto& context : request->contexts) {
+    check(context.id % 2 == 1 && dicom::is_uid(context.abstract_syntax),
+          "a context has its number and syntax");
+    for (const auto& syntax : context.transfer_syntaxes) check(dicom::is_uid(syntax), "syntaxes are UIDs");
+  }
+  const auto answers = dicom::negotiate(*request, {});
+  if (!answers) return;
+  check(answers->size() == request->contexts.size(), "each context is answered");
+  const std::string accept = dicom::associate_accept(*request, *answers, 1 << 17);
+  const auto header = dicom::read_pdu_header(accept);
+  check(header.type == 2 && header.length == accept.size() - dicom::pdu_header_bytes,
+        "the answer says its length");
+}
+
+void run_fragments(std::string_view body) {
+  const auto fragments = dicom::read_fragments(body);
+  if (!fragments) return;
+  std::size_t total = 0;
+  for (const auto& fragment : *fragments) total += 6 + fragment.bytes.size();
+  check(total == body.size(), "fragments fill their PDU");
+}
+
+void run_command(std::string_view bytes) {
+  const auto command = dicom::read_command(bytes);
+  if (!command) return;
+  check(command->sop_class.empty() || dicom::is_uid(command->sop_class), "the class is a UID");
+  check(command->sop_instance.empty() || dicom::is_uid(command->sop_instance), "the instance is a UID");
+  const std::string response = dicom::write_response(*command, dicom::Status::cannot_understand, "why\n");
+  const auto again = dicom::read_command(response);
+  check(again.has_value() && again->sop_class == command->sop_class && !again->data_set_follows &&
+            again->field == (command->field | 0x8000) && again->sop_instance == command->sop_instance,
+        "the response can be read and belongs to its command");
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  switch (Choices(bytes).byte() % 3) {
+    case 0:
+      return run_request(bytes);
+    case 1:
+      return run_fragments(bytes);
+    default:
+      return run_command(bytes);
+  }
+}
+
+std::vector<std::string> seeds() {
+  return {'\0' + peer::Request().body(),
+          '\1' + peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17")) + peer::fragment(3, 2, "data"),
+          '\2' + peer::command(1, xa_class, "2.25.17"), '\2' + peer::command(0x30, verification_class)};
+}
+
+}  // namespace helicarm::fuzz

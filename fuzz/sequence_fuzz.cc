@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/core/files.h"
+#include "helicarm/devices/tracker/sequence_file.h"
+#include "target.h"
+
+namespace helicarm::fuzz {
+namespace {
+
+bool same(const RecordedPose& a, const RecordedPose& b) {
+  for (int i = 0; i < 16; ++i) {
+    const double x = a.matrix(i / 4, i % 4), y = b.matrix(i / 4, i % 4);
+    if (x != y && !(std::isnan(x) && std::isnan(y))) return false;
+  }
+  return a.visible == b.visible;
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  const auto frames = read_sequence(put_file("input.mha", bytes));
+  if (!frames) return;
+  const auto path = folder() / "written.mha";
+  if (!write_sequence(path, *frames)) return;  // a name that is no word
+  const auto again = read_sequence(path);
+  check(again.has_value() && again->size() == frames->size(), "frames come back as written");
+  for (std::size_t i = 0; i < frames->size(); ++i) {
+    const SequenceFrame &one = (*frames)[i], &other = (*again)[i];
+    check(one.poses.size() == other.poses.size(), "poses come back as written");
+    for (const auto& [name, pose] : one.poses)
+      check(other.poses.contains(name) && same(pose, other.poses.at(name)), "a pose comes back to the bit");
+  }
+}
+
+std::vector<std::string> seeds() {
+  std::vector<SequenceFrame> frames(3);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    frames[i].time_s = 0.1 * double(i);
+    frames[i].poses["FemurToTracker"] = {Eigen::Matrix4d::Identity() * 1.5, i != 1};
+  }
+  std::vector<std::string> all{
+      "ObjectType = Image\r\nDimSize = 0 0 2          \nSeq_Frame0000_ToolToTrackerTransform = 1 0 0 10 0 1 "
+      "0 20 0 0 1 "
+      "-3e-018 0 0 0 1 \nSeq_Frame0000_Timestamp = 12.5\nElementDataFile = LOCAL\nbinary"};
+  if (write_sequence(folder() / "seed.mha", frames))
+    all.push_back(read_file(folder() / "seed.mha", 1 << 20).value());
+  return all;
+}
+
+}  // namespace helicarm::fuzz

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/devices/robot/robot_scene_test.h"
+#include "helicarm/devices/robot/script.h"
+#include "helicarm/devices/robot/urscript.h"
+#include "helicarm/devices/robot/virtual_controller.h"
+#include "target.h"
+
+namespace helicarm::fuzz {
+
+void run(std::string_view bytes) {
+  const int beats = static_cast<int>(Choices(bytes).byte());
+  VirtualController controller(ur5(), drill(), resting_joints());
+  controller.run_script(std::string(bytes));
+  constexpr int steps = 60;
+  for (int i = 0; i < steps; ++i) {
+    controller.set_heartbeat(std::min(i, beats));
+    controller.step();
+    const RobotState state = controller.state();
+    check(state.joints.allFinite() && state.joint_speeds.allFinite(), "the joints stay finite");
+    const Joints& farthest = ur5().farthest;
+    check((state.joints.cwiseAbs() - farthest).maxCoeff() < 0.1, "the joints stay within their limits");
+  }
+}
+
+std::vector<std::string> seeds() {
+  const char many = '\x7f';
+  return {many + script_of(planned(), ur5(), 7), '\3' + script_of(planned(), ur5(), 0),
+          many + std::string(
+                     "def f():\n  x = 2 * (1 + 3) - -1\n  if x == 9:\n    movej([0.2, -1.7, -1.5, -1.4, 1.5, "
+                     "0.4], a=1, v=0.5)\n  else:\n    set_payload(0)\n  end\n  global y = [1, x]\nend\n"),
+          many + std::string("def f():\n  while True:\n    sync()\n  end\nend\n")};
+}
+
+}  // namespace helicarm::fuzz
