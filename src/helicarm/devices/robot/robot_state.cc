@@ -23,7 +23,7 @@ std::string_view name(RobotMode mode) {
   constexpr std::array<std::string_view, 10> names = {
       "NO_CONTROLLER", "DISCONNECTED", "CONFIRM_SAFETY", "BOOTING", "POWER_OFF",
       "POWER_ON",      "IDLE",         "BACKDRIVE",      "RUNNING", "UPDATING_FIRMWARE"};
-  const auto index = static_cast<std::size_t>(static_cast<std::int32_t>(mode) + 1);
+  const auto index = static_cast<std::size_t>(static_cast<std::int64_t>(mode) + 1);
   return index < names.size() ? names[index] : "UNKNOWN";
 }
 
@@ -42,7 +42,7 @@ std::string_view name(SafetyMode mode) {
                                                       "AUTOMATIC_MODE_SAFEGUARD_STOP",
                                                       "SYSTEM_THREE_POSITION_ENABLING_STOP",
                                                       "TP_THREE_POSITION_ENABLING_STOP"};
-  const auto index = static_cast<std::size_t>(static_cast<std::int32_t>(mode) - 1);
+  const auto index = static_cast<std::size_t>(static_cast<std::int64_t>(mode) - 1);
   return index < names.size() ? names[index] : "UNKNOWN";
 }
 

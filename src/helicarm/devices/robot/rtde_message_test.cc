@@ -126,6 +126,14 @@ TEST(RtdeMessage, TextOfTheRobotCannotMoveTheCursor) {
   EXPECT_EQ(read_text({RtdeKind::text, "\x09 abc"s}).error().reason, Reason::truncated);
 }
 
+TEST(RobotState, ModeThatNobodyKnowsHasANameToo) {
+  for (const std::int32_t mode :
+       {std::numeric_limits<std::int32_t>::min(), -2, 99, std::numeric_limits<std::int32_t>::max()}) {
+    EXPECT_EQ(name(static_cast<RobotMode>(mode)), "UNKNOWN");
+    EXPECT_EQ(name(static_cast<SafetyMode>(mode)), "UNKNOWN");
+  }
+}
+
 TEST(RobotState, EveryStopIsTold) {
   RobotState state;
   EXPECT_FALSE(why_stopped(state));

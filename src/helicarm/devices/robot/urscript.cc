@@ -3,6 +3,7 @@
 
 #include <cctype>
 #include <charconv>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -96,6 +97,10 @@ class Expression {
     if (++parts_ > longest_expression) throw BadInput(Reason::bad_value, "expression is too long");
     return {negation() == UrValue{0} ? 1.0 : 0.0};
   }
+  static double finite(double value) {
+    if (!std::isfinite(value)) throw BadInput(Reason::not_finite, "a number is not finite");
+    return value;
+  }
   UrValue comparison() {
     const UrValue left = sum();
     for (const std::string_view mark : {"==", "!=", "<=", ">=", "<", ">"}) {
@@ -115,16 +120,16 @@ class Expression {
     UrValue value = product();
     for (;;) {
       if (taken("+"))
-        value = {number(value) + number(product())};
+        value = {finite(number(value) + number(product()))};
       else if (taken("-"))
-        value = {number(value) - number(product())};
+        value = {finite(number(value) - number(product()))};
       else
         return value;
     }
   }
   UrValue product() {
     UrValue value = primary();
-    while (taken("*")) value = {number(value) * number(primary())};
+    while (taken("*")) value = {finite(number(value) * number(primary()))};
     return value;
   }
   UrValue primary() {

@@ -88,5 +88,11 @@ TEST(UrScript, WhatItDoesNotKnowIsRefused) {
   EXPECT_EQ(refused(std::string(70000, ' ')), Reason::bad_size);
 }
 
+TEST(UrScript, NumberThatOverflowsIsNotFinite) {
+  for (const char* overflow : {"1e308 * 10", "1e308 + 1e308", "-1e308 - 1e308", "1e308 * 10 - 1e308 * 10"})
+    EXPECT_EQ(refused(std::string("def f():\n  x = ") + overflow + "\nend\n"), Reason::not_finite)
+        << overflow;
+}
+
 }  // namespace
 }  // namespace helicarm

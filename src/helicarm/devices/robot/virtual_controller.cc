@@ -2,6 +2,7 @@
 #include "helicarm/devices/robot/virtual_controller.h"
 
 #include <array>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -32,6 +33,15 @@ UrPose six(const UrValue& value) {
 double one(const UrValue& value) {
   if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due");
   return value[0];
+}
+
+std::int32_t register_value(const UrValue& value) {
+  constexpr double least = std::numeric_limits<std::int32_t>::min(),
+                   most = std::numeric_limits<std::int32_t>::max();
+  const double number = one(value);
+  if (!(number >= least && number <= most))
+    throw BadInput(Reason::bad_value, "a register holds whole numbers of 32 bits");
+  return static_cast<std::int32_t>(number);
 }
 
 double named_or(const std::map<std::string, double>& named, const char* name, double fallback) {
@@ -249,7 +259,7 @@ UrValue VirtualController::call(const std::string& name, const std::vector<UrVal
     return {double(outputs_.at(place(0, outputs_.size())))};
   } else if (name == "write_output_integer_register") {
     expect(2);
-    outputs_.at(place(0, outputs_.size())) = static_cast<std::int32_t>(one(arguments[1]));
+    outputs_.at(place(0, outputs_.size())) = register_value(arguments[1]);
   } else {
     throw BadInput(Reason::unsupported, "function " + name + " is not defined");
   }

@@ -142,6 +142,15 @@ TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
   EXPECT_FALSE(controller.moving());
 }
 
+TEST(VirtualController, RegisterTakesNoNumberBeyondItsBits) {
+  for (const char* number : {"1e300", "-3e9", "2147483648"}) {
+    VirtualController controller = robot();
+    controller.run_script(std::string("def f():\n  write_output_integer_register(0, ") + number + ")\nend\n");
+    controller.step();
+    EXPECT_THAT(controller.script_error(), testing::HasSubstr("32 bits")) << number;
+  }
+}
+
 TEST(VirtualController, FaultsHaveNames) {
   EXPECT_EQ(*robot_fault("cut_cable"), RobotFault::cut_cable);
   EXPECT_EQ(*robot_fault("not_finite"), RobotFault::not_finite);
