@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <optional>
 #include <string_view>
 
@@ -36,6 +37,14 @@ double take_number(std::string_view& text, std::size_t line) {
     refuse_line(line, "a number is missing");
   text.remove_prefix(static_cast<std::size_t>(end - text.data()));
   return value;
+}
+
+/// Differences of times must be of use as waiting times, which are counted in 64 bits of nanoseconds.
+double take_time(std::string_view& text, std::size_t line) {
+  constexpr double latest_s = 4e9;  // UTC until 2096
+  const double time_s = take_number(text, line);
+  if (!(std::abs(time_s) <= latest_s)) refuse_line(line, fmt::format("a time beyond {} s", latest_s));
+  return time_s;
 }
 
 Eigen::Matrix4d matrix_of(std::string_view text, std::size_t line) {
@@ -75,7 +84,7 @@ void take_field(ReadFrame& frame, std::string_view name, std::string_view value,
     return std::string(name.substr(0, name.size() - ending.size()));
   };
   if (name == "Timestamp")
-    frame.time_s = take_number(value, line);
+    frame.time_s = take_time(value, line);
   else if (name.ends_with(pose))
     frame.matrices[without(pose)] = matrix_of(value, line);
   else if (name.ends_with(status))

@@ -87,6 +87,13 @@ TEST_F(SequenceFile, HeaderThatEndsInALongerKeyThanElementDataFileIsTruncated) {
 
 TEST_F(SequenceFile, ElementDataFileNeedsNoNewline) { EXPECT_TRUE(read("ElementDataFile=LOCAL")); }
 
+TEST_F(SequenceFile, TimeThatNobodyCanWaitForIsRefused) {
+  for (const char* time : {"nan", "inf", "-inf", "1e300", "-5e9"})
+    EXPECT_EQ(read(std::string("Seq_Frame0000_Timestamp = ") + time + "\n" + end_line).error().reason,
+              Reason::bad_value)
+        << time;
+}
+
 TEST_F(SequenceFile, NameThatWouldBreakTheHeaderIsRefused) {
   SequenceFrame frame;
   frame.poses["a = 1\nb"] = {};

@@ -85,7 +85,9 @@ void replay(std::span<const SequenceFrame> frames, bool as_tracking,
   if (frames.empty()) return;
   std::mutex mutex;
   std::condition_variable_any wake;
-  const double length = frames.back().time_s - frames.front().time_s + round_pause_s;
+  // A recorded clock may have leapt back: a round must not end before it began.
+  const double latest_s = std::ranges::max_element(frames, {}, &SequenceFrame::time_s)->time_s;
+  const double length = latest_s - frames.front().time_s + round_pause_s;
   const auto began = std::chrono::steady_clock::now();
   const double began_wall_s = wall_seconds();
   for (int round = 0;; ++round)

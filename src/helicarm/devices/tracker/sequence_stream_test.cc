@@ -56,6 +56,21 @@ TEST(SequenceStream, FramesGoRoundWithIncreasingStampsUntilStopped) {
   EXPECT_EQ(std::get<IgtlTransform>(sent[6].content).matrix(0, 3), 5);
 }
 
+TEST(SequenceStream, RoundOfAClockThatLeapsBackIsNotOverBeforeItBegan) {
+  const std::vector<SequenceFrame> frames{frame_at(15), frame_at(5)};
+  std::stop_source stop;
+  std::vector<IgtlMessage> sent;
+  replay(
+      frames, false,
+      [&](const IgtlMessage& message) {
+        sent.push_back(message);
+        if (sent.size() == 3) stop.request_stop();
+      },
+      stop.get_token());
+  ASSERT_EQ(sent.size(), 3u);
+  EXPECT_GT(sent[2].stamp, sent[0].stamp);
+}
+
 TEST(SequenceStream, HiddenAndMissingPosesAreGatedOut) {
   const std::vector<SequenceFrame> frames{frame_at(5), frame_at(5.1), frame_at(5.1)};
   const GatedPoses femur = gated_poses(frames, "Femur");
