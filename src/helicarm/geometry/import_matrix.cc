@@ -177,6 +177,9 @@ Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double
   return guarded([&] {
     ImportedMatrix result = parse(*text, path.filename().string());
     result.view.camera_from_world.translation *= mm_per_unit;
+    if (!result.view.camera_from_world.translation.allFinite())
+      throw BadInput(Reason::not_finite,
+                     fmt::format("{}: the translation is not finite in mm", path.filename().string()));
     return result;
   });
 }

@@ -91,6 +91,13 @@ TEST(ImportMatrix, NegativeScaleIsUndoneAndAMirrorKept) {
   EXPECT_LT((negated->view.projection() - result->view.projection()).norm(), 1e-9);
 }
 
+TEST(ImportMatrix, TranslationThatOverflowsInMillimetresIsNotFinite) {
+  std::string far = maya_cam;
+  far.replace(far.find("125.25"), 6, "1e308");
+  EXPECT_TRUE(import_text(far, 1).has_value());
+  EXPECT_EQ(import_text(far, 10).error().reason, Reason::not_finite);
+}
+
 TEST(ImportMatrix, BadFilesAreNamed) {
   EXPECT_EQ(reason_of(""), Reason::truncated);
   EXPECT_EQ(reason_of("1 2 3\n4 5 6\n7 8 9\n"), Reason::bad_size);
