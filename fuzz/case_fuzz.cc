@@ -2,7 +2,7 @@
 #include <cmath>
 #include <set>
 
-#include "helicarm/navigation/case.h"
+#include "helicarm/pipeline/case.h"
 #include "json_target.h"
 
 namespace helicarm::fuzz {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/navigation/case.h"
+#include "helicarm/pipeline/case.h"
 #include "json_target.h"
 
 namespace helicarm::fuzz {

@@ -7,13 +7,18 @@
 
 namespace helicarm::fuzz {
 
+namespace {
+constexpr OrderNumber number{7, 1};
+}  // namespace
+
 void run(std::string_view bytes) {
   const int beats = static_cast<int>(Choices(bytes).byte());
   VirtualController controller(ur5(), drill(), resting_joints());
   controller.run_script(std::string(bytes));
   constexpr int steps = 60;
   for (int i = 0; i < steps; ++i) {
-    controller.set_heartbeat(std::min(i, beats));
+    const ScriptReport script = controller.state().script;
+    controller.set_heartbeat({i < beats ? script.tick : stop_beat, number});
     controller.step();
     const RobotState state = controller.state();
     check(state.joints.allFinite() && state.joint_speeds.allFinite(), "the joints stay finite");
@@ -24,7 +29,7 @@ void run(std::string_view bytes) {
 
 std::vector<std::string> seeds() {
   const char many = '\x7f';
-  return {many + script_of(planned(), ur5(), 7), '\3' + script_of(planned(), ur5(), 0),
+  return {many + script_of(planned(), ur5(), number), '\3' + script_of(planned(), ur5(), OrderNumber{}),
           many + std::string(
                      "def f():\n  x = 2 * (1 + 3) - -1\n  if x == 9:\n    movej([0.2, -1.7, -1.5, -1.4, 1.5, "
                      "0.4], a=1, v=0.5)\n  else:\n    set_payload(0)\n  end\n  global y = [1, x]\nend\n"),
