@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
+#include "helicarm/core/files.h"
+#include "helicarm/devices/receiver/association.h"
+#include "helicarm/devices/receiver/peer.h"
+#include "helicarm/xray/read_dicom.h"
+#include "target.h"
+
+namespace helicarm::fuzz {
+namespace {
+
+/// As the socket's side cuts the stream into PDUs; a length beyond the input means its rest.
+void converse(Association& association, std::string_view bytes) {
+  while (!association.over() && bytes.size() >= dicom::pdu_header_bytes) {
+    Choices choices(bytes);
+    const auto [type, length] = dicom::read_pdu_header(choices.take(dicom::pdu_header_bytes));
+    const std::string_view body = choices.take(length);
+    if (type < 1 || type > 7 || body.size() > association.most_pdu_bytes()) return;
+    std::string_view answers;
+    const std::string sent = association.take(type, body);
+    for (answers = sent; !answers.empty();) {
+      check(answers.size() >= dicom::pdu_header_bytes, "an answer is a PDU");
+      const auto header = dicom::read_pdu_header(answers.substr(0, dicom::pdu_header_bytes));
+      check(header.length <= answers.size() - dicom::pdu_header_bytes, "an answer is a whole PDU");
+      answers.remove_prefix(dicom::pdu_header_bytes + header.length);
+    }
+  }
+}
+
+}  // namespace
+
+void run(std::string_view bytes) {
+  static const auto inbox = Inbox::open(folder() / "inbox").value();
+  ReceiverOptions options;
+  options.most_object_bytes = 4096;  // so that the limit is met
+  ReceiverShared shared(options, *inbox, {});
+  const auto id = shared.admission
+                      .connect(
+                          "192.0.2.1", [] {}, Admission::Clock::now())
+                      .value();
+  {
+    Association association(shared, "192.0.2.1", id);
+    try {
+      converse(association, bytes);
+    } catch (const Breach& breach) {
+      check(!breach.why.empty(), "a breach is explained");
+    }
+    check(!association.peer().empty(), "the peer has a name");
+  }
+  shared.admission.leave(id);
+  check(shared.counters.bytes_on_the_way == 0, "all memory is given back");
+  std::uint64_t images = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(inbox->folder())) {
+    if (entry.path().extension() != ".dcm") continue;
+    ++images;
+    check(read_dicom(read_file(entry.path(), 1 << 20).value(), "stored", 1).has_value(),
+          "stored images are readable");
+    std::filesystem::remove(entry.path());
+  }
+  check(images == shared.counters.stored, "as many images are stored as were acknowledged");
+}
+
+std::vector<std::string> seeds() {
+  const std::string request = peer::Request().bytes(), store = peer::store(DicomBuilder());
+  return {request + peer::echo() + peer::release(),
+          request + store + peer::release(),
+          request + store + store + peer::echo() + peer::release(),
+          request + peer::store(DicomBuilder(), "2.25.18"),
+          request + peer::pdu(7, std::string(4, '\0')),
+          peer::Request{.called = peer::padded("OTHER")}.bytes()};
+}
+
+}  // namespace helicarm::fuzz
