@@ -118,7 +118,8 @@ void Desk::open(Source source, const fs::path& folder, std::string doing, std::f
   live_tool_.reset();
   state_ = DeskState{};
   begin(Phase::acquire, std::move(doing),
-        [=, this, old = std::move(old), options = options_]() mutable -> Change {
+        [this, source, folder, work = std::move(work), old = std::move(old),
+         options = options_]() mutable -> Change {
           old.reset();
           auto room = std::make_shared<Room>();
           room->options = options;
@@ -144,13 +145,14 @@ void Desk::start_operation(Room& room, OperationPlan plan, const fs::path& folde
 
 void Desk::open_room(const operating_room::VirtualRoomOptions& options, const OperationPlan& wished,
                      const fs::path& folder) {
-  open(Source::virtual_room, folder, "opening the virtual operating room", [=, this](Room& room) -> Change {
+  const auto work = [=, this, freshness = freshness_](Room& room) -> Change {
     room.virtual_room = value_or_throw(operating_room::VirtualRoom::open(options));
     OperationPlan plan = plan_for(*room.virtual_room, room.virtual_room->tracker().port());
     for (const auto& field : plan_fields)
       if (field.get(wished) != field.get(OperationPlan())) field.set(plan, field.get(wished));
     const Json offered = std::exchange(plan.picks, Json::array());
-    room.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
+    room.devices =
+        std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")), freshness);
     ReceiverOptions receiver;
     receiver.port = 0;
     value_or_throw(room.devices->listen(receiver));
@@ -162,7 +164,8 @@ void Desk::open_room(const operating_room::VirtualRoomOptions& options, const Op
       change(state);
       state.bones = bones;
     };
-  });
+  };
+  open(Source::virtual_room, folder, "opening the virtual operating room", work);
 }
 
 void Desk::open_devices(const fs::path& file, const ReceiverOptions& receiver, const fs::path& folder) {

@@ -50,6 +50,9 @@ class Desk : public QObject {
   void open_case(const std::filesystem::path& folder);
   void open_pictures(const std::vector<std::filesystem::path>& pictures);
 
+  /// For virtual rooms opened from now on, never for real devices: a test on a busy machine sets longer ones.
+  void set_virtual_freshness(const FreshnessLimits& limits) { freshness_ = limits; }
+
   /// For the next measurement.
   void set_options(const RunOptions& options);
   void expect(const std::string& view);        ///< the next picture is this view's
@@ -113,6 +116,7 @@ class Desk : public QObject {
   std::string followed_;
   bool picks_came_ = false;  ///< while it measured
   RunOptions options_;
+  FreshnessLimits freshness_;
   QTimer pictures_;
   QThreadPool errands_;  ///< what must not wait for the worker: the stop above all
   Worker worker_;        ///< last: its jobs use all the others

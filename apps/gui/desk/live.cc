@@ -49,20 +49,16 @@ Lamp robot_lamp(const RobotLinkStatus& status) {
   const QString age = age_text(status.state ? std::optional(status.age_s) : std::nullopt);
   switch (status.phase) {
     case LinkPhase::disconnected:
+    case LinkPhase::stopped:
       lamp.light = Light::red;
       break;
     case LinkPhase::idle:
       lamp.light = Light::amber;
       break;
     case LinkPhase::ready:
-      lamp.light = Light::green;
-      break;
     case LinkPhase::starting:
     case LinkPhase::moving:
       lamp.light = Light::green;
-      break;
-    case LinkPhase::stopped:
-      lamp.light = Light::red;
       break;
   }
   const QString phase = status.phase == LinkPhase::idle ? tr("locked") : words(name(status.phase));

@@ -21,20 +21,23 @@ void drop(QWidget& onto, const std::vector<fs::path>& paths) {
   QApplication::sendEvent(&onto, &event);
 }
 
-TEST_F(Window, SilentTrackerShowsWithinASecondAndAHalf) {
+TEST_F(Window, SilentTrackerIsShownUntilItSpeaksAgain) {
   open_rehearsal();
   const auto light = [&](const char* name) { return lamp(name).light; };
-  ASSERT_TRUE(wait([&] { return light("tool") == Light::green && light("robot") == Light::amber; }));
+  ASSERT_TRUE(wait("tool is green and the robot locked",
+                   [&] { return light("tool") == Light::green && light("robot") == Light::amber; }));
   window_->desk().set_fault("silent", true);
-  EXPECT_TRUE(wait([&] { return light("femur") == Light::red && light("tool") == Light::red; }, 1500));
+  EXPECT_TRUE(wait("femur and tool are red",
+                   [&] { return light("femur") == Light::red && light("tool") == Light::red; }));
   window_->desk().set_fault("silent", false);
-  EXPECT_TRUE(wait([&] { return light("femur") == Light::green; }, 3000));
+  EXPECT_TRUE(wait("femur is green", [&] { return light("femur") == Light::green; }));
 }
 
 TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
-  ASSERT_NO_FATAL_FAILURE(begin_to_register());
-  window_->desk().set_fault("cut_cable", true);
-  ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
+  window_->desk().set_virtual_freshness({});
+  ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->desk().set_fault("cut_cable", true); },
+                                         "the robot's states have stopped coming"));
+  ASSERT_TRUE(wait_for_phase(LinkPhase::disconnected));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_EQ(lamp("robot").light, Light::red);
   EXPECT_FALSE(lamp("robot").why.isEmpty());
@@ -42,9 +45,8 @@ TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
     EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
   window_->desk().set_fault("cut_cable", false);
   // Connected again it is still locked: only a person frees it.
-  ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::idle; }, 10000));
-  hold("unlock");
-  EXPECT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }, 10000));
+  ASSERT_TRUE(wait_for_phase(LinkPhase::idle));
+  EXPECT_TRUE(unlock());
 }
 
 TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
@@ -52,38 +54,40 @@ TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
   EXPECT_EQ(lamp("C-arm").light, Light::off);
   window_->desk().set_fault("breaks_off", true);
   click("shootAP");
-  ASSERT_TRUE(wait([&] { return !state().busy; }));
+  ASSERT_TRUE(wait_idle());
   EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
-  EXPECT_TRUE(wait([&] { return lamp("C-arm").light == Light::red; }, 2000));
+  EXPECT_TRUE(wait("the C-arm is red", [&] { return lamp("C-arm").light == Light::red; }));
   EXPECT_EQ(lamp("C-arm").text, "broke off");
   window_->desk().set_fault("breaks_off", false);
-  click("shootAP");
-  ASSERT_TRUE(wait([&] { return !state().busy && state().result->views[0].exposure; }));
+  ASSERT_TRUE(attempt(
+      "AP is taken", [&] { click("shootAP"); },
+      [&] { return state().result->views[0].exposure.has_value(); }));
   EXPECT_EQ(lamp("C-arm").light, Light::green);
   EXPECT_NE(card(Phase::acquire).mood, StepMood::refused);
 }
 
 TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
-  ASSERT_NO_FATAL_FAILURE(begin_to_register());
-  window_->desk().set_fault("silent", true);
-  ASSERT_TRUE(wait([&] { return !state().busy; }, 5000));
+  window_->desk().set_virtual_freshness({});
+  ASSERT_NO_FATAL_FAILURE(
+      stop_in_motion([&] { window_->desk().set_fault("silent", true); }, "the newest pose of \"tool\""));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
-  EXPECT_EQ(live().robot.phase, LinkPhase::stopped);
   EXPECT_FALSE(state().hand_eye_rms_mm);
   window_->desk().set_fault("silent", false);
 }
 
 TEST_F(Window, StopWorksBesideEveryDialog) {
-  ASSERT_NO_FATAL_FAILURE(begin_to_register());
-  QTest::keyClick(window_.get(), Qt::Key_Comma, Qt::ControlModifier);
-  ASSERT_TRUE(wait([&] { return window_->findChild<SettingsDialog*>() != nullptr; }, 5000));
-  auto* stop = find("stop");
-  // Through the screen's own way in, where a modal dialog would be in between.
-  QTest::mouseClick(window_->windowHandle(), Qt::LeftButton, Qt::NoModifier,
-                    stop->mapTo(window_.get(), stop->rect().center()));
-  EXPECT_TRUE(wait([&] { return live().robot.phase == LinkPhase::stopped; }, 2000));
-  window_->findChild<SettingsDialog*>()->close();
-  wait_idle();
+  const auto stop_beside_settings = [&] {
+    QTest::keyClick(window_.get(), Qt::Key_Comma, Qt::ControlModifier);
+    ASSERT_TRUE(
+        wait("the settings are open", [&] { return window_->findChild<SettingsDialog*>() != nullptr; }));
+    auto* stop = find("stop");
+    // Through the screen's own way in, where a modal dialog would be in between.
+    QTest::mouseClick(window_->windowHandle(), Qt::LeftButton, Qt::NoModifier,
+                      stop->mapTo(window_.get(), stop->rect().center()));
+    wait_idle();
+    window_->findChild<SettingsDialog*>()->close();
+  };
+  stop_in_motion(stop_beside_settings, "this program's user");
 }
 
 TEST_F(Window, CancelEndsTheWaitForAPicture) {
@@ -93,7 +97,7 @@ TEST_F(Window, CancelEndsTheWaitForAPicture) {
   click("shootAP");
   ASSERT_TRUE(cancel->isVisible());
   QTest::mouseClick(cancel, Qt::LeftButton);
-  ASSERT_TRUE(wait([&] { return !state().busy; }));
+  ASSERT_TRUE(wait_idle());
   EXPECT_FALSE(cancel->isVisible());
 }
 
@@ -104,7 +108,7 @@ TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
   for (auto& pixel : simulated.views[1].pixels.pixels()) pixel = 2000;
   ASSERT_TRUE(simulation::write_case(folder_ / "blank", simulated));
   drop(*window_, {folder_ / "blank"});
-  ASSERT_TRUE(wait([&] { return state().source == Source::files && !state().busy; }));
+  ASSERT_TRUE(wait("the case is read", [&] { return state().source == Source::files && !state().busy; }));
   EXPECT_EQ(card(Phase::rectify).mood, StepMood::refused);
   EXPECT_THAT(card(Phase::rectify).why.toStdString(), HasSubstr("blank_image"));
   EXPECT_FALSE(state().measured);
@@ -157,8 +161,7 @@ TEST_F(Window, ThousandRandomClicksAndKeysFreezeNothing) {
   }
   RecordProperty("longest_ms", int(longest));
   ASSERT_TRUE(wait_idle());
-  window_->open_rehearsal();
-  ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+  open_rehearsal();
 }
 
 }  // namespace

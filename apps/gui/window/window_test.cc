@@ -28,7 +28,8 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   }
 
   QTest::keyClick(window_.get(), Qt::Key_4, Qt::AltModifier);
-  ASSERT_TRUE(wait([&] { return window_->strip().button(Phase::plan)->isChecked(); }, 2000));
+  ASSERT_TRUE(
+      wait("the plan's page is chosen", [&] { return window_->strip().button(Phase::plan)->isChecked(); }));
   pick_all();
   ASSERT_TRUE(card(Phase::plan).mood == StepMood::good || card(Phase::plan).mood == StepMood::warning)
       << card(Phase::plan).why.toStdString();
@@ -42,34 +43,35 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
         EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
                   fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
       }
-  EXPECT_EQ(state().measurements, 5) << "one for the pictures, one for each of four ends";
+  EXPECT_GE(state().measurements, 2) << "one for the pictures; ends picked while it measures go together";
+  EXPECT_LE(state().measurements, 5);
   screenshot("4-plan");
 
-  hold("unlock");
-  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::ready; }));
-  with_robot([&] { hold("register", true); }, [&] { return state().hand_eye_rms_mm.has_value(); });
+  ASSERT_NO_FATAL_FAILURE(register_robot(true));
   for (const PlannedTunnel& tunnel : state().tunnels) {
     find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
     const auto go = [&] {
       click("planWay");
-      if (!wait_for_robot([&] { return state().order.has_value(); })) return;
+      if (!wait_idle() || !state().order) return;
       if (state().outcomes.empty()) screenshot("5-path");
       hold("go");
     };
-    with_robot(go, [&] { return state().outcomes.contains(tunnel.name); });
+    ASSERT_TRUE(
+        with_robot("the tool is in the tunnel", go, [&] { return state().outcomes.contains(tunnel.name); }));
     screenshot("6-navigate");
-    with_robot([] {}, [&] { return !state().tool_is_out; });  // it withdraws what is out
-    ASSERT_FALSE(HasFatalFailure());
+    ASSERT_TRUE(make_ready());
   }
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::good);
   EXPECT_EQ(card(Phase::verify).mood, StepMood::good);
   QTest::keyClick(window_.get(), Qt::Key_6, Qt::AltModifier);
-  ASSERT_TRUE(wait([&] { return window_->strip().button(Phase::verify)->isChecked(); }, 2000));
+  ASSERT_TRUE(wait("the verification's page is chosen",
+                   [&] { return window_->strip().button(Phase::verify)->isChecked(); }));
   auto* table = find<QTableWidget>("outcomeTable");
   ASSERT_EQ(table->rowCount(), 4);
-  // Two checks followed the measurement of the picks; the last one is of the last tunnel.
-  const fs::path last = state().folder / ("case-" + std::to_string(state().measurements + 2));
-  const Json checked = read_json(last / "result.json").value();
+  // Checks followed the measurement of the picks, one at least for each tunnel; the last one is of the last.
+  int last = state().measurements + 2;
+  while (fs::exists(case_folder(last + 1))) ++last;
+  const Json checked = read_json(case_folder(last) / "result.json").value();
   const Json& line = checked.at("verification").at(0);
   const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
   EXPECT_EQ(table->item(row, 3)->text().toStdString(),
@@ -88,7 +90,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   auto* replay = window_->findChild<ReplayPanel*>();
   ASSERT_TRUE(replay->timeline());
   replay->set_moment(int(replay->timeline()->moments.size()) - 1);
-  ASSERT_TRUE(wait([&] { return window_->recorded().has_value(); }, 30000));
+  ASSERT_TRUE(wait("the replayed tool is shown", [&] { return window_->recorded().has_value(); }));
   EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
   screenshot("8-replay");
   open_rehearsal();
@@ -96,10 +98,8 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
-  ASSERT_NO_FATAL_FAILURE(begin_to_register());
-  QTest::keyClick(find("shootAP"), Qt::Key_Space);
-  ASSERT_TRUE(wait([&] { return window_->desk().live().robot.phase == LinkPhase::stopped; }, 2000));
-  ASSERT_TRUE(wait_idle());
+  ASSERT_NO_FATAL_FAILURE(
+      stop_in_motion([&] { QTest::keyClick(find("shootAP"), Qt::Key_Space); }, "this program's user"));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
 }
@@ -123,7 +123,7 @@ TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
 TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   open_rehearsal();
   auto* unlock = find<HoldButton>("unlock");
-  ASSERT_TRUE(wait([&] { return unlock->isEnabled(); }));
+  ASSERT_TRUE(wait("unlock is enabled", [&] { return unlock->isEnabled(); }));
   QTest::mouseClick(unlock, Qt::LeftButton);
   QTest::keyClick(unlock, Qt::Key_Return);
   QTest::qWait(HoldButton::hold_ms + 200);

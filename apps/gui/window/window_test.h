@@ -18,7 +18,12 @@ namespace helicarm::gui {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-constexpr int long_ms = 120000;
+/// A wait for a state ends in vain only after this: longer than anything takes with every core busy.
+constexpr int patience_ms = 180000;
+/// A busy machine makes the tracker stutter or the robot stop: so often a person tries again.
+constexpr int most_attempts = 10;
+/// The window's steps do not depend on how late a busy machine's poses and states come.
+constexpr FreshnessLimits patient{.pose_s = 3, .state_s = 3, .heartbeat_s = 3};
 
 /// Which event held the interface up longest, and for how long. Loops within an event (a dialog's) count as
 /// theirs.
@@ -49,6 +54,7 @@ class Window : public testing::Test {
     fs::create_directories(folder_);
     QSettings().clear();
     window_ = std::make_unique<MainWindow>(folder_ / "sessions");
+    window_->desk().set_virtual_freshness(patient);
     window_->resize(1280, 800);
     window_->show();
     EXPECT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
@@ -68,22 +74,45 @@ class Window : public testing::Test {
     ADD_FAILURE() << "no lamp " << name.toStdString();
     return {};
   }
+  /// What the window knows at this moment, for a wait that ended in vain.
+  std::string seen() {
+    const DeskState& now = state();
+    const LiveState devices = live();
+    std::string text = now.busy ? fmt::format("busy: \"{}\"", now.doing) : "idle";
+    for (const StepCard& step : steps_of(now))
+      text += fmt::format("; {} [{}] {} {}", step.name.toStdString(), int(step.mood),
+                          step.figure.toStdString(), step.why.toStdString());
+    text += fmt::format("; robot {}, state {:.3f} s old", name(devices.robot.phase), devices.robot.age_s);
+    if (devices.robot.why) text += ", " + sentence_of(*devices.robot.why).toStdString();
+    for (const Lamp& lamp : devices.lamps)
+      text += fmt::format("; {}: {}", lamp.name.toStdString(), lamp.text.toStdString());
+    return text + fmt::format("; {} measurements, {} picks, {} outcomes, tool {}", now.measurements,
+                              now.picks.size(), now.outcomes.size(), now.tool_is_out ? "out" : "at rest");
+  }
+  /// For a state, `what` in words. In vain it fails with the state as seen.
   template <class Done>
-  bool wait(const Done& done, int patience_ms = long_ms) {
+  bool wait(const char* what, const Done& done) {
     if (QTest::qWaitFor(done, patience_ms)) return true;
-    std::string why = "doing \"" + state().doing + "\"";
-    for (const auto& [phase, failure] : state().refusals) why += "; " + sentence_of(failure).toStdString();
-    ADD_FAILURE() << "waited in vain; " << why;
+    ADD_FAILURE() << "waited " << patience_ms / 1000 << " s in vain until " << what << "; seen: " << seen();
     return false;
   }
-  /// For what the robot was told to do; its refusal ends the wait.
-  template <class Done>
-  bool wait_for_robot(const Done& done) {
-    return wait([&] { return !state().busy && (done() || state().refusals.contains(Phase::navigate)); }) &&
-           done();
+  /// Acts, waits until nothing is being done, and acts again where the virtual devices refused.
+  template <class Act, class Done>
+  bool attempt(const char* what, const Act& act, const Done& done) {
+    for (int left = most_attempts; left > 0 && !done(); --left) {
+      act();
+      if (!wait_idle()) return false;
+    }
+    if (done()) return true;
+    ADD_FAILURE() << "tried " << most_attempts << " times in vain until " << what << "; seen: " << seen();
+    return false;
   }
   bool wait_idle() {
-    return wait([&] { return !state().busy; });
+    return wait("nothing is being done", [&] { return !state().busy; });
+  }
+  bool wait_for_phase(LinkPhase phase) {
+    return wait(fmt::format("the robot is {}", name(phase)).c_str(),
+                [&] { return live().robot.phase == phase; });
   }
   template <class Widget = QPushButton>
   Widget* find(const char* name) {
@@ -92,60 +121,81 @@ class Window : public testing::Test {
     return found;
   }
   void click(const char* name) { QTest::mouseClick(find(name), Qt::LeftButton); }
-  /// With the mouse, or with Enter.
+  /// With the mouse, or with Enter, until the button is full or may not be pressed any more.
   void hold(const char* name, bool by_key = false) {
     auto* button = find<HoldButton>(name);
-    if (!QTest::qWaitFor([&] { return button->isEnabled(); }, 10000)) return;
+    if (!wait(fmt::format("{} is enabled", name).c_str(), [&] { return button->isEnabled(); })) return;
+    bool over = false;
+    const auto full = QObject::connect(button, &HoldButton::held, [&] { over = true; });
+    const auto until_over = [&] {
+      wait(fmt::format("{} is full", name).c_str(), [&] { return over || !button->isEnabled(); });
+    };
     if (by_key) {
       button->setFocus();
       QTest::keyPress(button, Qt::Key_Return);
-      QTest::qWait(HoldButton::hold_ms + 150);
+      until_over();
       QTest::keyRelease(button, Qt::Key_Return);
     } else {
       QTest::mousePress(button, Qt::LeftButton);
-      QTest::qWait(HoldButton::hold_ms + 150);
+      until_over();
       QTest::mouseRelease(button, Qt::LeftButton);
     }
+    QObject::disconnect(full);
   }
-  /// A busy machine holds tracker and robot up, and then the robot stops, as it must: a person unlocks it and
-  /// tries again.
-  void with_robot(const std::function<void()>& attempt, const std::function<bool()>& done) {
-    for (int left = 6; left > 0 && !done(); --left) {
-      if (live().robot.phase != LinkPhase::ready) {
-        hold("unlock");
-        ASSERT_TRUE(wait_idle());
-      }
-      if (state().tool_is_out) {
-        hold("withdraw");
-        ASSERT_TRUE(wait_idle());
-      }
-      if (state().tool_is_out || live().robot.phase != LinkPhase::ready) continue;
-      attempt();
-      wait_for_robot(done);
-    }
-    ASSERT_TRUE(done()) << card(Phase::navigate).why.toStdString();
+  bool unlock() {
+    return attempt(
+        "the robot is unlocked", [&] { hold("unlock"); },
+        [&] { return live().robot.phase == LinkPhase::ready; });
   }
-  /// In a rehearsal of its own. A busy machine may stop the robot before it has moved.
-  void begin_to_register() {
-    open_rehearsal();
-    for (int left = 3; left > 0; --left) {
-      hold("unlock");
-      ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
+  /// Unlocked, and with the tool out of the knee.
+  bool make_ready() {
+    return attempt(
+        "the robot is unlocked and the tool withdrawn",
+        [&] { hold(live().robot.phase == LinkPhase::ready ? "withdraw" : "unlock"); },
+        [&] { return live().robot.phase == LinkPhase::ready && !state().tool_is_out; });
+  }
+  /// What the robot is to do, from its rest.
+  template <class Act, class Done>
+  bool with_robot(const char* what, const Act& act, const Done& done) {
+    return attempt(
+        what,
+        [&] {
+          if (make_ready()) act();
+        },
+        done);
+  }
+  /// Acts while the robot moves, until that is why it stopped: a busy machine may stop it before, or the move
+  /// be over too soon; then once more, from a rehearsal of its own.
+  template <class Act>
+  void stop_in_motion(const Act& act, const std::string& why) {
+    for (int left = most_attempts; left > 0; --left) {
+      ASSERT_NO_FATAL_FAILURE(open_rehearsal());
+      ASSERT_TRUE(unlock());
       hold("register");
-      const auto begun = [&] { return live().robot.phase == LinkPhase::moving || !state().busy; };
-      ASSERT_TRUE(wait(begun));
-      if (live().robot.phase == LinkPhase::moving) return;
+      const auto moves = [&] { return live().robot.phase == LinkPhase::moving; };
+      ASSERT_TRUE(wait("the robot moves or refuses", [&] { return moves() || !state().busy; }));
+      if (!moves()) continue;
+      act();
+      ASSERT_TRUE(wait_idle());
+      const auto& refusals = state().refusals;
+      const auto refused = refusals.find(Phase::navigate);
+      if (!moves() && refused != refusals.end() && refused->second.message.find(why) != std::string::npos)
+        return;
     }
-    FAIL() << card(Phase::navigate).why.toStdString();
+    FAIL() << "the robot was not stopped by \"" << why << "\"; seen: " << seen();
+  }
+  void register_robot(bool by_key = false) {
+    ASSERT_TRUE(with_robot(
+        "the robot is registered", [&] { hold("register", by_key); },
+        [&] { return state().hand_eye_rms_mm.has_value(); }));
   }
   void register_in_rehearsal() {
     open_rehearsal();
     shoot_both();
     window_->desk().take_offered_picks();
-    ASSERT_TRUE(wait([&] { return state().result->points.size() > 3 && !state().busy; }));
-    hold("unlock");
-    ASSERT_TRUE(wait([&] { return live().robot.phase == LinkPhase::ready; }));
-    with_robot([&] { hold("register"); }, [&] { return state().hand_eye_rms_mm.has_value(); });
+    ASSERT_TRUE(
+        wait("the picks are located", [&] { return state().result->points.size() > 3 && !state().busy; }));
+    register_robot();
   }
   /// Kept where HELICARM_SCREENSHOTS says.
   void screenshot(const char* name) {
@@ -156,20 +206,25 @@ class Window : public testing::Test {
 
   void open_rehearsal() {
     window_->open_rehearsal();
-    ASSERT_TRUE(wait([&] { return state().source == Source::virtual_room && !state().busy; }));
+    ASSERT_TRUE(wait("the rehearsal is open",
+                     [&] { return state().source == Source::virtual_room && !state().busy; }));
   }
   void shoot_both() {
-    click("shootAP");
-    ASSERT_TRUE(wait([&] { return !state().busy && state().result->views[0].exposure; }));
+    ASSERT_TRUE(attempt(
+        "AP is taken", [&] { click("shootAP"); },
+        [&] { return state().result->views[0].exposure.has_value(); }));
     auto* lateral = find("shootLAT");
-    lateral->setFocus();
-    QTest::keyClick(lateral, Qt::Key_Return);
-    ASSERT_TRUE(wait([&] { return state().measured && !state().busy; }));
+    ASSERT_TRUE(attempt(
+        "LAT is taken",
+        [&] {
+          lateral->setFocus();
+          QTest::keyClick(lateral, Qt::Key_Return);
+        },
+        [&] { return state().result->views[1].exposure.has_value(); }));
+    ASSERT_TRUE(wait("the views are measured", [&] { return state().measured && !state().busy; }));
   }
-  Json result_file() {
-    const fs::path newest = state().folder / ("case-" + std::to_string(state().measurements)) / "result.json";
-    return read_json(newest).value();
-  }
+  fs::path case_folder(int number) { return state().folder / ("case-" + std::to_string(number)); }
+  Json result_file() { return read_json(case_folder(state().measurements) / "result.json").value(); }
   void pick_all() {
     while (const auto wanted = next_pick(state())) {
       const std::size_t view = wanted->view == "AP" ? 0 : 1;
@@ -177,11 +232,12 @@ class Window : public testing::Test {
         return pick.name == wanted->point && pick.view == wanted->view;
       });
       XrayView& xray = window_->xray(view);
-      ASSERT_TRUE(wait([&] { return !xray.is_computing(); }));
+      ASSERT_TRUE(wait("the X-ray's layers are computed", [&] { return !xray.is_computing(); }));
       const auto place = xray.place_of({offered->uv_raw.x(), offered->uv_raw.y()});
       ASSERT_TRUE(place);
       QTest::mouseClick(&xray, Qt::LeftButton, Qt::NoModifier, place->toPoint());
-      ASSERT_TRUE(wait([&] { return pick_of(state(), wanted->point, wanted->view) != nullptr; }, 5000));
+      ASSERT_TRUE(wait("the click is a pick",
+                       [&] { return pick_of(state(), wanted->point, wanted->view) != nullptr; }));
       QTest::qWait(QApplication::doubleClickInterval() + 50);
     }
     ASSERT_TRUE(wait_idle());

@@ -49,7 +49,8 @@ TEST_F(Window, TellsItsTimes) {
   ASSERT_TRUE(QTest::qWaitForWindowExposed(&fresh));
   std::printf("window on the screen after %lld ms\n", since.elapsed());
   fresh.open_rehearsal();
-  ASSERT_TRUE(wait([&] { return fresh.desk().state().source == Source::virtual_room; }));
+  ASSERT_TRUE(
+      wait("the rehearsal is open", [&] { return fresh.desk().state().source == Source::virtual_room; }));
   std::printf("rehearsal ready after %lld ms\n", since.elapsed());
   fresh.close();
 

@@ -6,7 +6,7 @@
 namespace helicarm {
 namespace {
 
-RobotConfig config_of(const RobotPlan& plan) {
+RobotConfig config_of(const RobotPlan& plan, const FreshnessLimits& limits) {
   RobotConfig config;
   config.model = value_or_throw(robot_model(plan.model));
   config.address = plan.address;
@@ -14,20 +14,22 @@ RobotConfig config_of(const RobotPlan& plan) {
   config.dashboard_port = plan.dashboard_port;
   config.script_port = plan.script_port;
   config.limits = plan.approach.limits;
+  config.stale_s = limits.state_s;
+  config.program_silence_s = limits.heartbeat_s;
   return config;
 }
 
-/// A repeated pose is as old as when it first came, and none older than 0.1 s may guide a robot.
-PoseBoardOptions board_options() {
+PoseBoardOptions board_options(const FreshnessLimits& limits) {
   PoseBoardOptions options;
-  options.gate.frozen_s = 0.1;
+  options.max_age_s = options.gate.frozen_s = limits.pose_s;
   return options;
 }
 
 }  // namespace
 
-Connections::Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox)
-    : inbox_(std::move(inbox)), board_(board_options()), robot_(config_of(plan.robot)) {
+Connections::Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox,
+                         const FreshnessLimits& limits)
+    : inbox_(std::move(inbox)), board_(board_options(limits)), robot_(config_of(plan.robot, limits)) {
   IgtlClientOptions options;
   options.address = plan.tracker.address;
   options.port = plan.tracker.port;

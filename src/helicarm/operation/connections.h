@@ -28,12 +28,19 @@ struct CArmStatus {
   bool broke_off = false;                ///< a connection since then was lost, or its request turned down
 };
 
+/// How old what guides a robot may be, s. Only tests on a busy machine use other limits than these.
+struct FreshnessLimits {
+  double pose_s = 0.1;       ///< of tool and bones; a repeated pose is as old as when it first came
+  double state_s = 0.1;      ///< of the robot
+  double heartbeat_s = 0.1;  ///< it ends so long after this program last looked
+};
+
 /// The three devices of a plan. Tracker and robot are connected to from the start, and again whenever they
 /// were away.
 class Connections {
  public:
   /// Throws BadInput for a plan whose addresses are none.
-  Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox);
+  Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox, const FreshnessLimits& limits = {});
 
   /// Takes pictures from now on. Refuses as DicomReceiver.
   Expected<void> listen(const ReceiverOptions& options);

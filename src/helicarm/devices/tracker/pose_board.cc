@@ -85,26 +85,27 @@ Expected<const PoseBoard::Tool*> PoseBoard::known(const std::string& name) const
   return &found->second;
 }
 
-Expected<PoseSample> PoseBoard::latest(const std::string& name, double now_s, double max_age_s) const {
+Expected<PoseSample> PoseBoard::latest(const std::string& name, double now_s,
+                                       std::optional<double> max_age_s) const {
   const std::lock_guard lock(mutex_);
   const auto tool = known(name);
   if (!tool) return tl::unexpected(tool.error());
   const PoseSample newest = *(*tool)->buffer.latest();
-  const double age = now_s - newest.time_s;
-  if (age > max_age_s)
+  const double age = now_s - newest.time_s, limit = max_age_s.value_or(options_.max_age_s);
+  if (age > limit)
     return fail(Reason::stale_pose,
-                fmt::format("the newest pose of \"{}\" is {:.3g} s old, limit {:g} s", name, age, max_age_s),
+                fmt::format("the newest pose of \"{}\" is {:.3g} s old, limit {:g} s", name, age, limit),
                 {{"age_s", age}});
   return newest;
 }
 
 std::optional<PoseSample> PoseBoard::elsewhere(const std::string& name, double now_s,
-                                               double max_age_s) const {
+                                               std::optional<double> max_age_s) const {
   const std::lock_guard lock(mutex_);
   const auto found = tools_.find(name);
   if (found == tools_.end()) return std::nullopt;
   const auto seen = found->second.gate.elsewhere();
-  return seen && now_s - seen->time_s <= max_age_s ? seen : std::nullopt;
+  return seen && now_s - seen->time_s <= max_age_s.value_or(options_.max_age_s) ? seen : std::nullopt;
 }
 
 std::vector<PoseSample> PoseBoard::between(const std::string& name, double from_s, double to_s) const {

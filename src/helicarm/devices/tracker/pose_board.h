@@ -19,6 +19,7 @@ double monotonic_seconds();
 
 struct PoseBoardOptions {
   PoseGateOptions gate;
+  double max_age_s = 0.1;       ///< of a pose that guides a robot: the time in which a drill must stop
   std::size_t capacity = 4096;  ///< poses kept of each tool
   std::size_t max_tools = 64;   ///< names beyond are not believed; a hospital's tracker follows ten
 };
@@ -43,12 +44,14 @@ class PoseBoard {
   /// To be called when a connection is new: the device may have set its clock.
   void forget_time();
 
-  /// Fails with `no_pose`, or `stale_pose` for one older than `max_age_s`: 0.1 s is the time in which a
-  /// drill must stop.
-  Expected<PoseSample> latest(const std::string& tool, double now_s, double max_age_s = 0.1) const;
+  /// Fails with `no_pose`, or `stale_pose` for one older than `max_age_s`, the board's own limit if none is
+  /// given.
+  Expected<PoseSample> latest(const std::string& tool, double now_s,
+                              std::optional<double> max_age_s = {}) const;
   /// Where the tool seems to be since a jump whose poses are not believed yet: three of them agree, and the
-  /// newest is no older than `max_age_s`. A reason to stop, never to move.
-  std::optional<PoseSample> elsewhere(const std::string& tool, double now_s, double max_age_s = 0.1) const;
+  /// newest is no older than `max_age_s`, the board's own limit if none is given. A reason to stop, never to move.
+  std::optional<PoseSample> elsewhere(const std::string& tool, double now_s,
+                                      std::optional<double> max_age_s = {}) const;
   /// As `exposure_pose`.
   Expected<ExposurePose> at(const std::string& tool, double time_s,
                             const ExposurePoseOptions& options = {}) const;
