@@ -31,7 +31,8 @@ Expected<RobotOrder> plan_approach(const std::string& name, const RobotModel& mo
   double least_motion = 0;
   constexpr int turns = 36;
   for (int i = 0; i < turns; ++i) {
-    const double turn = (i % 2 ? 1 : -1) * ((i + 1) / 2) * 2 * std::numbers::pi / turns;
+    const int step = (i % 2 ? 1 : -1) * ((i + 1) / 2);
+    const double turn = step * 2 * std::numbers::pi / turns;
     const Eigen::Matrix3d rotation = nearest * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ());
     order.waypoints = {{{rotation, axis.start_in_base - options.stand_off_mm * direction},
                         options.travel_mm_s,
