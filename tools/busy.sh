@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Runs a command while N loops per core compute: tools/busy.sh N COMMAND ...
+set -euo pipefail
+
+[ $# -ge 2 ] || { echo "usage: tools/busy.sh N COMMAND ..." >&2; exit 2; }
+loops=()
+for ((i = 0; i < $1 * $(nproc); ++i)); do
+  bash -c 'while :; do :; done' &
+  loops+=($!)
+done
+trap 'kill "${loops[@]}"' EXIT
+"${@:2}"
