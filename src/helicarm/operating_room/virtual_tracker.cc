@@ -80,14 +80,18 @@ void VirtualTracker::run(const std::stop_token& stop) {
   auto next = Clock::now();
   for (std::uint64_t number = 0; !stop.stop_requested(); ++number) {
     tell(number);
-    next += period;
+    next = std::max(next + period, Clock::now() - period);  // samples that were missed are not made up for
     pause.wait_until(lock, stop, next, [] { return false; });
   }
 }
 
 void VirtualTracker::tell(std::uint64_t number) {
-  const std::lock_guard lock(mutex_);
-  const auto has = [&](TrackerFault fault) { return faults_.contains(fault); };
+  // Not held while it computes: a machine too slow for the rate would never let others have it.
+  std::unique_lock lock(mutex_);
+  const auto faults = faults_;
+  const auto hidden = hidden_;
+  lock.unlock();
+  const auto has = [&](TrackerFault fault) { return faults.contains(fault); };
   if (has(TrackerFault::silent)) return;
   if (!has(TrackerFault::frozen)) {
     IgtlTracking tracking;
@@ -97,7 +101,7 @@ void VirtualTracker::tell(std::uint64_t number) {
       const simulation::TrackerSample sample = simulation::track_sample(
           options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
           options_.seed, samples_stream + 2 * std::uint32_t(i), number);
-      if (sample.valid() && !hidden_.contains(followed.name))
+      if (sample.valid() && !hidden.contains(followed.name))
         tracking.tools.push_back({has(TrackerFault::swapped) ? other_bone(followed.name) : followed.name, 2,
                                   sample.tracker_from_body->matrix()});
       else if (has(TrackerFault::identity))
