@@ -49,7 +49,8 @@ class PoseBoard {
   Expected<PoseSample> latest(const std::string& tool, double now_s,
                               std::optional<double> max_age_s = {}) const;
   /// Where the tool seems to be since a jump whose poses are not believed yet: three of them agree, and the
-  /// newest is no older than `max_age_s`, the board's own limit if none is given. A reason to stop, never to move.
+  /// newest is no older than `max_age_s`, the board's own limit if none is given. A reason to stop, never to
+  /// move.
   std::optional<PoseSample> elsewhere(const std::string& tool, double now_s,
                                       std::optional<double> max_age_s = {}) const;
   /// As `exposure_pose`.
