@@ -73,7 +73,7 @@ TEST_F(DeskRehearsal, MeasuresAndFollowsTheToolWhileTheDevicesWork) {
   for (const std::size_t view : {0, 1})
     ASSERT_TRUE(attempt(
         "the view is taken", [&] { desk_->shoot(desk_->state().views[view]); },
-        [&] { return desk_->state().result->views[view].exposure.has_value(); }));
+        [&] { return desk_->state().result->views[view].exposure != nullptr; }));
   ASSERT_TRUE(wait("the views are measured", [&] { return desk_->state().measured; }));
   ASSERT_TRUE(attempt(
       "the robot is registered",

@@ -107,13 +107,13 @@ TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
 TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
   ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
   find<QComboBox>("tunnel")->setCurrentText("femur");
-  click("planWay");
-  ASSERT_TRUE(wait_for_robot([&] { return state().order.has_value(); }));
+  ASSERT_TRUE(with_robot(
+      "a path is planned", [&] { click("planWay"); }, [&] { return state().order.has_value(); }));
   auto* go = find<HoldButton>("go");
   ASSERT_TRUE(go->isEnabled());
   QTest::keyPress(go, Qt::Key_Return);  // and held
   window_->desk().move_bone("femur", {3, 0, 0});
-  ASSERT_TRUE(wait([&] { return !state().order && !state().busy; }));
+  ASSERT_TRUE(wait("the path is taken away", [&] { return !state().order && !state().busy; }));
   EXPECT_FALSE(go->isEnabled());
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));

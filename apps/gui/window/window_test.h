@@ -212,7 +212,7 @@ class Window : public testing::Test {
   void shoot_both() {
     ASSERT_TRUE(attempt(
         "AP is taken", [&] { click("shootAP"); },
-        [&] { return state().result->views[0].exposure.has_value(); }));
+        [&] { return state().result->views[0].exposure != nullptr; }));
     auto* lateral = find("shootLAT");
     ASSERT_TRUE(attempt(
         "LAT is taken",
@@ -220,7 +220,7 @@ class Window : public testing::Test {
           lateral->setFocus();
           QTest::keyClick(lateral, Qt::Key_Return);
         },
-        [&] { return state().result->views[1].exposure.has_value(); }));
+        [&] { return state().result->views[1].exposure != nullptr; }));
     ASSERT_TRUE(wait("the views are measured", [&] { return state().measured && !state().busy; }));
   }
   fs::path case_folder(int number) { return state().folder / ("case-" + std::to_string(number)); }
