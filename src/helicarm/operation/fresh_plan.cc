@@ -7,8 +7,6 @@
 namespace helicarm {
 namespace {
 
-constexpr std::chrono::seconds robot_patience{5};
-
 /// Straight back along the tool's axis until it is as far as the stand-off; nothing where it is already.
 std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTransform& base_from_tcp) {
   Waypoint back = order.waypoints.front();

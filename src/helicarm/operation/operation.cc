@@ -18,7 +18,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::chrono::seconds robot_patience{5};
 /// The tip is drawn into the X-rays every so many mm.
 constexpr double preview_step_mm = 5;
 

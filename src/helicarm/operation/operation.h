@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -128,6 +129,8 @@ class Operation {
   Expected<void> withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm);
 
  private:
+  static constexpr std::chrono::seconds robot_patience{5};
+
   struct View {
     std::string name;
     std::filesystem::path picture;

@@ -143,11 +143,12 @@ TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
 }
 
 TEST(VirtualController, RegisterTakesNoNumberBeyondItsBits) {
-  for (const char* number : {"1e300", "-3e9", "2147483648"}) {
+  for (const char* too_large : {"1e300", "-3e9", "2147483648"}) {
     VirtualController controller = robot();
-    controller.run_script(std::string("def f():\n  write_output_integer_register(0, ") + number + ")\nend\n");
+    controller.run_script(std::string("def f():\n  write_output_integer_register(0, ") + too_large +
+                          ")\nend\n");
     controller.step();
-    EXPECT_THAT(controller.script_error(), testing::HasSubstr("32 bits")) << number;
+    EXPECT_THAT(controller.script_error(), testing::HasSubstr("32 bits")) << too_large;
   }
 }
 
