@@ -42,9 +42,13 @@ PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& win
   const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));
   const std::string& bone = plan_.tracker.marker_of(tunnel.bone);
   const RigidTransform from_tcp = marker_from_tcp(*hand_eye_, plan_.robot.tool);
-  return {window.middle_s, bone,
-          see(bone),       {ends.enter, ends.leave},
-          from_tcp,        base_by_tool(see(plan_.tracker.tool), from_tcp, present.base_from_tcp)};
+  return {window.middle_s,
+          bone,
+          see(bone),
+          {ends.enter, ends.leave},
+          from_tcp,
+          base_by_tool(see(plan_.tracker.tool), from_tcp, present.base_from_tcp),
+          disagreement_of(*hand_eye_)};
 }
 
 const Operation::Planned& Operation::planned(const RobotOrder& order) const {

@@ -133,8 +133,8 @@ Expected<Motion> PlanWatch::base_motion(const PoseBoard& board, const ToolTrack&
 Expected<void> PlanWatch::in_place(const PoseBoard& board, const ToolTrack& track, double now_s) const {
   return guarded([&] {
     value_or_throw(check_motion(basis_.bone, value_or_throw(bone_motion(board, now_s)), limits_));
-    value_or_throw(
-        check_motion("robot base or tool", value_or_throw(base_motion(board, track, now_s)), limits_));
+    value_or_throw(check_motion("robot base or tool", value_or_throw(base_motion(board, track, now_s)),
+                                widened(limits_, basis_.disagreement)));
   });
 }
 

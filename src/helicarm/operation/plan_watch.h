@@ -5,10 +5,17 @@
 #include <vector>
 
 #include "helicarm/devices/robot/tool_track.h"
+#include "helicarm/devices/tracker/hand_eye.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
 namespace helicarm {
+
+/// How far something has moved.
+struct Motion {
+  double distance_mm = 0;
+  double turn_deg = 0;
+};
 
 /// What an order was planned on.
 struct PlanBasis {
@@ -18,7 +25,19 @@ struct PlanBasis {
   std::vector<Eigen::Vector3d> points_in_bone = {};  ///< mm, where its motion counts: the tunnel's ends
   RigidTransform marker_from_tcp = {};               ///< of the tool, by hand-eye calibration
   RigidTransform tracker_from_base = {};  ///< by the tool: as the tracker sees it and the robot has it
+  Motion disagreement =
+      {};  ///< of tracker and robot about the tool with nothing moved; added to the base's limits
 };
+
+/// Three times the rms residual of the hand-eye calibration: an arm that is not as drawn, and the tracker's
+/// noise.
+inline Motion disagreement_of(const HandEye& hand_eye) { return {3 * hand_eye.rms_mm, 3 * hand_eye.rms_deg}; }
+/// The limits of the robot's base and the tool.
+inline PlanLimits widened(PlanLimits limits, const Motion& disagreement) {
+  limits.distance_mm += disagreement.distance_mm;
+  limits.turn_deg += disagreement.turn_deg;
+  return limits;
+}
 
 /// The robot's base in the tracker, from one pose of the tool.
 inline RigidTransform base_by_tool(const RigidTransform& tracker_from_marker,
@@ -26,12 +45,6 @@ inline RigidTransform base_by_tool(const RigidTransform& tracker_from_marker,
                                    const RigidTransform& base_from_tcp) {
   return tracker_from_marker * marker_from_tcp * base_from_tcp.inverse();
 }
-
-/// How far something has moved.
-struct Motion {
-  double distance_mm = 0;
-  double turn_deg = 0;
-};
 
 /// Of this point of a body, from one pose to another.
 Motion motion_of(const Eigen::Vector3d& point, const RigidTransform& from, const RigidTransform& to);

@@ -347,5 +347,15 @@ TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNothingHolds) {
   EXPECT_EQ(watch.in_place(scene.board, ToolTrack(), scene.time_s).error().reason, Reason::stale_state);
 }
 
+TEST(PlanWatch, BaseHasTheDisagreementOfTrackerAndRobotAsALimitBesides) {
+  HandEye hand_eye{};
+  hand_eye.rms_mm = 0.2;
+  hand_eye.rms_deg = 0.1;
+  const PlanLimits base = widened({1, 1, 60}, disagreement_of(hand_eye));
+  EXPECT_TRUE(check_motion("robot base or tool", {1.59, 1.29}, base));
+  EXPECT_FALSE(check_motion("robot base or tool", {1.61, 0}, base));
+  EXPECT_FALSE(check_motion("robot base or tool", {0, 1.31}, base));
+}
+
 }  // namespace
 }  // namespace helicarm
