@@ -48,7 +48,7 @@ PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& win
           {ends.enter, ends.leave},
           from_tcp,
           base_by_tool(see(plan_.tracker.tool), from_tcp, present.base_from_tcp),
-          disagreement_of(*hand_eye_)};
+          present.base_from_tcp};
 }
 
 const Operation::Planned& Operation::planned(const RobotOrder& order) const {

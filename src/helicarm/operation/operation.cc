@@ -27,7 +27,7 @@ Expected<void> refuse_moved_base(const HandEye& registered, const PlanBasis& bas
   return check_motion(
       "robot base or tool",
       motion_of(present.base_from_tcp.translation, registered.tracker_from_base, basis.tracker_from_base),
-      widened(limits, basis.disagreement), "registration", "register the robot again");
+      limits, "registration", "register the robot again");
 }
 
 }  // namespace

@@ -130,11 +130,17 @@ Expected<Motion> PlanWatch::base_motion(const PoseBoard& board, const ToolTrack&
   });
 }
 
+Expected<Motion> PlanWatch::travelled(const ToolTrack& track, double now_s) const {
+  const auto poses = track.between(now_s - recent_s, std::numeric_limits<double>::infinity());
+  if (poses.empty()) return fail(Reason::stale_state, "the robot's last poses are not known");
+  return motion_of(Vector3d::Zero(), basis_.base_from_tcp, poses.back().base_from_tcp);
+}
+
 Expected<void> PlanWatch::in_place(const PoseBoard& board, const ToolTrack& track, double now_s) const {
   return guarded([&] {
     value_or_throw(check_motion(basis_.bone, value_or_throw(bone_motion(board, now_s)), limits_));
     value_or_throw(check_motion("robot base or tool", value_or_throw(base_motion(board, track, now_s)),
-                                widened(limits_, basis_.disagreement)));
+                                widened(limits_, value_or_throw(travelled(track, now_s)))));
   });
 }
 

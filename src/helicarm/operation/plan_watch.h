@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "helicarm/devices/robot/tool_track.h"
-#include "helicarm/devices/tracker/hand_eye.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
@@ -25,17 +24,14 @@ struct PlanBasis {
   std::vector<Eigen::Vector3d> points_in_bone = {};  ///< mm, where its motion counts: the tunnel's ends
   RigidTransform marker_from_tcp = {};               ///< of the tool, by hand-eye calibration
   RigidTransform tracker_from_base = {};  ///< by the tool: as the tracker sees it and the robot has it
-  Motion disagreement =
-      {};  ///< of tracker and robot about the tool with nothing moved; added to the base's limits
+  RigidTransform base_from_tcp = {};      ///< as the robot had it at planning
 };
 
-/// Three times the rms residual of the hand-eye calibration: an arm that is not as drawn, and the tracker's
-/// noise.
-inline Motion disagreement_of(const HandEye& hand_eye) { return {3 * hand_eye.rms_mm, 3 * hand_eye.rms_deg}; }
-/// The limits of the robot's base and the tool.
-inline PlanLimits widened(PlanLimits limits, const Motion& disagreement) {
-  limits.distance_mm += disagreement.distance_mm;
-  limits.turn_deg += disagreement.turn_deg;
+/// The limits of robot base and tool once the tool has travelled so far since planning: an arm that is not as
+/// drawn seems to move its base, by up to 0.5 % of its way and 1 % of its turn (4 mm over a UR5's reach).
+inline PlanLimits widened(PlanLimits limits, const Motion& travelled) {
+  limits.distance_mm += 0.005 * travelled.distance_mm;
+  limits.turn_deg += 0.01 * travelled.turn_deg;
   return limits;
 }
 
@@ -81,6 +77,9 @@ class PlanWatch {
   /// once the tool slows down. Fails besides with stale_state where the robot's poses of that time are not
   /// known.
   Expected<Motion> base_motion(const PoseBoard& board, const ToolTrack& track, double now_s) const;
+  /// Of the tool since planning, by the robot. Fails with stale_state where the robot's last poses are not
+  /// known.
+  Expected<Motion> travelled(const ToolTrack& track, double now_s) const;
 
  private:
   PlanLimits limits_;

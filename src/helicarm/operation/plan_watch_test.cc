@@ -57,7 +57,7 @@ struct Scene {
     const RigidTransform from_tcp = hand_eye.flange_from_marker.inverse() * drill().flange_from_tcp;
     return {PlanLimits(), TrackerPlan(),
             PlanBasis{time_s, "femur", tracker_from_femur, points_in_femur, from_tcp,
-                      hand_eye.tracker_from_base}};
+                      hand_eye.tracker_from_base, robot.state().base_from_tcp}};
   }
 
   RigidTransform tip() const { return base_moves * hand_eye.tracker_from_base * robot.state().base_from_tcp; }
@@ -347,14 +347,12 @@ TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNothingHolds) {
   EXPECT_EQ(watch.in_place(scene.board, ToolTrack(), scene.time_s).error().reason, Reason::stale_state);
 }
 
-TEST(PlanWatch, BaseHasTheDisagreementOfTrackerAndRobotAsALimitBesides) {
-  HandEye hand_eye{};
-  hand_eye.rms_mm = 0.2;
-  hand_eye.rms_deg = 0.1;
-  const PlanLimits base = widened({1, 1, 60}, disagreement_of(hand_eye));
-  EXPECT_TRUE(check_motion("robot base or tool", {1.59, 1.29}, base));
-  EXPECT_FALSE(check_motion("robot base or tool", {1.61, 0}, base));
-  EXPECT_FALSE(check_motion("robot base or tool", {0, 1.31}, base));
+TEST(PlanWatch, ArmThatIsNotAsDrawnWidensTheBasesLimitsAsItTravels) {
+  const PlanLimits at_rest = widened({1, 1, 60}, {0, 0}), travelled = widened({1, 1, 60}, {200, 50});
+  EXPECT_FALSE(check_motion("robot base or tool", {1.01, 0}, at_rest));
+  EXPECT_TRUE(check_motion("robot base or tool", {1.99, 1.49}, travelled));
+  EXPECT_FALSE(check_motion("robot base or tool", {2.01, 0}, travelled));
+  EXPECT_FALSE(check_motion("robot base or tool", {0, 1.51}, travelled));
 }
 
 }  // namespace
