@@ -14,6 +14,16 @@ Expected<std::string> digest_of(const std::filesystem::path& file) {
   return read_file(file, most_file_bytes).map([](const std::string& bytes) { return digest(bytes); });
 }
 
+/// The file beside a PNG or TIFF that states its pixel size and source distance, where there is one.
+std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image) {
+  std::filesystem::path full = image, plain = image;
+  full += ".json";
+  plain.replace_extension(".json");
+  for (const std::filesystem::path& sidecar : {full, plain})
+    if (std::filesystem::exists(sidecar)) return sidecar;
+  return std::nullopt;
+}
+
 /// All that the calibration of a case depends on, by content.
 Expected<std::string> key_of(const Case& given, Method method) {
   Json key = {{"calibrator", to_json(given.calibrator)},
@@ -22,7 +32,8 @@ Expected<std::string> key_of(const Case& given, Method method) {
               {"views", Json::array()}};
   for (const CaseView& view : given.views) {
     Json files = Json::array();
-    for (const auto& file : {std::optional(view.image), view.plate_image, view.map}) {
+    for (const auto& file : {std::optional(view.image), sidecar_of(view.image), view.plate_image,
+                             view.plate_image ? sidecar_of(*view.plate_image) : std::nullopt, view.map}) {
       const auto content = file ? digest_of(*file) : Expected<std::string>();
       if (!content) return tl::unexpected<Failure>(content.error());
       files.push_back(*content);
