@@ -37,8 +37,8 @@ void run_study(benchmark::State& state, const NumberOptions& options) {
 }
 
 /// Calibration's own pixels projected back, FRE only: what the other versions do.
-void number_in_lanes(benchmark::State& state) { run_study(state, yardstick()); }
-BENCHMARK(number_in_lanes)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+void number_simd(benchmark::State& state) { run_study(state, yardstick()); }
+BENCHMARK(number_simd)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// One sigma, fresh noise, FRE and TRE of 43 targets.
 void number_with_targets(benchmark::State& state) {

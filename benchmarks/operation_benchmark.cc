@@ -25,9 +25,9 @@ std::string message_at(double time_s) {
 
 void message_to_lines_in_xrays(benchmark::State& state) {
   PoseBoard board;
-  Poses exposure;
-  exposure.tracker_from_calibrator = RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 900}};
-  exposure.tracker_from_femur = RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
+  Poses xray_image;
+  xray_image.tracker_from_calibrator = RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 900}};
+  xray_image.tracker_from_femur = RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
   const View views[2] = {{{4000, 4000, 511, 511, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 700}}},
                          {{4000, 4000, 511, 511, 0}, {rotation_from_euler(1.57, 0, 0), {0, 0, 700}}}};
   const double begin = monotonic_seconds();
@@ -42,7 +42,7 @@ void message_to_lines_in_xrays(benchmark::State& state) {
     Poses now;
     now.tracker_from_tool = board.latest("tool", begin + time_s).value().tracker_from_tool;
     now.tracker_from_femur = board.latest("femur", begin + time_s).value().tracker_from_tool;
-    const ToolLine line = tool_line("femur", Bone::femur, exposure, now, {}).value();
+    const ToolLine line = tool_line("femur", Bone::femur, xray_image, now, {}).value();
     for (const View& view : views) benchmark::DoNotOptimize(line_in_xray(view, line));
   }
 }

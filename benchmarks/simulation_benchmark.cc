@@ -4,7 +4,7 @@
 
 #include "helicarm/simulation/c_arm.h"
 #include "helicarm/simulation/calibrator_body.h"
-#include "helicarm/simulation/develop.h"
+#include "helicarm/simulation/detector_response.h"
 #include "helicarm/simulation/knee.h"
 #include "helicarm/simulation/render_view.h"
 #include "helicarm/simulation/streams.h"
@@ -12,20 +12,21 @@
 namespace helicarm::simulation {
 namespace {
 
-Shot shot() { return take_stand({}, *plate48().height_above_receiver_mm, {}).front(); }
+TrueView true_view() { return take_stand({}, *plate48().height_above_receiver_mm, {}).front(); }
 
-Scene scene_before(const Shot& shot) {
+Scene scene_before(const TrueView& true_view) {
   Calibrator calibrator = udcsc();
   calibrator.targets = check_targets(calibrator);
   Scene scene = calibrator_body(calibrator);
   for (const Body& body : knee_body())
     scene.push_back(moved(body, {Eigen::Matrix3d::Identity(), {10, 0, 14}}));
-  for (const Body& body : plate_body(plate48(), shot.camera_from_plate, shot.view)) scene.push_back(body);
+  for (const Body& body : plate_body(plate48(), true_view.camera_from_plate, true_view.view))
+    scene.push_back(body);
   return scene;
 }
 
 void render_knee(benchmark::State& state) {
-  const Shot taken = shot();
+  const TrueView taken = true_view();
   const Scene scene = scene_before(taken);
   for (auto _ : state)
     benchmark::DoNotOptimize(
@@ -33,14 +34,14 @@ void render_knee(benchmark::State& state) {
 }
 BENCHMARK(render_knee)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-void develop_knee(benchmark::State& state) {
-  const Shot taken = shot();
+void knee_image(benchmark::State& state) {
+  const TrueView taken = true_view();
   const Image<float> signal = render_view(scene_before(taken), taken.detector, taken.view);
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        develop(signal, taken.imaging, 1, stream::noise, static_cast<unsigned>(state.range(0))));
+        detector_response(signal, taken.imaging, 1, stream::noise, static_cast<unsigned>(state.range(0))));
 }
-BENCHMARK(develop_knee)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(knee_image)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 }  // namespace
 }  // namespace helicarm::simulation

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times every stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 exposures.
+// Times every stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 acquisitions.
 #include <filesystem>
 
 #include <benchmark/benchmark.h>
@@ -12,7 +12,7 @@
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/write_case.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm {
 namespace {
@@ -29,59 +29,59 @@ const Case& simulated_case() {
   return given;
 }
 
-const Exposure& exposure() {
-  static const Exposure read = value_or_throw(read_exposure(simulated_case().views[0].image, "AP", {}));
+const XrayImage& xray_image() {
+  static const XrayImage read = value_or_throw(read_xray_image(simulated_case().views[0].image, "AP", {}));
   return read;
 }
 
 const Rectification& rectification() {
-  static const Rectification rectified = value_or_throw(rectify(exposure(), *simulated_case().plate, {}));
+  static const Rectification rectified = value_or_throw(rectify(xray_image(), *simulated_case().plate, {}));
   return rectified;
 }
 
 void read_file(benchmark::State& state) {
   const std::filesystem::path& image = simulated_case().views[0].image;
-  for (auto _ : state) benchmark::DoNotOptimize(read_exposure(image, "AP", {}));
+  for (auto _ : state) benchmark::DoNotOptimize(read_xray_image(image, "AP", {}));
 }
 BENCHMARK(read_file)->Unit(benchmark::kMillisecond);
 
 void search_blobs(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(find_blobs(exposure().pixels, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(find_blobs(xray_image().pixels, {}));
 }
 BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
-/// As the balls are fitted at last: from where the search left them, with the picture's own look.
+/// As the balls are fitted at last: from where the search left them, with the image's own look.
 void fit_one_ball(benchmark::State& state) {
-  const Candidates candidates = detect_candidates(exposure(), rectification());
+  const Candidates candidates = detect_candidates(xray_image(), rectification());
   const auto found = value_or_throw(
-      label_fiducials(exposure(), rectification(), candidates, simulated_case().calibrator, {}));
+      label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
   std::vector<Dot> balls;
   for (const Dot& dot : candidates.dots)
     for (const Fiducial& ball : found.fiducials)
       if (ball.status == FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
-  const DotLook look = estimate_look(exposure(), rectification().noise, balls);
-  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(exposure(), {balls.front()}, look, {}));
+  const DotLook look = estimate_look(xray_image(), rectification().noise, balls);
+  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(xray_image(), {balls.front()}, look, {}));
 }
 BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
 
 void rectify_view(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(rectify(exposure(), *simulated_case().plate, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(rectify(xray_image(), *simulated_case().plate, {}));
 }
 BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
 void label_candidates(benchmark::State& state) {
-  const Candidates candidates = detect_candidates(exposure(), rectification());
+  const Candidates candidates = detect_candidates(xray_image(), rectification());
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        label_fiducials(exposure(), rectification(), candidates, simulated_case().calibrator, {}));
+        label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
 }
 BENCHMARK(label_candidates)->Unit(benchmark::kMillisecond);
 
-void resample_picture(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(resample(exposure(), rectification().map));
+void resample_image(benchmark::State& state) {
+  for (auto _ : state) benchmark::DoNotOptimize(resample(xray_image(), rectification().map));
 }
-BENCHMARK(resample_picture)->Unit(benchmark::kMillisecond);
+BENCHMARK(resample_image)->Unit(benchmark::kMillisecond);
 
 void run_whole_case(benchmark::State& state) {
   RunOptions options;

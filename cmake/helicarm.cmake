@@ -39,10 +39,10 @@ target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::
 target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
                           <gmock/gmock.h> <gtest/gtest.h>)
 
-# helicarm_room(NAME [APART] [TESTS_APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
+# helicarm_module(NAME [APART] [TESTS_APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
 # A room's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
 # name for several things.
-function(helicarm_room name)
+function(helicarm_module name)
   cmake_parse_arguments(ARG "APART;TESTS_APART" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)

@@ -11,35 +11,36 @@ namespace helicarm::fuzz {
 namespace {
 
 /// Written as an image of 16 bits, its values come back as they were.
-void check_written_again(const Exposure& exposure) {
+void check_written_again(const XrayImage& xray_image) {
   DerivedImage image;
-  image.pixels = Image<std::uint16_t>(exposure.pixels.width(), exposure.pixels.height());
-  for (int v = 0; v < exposure.pixels.height(); ++v)
-    for (int u = 0; u < exposure.pixels.width(); ++u)
-      image.pixels(u, v) = static_cast<std::uint16_t>(exposure.pixels(u, v) - exposure.lowest);
-  image.acquisition = exposure.acquisition;
-  image.rle = exposure.pixels.width() % 2 == 0;
+  image.pixels = Image<std::uint16_t>(xray_image.pixels.width(), xray_image.pixels.height());
+  for (int v = 0; v < xray_image.pixels.height(); ++v)
+    for (int u = 0; u < xray_image.pixels.width(); ++u)
+      image.pixels(u, v) = static_cast<std::uint16_t>(xray_image.pixels(u, v) - xray_image.lowest);
+  image.acquisition = xray_image.acquisition;
+  image.rle = xray_image.pixels.width() % 2 == 0;
   const auto path = folder() / "written.dcm";
   check(write_dicom(path, image).has_value(), "an image that was read can be written");
   const auto again = read_dicom(read_file(path, 1 << 30).value(), "written.dcm", {});
   check(again.has_value(), "an image that was written can be read");
-  check(again->acquisition.pixel_mm.has_value() == exposure.acquisition.pixel_mm.has_value(),
+  check(again->acquisition.pixel_mm.has_value() == xray_image.acquisition.pixel_mm.has_value(),
         "the spacing is kept");
   check(again->acquisition.source_detector_mm.has_value() ==
-            exposure.acquisition.source_detector_mm.has_value(),
+            xray_image.acquisition.source_detector_mm.has_value(),
         "the source distance is kept");
 }
 
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto exposure = read_dicom(bytes, "input.dcm", 1);
-  if (!exposure) return;
-  const auto pixels = exposure->pixels.pixels();
+  const auto xray_image = read_dicom(bytes, "input.dcm", 1);
+  if (!xray_image) return;
+  const auto pixels = xray_image->pixels.pixels();
   check(!pixels.empty(), "an image has pixels");
   for (const float pixel : pixels)
-    check(pixel >= exposure->lowest && pixel <= exposure->highest, "pixels are between lowest and highest");
-  const Acquisition& acquisition = exposure->acquisition;
+    check(pixel >= xray_image->lowest && pixel <= xray_image->highest,
+          "pixels are between lowest and highest");
+  const Acquisition& acquisition = xray_image->acquisition;
   if (acquisition.pixel_mm)
     check(acquisition.pixel_mm->minCoeff() >= 0.01 && acquisition.pixel_mm->maxCoeff() <= 2,
           "the spacing is in range");
@@ -48,7 +49,7 @@ void run(std::string_view bytes) {
           "the time is a time");
   check(acquisition.uid_key.size() == 32 && acquisition.instance_key.size() == 32, "an image has its keys");
   constexpr std::size_t small = 4096;
-  if (pixels.size() <= small) check_written_again(*exposure);
+  if (pixels.size() <= small) check_written_again(*xray_image);
 }
 
 std::vector<std::string> seeds() {

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int width = 24, height = 16;
 
-/// The compressed bytes of a picture, by DCMTK's encoder.
+/// The compressed bytes of an image, by DCMTK's encoder.
 std::string compressed(int bits, E_TransferSyntax syntax, const DcmRepresentationParameter& how) {
   std::string pixels;
   for (int i = 0; i < width * height; ++i)

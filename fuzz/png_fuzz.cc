@@ -35,16 +35,16 @@ Image<T> as(const Image<std::uint16_t>& pixels) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto picture = decode_png(with_check_sums(std::string(bytes)), "input.png");
-  if (!picture) return;
-  check(picture->bits == 8 || picture->bits == 16, "an image has 8 or 16 bits");
-  const auto pixels = picture->pixels.pixels();
-  check(picture->bits == 16 || std::ranges::all_of(pixels, [](auto v) { return v < 256; }),
+  const auto grey_image = decode_png(with_check_sums(std::string(bytes)), "input.png");
+  if (!grey_image) return;
+  check(grey_image->bits == 8 || grey_image->bits == 16, "an image has 8 or 16 bits");
+  const auto pixels = grey_image->pixels.pixels();
+  check(grey_image->bits == 16 || std::ranges::all_of(pixels, [](auto v) { return v < 256; }),
         "values are in range");
   constexpr std::size_t small = 4096;
   if (pixels.size() > small) return;
-  const std::string written = picture->bits == 8 ? encode_png(as<std::uint8_t>(picture->pixels))
-                                                 : encode_png(as<std::uint16_t>(picture->pixels));
+  const std::string written = grey_image->bits == 8 ? encode_png(as<std::uint8_t>(grey_image->pixels))
+                                                    : encode_png(as<std::uint16_t>(grey_image->pixels));
   const auto again = decode_png(written, "written.png");
   check(again.has_value() && std::ranges::equal(again->pixels.pixels(), pixels),
         "an image comes back as written");

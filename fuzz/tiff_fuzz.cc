@@ -37,11 +37,11 @@ void run(std::string_view bytes) {
   const auto pages = count_tiff_pages(bytes, "input.tif");
   if (!pages) return;
   check(*pages >= 1, "a file has pages");
-  const auto picture = decode_tiff(bytes, *pages - 1, "input.tif");
-  if (!picture) return;
-  check(picture->bits == 8 || picture->bits == 16, "an image has 8 or 16 bits");
-  check(!picture->pixels.empty(), "an image has pixels");
-  check(picture->bits == 16 || std::ranges::all_of(picture->pixels.pixels(), [](auto v) { return v < 256; }),
+  const auto image = decode_tiff(bytes, *pages - 1, "input.tif");
+  if (!image) return;
+  check(image->bits == 8 || image->bits == 16, "an image has 8 or 16 bits");
+  check(!image->pixels.empty(), "an image has pixels");
+  check(image->bits == 16 || std::ranges::all_of(image->pixels.pixels(), [](auto v) { return v < 256; }),
         "values are in range");
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Holds the source to its layers: which room may include which, nothing below includes apps, every file has its licence.
+"""Holds the source to its layers: which module may include which, nothing below includes apps, every file has its licence.
 
 Run from anywhere; prints each breach as file:line and exits 1 if there is one.
 """
@@ -11,8 +11,8 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# Bottom to top: each room with the rooms it may include beside itself.
-ROOMS = {
+# Bottom to top: each module with the modules it may include beside itself.
+MODULES = {
     "core": "",
     "geometry": "core",
     "phantom": "core geometry",
@@ -28,7 +28,7 @@ ROOMS = {
     "volume": "core geometry image xray",
     "simulation": "core geometry image phantom xray volume",
     "devices": "core geometry image xray",
-    "operating_room": "core geometry image phantom xray volume simulation devices",
+    "virtual_devices": "core geometry image phantom xray volume simulation devices",
     "session": "core",
     "pipeline": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                   " verification volume simulation",
@@ -36,7 +36,7 @@ ROOMS = {
               " verification volume simulation pipeline",
     "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                  " verification devices session pipeline report",
-    "rehearsal": "core geometry image phantom xray volume simulation devices operating_room session pipeline operation"
+    "rehearsal": "core geometry image phantom xray volume simulation devices virtual_devices session pipeline operation"
                  " guidance verification report",
     "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
              " verification volume simulation pipeline report",
@@ -54,8 +54,8 @@ def includes(path):
             yield number, found.group(1)
 
 
-def breaches_of_layers(room, path):
-    allowed = {room, *ROOMS[room].split()}
+def breaches_of_layers(module, path):
+    allowed = {module, *MODULES[module].split()}
     if path.stem.endswith("_test"):
         allowed |= FOR_TESTS
     for number, included in includes(path):
@@ -63,7 +63,7 @@ def breaches_of_layers(room, path):
         if "apps" in parts or included.startswith("cli/"):
             yield f"{path.relative_to(ROOT)}:{number}: src must not include apps ({included})"
         elif parts[0] == "helicarm" and parts[1] not in allowed:
-            yield f"{path.relative_to(ROOT)}:{number}: {room} must not include {parts[1]} ({included})"
+            yield f"{path.relative_to(ROOT)}:{number}: {module} must not include {parts[1]} ({included})"
         elif ".." in parts:
             yield f"{path.relative_to(ROOT)}:{number}: includes go from src/, not by .. ({included})"
 
@@ -72,8 +72,8 @@ def breaches():
     for folder in sorted((ROOT / "src" / "helicarm").iterdir()):
         if not folder.is_dir():
             continue
-        if folder.name not in ROOMS:
-            yield f"{folder.relative_to(ROOT)}: not a room of {pathlib.Path(__file__).name}"
+        if folder.name not in MODULES:
+            yield f"{folder.relative_to(ROOT)}: not a module of {pathlib.Path(__file__).name}"
             continue
         for path in sorted(p for p in folder.rglob("*") if p.suffix in SOURCES):
             yield from breaches_of_layers(folder.name, path)

@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 
-from drill_theatre import EXPOSURE_S, Program, Theatre, check, failures, free_port
+from drill_virtual_devices import EXPOSURE_S, Program, VirtualDevices, check, failures, free_port
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 CANARY = "CANARYKNEE"
@@ -31,70 +31,70 @@ def drill_whole(program, folder):
     """From the first X-ray to the last check, with pictures that bear a name that must not leave them."""
     case = folder / "canary"
     subprocess.run([program, "simulate", case, "--kind", "tunnels", "--size", "512", "--seed", "1", "--quiet"], check=True)
-    with Theatre(program, folder / "whole") as theatre:
-        check("other program on the same session is refused", theatre.navigate().process.wait(10) == 2)
-        theatre.say("shoot AP wrong_title", "not_connected")
-        theatre.say("shoot AP breaks_off", "not_connected")
+    with VirtualDevices(program, folder / "whole") as devices:
+        check("other program on the same session is refused", devices.navigate().process.wait(10) == 2)
+        devices.say("shoot AP wrong_title", "not_connected")
+        devices.say("shoot AP breaks_off", "not_connected")
         for view, then in (("AP", "waiting for LAT"), ("LAT", "^measure: ")):
             picture = case / f"{view}.dcm"
             subprocess.run(["dcmodify", "-nb", "-m", f"PatientName={CANARY}^A", "-m", f"PatientID={CANARY}", picture],
                            check=True)
-            subprocess.run(["storescu", "-aec", "HELICARM", "127.0.0.1", theatre.port, picture], check=True)
-            theatre.navigation.wait_for(then)
-        theatre.navigation.wait_for("tibia: withdraw", 300)
-        check("whole operation ends with 0", theatre.navigation.process.wait(60) == 0)
-        theatre.expect_replay("whole operation")
-        told = theatre.navigation.said()
-        holding = [file.name for file in theatre.session.rglob("*")
+            subprocess.run(["storescu", "-aec", "HELICARM", "127.0.0.1", devices.port, picture], check=True)
+            devices.navigation.wait_for(then)
+        devices.navigation.wait_for("tibia: withdraw", 300)
+        check("whole operation ends with 0", devices.navigation.process.wait(60) == 0)
+        devices.expect_replay("whole operation")
+        told = devices.navigation.said()
+        holding = [file.name for file in devices.session.rglob("*")
                    if file.is_file() and file.suffix != ".dcm" and CANARY.encode() in file.read_bytes()]
         check("the patient's name is in the pictures alone", CANARY not in told and not holding, " ".join(holding))
 
 
 def drill_pictures(program, folder):
-    with Theatre(program, folder / "pictures") as theatre:
-        theatre.say("fault frozen on", "frozen on")
+    with VirtualDevices(program, folder / "pictures") as devices:
+        devices.say("fault frozen on", "frozen on")
         time.sleep(EXPOSURE_S)
-        theatre.say("shoot AP", "shot AP")
-        theatre.navigation.wait_for("(no|stale)_pose.*expose again")
-        theatre.say("fault frozen off", "frozen off")
+        devices.say("shoot AP", "shot AP")
+        devices.navigation.wait_for("(no|stale)_pose.*expose again")
+        devices.say("fault frozen off", "frozen off")
         time.sleep(EXPOSURE_S)
-        theatre.shoot("AP", "waiting for LAT")
+        devices.shoot("AP", "waiting for LAT")
         for fault, reason in (("same_picture", "views_too_close"), ("other_patient", "patient_mismatch")):
-            theatre.say(f"shoot LAT {fault}", "shot LAT")
-            check(f"{fault}: expose again", bool(theatre.navigation.wait_for(f"{reason}.*expose again")))
-        theatre.say("shoot LAT held_back", "shot LAT")
+            devices.say(f"shoot LAT {fault}", "shot LAT")
+            check(f"{fault}: expose again", bool(devices.navigation.wait_for(f"{reason}.*expose again")))
+        devices.say("shoot LAT held_back", "shot LAT")
         check("picture held back while the leg moved: expose again",
-              bool(theatre.navigation.wait_for("stale_pose.*later after its acquisition.*expose again")))
+              bool(devices.navigation.wait_for("stale_pose.*later after its acquisition.*expose again")))
         time.sleep(EXPOSURE_S)
-        theatre.shoot("LAT", "^measure: ")
-        theatre.navigation.end(signal.SIGKILL)
-        theatre.expect_replay("wrong pictures")
-    with Theatre(program, folder / "order") as theatre:
-        theatre.shoot("LAT", "waiting for AP")
+        devices.shoot("LAT", "^measure: ")
+        devices.navigation.end(signal.SIGKILL)
+        devices.expect_replay("wrong pictures")
+    with VirtualDevices(program, folder / "order") as devices:
+        devices.shoot("LAT", "waiting for AP")
         check("lateral picture first is taken as such",
-              any("LAT: came in place of AP" in line for line in theatre.navigation.heard))
-        theatre.shoot("AP", "^measure: ")
-    with Theatre(program, folder / "hidden") as theatre:
-        theatre.say("fault hide:femur on", "hide:femur on")
+              any("LAT: came in place of AP" in line for line in devices.navigation.heard))
+        devices.shoot("AP", "^measure: ")
+    with VirtualDevices(program, folder / "hidden") as devices:
+        devices.say("fault hide:femur on", "hide:femur on")
         time.sleep(EXPOSURE_S)
-        theatre.say("shoot AP", "shot AP")
+        devices.say("shoot AP", "shot AP")
         check("femur hidden during the exposure: expose again",
-              bool(theatre.navigation.wait_for("no_pose: AP: the marker of the femur.*expose again")))
+              bool(devices.navigation.wait_for("no_pose: AP: the marker of the femur.*expose again")))
 
 
 def drill_checks(program, folder):
     """A marker that is bumped between the X-rays and the robot's first order to its bone."""
-    with Theatre(program, folder / "checks", room=["--check-points"], begins="touch \"femur notch\"") as theatre:
+    with VirtualDevices(program, folder / "checks", room=["--check-points"], begins="touch \"femur notch\"") as devices:
         for bone in ("femur", "tibia"):
-            theatre.touch(bone, f"{bone} notch: taken, 0.00 mm off")
-        theatre.navigation.wait_for("waiting for AP")
-        theatre.say("touch nothing", "touching nothing")
-        theatre.expose()
-        theatre.navigation.wait_for("touch \"femur notch\"", 120)
-        theatre.say("bump femur 0 2.5 0", "bumped femur")
-        theatre.touch("femur", "residual_too_large")
-        theatre.expect_end("bumped marker", "residual_too_large")
-        theatre.expect_replay("bumped marker")
+            devices.touch(bone, f"{bone} notch: taken, 0.00 mm off")
+        devices.navigation.wait_for("waiting for AP")
+        devices.say("touch nothing", "touching nothing")
+        devices.expose()
+        devices.navigation.wait_for("touch \"femur notch\"", 120)
+        devices.say("bump femur 0 2.5 0", "bumped femur")
+        devices.touch("femur", "residual_too_large")
+        devices.expect_end("bumped marker", "residual_too_large")
+        devices.expect_replay("bumped marker")
 
 
 def drill_motion(program, folder):
@@ -103,34 +103,34 @@ def drill_motion(program, folder):
                                    ("cut_cable", "stale_state", 0.2), ("emergency_stop", "robot_stopped", 0.6),
                                    ("protective_stop", "robot_stopped", 0.6),
                                    ("frozen", "stale_pose", 0.4)):
-        with Theatre(program, folder / fault.replace(":", "_")) as theatre:
-            theatre.expose()
-            theatre.navigation.wait_for("register: pose 1")
-            theatre.wait_moving()
+        with VirtualDevices(program, folder / fault.replace(":", "_")) as devices:
+            devices.expose()
+            devices.navigation.wait_for("register: pose 1")
+            devices.wait_moving()
             begun = time.monotonic()
-            theatre.say(f"fault {fault} on", f"{fault} on")
-            stop_s = theatre.stop_s(begun)
+            devices.say(f"fault {fault} on", f"{fault} on")
+            stop_s = devices.stop_s(begun)
             check(f"{fault} while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= limit_s)
-            theatre.expect_end(fault, reason)
-            theatre.expect_replay(fault)
-    with Theatre(program, folder / "bone") as theatre:
-        theatre.expose()
-        theatre.navigation.wait_for("navigate: femur", 120)
-        theatre.wait_moving()
+            devices.expect_end(fault, reason)
+            devices.expect_replay(fault)
+    with VirtualDevices(program, folder / "bone") as devices:
+        devices.expose()
+        devices.navigation.wait_for("navigate: femur", 120)
+        devices.wait_moving()
         begun = time.monotonic()
-        theatre.say("fault hide:femur on", "hide:femur on")
-        stop_s = theatre.stop_s(begun)
+        devices.say("fault hide:femur on", "hide:femur on")
+        stop_s = devices.stop_s(begun)
         check(f"bone lost on the way to its tunnel: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.3)
-        theatre.expect_end("bone lost", "stale_pose")
-    with Theatre(program, folder / "full") as theatre:
-        theatre.expose()
-        theatre.navigation.wait_for("register: pose 1")
-        full = (theatre.session / "session.log").stat().st_size + 100
-        resource.prlimit(theatre.navigation.process.pid, resource.RLIMIT_FSIZE, (full, full))
-        theatre.expect_end("disk full while the robot is at work", "cannot_write", 2)
+        devices.expect_end("bone lost", "stale_pose")
+    with VirtualDevices(program, folder / "full") as devices:
+        devices.expose()
+        devices.navigation.wait_for("register: pose 1")
+        full = (devices.session / "session.log").stat().st_size + 100
+        resource.prlimit(devices.navigation.process.pid, resource.RLIMIT_FSIZE, (full, full))
+        devices.expect_end("disk full while the robot is at work", "cannot_write", 2)
         time.sleep(0.2)
-        check("     the robot is at rest", "moving" not in theatre.say("where", "^tip "))
-        theatre.expect_replay("disk full")
+        check("     the robot is at rest", "moving" not in devices.say("where", "^tip "))
+        devices.expect_replay("disk full")
 
 
 def drill_stale(program, folder):
@@ -140,38 +140,38 @@ def drill_stale(program, folder):
                "jump": ("move femur 3 0 0", 1, 0, 1), "turn": ("turn femur 0.4", 8, 0.05, 3),
                "base": ("move base 0 3 0", 1, 0, 1)}
     for name, (words, times, apart_s, beyond) in motions.items():
-        with Theatre(program, folder / name.split()[0]) as theatre:
-            theatre.expose()
-            theatre.navigation.wait_for("navigate: femur", 120)
-            theatre.wait_moving()
+        with VirtualDevices(program, folder / name.split()[0]) as devices:
+            devices.expose()
+            devices.navigation.wait_for("navigate: femur", 120)
+            devices.wait_moving()
             for number in range(1, times + 1):
-                theatre.say(words, words.split()[1])
+                devices.say(words, words.split()[1])
                 if number == beyond:
                     begun = time.monotonic()
-                if number > beyond and theatre.rested_s() is not None:
+                if number > beyond and devices.rested_s() is not None:
                     break
                 time.sleep(apart_s)
-            stop_s = theatre.stop_s(begun)
+            stop_s = devices.stop_s(begun)
             check(f"{name} on the way: at rest after {stop_s * 1000:.0f} ms, {number} of {times} motions", stop_s <= 0.5)
-            theatre.expect_end(name, "plan_stale")
-            theatre.expect_replay(name)
+            devices.expect_end(name, "plan_stale")
+            devices.expect_replay(name)
     for name, plan, words in (("femur 40 mm off", {}, "move femur 40 0 0"), ("plan too old", {"plan_stale_s": 10}, None)):
-        with Theatre(program, folder / name.split()[-1], terminal=True, plan=plan) as theatre:
-            theatre.expose()
-            theatre.navigation.wait_for("^ *9: tip", 120)
+        with VirtualDevices(program, folder / name.split()[-1], terminal=True, plan=plan) as devices:
+            devices.expose()
+            devices.navigation.wait_for("^ *9: tip", 120)
             for pose in range(1, 10):
-                theatre.confirm()
-                theatre.navigation.wait_for(f"register: pose {pose}")
-            theatre.navigation.wait_for("^look at")
-            rest = theatre.say("where", "^tip ").split(",")[0]
+                devices.confirm()
+                devices.navigation.wait_for(f"register: pose {pose}")
+            devices.navigation.wait_for("^look at")
+            rest = devices.say("where", "^tip ").split(",")[0]
             if words:
-                theatre.say(words, "moved")
+                devices.say(words, "moved")
             begun = time.monotonic()
-            theatre.navigation.process.wait(30)
+            devices.navigation.process.wait(30)
             check(f"{name} while the confirmation is open: told after {time.monotonic() - begun:.1f} s", True)
-            theatre.expect_end(name, "plan_stale")
-            check("     the robot has not moved", theatre.say("where", "^tip ").split(",")[0] == rest)
-            theatre.expect_replay(name)
+            devices.expect_end(name, "plan_stale")
+            check("     the robot has not moved", devices.say("where", "^tip ").split(",")[0] == rest)
+            devices.expect_replay(name)
 
 
 def drill_ends(program, folder):
@@ -179,37 +179,37 @@ def drill_ends(program, folder):
     steps = {"waiting for AP": None, "waiting for LAT": "AP", "^measure: ": "both", "^register: pose 2": "both",
              "^plan: ": "both", "^navigate: femur": "both", "^verify: ": "both"}
     for number, (step, shots) in enumerate(steps.items()):
-        with Theatre(program, folder / f"term{number}") as theatre:
+        with VirtualDevices(program, folder / f"term{number}") as devices:
             if shots == "both":
-                theatre.expose()
+                devices.expose()
             elif shots:
-                theatre.shoot(shots, "waiting for LAT")
+                devices.shoot(shots, "waiting for LAT")
             if shots == "both" and not step.startswith("^measure"):
-                theatre.navigation.wait_for(step, 120)
-            code, seconds = theatre.navigation.end()
+                devices.navigation.wait_for(step, 120)
+            code, seconds = devices.navigation.end()
             check(f"SIGTERM at \"{step.strip('^: ')}\" ends it in {seconds * 1000:.0f} ms with {code}",
                   seconds <= 1 and code == 3)
             time.sleep(0.2)
-            check("     the robot is at rest", "moving" not in theatre.say("where", "^tip "))
-            theatre.expect_replay("     SIGTERM")
+            check("     the robot is at rest", "moving" not in devices.say("where", "^tip "))
+            devices.expect_replay("     SIGTERM")
     for number, step in enumerate(("^register: pose 1", "^register: pose 4", "^navigate: femur$")):
-        with Theatre(program, folder / f"kill{number}") as theatre:
-            theatre.expose()
-            theatre.navigation.wait_for(step, 120)
-            theatre.wait_moving()
+        with VirtualDevices(program, folder / f"kill{number}") as devices:
+            devices.expose()
+            devices.navigation.wait_for(step, 120)
+            devices.wait_moving()
             begun = time.monotonic()
-            theatre.navigation.end(signal.SIGKILL)
-            stop_s = theatre.stop_s(begun)
+            devices.navigation.end(signal.SIGKILL)
+            stop_s = devices.stop_s(begun)
             check(f"SIGKILL while the robot moves: at rest after {stop_s * 1000:.0f} ms", stop_s <= 0.2)
-            theatre.expect_replay("SIGKILL")
-    with Theatre(program, folder / "room") as theatre:
-        code, seconds = theatre.room.end()
+            devices.expect_replay("SIGKILL")
+    with VirtualDevices(program, folder / "room") as devices:
+        code, seconds = devices.room.end()
         check(f"SIGTERM ends virtual-or in {seconds * 1000:.0f} ms with {code}", seconds <= 1 and code == 0)
 
 
 def drill_system(program, folder):
-    with Theatre(program, folder / "ports") as theatre:
-        ports = json.loads(theatre.plan.read_text())
+    with VirtualDevices(program, folder / "ports") as devices:
+        ports = json.loads(devices.plan.read_text())
         taken = {"--tracker-port": ports["tracker"]["port"], "--rtde-port": ports["robot"]["rtde_port"]}
         for option, port in taken.items():
             others = [word for name in ("--tracker-port", "--rtde-port", "--dashboard-port", "--script-port")
@@ -217,12 +217,12 @@ def drill_system(program, folder):
             done = subprocess.run([program, "virtual-or", option, str(port), *others], capture_output=True, text=True,
                                   stdin=subprocess.DEVNULL)
             check(f"{option} that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
-        done = subprocess.run([program, "navigate", theatre.plan, "--yes", "--out", folder / "second", "--port",
-                               theatre.port],
+        done = subprocess.run([program, "navigate", devices.plan, "--yes", "--out", folder / "second", "--port",
+                               devices.port],
                               capture_output=True, text=True)
         check("navigate's port that is taken", done.returncode == 2 and "port_taken" in done.stderr, done.stderr.strip())
         for name, out in (("folder that nobody can write", "/proc/session"), ("path too long", folder / ("x" * 300))):
-            done = subprocess.run([program, "navigate", theatre.plan, "--yes", "--out", out, "--port", "0"], capture_output=True,
+            done = subprocess.run([program, "navigate", devices.plan, "--yes", "--out", out, "--port", "0"], capture_output=True,
                                   text=True)
             check(name, done.returncode == 2 and "cannot_write" in done.stderr, done.stderr.strip()[-80:])
     case, not_loaded = folder / "memory", 127

@@ -78,7 +78,7 @@ Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(
   return *arguments;
 }
 
-/// Pictures to points and error bars.
+/// Images to points and error bars.
 void add_measuring_commands(CLI::App& app, Action& action);
 /// What needs no hardware: simulations, studies, the phantom.
 void add_rehearsal_commands(CLI::App& app, Action& action);

@@ -8,26 +8,26 @@
 #include "helicarm/core/json.h"
 #include "helicarm/detection/find_crosses.h"
 #include "helicarm/detection/find_dots.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::cli {
 namespace {
 
-std::vector<Dot> found_in(const Exposure& exposure, bool crosses, Polarity polarity) {
+std::vector<Dot> found_in(const XrayImage& xray_image, bool crosses, Polarity polarity) {
   if (crosses) {
     CrossOptions options;
     options.polarity = polarity;
-    return find_crosses(exposure, options);
+    return find_crosses(xray_image, options);
   }
   DotOptions options;
   options.polarity = polarity;
-  return find_clear_dots(exposure, options);
+  return find_clear_dots(xray_image, options);
 }
 
-/// Metal is dark in most pictures and bright in the others: the polarity that shows more of it is right.
-std::vector<Dot> metal_in(const Exposure& exposure, bool crosses) {
-  auto dark = found_in(exposure, crosses, Polarity::dark);
-  auto bright = found_in(exposure, crosses, Polarity::bright);
+/// Metal is dark in most images and bright in the others: the polarity that shows more of it is right.
+std::vector<Dot> metal_in(const XrayImage& xray_image, bool crosses) {
+  auto dark = found_in(xray_image, crosses, Polarity::dark);
+  auto bright = found_in(xray_image, crosses, Polarity::bright);
   return dark.size() >= bright.size() ? dark : bright;
 }
 
@@ -39,10 +39,10 @@ CommandResult detect_command(const DetectArguments& arguments, Console& console)
     if (!crosses && arguments.kind != "balls" && arguments.kind != "holes")
       throw BadInput(Reason::usage,
                      fmt::format("--kind: \"{}\" is none of: balls, holes, crosses", arguments.kind));
-    const Exposure exposure =
-        value_or_throw(read_exposure(arguments.image, arguments.image.filename().string(), arguments.frame));
-    const std::vector<Dot> dots =
-        arguments.kind == "holes" ? found_in(exposure, false, Polarity::bright) : metal_in(exposure, crosses);
+    const XrayImage xray_image = value_or_throw(
+        read_xray_image(arguments.image, arguments.image.filename().string(), arguments.frame));
+    const std::vector<Dot> dots = arguments.kind == "holes" ? found_in(xray_image, false, Polarity::bright)
+                                                            : metal_in(xray_image, crosses);
     if (console.json) {
       Json list = Json::array();
       for (const Dot& dot : dots)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
-#include "helicarm/operating_room/room_fields.h"
+#include "helicarm/virtual_devices/virtual_devices_fields.h"
 #include "navigate_command.h"
 #include "operate_command.h"
 #include "receive_command.h"
@@ -100,11 +100,12 @@ void add_virtual_or(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, virtual_or_command);
   command->add_option("--plan", a.plan, "Write a plan for navigate, with a surgeon's clicks");
   command->add_flag("--check-points", a.check_points, "The plan asks for a check point on each bone");
-  add_fields(command, a.room, operating_room::room_fields);
-  add_port(command, "--tracker-port", a.room.tracker_port, "OpenIGTLink; each port 0: any that is free");
-  add_port(command, "--rtde-port", a.room.rtde_port, "of the robot");
-  add_port(command, "--dashboard-port", a.room.dashboard_port, "of the robot");
-  add_port(command, "--script-port", a.room.script_port, "of the robot");
+  add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
+  add_port(command, "--tracker-port", a.virtual_or.tracker_port,
+           "OpenIGTLink; each port 0: any that is free");
+  add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
+  add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
+  add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");
   add_port(command, "--receiver-port", a.receiver.port, "Where the C-arm sends its pictures");
   command->add_option("--receiver-title", a.receiver.title, "Its application entity title")
       ->capture_default_str();

@@ -19,13 +19,13 @@ namespace {
 /// One point as it was picked, in the order of the first picks.
 struct PickedPoint {
   std::string name;
-  std::vector<PointPicture> pictures;
-  std::optional<Failure> unseen = {};  ///< why the last picture missing here is so
+  std::vector<PointObservation> images;
+  std::optional<Failure> unseen = {};  ///< why the last image missing here is so
 };
 
 /// As `run` sees the picks of its case; rectified ones are taken as they are.
-Expected<PointPicture> picture_from(const CsvTable& table, std::size_t row,
-                                    const SavedCalibration& calibration, bool raw) {
+Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
+                                      const SavedCalibration& calibration, bool raw) {
   const std::string where = fmt::format("picks: row {}", row + 1);
   const auto found = std::ranges::find(calibration.views, table.text(row, "view"), &CalibratedView::name);
   if (found == calibration.views.end())
@@ -41,9 +41,9 @@ Expected<PointPicture> picture_from(const CsvTable& table, std::size_t row,
     throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the picture of {} x {} pixels",
                                                   where, uv.x(), uv.y(), map->width, map->height));
   return (raw && map ? see_click(*map, uv, given_sigma)
-                     : SeenPoint{uv, uv, given_sigma.value_or(click_sigma_px)})
-      .map([&](const SeenPoint& seen) {
-        return PointPicture{view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
+                     : ImagePoint{uv, uv, given_sigma.value_or(click_sigma_px)})
+      .map([&](const ImagePoint& seen) {
+        return PointObservation{view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
       });
 }
 
@@ -51,17 +51,17 @@ std::vector<PickedPoint> picked_points(const CsvTable& table, const SavedCalibra
   std::vector<PickedPoint> points;
   std::set<std::pair<std::string, std::string>> clicks;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto picture = picture_from(table, row, calibration, raw);
+    const auto image = image_from(table, row, calibration, raw);
     const std::string &name = table.text(row, "name"), &view = table.text(row, "view");
     if (!clicks.emplace(name, view).second)
       throw BadInput(Reason::name_clash, fmt::format("picks: row {}: \"{}\" is picked twice in view \"{}\"",
                                                      row + 1, name, view));
     auto point = std::ranges::find(points, name, &PickedPoint::name);
     if (point == points.end()) point = points.insert(points.end(), {name, {}});
-    if (picture)
-      point->pictures.push_back(*picture);
+    if (image)
+      point->images.push_back(*image);
     else
-      point->unseen = picture.error();
+      point->unseen = image.error();
   }
   return points;
 }
@@ -73,8 +73,8 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   Json points = Json::array();
-  for (const auto& [name, pictures, unseen] : picked_points(table, calibration, arguments.raw)) {
-    const auto point = locate(name, PointSource::pick, pictures, calibration);
+  for (const auto& [name, images, unseen] : picked_points(table, calibration, arguments.raw)) {
+    const auto point = locate(name, PointSource::pick, images, calibration);
     const auto why = point ? point->doubt : unseen ? unseen : std::optional(point.error());
     points.push_back(point ? point_json(*point) : point_json(name, PointSource::pick, why->reason));
     if (why) progress << fmt::format("{}: {}\n", name, why->message);

@@ -23,7 +23,7 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
       ->capture_default_str();
   add_fields(command, a.options, run_fields);
-  command->add_option("--machine", a.machine,
+  command->add_option("--machine", a.history,
                       "The C-arm's history (JSON): serves as prior, and this case's shots are added to it");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
@@ -41,7 +41,7 @@ void add_export(CLI::App& app, Action& action) {
           fmt::format("Some of {}, with commas between (default: all)", fmt::join(export_words, ", ")))
       ->delimiter(',');
   add_fields(command, a.run.options, run_fields);
-  command->add_option("--machine", a.run.machine, "The C-arm's history (JSON), which is left as it is");
+  command->add_option("--machine", a.run.history, "The C-arm's history (JSON), which is left as it is");
 }
 
 void add_predict(CLI::App& app, Action& action) {
@@ -57,7 +57,7 @@ void add_predict(CLI::App& app, Action& action) {
   command->add_option("--max-error", a.max_error_mm, "Limit of the decision, mm (95 %)")
       ->check(within(1e-6, 1000))
       ->capture_default_str();
-  command->add_option("--machine", a.machine, "The C-arm's history (JSON), which is left as it is");
+  command->add_option("--machine", a.history, "The C-arm's history (JSON), which is left as it is");
   command->add_option("--map", a.map, "Folder for a map about the calibrator: tre.csv, tre.vtk, tre.svg");
   command->add_option("--half", a.half_mm, "The map reaches so far, mm")
       ->check(within(1, 1000))

@@ -37,14 +37,14 @@ class Ending {
       : thread_([this, &signal, &robot, &operation](const std::stop_token& over) {
           while (!over.stop_requested())
             if (signal.wait(glance_s)) {
-              told_ = true;
+              reported_ = true;
               operation.interrupt();
               return robot.stop();
             }
         }) {}
 
   void check() const {
-    if (told_) throw BadInput(Reason::interrupted, "told to end");
+    if (reported_) throw BadInput(Reason::interrupted, "told to end");
   }
   /// Until this holds, looking again and again.
   template <class Holds>
@@ -54,7 +54,7 @@ class Ending {
 
  private:
   static constexpr double glance_s = 0.05;
-  std::atomic<bool> told_{false};
+  std::atomic<bool> reported_{false};
   std::jthread thread_;
 };
 
@@ -253,9 +253,9 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       if (!console.quiet)
         console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
                          << std::flush;
-      std::optional<DatedArrival> picture;
-      ending.wait_until([&] { return (picture = devices.next_picture(0)).has_value(); });
-      const auto taken = operation->take(view, picture->arrival, picture->time_s);
+      std::optional<DatedArrival> image;
+      ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
+      const auto taken = operation->take(view, image->arrival, image->time_s);
       if (!taken)
         console.progress << fmt::format("{}: {}: {}; expose again\n", view, code(taken.error().reason),
                                         without_control_characters(taken.error().message))

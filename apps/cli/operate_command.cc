@@ -53,14 +53,14 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
     const unsigned crew = console.threads == 0 ? most_at_once : console.threads;
     parallel_for(done.size(), crew, [&](std::size_t i) {
       RehearsalOptions options;
-      options.picture_size = arguments.size;
+      options.image_size = arguments.size;
       options.tracker_rate_hz = arguments.rate_hz;
       const auto say = [&](const std::string& what) {
         if (console.quiet) return;
         const std::lock_guard lock(telling);
         console.progress << fmt::format("bones {}: {}\n", i + 1, what) << std::flush;
       };
-      options.tell = [&](const std::string& what) {
+      options.notify = [&](const std::string& what) {
         check();
         say(what);
       };

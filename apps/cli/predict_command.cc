@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/calibration/machine.h"
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/localization/locate.h"
@@ -75,7 +75,7 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     if (places.empty()) places.push_back(middle);
     RunOptions options;
     options.threads = console.threads;
-    if (arguments.machine) options.machine = value_or_throw(read_machine(*arguments.machine));
+    if (arguments.history) options.history = value_or_throw(read_history(*arguments.history));
     const auto calibrated = calibrate_case(given, options);
     if (!calibrated) throw BadInput(calibrated.error().failure);
     const Calibration& calibration = *calibrated;

@@ -15,7 +15,7 @@ struct PredictArguments {
   std::vector<std::string> at;   ///< "x,y,z" each, mm in the calibrator's frame
   double sigma_px = 0.5;         ///< of a pick, per axis
   double max_error_mm = 2;       ///< limit of the decision (95 %)
-  std::optional<std::filesystem::path> machine = {};
+  std::optional<std::filesystem::path> history = {};
   std::optional<std::filesystem::path> map = {};  ///< folder for tre.csv, tre.vtk, tre.svg
   double half_mm = 150;                           ///< of the map's edge
   double step_mm = 10;

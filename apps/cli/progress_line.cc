@@ -29,19 +29,20 @@ ProgressLine::ProgressLine(const Console& console)
     : out_(console.quiet ? nullptr : &console.progress),
       terminal_(&console.progress == &std::cerr && ::isatty(STDERR_FILENO)),
       start_(Clock::now()),
-      told_(start_) {}
+      reported_(start_) {}
 
 ProgressLine::~ProgressLine() {
   if (begun_ && terminal_) *out_ << '\n';
 }
 
-void ProgressLine::tell(double share) {
+void ProgressLine::notify(double share) {
   if (!out_) return;
   const auto now = Clock::now();
   if (first_share_ < 0) first_share_ = told_share_ = share, start_ = now;
   const double passed = seconds(now - start_);
   if (passed < silent_s) return;
-  if (terminal_ ? seconds(now - told_) < between_lines_s && share < 1 : share - told_share_ < between_shares)
+  if (terminal_ ? seconds(now - reported_) < between_lines_s && share < 1
+                : share - told_share_ < between_shares)
     return;
   const double done = share - first_share_;
   const std::string left = done > 0 ? span_of(passed * (1 - share) / done) + " left" : "";
@@ -49,7 +50,7 @@ void ProgressLine::tell(double share) {
                        terminal_ ? "   " : "\n")
         << std::flush;
   begun_ = true;
-  told_ = now;
+  reported_ = now;
   told_share_ = share;
 }
 

@@ -18,7 +18,7 @@ class ProgressLine {
   ProgressLine& operator=(const ProgressLine&) = delete;
 
   /// `share` of the whole; what was done before the first call does not count for the time left.
-  void tell(double share);
+  void notify(double share);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -29,7 +29,7 @@ class ProgressLine {
   double first_share_ = -1;
   double told_share_ = 0;
   Clock::time_point start_;
-  Clock::time_point told_;
+  Clock::time_point reported_;
 };
 
 }  // namespace helicarm::cli

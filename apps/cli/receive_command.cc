@@ -12,20 +12,20 @@
 namespace helicarm::cli {
 namespace {
 
-/// Tells the console of pictures as they come, from whatever thread.
-class Tale {
+/// Tells the console of images as they come, from whatever thread.
+class ReceptionLog {
  public:
-  Tale(Console& console, std::optional<std::uint64_t> count, StopSignal& stop)
+  ReceptionLog(Console& console, std::optional<std::uint64_t> count, StopSignal& stop)
       : console_(console), left_(count), stop_(stop) {}
 
   ReceiverHooks hooks() {
-    return {[this](const Arrival& arrival) { tell(arrival); },
-            [this](const Failure& why) { tell("refused", why); },
-            [this](const Failure& why) { tell("cut", why); }};
+    return {[this](const Arrival& arrival) { notify(arrival); },
+            [this](const Failure& why) { notify("refused", why); },
+            [this](const Failure& why) { notify("cut", why); }};
   }
 
  private:
-  void tell(const Arrival& arrival) {
+  void notify(const Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     if (console_.json) {
       Json warnings = Json::array();
@@ -43,7 +43,7 @@ class Tale {
     }
     if (left_ && --*left_ == 0) stop_.raise();
   }
-  void tell(const char* what, const Failure& failure) {
+  void notify(const char* what, const Failure& failure) {
     const std::lock_guard lock(mutex_);
     console_.progress << fmt::format("{}: {}: {}\n", what, code(failure.reason),
                                      without_control_characters(failure.message))
@@ -76,7 +76,7 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
     if (!arguments.certificate.empty())
       options.tls = TlsFiles{arguments.certificate, arguments.key, arguments.authorities};
     StopSignal stop;
-    Tale tale(console, arguments.count, stop);
+    ReceptionLog tale(console, arguments.count, stop);
     const auto inbox = value_or_throw(Inbox::open(arguments.out));
     std::unique_ptr<DicomReceiver> receiver;
     std::optional<WatchedFolder> watched;

@@ -12,16 +12,16 @@
 #include "helicarm/rectification/inpaint.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/test_grid.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/write_dicom.h"
 #include "run_command.h"
 
 namespace helicarm::cli {
 namespace {
 
-Exposure picture_of(const RectifyArguments& arguments) {
+XrayImage image_of(const RectifyArguments& arguments) {
   return value_or_throw(
-      read_exposure(*arguments.image, arguments.image->filename().string(), arguments.frame));
+      read_xray_image(*arguments.image, arguments.image->filename().string(), arguments.frame));
 }
 
 DistortionMap map_of(const RectifyArguments& arguments) {
@@ -33,17 +33,17 @@ Plate plate_of(const std::string& name) {
   return name == plate48().name ? plate48() : value_or_throw(read_plate(name));
 }
 
-DerivedImage rectified_image(const Exposure& exposure, const DistortionMap& map, std::string description) {
-  const Image<float> picture = resample(exposure, map);
+DerivedImage rectified_image(const XrayImage& xray_image, const DistortionMap& map, std::string description) {
+  const Image<float> view_image = resample(xray_image, map);
   DerivedImage image;
   const auto range =
-      std::clamp(static_cast<long>(std::lround(exposure.highest - exposure.lowest)), 1l, 65535l);
+      std::clamp(static_cast<long>(std::lround(xray_image.highest - xray_image.lowest)), 1l, 65535l);
   image.bits_stored = std::max(8, static_cast<int>(std::bit_width(static_cast<unsigned>(range))));
-  image.pixels = Image<std::uint16_t>(picture.width(), picture.height());
-  std::ranges::transform(picture.pixels(), image.pixels.pixels().begin(), [&](float value) {
-    return static_cast<std::uint16_t>(std::clamp(std::lround(value - exposure.lowest), 0l, range));
+  image.pixels = Image<std::uint16_t>(view_image.width(), view_image.height());
+  std::ranges::transform(view_image.pixels(), image.pixels.pixels().begin(), [&](float value) {
+    return static_cast<std::uint16_t>(std::clamp(std::lround(value - xray_image.lowest), 0l, range));
   });
-  image.acquisition = exposure.acquisition;
+  image.acquisition = xray_image.acquisition;
   if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
     image.acquisition.pixel_mm = Eigen::Vector2d::Constant(*map.rectified_pixel_mm);
   image.series_description = std::move(description);
@@ -61,17 +61,18 @@ Json figures_of(const Rectification& r) {
           {"raw_max_px", r.raw_max_px}};
 }
 
-void rectify_picture(const RectifyArguments& arguments, Console& console) {
-  const Exposure exposure = picture_of(arguments);
+void rectify_image(const RectifyArguments& arguments, Console& console) {
+  const XrayImage xray_image = image_of(arguments);
   const Rectification r = value_or_throw(
-      rectify(exposure, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
+      rectify(xray_image, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
-  value_or_throw(write_dicom(arguments.out / "rectified.dcm", rectified_image(exposure, r.map, "rectified")));
-  Exposure without_dots = exposure;
-  without_dots.pixels = inpainted(exposure.pixels, r.plate_dots);
+  value_or_throw(
+      write_dicom(arguments.out / "rectified.dcm", rectified_image(xray_image, r.map, "rectified")));
+  XrayImage without_dots = xray_image;
+  without_dots.pixels = inpainted(xray_image.pixels, r.plate_dots);
   value_or_throw(write_dicom(arguments.out / "inpainted.dcm",
                              rectified_image(without_dots, r.map, "rectified, plate hidden")));
   value_or_throw(write_file(arguments.out / "map.json", to_text(to_json(r.map)) + "\n"));
@@ -91,7 +92,7 @@ void map_points(const RectifyArguments& arguments, Console& console) {
   Json points = Json::array();
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const Eigen::Vector2d given{table.number(row, "u_px"), table.number(row, "v_px")};
-    const auto mapped = arguments.inverse ? raw_in_picture(map, given) : rectified_in_picture(map, given);
+    const auto mapped = arguments.inverse ? raw_in_image(map, given) : rectified_in_image(map, given);
     points.push_back(mapped ? Json{{"u", mapped->x()}, {"v", mapped->y()}}
                             : Json{{"u", nullptr}, {"v", nullptr}});
   }
@@ -105,7 +106,7 @@ void map_points(const RectifyArguments& arguments, Console& console) {
 
 void measure_grid(const RectifyArguments& arguments, Console& console) {
   const DistortionMap map = map_of(arguments);
-  const TestGrid grid = value_or_throw(measure_test_grid(find_grid(picture_of(arguments)), map));
+  const TestGrid grid = value_or_throw(measure_test_grid(find_grid(image_of(arguments)), map));
   const auto json_of = [](const GridError& error) {
     return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
   };
@@ -127,7 +128,7 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
     if (arguments.points && arguments.map && !arguments.image) return map_points(arguments, console);
     if (arguments.image && arguments.test_grid_mm && arguments.map) return measure_grid(arguments, console);
     if (arguments.image && arguments.plate && !arguments.map && !arguments.points)
-      return rectify_picture(arguments, console);
+      return rectify_image(arguments, console);
     throw BadInput(Reason::usage,
                    "rectify: give IMAGE --plate, or --map --points, or IMAGE --map --test-grid (see --help)");
   });

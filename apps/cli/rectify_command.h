@@ -22,7 +22,7 @@ struct RectifyArguments {
   bool inverse = false;  ///< points: rectified -> raw
 };
 
-/// Fits the distortion of a picture and writes rectified.dcm, map.json and residuals.csv; or applies a map to
+/// Fits the distortion of an image and writes rectified.dcm, map.json and residuals.csv; or applies a map to
 /// points; or measures what a map leaves on the test grid (Eq. 14-15).
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console);
 

@@ -16,7 +16,7 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"torn", report.torn},
                               {"finished", report.finished},
                               {"exposures", report.exposures},
-                              {"pictures", report.pictures},
+                              {"pictures", report.images},
                               {"results", report.results},
                               {"hand_eyes", report.hand_eyes},
                               {"differences", report.differences}})
@@ -25,7 +25,7 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
       console.out << fmt::format(
           "{} records{}{}: {} exposures, {} pictures of cases, {} results, {} hand-eye calibrations\n",
           report.records, report.torn ? " and a torn one" : "",
-          report.finished ? "" : ", without the operation's end", report.exposures, report.pictures,
+          report.finished ? "" : ", without the operation's end", report.exposures, report.images,
           report.results, report.hand_eyes);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }

@@ -30,18 +30,18 @@ void forget(const std::filesystem::path& out) {
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
 }
 
-/// Each picture once.
-Expected<void> remember(const std::filesystem::path& path, Machine machine,
-                        const std::vector<MachineShot>& shots, Console& console) {
-  const std::size_t earlier = machine.shots.size();
-  for (const MachineShot& shot : shots)
-    if (std::ranges::find(machine.shots, shot.picture, &MachineShot::picture) == machine.shots.end())
-      machine.shots.push_back(shot);
+/// Each image once.
+Expected<void> remember(const std::filesystem::path& path, CArmHistory history,
+                        const std::vector<HistoryEntry>& entries, Console& console) {
+  const std::size_t earlier = history.entries.size();
+  for (const HistoryEntry& entry : entries)
+    if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
+      history.entries.push_back(entry);
   if (!console.quiet)
     console.progress << fmt::format("helicarm: {}: {} earlier shots, {} added{}\n", path.string(), earlier,
-                                    machine.shots.size() - earlier,
-                                    shots.empty() ? ": the residuals belie this case" : "");
-  return write_file(path, to_text(to_json(machine)) + "\n");
+                                    history.entries.size() - earlier,
+                                    entries.empty() ? ": the residuals belie this case" : "");
+  return write_file(path, to_text(to_json(history)) + "\n");
 }
 
 /// The result goes last: where it lies, all that belongs to it lies there too.
@@ -69,10 +69,10 @@ Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions
 
 }  // namespace
 
-Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path) {
-  if (!path) return std::optional<Machine>();
-  if (!std::filesystem::exists(*path)) return std::optional(Machine());
-  return read_machine(*path).map([](Machine machine) { return std::optional(std::move(machine)); });
+Expected<std::optional<CArmHistory>> history_at(const std::optional<std::filesystem::path>& path) {
+  if (!path) return std::optional<CArmHistory>();
+  if (!std::filesystem::exists(*path)) return std::optional(CArmHistory());
+  return read_history(*path).map([](CArmHistory history) { return std::optional(std::move(history)); });
 }
 
 Expected<Method> method_named(const std::string& name) {
@@ -113,7 +113,7 @@ Expected<Result> measure(const RunArguments& arguments, Console& console) {
   return guarded([&] {
     RunOptions options = arguments.options;
     options.threads = console.threads;
-    options.machine = value_or_throw(machine_at(arguments.machine));
+    options.history = value_or_throw(history_at(arguments.history));
     Result result = value_or_throw(result_of(arguments.folder, options));
     if (!console.quiet)
       for (const Warning& warning : result.warnings)
@@ -128,8 +128,8 @@ Expected<Result> run_and_write(const RunArguments& arguments, Console& console) 
     forget(arguments.out);
     const Result result = value_or_throw(measure(arguments, console));
     value_or_throw(write(result, arguments));
-    if (arguments.machine && !result.failure)
-      value_or_throw(remember(*arguments.machine, *result.options.machine, result.shots, console));
+    if (arguments.history && !result.failure)
+      value_or_throw(remember(*arguments.history, *result.options.history, result.entries, console));
     return result;
   });
 }

@@ -15,7 +15,7 @@ struct RunArguments {
   std::filesystem::path out = "helicarm-result";
   RunOptions options = {};                            ///< threads and the machine's history are filled in
   bool no_report = false;                             ///< only result.json
-  std::optional<std::filesystem::path> machine = {};  ///< the C-arm's history: read, and added to
+  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read, and added to
 };
 
 /// Runs a case and writes result.json, report.html and NAME_overlay.png. A refusal writes them too and then
@@ -29,7 +29,7 @@ Expected<Result> measure(const RunArguments& arguments, Console& console);
 Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
 
 /// A C-arm's history, where a file is named; one that is not there yet is empty.
-Expected<std::optional<Machine>> machine_at(const std::optional<std::filesystem::path>& path);
+Expected<std::optional<CArmHistory>> history_at(const std::optional<std::filesystem::path>& path);
 
 /// "best" or "paper"; usage otherwise.
 Expected<Method> method_named(const std::string& name);

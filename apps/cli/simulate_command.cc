@@ -97,7 +97,7 @@ Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase
     const auto clear = [](const std::vector<simulation::TruePoint>& points) {
       return std::ranges::count(points, Visibility::clear, &simulation::TruePoint::visibility);
     };
-    Json entry = {{"name", view.shot.name}};
+    Json entry = {{"name", view.true_view.name}};
     if (simulated.options.kind == simulation::CaseKind::grid)
       entry.update({{"clear_crosses", clear(view.crosses)}, {"crosses", view.crosses.size()}});
     else

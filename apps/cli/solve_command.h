@@ -13,7 +13,7 @@ struct SolveArguments {
   std::string method = "ml";     ///< dlt, homogeneous or ml
 };
 
-/// A view from points of known place and their pictures. Every point is believed. Without sigmas the
+/// A view from points of known place and their images. Every point is believed. Without sigmas the
 /// covariance is scaled by the residuals.
 CommandResult solve_command(const SolveArguments& arguments, Console& console);
 

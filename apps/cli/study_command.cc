@@ -187,7 +187,7 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     StudyFiles files;
     {
       ProgressLine line(console);
-      run.engine.progress = [&](double share) { line.tell(share); };
+      run.engine.progress = [&](double share) { line.notify(share); };
       files = study.run(run);
     }
     if (!ranks.leads()) return;

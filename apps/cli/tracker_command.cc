@@ -21,13 +21,13 @@ namespace helicarm::cli {
 namespace {
 
 /// Calls `tell` each second until the time is over or the user interrupts.
-template <class Tell>
-void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Tell tell) {
+template <class Notify>
+void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Notify notify) {
   const double until = seconds ? monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
   while (true) {
     const double left = until - monotonic_seconds();
     if (left <= 0 || interrupt.wait(std::min(left, 1.0))) return;
-    tell();
+    notify();
   }
 }
 

@@ -19,7 +19,7 @@
 namespace helicarm::cli {
 namespace {
 
-using operating_room::VirtualRoom;
+using virtual_devices::VirtualDevices;
 
 /// Five times what the virtual tracker's drift makes of two touches.
 constexpr double notch_limit_mm = 1.5;
@@ -31,31 +31,31 @@ std::string words() {
       "DEG (about its tunnel's outer end) | bump femur|tibia X Y Z (mm: its marker) | touch "
       "femur|tibia|nothing | power on | where "
       "| quit",
-      operating_room::c_arm_fault_names(), operating_room::room_fault_names());
+      virtual_devices::c_arm_fault_names(), virtual_devices::virtual_fault_names());
 }
 
-operating_room::CArmFault fault_of_shot(const std::string& name) {
-  if (name.empty()) return operating_room::CArmFault::none;
-  if (const auto fault = operating_room::c_arm_fault(name)) return *fault;
+virtual_devices::CArmFault fault_of_shot(const std::string& name) {
+  if (name.empty()) return virtual_devices::CArmFault::none;
+  if (const auto fault = virtual_devices::c_arm_fault(name)) return *fault;
   throw BadInput(Reason::bad_value,
-                 fmt::format("a fault of the C-arm is one of {}", operating_room::c_arm_fault_names()));
+                 fmt::format("a fault of the C-arm is one of {}", virtual_devices::c_arm_fault_names()));
 }
 
 /// Does what one line says and answers with one; throws BadInput.
-std::string obey(const std::string& line, VirtualRoom& room,
-                 const operating_room::PictureReceiver& receiver) {
+std::string obey(const std::string& line, VirtualDevices& virtual_or,
+                 const virtual_devices::ImageReceiver& receiver) {
   std::istringstream said(line);
   std::string verb, what, how;
   said >> verb >> what;
   if (verb == "shoot") {
     said >> how;
-    value_or_throw(operating_room::shoot(room.theatre(), what, receiver, fault_of_shot(how)));
+    value_or_throw(virtual_devices::shoot(virtual_or.simulated_scene(), what, receiver, fault_of_shot(how)));
     return "shot " + what;
   }
   if (verb == "fault") {
     said >> how;
     if (how != "on" && how != "off") throw BadInput(Reason::usage, "fault NAME on or off");
-    value_or_throw(room.set_fault(what, how == "on"));
+    value_or_throw(virtual_or.set_fault(what, how == "on"));
     return fmt::format("{} {}", what, how);
   }
   const bool bone = what == "femur" || what == "tibia";
@@ -65,36 +65,36 @@ std::string obey(const std::string& line, VirtualRoom& room,
     if (!(said >> shift.x() >> shift.y() >> shift.z()) || !(bone || base))
       throw BadInput(Reason::usage, verb + " femur|tibia X Y Z");
     if (verb == "bump")
-      room.theatre().bump_marker(what, shift);
+      virtual_or.simulated_scene().bump_marker(what, shift);
     else if (base)
-      room.theatre().move_base(shift);
+      virtual_or.simulated_scene().move_base(shift);
     else
-      room.theatre().move_bone(what, {Eigen::Matrix3d::Identity(), shift});
+      virtual_or.simulated_scene().move_bone(what, {Eigen::Matrix3d::Identity(), shift});
     return (verb == "bump" ? "bumped " : "moved ") + what;
   }
   if (verb == "turn") {
     double degrees = 0;
     if (!(said >> degrees) || !bone) throw BadInput(Reason::usage, "turn femur|tibia DEG");
-    room.theatre().turn_bone(
-        what, room.theatre().point_in_tracker(what == "femur" ? "FE" : "TS"),
+    virtual_or.simulated_scene().turn_bone(
+        what, virtual_or.simulated_scene().point_in_tracker(what == "femur" ? "FE" : "TS"),
         Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::UnitX()).toRotationMatrix());
     return "turned " + what;
   }
   if (verb == "touch") {
     if (!bone && what != "nothing") throw BadInput(Reason::usage, "touch femur|tibia|nothing");
     if (bone)
-      room.touch(what);
+      virtual_or.touch(what);
     else
-      room.lift_pointer();
+      virtual_or.lift_pointer();
     return "touching " + what;
   }
   if (verb == "power") {
     if (what != "on") throw BadInput(Reason::usage, "power on");
-    return room.power_on();
+    return virtual_or.power_on();
   }
   if (verb == "where") {
-    const Eigen::Vector3d tip = room.tracker_from_tip().translation;
-    const VirtualTruth robot = room.robot().truth();
+    const Eigen::Vector3d tip = virtual_or.tracker_from_tip().translation;
+    const VirtualTruth robot = virtual_or.robot().truth();
     const std::string motion =
         robot.moving         ? "moving"
         : robot.rest_since_s ? fmt::format("at rest for {:.3f} s", robot.state.time_s - *robot.rest_since_s)
@@ -105,7 +105,7 @@ std::string obey(const std::string& line, VirtualRoom& room,
 }
 
 /// Until its input ends, "quit", or the stop token.
-void listen(const std::stop_token& stop, VirtualRoom& room, const VirtualOrArguments& arguments,
+void listen(const std::stop_token& stop, VirtualDevices& virtual_or, const VirtualOrArguments& arguments,
             Console& console, StopSignal& end) {
   constexpr int look_again_ms = 100;
   LineInput input(STDIN_FILENO);
@@ -118,7 +118,7 @@ void listen(const std::stop_token& stop, VirtualRoom& room, const VirtualOrArgum
     }
     if (!*line || (*line)->empty()) continue;
     if (**line == "quit") return end.raise();
-    const auto answer = guarded([&] { return obey(**line, room, arguments.receiver); });
+    const auto answer = guarded([&] { return obey(**line, virtual_or, arguments.receiver); });
     if (answer)
       console.out << *answer << std::endl;
     else
@@ -133,16 +133,16 @@ void listen(const std::stop_token& stop, VirtualRoom& room, const VirtualOrArgum
 CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& console) {
   return guarded([&] {
     StopSignal end;
-    operating_room::VirtualRoomOptions options = arguments.room;
+    virtual_devices::VirtualDevicesOptions options = arguments.virtual_or;
     options.seed = console.seed;
     std::mutex telling;
     options.on_notice = [&](const std::string& line) {
       const std::lock_guard lock(telling);
       if (!console.quiet) console.progress << line + "\n" << std::flush;
     };
-    const auto room = value_or_throw(VirtualRoom::open(options));
+    const auto virtual_or = value_or_throw(VirtualDevices::open(options));
     if (!arguments.plan.empty()) {
-      OperationPlan plan = plan_for(*room, room->tracker().port());
+      OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
       if (arguments.check_points)
         plan.check_points = {{"femur notch", Bone::femur, notch_limit_mm},
                              {"tibia notch", Bone::tibia, notch_limit_mm}};
@@ -152,13 +152,13 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
       console.progress << fmt::format(
                               "tracker (OpenIGTLink) port {}\nrobot (UR5): RTDE {}, dashboard {}, script {}\n"
                               "C-arm sends to {} {} port {}\nsay: {}\n",
-                              room->tracker().port(), room->robot().rtde_port(),
-                              room->robot().dashboard_port(), room->robot().script_port(),
+                              virtual_or->tracker().port(), virtual_or->robot().rtde_port(),
+                              virtual_or->robot().dashboard_port(), virtual_or->robot().script_port(),
                               arguments.receiver.title, arguments.receiver.address, arguments.receiver.port,
                               words())
                        << std::flush;
     const std::jthread listener(
-        [&](const std::stop_token& stop) { listen(stop, *room, arguments, console, end); });
+        [&](const std::stop_token& stop) { listen(stop, *virtual_or, arguments, console, end); });
     end.wait(arguments.seconds);
   });
 }

@@ -5,13 +5,13 @@
 #include <optional>
 
 #include "command.h"
-#include "helicarm/operating_room/virtual_room.h"
+#include "helicarm/virtual_devices/virtual_devices.h"
 
 namespace helicarm::cli {
 
 struct VirtualOrArguments {
-  operating_room::VirtualRoomOptions room;
-  operating_room::PictureReceiver receiver;
+  virtual_devices::VirtualDevicesOptions virtual_or;
+  virtual_devices::ImageReceiver receiver;
   std::filesystem::path plan;  ///< written for `navigate`; empty: none
   bool check_points = false;   ///< in the plan
   std::optional<double> seconds;

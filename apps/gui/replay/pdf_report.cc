@@ -5,7 +5,7 @@
 #include <QCoreApplication>
 #include <algorithm>
 
-#include "gui/replay/paper.h"
+#include "gui/replay/pdf_layout.h"
 #include "gui/replay/print_svg.h"
 #include "helicarm/core/files.h"
 #include "helicarm/report/figures.h"
@@ -35,14 +35,14 @@ QString message_of(const Failure& failure) {
            QString::fromUtf8(reason.data(), qsizetype(reason.size())));
 }
 
-void draw_summary(const Result& result, Paper& paper) {
-  paper.title(Words::tr("helicarm report"));
-  paper.paragraph(Words::tr("Research instrument, not a medical device."), Paper::Tone::bad);
+void draw_summary(const Result& result, PdfLayout& layout) {
+  layout.title(Words::tr("helicarm report"));
+  layout.paragraph(Words::tr("Research instrument, not a medical device."), PdfLayout::Tone::bad);
   if (result.failure)
-    paper.paragraph(Words::tr("Refused: %1").arg(message_of(*result.failure)), Paper::Tone::bad);
+    layout.paragraph(Words::tr("Refused: %1").arg(message_of(*result.failure)), PdfLayout::Tone::bad);
   else
-    paper.paragraph(Words::tr("Measured."), Paper::Tone::good);
-  std::vector<PaperCard> cards;
+    layout.paragraph(Words::tr("Measured."), PdfLayout::Tone::good);
+  std::vector<LayoutCard> cards;
   const Accuracy& accuracy = result.accuracy;
   if (accuracy.fle_px.n)
     cards.push_back({fixed(accuracy.fle_px.rms), "px", Words::tr("fiducial localization error, rms")});
@@ -55,13 +55,13 @@ void draw_summary(const Result& result, Paper& paper) {
     if (point.place) largest = std::max(largest, length_at_95(point.place->covariance_in_calibrator));
   if (largest > 0)
     cards.push_back({fixed(largest), "mm", Words::tr("least certain point, predicted at 95 %")});
-  paper.cards(cards);
-  if (!result.warnings.empty()) paper.heading(Words::tr("Warnings"));
-  for (const Warning& warning : result.warnings) paper.paragraph("• " + message_of(warning));
+  layout.cards(cards);
+  if (!result.warnings.empty()) layout.heading(Words::tr("Warnings"));
+  for (const Warning& warning : result.warnings) layout.paragraph("• " + message_of(warning));
 }
 
-void draw_views(const Result& result, Paper& paper) {
-  std::vector<PaperFigure> figures;
+void draw_views(const Result& result, PdfLayout& layout) {
+  std::vector<LayoutFigure> figures;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     const ViewResult& view = result.views[i];
     const std::string figure = view_figure(result, i);
@@ -74,15 +74,15 @@ void draw_views(const Result& result, Paper& paper) {
     figures.push_back({print_svg(figure), caption});
   }
   if (figures.empty()) return;
-  paper.heading(Words::tr("The X-rays, rectified"));
-  paper.figures(figures);
-  paper.paragraph(
+  layout.heading(Words::tr("The X-rays, rectified"));
+  layout.figures(figures);
+  layout.paragraph(
       Words::tr("Green: balls used, with their residuals as orange arrows. Red crosses: false blobs. Blue: "
                 "plate. Violet: points. Yellow: planned tunnels. Red lines: tool."),
-      Paper::Tone::soft);
+      PdfLayout::Tone::soft);
 }
 
-void draw_points(const Result& result, Paper& paper) {
+void draw_points(const Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
   QStringList missing;
   for (const PointResult& point : result.points) {
@@ -100,46 +100,46 @@ void draw_points(const Result& result, Paper& paper) {
                     fixed(sigma.z()), fixed(length_at_95(covariance)), fixed(point.ray_gap_mm)});
   }
   if (rows.empty() && missing.empty()) return;
-  paper.heading(Words::tr("Points in the calibrator, mm"));
+  layout.heading(Words::tr("Points in the calibrator, mm"));
   if (!rows.empty())
-    paper.table({Words::tr("Point"), Words::tr("Kind"), "#x", "#y", "#z", "#σ x", "#σ y", "#σ z",
-                 "#" + Words::tr("within (95 %)"), "#" + Words::tr("ray gap")},
-                rows);
-  for (const QString& line : missing) paper.paragraph(line, Paper::Tone::bad);
+    layout.table({Words::tr("Point"), Words::tr("Kind"), "#x", "#y", "#z", "#σ x", "#σ y", "#σ z",
+                  "#" + Words::tr("within (95 %)"), "#" + Words::tr("ray gap")},
+                 rows);
+  for (const QString& line : missing) layout.paragraph(line, PdfLayout::Tone::bad);
 }
 
-void draw_accuracy(const Accuracy& accuracy, Paper& paper) {
+void draw_accuracy(const Accuracy& accuracy, PdfLayout& layout) {
   std::vector<QStringList> rows;
   for (const auto& [what, s] : {std::pair{Words::tr("FRE, the balls themselves (Eq. 11)"), accuracy.fre_mm},
                                 {Words::tr("TRE, the check targets (Eq. 12)"), accuracy.tre_mm}})
     if (s.n > 0)
       rows.push_back({what, fixed(s.mean), fixed(s.rms), fixed(s.max), fixed(s.min), QString::number(s.n)});
   if (rows.empty()) return;
-  paper.heading(Words::tr("Accuracy"));
-  paper.table({Words::tr("Error, mm"), "#" + Words::tr("mean"), "#rms", "#" + Words::tr("max"),
-               "#" + Words::tr("min"), "#n"},
-              rows);
+  layout.heading(Words::tr("Accuracy"));
+  layout.table({Words::tr("Error, mm"), "#" + Words::tr("mean"), "#rms", "#" + Words::tr("max"),
+                "#" + Words::tr("min"), "#n"},
+               rows);
   rows.clear();
   for (const TargetError& target : accuracy.targets)
     rows.push_back({text_of(target.name), fixed(target.error_mm), fixed(target.predicted_mm),
                     fixed(target.predicted_95_mm)});
   if (!rows.empty())
-    paper.table({Words::tr("Check target"), "#" + Words::tr("error, mm"),
-                 "#" + Words::tr("predicted rms, mm"), "#" + Words::tr("predicted at 95 %, mm")},
-                rows);
+    layout.table({Words::tr("Check target"), "#" + Words::tr("error, mm"),
+                  "#" + Words::tr("predicted rms, mm"), "#" + Words::tr("predicted at 95 %, mm")},
+                 rows);
 }
 
-void draw_guidance(const Result& result, Paper& paper) {
+void draw_guidance(const Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
   for (const Tunnel& tunnel : result.tunnels)
     rows.push_back({text_of(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
                     coordinates(tunnel.axis_in_tool, 4), fixed(tunnel.axis_sigma_deg()),
                     fixed(tunnel.length_mm, 2)});
   if (!rows.empty()) {
-    paper.heading(Words::tr("Tunnels"));
-    paper.table({Words::tr("Tunnel"), Words::tr("start in tool, mm"), Words::tr("end in tool, mm"),
-                 Words::tr("axis in tool"), "#" + Words::tr("axis ±, °"), "#" + Words::tr("length, mm")},
-                rows);
+    layout.heading(Words::tr("Tunnels"));
+    layout.table({Words::tr("Tunnel"), Words::tr("start in tool, mm"), Words::tr("end in tool, mm"),
+                  Words::tr("axis in tool"), "#" + Words::tr("axis ±, °"), "#" + Words::tr("length, mm")},
+                 rows);
   }
   rows.clear();
   for (const Verification& line : result.verifications)
@@ -149,15 +149,15 @@ void draw_guidance(const Result& result, Paper& paper) {
         rows.push_back({text_of(line.name), end, fixed((*error)->combined_px, 2),
                         fixed((*error)->combined_mm, 2), fixed((*error)->distance_mm, 2)});
   if (rows.empty()) return;
-  paper.heading(Words::tr("Verification"));
-  paper.table({Words::tr("Tool line"), Words::tr("end of tunnel"), "#" + Words::tr("Eq. 17, px"),
-               "#" + Words::tr("Eq. 17, mm"), "#" + Words::tr("in space, mm")},
-              rows);
+  layout.heading(Words::tr("Verification"));
+  layout.table({Words::tr("Tool line"), Words::tr("end of tunnel"), "#" + Words::tr("Eq. 17, px"),
+                "#" + Words::tr("Eq. 17, mm"), "#" + Words::tr("in space, mm")},
+               rows);
 }
 
-void draw_rectification(const Result& result, Paper& paper) {
+void draw_rectification(const Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
-  std::vector<PaperFigure> figures;
+  std::vector<LayoutFigure> figures;
   for (const ViewResult& view : result.views) {
     if (!view.rectification || view.rectification->map.is_identity()) continue;
     const Rectification& of = *view.rectification;
@@ -172,12 +172,12 @@ void draw_rectification(const Result& result, Paper& paper) {
            Words::tr("Distortion in %1: from the rectified to the raw place").arg(text_of(view.name))});
   }
   if (rows.empty()) return;
-  paper.heading(Words::tr("Rectification"));
-  paper.table(
+  layout.heading(Words::tr("Rectification"));
+  layout.table(
       {Words::tr("View"), Words::tr("plate dots"), "#" + Words::tr("residual, px"),
        "#" + Words::tr("held out, px"), "#" + Words::tr("distortion, px"), "#" + Words::tr("largest, px")},
       rows);
-  paper.figures(figures);
+  layout.figures(figures);
 }
 
 }  // namespace
@@ -194,14 +194,14 @@ Expected<void> write_pdf_report(const Result& result, const std::filesystem::pat
     writer.setTitle(Words::tr("helicarm report"));
     writer.setCreator("helicarm " HELICARM_VERSION);
     const QString method = result.options.method == Method::paper ? "paper" : "best";
-    Paper paper(writer, Words::tr("helicarm %1, method %2 · research instrument, not a medical device")
-                            .arg(HELICARM_VERSION, method));
-    draw_summary(result, paper);
-    draw_views(result, paper);
-    draw_points(result, paper);
-    draw_accuracy(result.accuracy, paper);
-    draw_guidance(result, paper);
-    draw_rectification(result, paper);
+    PdfLayout layout(writer, Words::tr("helicarm %1, method %2 · research instrument, not a medical device")
+                                 .arg(HELICARM_VERSION, method));
+    draw_summary(result, layout);
+    draw_views(result, layout);
+    draw_points(result, layout);
+    draw_accuracy(result.accuracy, layout);
+    draw_guidance(result, layout);
+    draw_rectification(result, layout);
   }
   return write_file(path, {bytes.constData(), std::size_t(bytes.size())});
 }

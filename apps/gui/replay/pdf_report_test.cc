@@ -23,10 +23,10 @@ Result result_of_two_views(std::size_t points) {
   for (const char* name : {"AP", "LAT <&>"}) {
     ViewResult& view = result.views.emplace_back();
     view.name = name;
-    Exposure exposure{name, Image<float>(640, 480, 3000), 0, 4095, {}, {}};
+    XrayImage exposure{name, Image<float>(640, 480, 3000), 0, 4095, {}, {}};
     for (int v = 0; v < 480; ++v)
       for (int u = 0; u < 640; ++u) exposure.pixels(u, v) = float(500 + 4 * u);
-    view.exposure = std::make_shared<const Exposure>(std::move(exposure));
+    view.xray_image = std::make_shared<const XrayImage>(std::move(exposure));
     view.rectification = Rectification{};
     view.rectification->map = identity_map(640, 480, 0.2);
     view.found = LabelledFiducials{};
@@ -44,7 +44,7 @@ Result result_of_two_views(std::size_t points) {
       point.reason = Failure{Reason::not_seen, "is in one view only", "", {}};
       continue;
     }
-    point.place = GuidedPoint{};
+    point.place = PointInFrames{};
     point.place->covariance_in_calibrator = 0.01 * Eigen::Matrix3d::Identity();
   }
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
@@ -92,7 +92,7 @@ TEST_F(Pdf, IsWrittenWholeOrNotAtAll) {
   EXPECT_EQ(std::distance(fs::directory_iterator(path_.parent_path()), {}), 1);
 }
 
-TEST_F(Pdf, FigureBringsItsPictureAndItsColours) {
+TEST_F(Pdf, FigureBringsItsImageAndItsColours) {
   const Result result = result_of_two_views(1);
   QSvgRenderer svg(print_svg(view_figure(result, 1)));
   ASSERT_TRUE(svg.isValid());

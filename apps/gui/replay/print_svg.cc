@@ -39,7 +39,7 @@ void enlarge(QString& svg, const QString& attribute, double factor) {
 
 }  // namespace
 
-QByteArray print_svg(const std::string& figure, bool on_paper) {
+QByteArray print_svg(const std::string& figure, bool on_page) {
   QString svg = QString::fromStdString(figure);
   svg.replace(
       QRegularExpression("^<svg "),
@@ -50,10 +50,10 @@ QByteArray print_svg(const std::string& figure, bool on_paper) {
   svg.replace(" href=\"data:", " xlink:href=\"data:");
   for (const auto& [kind, attributes] : looks) svg.replace(QString("class=\"%1\"").arg(kind), attributes);
   svg.replace("class=\"bar\"",
-              on_paper ? R"(stroke="#1d2326" stroke-width="3")" : R"(stroke="#fff" stroke-width="3")");
+              on_page ? R"(stroke="#1d2326" stroke-width="3")" : R"(stroke="#fff" stroke-width="3")");
   static const QRegularExpression text(R"(<text class="[^"]*" ([^>]*)>([^<]*)</text>)");
   // QtSvg knows no halo about letters: a shadow keeps white ones legible on white bone
-  svg.replace(text, on_paper
+  svg.replace(text, on_page
                         ? R"x(<text fill="#1d2326" stroke="none" \1>\2</text>)x"
                         : R"x(<text fill="#000" stroke="none" transform="translate(1.7 1.7)" \1>\2</text>)x"
                           R"x(<text fill="#000" stroke="none" transform="translate(-1 -1)" \1>\2</text>)x"

@@ -232,7 +232,7 @@ void ReplayPanel::show_verdict(const Expected<ReplayReport>& report) {
   if (!report) {
     text = tr("Cannot be replayed: %1").arg(QString::fromStdString(report.error().message));
   } else if (same) {
-    text = text.arg(report->exposures).arg(report->pictures).arg(report->results).arg(report->hand_eyes);
+    text = text.arg(report->exposures).arg(report->images).arg(report->results).arg(report->hand_eyes);
   } else {
     text = tr("These came out otherwise:");
     for (const std::string& difference : report->differences)

@@ -67,7 +67,7 @@ TEST_F(Panel, SliderLeadsToTheLastMomentNotLater) {
   EXPECT_LT(panel_->moment(), int(session_kinds.size()) - 1);
 }
 
-TEST_F(Panel, VerificationTellsWhatItCannotReplay) {
+TEST_F(Panel, VerificationReportsWhatItCannotReplay) {
   QSignalSpy verified(panel_.get(), &ReplayPanel::verified);
   panel_->verify();
   ASSERT_TRUE(verified.wait(20000));

@@ -12,9 +12,9 @@
 
 #include "gui/replay/field_box.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
-#include "helicarm/operating_room/room_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/virtual_devices/virtual_devices_fields.h"
 
 namespace helicarm::gui {
 
@@ -41,7 +41,7 @@ SettingsDialog::SettingsDialog(Settings settings, QWidget* parent)
   add_page(*pages, tr("&Measurement"), &Settings::run, run_fields);
   add_page(*pages, tr("&Operation"), &Settings::plan, plan_fields);
   add_page(*pages, tr("&Receiver"), &Settings::receiver, receiver_fields);
-  add_page(*pages, tr("&Virtual room"), &Settings::room, operating_room::room_fields);
+  add_page(*pages, tr("&Virtual devices"), &Settings::virtual_or, virtual_devices::virtual_devices_fields);
   auto* buttons = new QDialogButtonBox(
       QDialogButtonBox::Ok | QDialogButtonBox::Cancel | QDialogButtonBox::RestoreDefaults, this);
   connect(buttons, &QDialogButtonBox::accepted, this, &QDialog::accept);

@@ -8,9 +8,9 @@
 
 #include "helicarm/core/field.h"
 #include "helicarm/devices/receiver/receiver.h"
-#include "helicarm/operating_room/virtual_room.h"
 #include "helicarm/operation/plan.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/virtual_devices/virtual_devices.h"
 
 class QTabWidget;
 
@@ -21,7 +21,7 @@ struct Settings {
   RunOptions run = {};
   OperationPlan plan = {};
   ReceiverOptions receiver = {};
-  operating_room::VirtualRoomOptions room = {};
+  virtual_devices::VirtualDevicesOptions virtual_or = {};
 };
 
 /// A page for each list of fields: label, box with unit and limits, tooltip.

@@ -13,9 +13,9 @@
 
 #include "gui/replay/application_test.h"
 #include "gui/replay/field_box.h"
-#include "helicarm/operating_room/room_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/virtual_devices/virtual_devices_fields.h"
 
 namespace helicarm::gui {
 namespace {
@@ -28,7 +28,7 @@ class Dialog : public testing::Test {
   }
 };
 
-TEST_F(Dialog, GivesBackWhatNobodyChanged) {
+TEST_F(Dialog, GivesBackWhatNoOneChanged) {
   Settings given;
   given.run.method = Method::paper;
   given.run.max_error_mm = 0.123456789;  // more digits than the box shows
@@ -38,7 +38,7 @@ TEST_F(Dialog, GivesBackWhatNobodyChanged) {
   EXPECT_EQ(back.run.method, Method::paper);
   EXPECT_EQ(back.run.max_error_mm, 0.123456789);
   EXPECT_EQ(to_json(back.plan), to_json(given.plan));
-  EXPECT_EQ(back.room.tracker_rate_hz, given.room.tracker_rate_hz);
+  EXPECT_EQ(back.virtual_or.tracker_rate_hz, given.virtual_or.tracker_rate_hz);
 }
 
 TEST_F(Dialog, HasABoxForEveryField) {
@@ -53,20 +53,20 @@ TEST_F(Dialog, KeysChangeANumber) {
   auto* rate = box(dialog, "tracker_rate_hz").findChild<QDoubleSpinBox*>();
   rate->selectAll();
   QTest::keyClicks(rate, "75.5");
-  EXPECT_EQ(dialog.settings().room.tracker_rate_hz, 75.5);
+  EXPECT_EQ(dialog.settings().virtual_or.tracker_rate_hz, 75.5);
   EXPECT_TRUE(rate->text().endsWith(" Hz"));
   QTest::keyClicks(rate, "99999");
-  EXPECT_TRUE(check_fields<operating_room::VirtualRoomOptions>(operating_room::room_fields,
-                                                               dialog.settings().room, ""));
+  EXPECT_TRUE(check_fields<virtual_devices::VirtualDevicesOptions>(virtual_devices::virtual_devices_fields,
+                                                                   dialog.settings().virtual_or, ""));
 }
 
 TEST_F(Dialog, NumberSnapsToItsSteps) {
   SettingsDialog dialog({});
   auto* size = box(dialog, "picture_size_px").findChild<QDoubleSpinBox*>();
   size->setValue(700);
-  EXPECT_EQ(dialog.settings().room.picture_size, 512);
+  EXPECT_EQ(dialog.settings().virtual_or.image_size, 512);
   size->setValue(1000);
-  EXPECT_EQ(dialog.settings().room.picture_size, 1024);
+  EXPECT_EQ(dialog.settings().virtual_or.image_size, 1024);
 }
 
 TEST_F(Dialog, LimitMayBeLeftUnset) {
@@ -86,11 +86,11 @@ TEST_F(Dialog, LimitMayBeLeftUnset) {
 TEST_F(Dialog, DefaultsComeBack) {
   Settings given;
   given.run.max_error_mm = 3;
-  given.room.seed = 77;
+  given.virtual_or.seed = 77;
   SettingsDialog dialog(given);
   dialog.findChild<QDialogButtonBox*>()->button(QDialogButtonBox::RestoreDefaults)->click();
   EXPECT_FALSE(dialog.settings().run.max_error_mm);
-  EXPECT_EQ(dialog.settings().room.seed, 1u);
+  EXPECT_EQ(dialog.settings().virtual_or.seed, 1u);
 }
 
 }  // namespace

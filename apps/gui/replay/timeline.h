@@ -43,12 +43,12 @@ struct LoopMiss {
 
 /// What was known once a moment had passed.
 struct SessionState {
-  std::vector<std::string> exposures;                   ///< views whose picture was taken, in that order
-  std::optional<std::filesystem::path> case_folder;     ///< the newest case: pictures and case.json
+  std::vector<std::string> exposures;                   ///< views whose image was taken, in that order
+  std::optional<std::filesystem::path> case_folder;     ///< the newest case: images and case.json
   bool measured = false;                                ///< that case has its result
   std::map<std::string, RigidTransform> tracker_from;   ///< the newest pose of each tool
   std::map<std::string, std::vector<LoopMiss>> misses;  ///< of the closed loop, by tunnel
-  std::map<std::string, std::size_t> exposed_at;        ///< the moment of each view's picture
+  std::map<std::string, std::size_t> exposed_at;        ///< the moment of each view's image
   std::optional<std::size_t> registered_at;             ///< the moment of the robot's newest registration
   std::string tunnel;                                   ///< to which the newest order goes
 };

@@ -73,7 +73,7 @@ TEST_F(TimelineTest, TornLogIsReadUpToItsTear) {
   EXPECT_EQ(timeline.moments.size(), session_kinds.size() - 1);
 }
 
-TEST_F(TimelineTest, DamageIsToldAsTheFailureItIs) {
+TEST_F(TimelineTest, DamageIsReportedAsTheFailureItIs) {
   EXPECT_EQ(read_timeline(folder_ / "nowhere").error().reason, Reason::missing_file);
   std::fstream log(folder_ / "session.log", std::ios::in | std::ios::out | std::ios::binary);
   log.seekp(200);

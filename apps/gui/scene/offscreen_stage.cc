@@ -59,12 +59,12 @@ bool OffscreenStage::begin(const QSize& pixels) {
 
 QImage OffscreenStage::finish(const SceneCamera& camera) {
   stage_->render_upside_down(camera, target_->handle());
-  QImage picture(target_->size(), QImage::Format_RGB32);
+  QImage image(target_->size(), QImage::Format_RGB32);
   QOpenGLFunctions* gl = context_.functions();
   gl->glBindFramebuffer(GL_FRAMEBUFFER, target_->handle());
   gl->glUseProgram(0);
-  gl->glReadPixels(0, 0, picture.width(), picture.height(), GL_BGRA, GL_UNSIGNED_BYTE, picture.bits());
-  return picture;
+  gl->glReadPixels(0, 0, image.width(), image.height(), GL_BGRA, GL_UNSIGNED_BYTE, image.bits());
+  return image;
 }
 
 }  // namespace helicarm::gui

@@ -12,7 +12,7 @@
 
 namespace helicarm::gui {
 
-/// A stage in an OpenGL context that no window sees, drawn into pictures. A QOpenGLWidget would have Qt
+/// A stage in an OpenGL context that no window sees, drawn into images. A QOpenGLWidget would have Qt
 /// compose its whole window by OpenGL whenever anything in it changes: in software, as a rule here, that
 /// takes longer than the scene itself.
 class OffscreenStage {

@@ -20,14 +20,14 @@ struct SceneCamera {
   double distance() const { return (focal_point - position).norm(); }
 };
 
-/// At the view's source along its central ray, up as in the picture, all of which fits into the window.
-/// `aspect`: the window's width over its height. A mirrored picture is seen as it would be unmirrored.
+/// At the view's source along its central ray, up as in the image, all of which fits into the window.
+/// `aspect`: the window's width over its height. A mirrored image is seen as it would be unmirrored.
 SceneCamera camera_through(const ViewShape& view, const Eigen::Vector3d& middle, double aspect);
 
 /// From above, obliquely, so that all these places fit.
 SceneCamera overview_of(std::span<const Eigen::Vector3d> places, double aspect);
 
-/// Turned about the focal point: to the right and up as seen in the picture, rad.
+/// Turned about the focal point: to the right and up as seen in the image, rad.
 SceneCamera turned(const SceneCamera& camera, double right_rad, double up_rad);
 /// Nearer (factor > 1) or farther.
 SceneCamera zoomed(const SceneCamera& camera, double factor);

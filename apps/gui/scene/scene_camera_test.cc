@@ -19,7 +19,7 @@ void expect_inside(const SceneCamera& camera, double aspect, const Vector3d& pla
   EXPECT_LE(seen->cwiseAbs().maxCoeff(), 1);
 }
 
-TEST(SceneCamera, EachViewsCameraSeesTheCalibratorAndTheWholePicture) {
+TEST(SceneCamera, EachViewsCameraSeesTheCalibratorAndTheWholeImage) {
   const ResultScene shown = scene();
   for (const ViewShape& view : shown.views)
     for (const double aspect : {0.5, 1.0, 2.5}) {
@@ -29,15 +29,15 @@ TEST(SceneCamera, EachViewsCameraSeesTheCalibratorAndTheWholePicture) {
     }
 }
 
-TEST(SceneCamera, EachViewsCameraSeesWhatItsPictureShows) {
+TEST(SceneCamera, EachViewsCameraSeesWhatItsImageShows) {
   for (const ViewShape& view : scene().views) {
     const SceneCamera camera = camera_through(view, {0, 0, 40}, 1);
     const Intrinsics& k = view.view.intrinsics;
     const Vector3d place(20, -15, 60), other(-12, 30, 20);
     const Vector2d way = *seen_at(camera, 1, other) - *seen_at(camera, 1, place);
-    const Vector2d in_picture = view.view.project(other) - view.view.project(place);
-    const double right = k.fx > 0 ? in_picture.x() : -in_picture.x();
-    EXPECT_NEAR(way.x() / right, -way.y() / in_picture.y(), 0.02 * std::abs(way.x() / right));
+    const Vector2d in_image = view.view.project(other) - view.view.project(place);
+    const double right = k.fx > 0 ? in_image.x() : -in_image.x();
+    EXPECT_NEAR(way.x() / right, -way.y() / in_image.y(), 0.02 * std::abs(way.x() / right));
     EXPECT_GT(way.x() / right, 0);
   }
 }

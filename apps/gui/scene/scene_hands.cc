@@ -52,8 +52,8 @@ SceneCamera SceneView::near_camera() const {
   for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
   for (const PointShape& point : scene_.points) places.push_back(point.error.centre);
   if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
-  constexpr double room_around = 0.72;
-  return zoomed(overview_of(places, aspect()), room_around);
+  constexpr double scene_around = 0.72;
+  return zoomed(overview_of(places, aspect()), scene_around);
 }
 
 void SceneView::look_near() { move_camera(near_camera()); }

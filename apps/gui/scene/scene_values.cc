@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Where no pixel size tells the focal length, the picture is drawn this much farther than the calibrator.
+/// Where no pixel size tells the focal length, the image is drawn this much farther than the calibrator.
 constexpr double beyond_calibrator = 1.5;
 
 double detector_depth(const ViewResult& view, const Vector3d& middle) {
@@ -23,8 +23,8 @@ double detector_depth(const ViewResult& view, const Vector3d& middle) {
   std::optional<double> pixel_mm;
   if (view.rectification && view.rectification->map.rectified_plane == RectifiedPlane::detector)
     pixel_mm = view.rectification->map.rectified_pixel_mm;
-  if (!pixel_mm && view.exposure && view.exposure->acquisition.pixel_mm)
-    pixel_mm = view.exposure->acquisition.pixel_mm->y();
+  if (!pixel_mm && view.xray_image && view.xray_image->acquisition.pixel_mm)
+    pixel_mm = view.xray_image->acquisition.pixel_mm->y();
   return pixel_mm ? calibrated.intrinsics.fy * *pixel_mm : beyond_calibrator * calibrated.depth(middle);
 }
 
@@ -37,7 +37,7 @@ Vector3d on_detector(const ViewShape& shape, const Vector2d& pixel) {
 ViewShape shape_of(const ViewResult& view, const Vector3d& middle) {
   const View& calibrated = view.calibrated->view;
   ViewShape shape{view.name, calibrated, {1024, 1024}, {}, {}};
-  if (view.exposure) shape.size_px = {view.exposure->pixels.width(), view.exposure->pixels.height()};
+  if (view.xray_image) shape.size_px = {view.xray_image->pixels.width(), view.xray_image->pixels.height()};
   const Vector3d source = calibrated.source_in_world();
   const Vector3d beam = calibrated.camera_from_world.rotation.row(2).transpose();
   shape.central_ray = {source, source + detector_depth(view, middle) * beam};

@@ -31,12 +31,12 @@ inline constexpr double chi2_95 = 7.815;
 
 Ellipsoid ellipsoid_95(const Eigen::Vector3d& centre, const Eigen::Matrix3d& covariance);
 
-/// A calibrated X-ray: its source, the edge of its picture and its central ray.
+/// A calibrated X-ray: its source, the edge of its image and its central ray.
 struct ViewShape {
   std::string name;
   View view;
   Eigen::Vector2d size_px;
-  std::array<Eigen::Vector3d, 4> detector;  ///< corners in order around the picture
+  std::array<Eigen::Vector3d, 4> detector;  ///< corners in order around the image
   Segment central_ray;                      ///< from the source to the detector
 };
 
@@ -72,7 +72,7 @@ std::optional<TriangleMesh> cone_of(const Calibrator& calibrator);
 /// What moves. Absent: not known now, so not shown.
 struct LiveScene {
   std::optional<RigidTransform> calibrator_from_tip;  ///< z along the tool, out of its tip
-  /// Motion of the bones since the exposure.
+  /// Motion of the bones since the xray_image.
   std::optional<RigidTransform> calibrator_from_femur_now, calibrator_from_tibia_now;
   /// Where the bones' markers are.
   std::optional<RigidTransform> calibrator_from_femur_marker, calibrator_from_tibia_marker;

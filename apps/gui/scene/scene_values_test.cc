@@ -57,12 +57,12 @@ TEST(SceneValues, RaysPassThroughTheirPointsAndEndOnTheDetectors) {
 TEST(SceneValues, DetectorIsAsLargeAndAsFarAsTheSimulatedOne) {
   const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
   for (std::size_t i = 0; i < 2; ++i) {
-    const simulation::Shot& shot = simulated().truth.views[i].shot;
+    const simulation::TrueView& true_view = simulated().truth.views[i].true_view;
     const ViewShape& view = scene.views[i];
     EXPECT_NEAR((view.central_ray.to - view.central_ray.from).norm(),
-                shot.view.intrinsics.fy * shot.pixel_mm(), 15);
-    EXPECT_NEAR((view.detector[1] - view.detector[0]).norm(), 512 * shot.pixel_mm(), 4);
-    EXPECT_LT((view.central_ray.from - shot.view.source_in_world()).norm(), 15);
+                true_view.view.intrinsics.fy * true_view.pixel_mm(), 15);
+    EXPECT_NEAR((view.detector[1] - view.detector[0]).norm(), 512 * true_view.pixel_mm(), 4);
+    EXPECT_LT((view.central_ray.from - true_view.view.source_in_world()).norm(), 15);
   }
 }
 

@@ -48,7 +48,7 @@ class SceneView : public QWidget {
   /// How many times larger than true the 95 % ellipsoids are drawn; 10 at first.
   void set_error_scale(double scale);
 
-  /// What the last drawing took, until its picture was there, ms.
+  /// What the last drawing took, until its image was there, ms.
   double last_render_ms() const { return last_render_ms_; }
   QSize sizeHint() const override { return {420, 420}; }
 

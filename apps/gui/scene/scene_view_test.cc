@@ -26,7 +26,7 @@ class ShownScene : public testing::Test {
     view_.show_result(simulated().result, simulated().given.calibrator);
   }
 
-  QImage shot(const char* name) {
+  QImage acquired_view(const char* name) {
     const QImage image = view_.grab().toImage().convertToFormat(QImage::Format_RGB32);
     if (qEnvironmentVariableIsSet("HELICARM_SHOTS"))
       image.save(qEnvironmentVariable("HELICARM_SHOTS") + "/" + name + ".png");
@@ -83,58 +83,58 @@ int pixels_apart(const QImage& a, const QImage& b) {
   return apart;
 }
 
-TEST_F(ShownScene, EachPresetShowsAnotherPicture) {
-  const QImage overview = shot("overview");
+TEST_F(ShownScene, EachPresetShowsAnotherImage) {
+  const QImage overview = acquired_view("overview");
   EXPECT_GT(colours_in(overview), 50u);
   view_.set_preset(SceneView::Preset::ap);
-  const QImage ap = shot("ap");
+  const QImage ap = acquired_view("ap");
   view_.set_preset(SceneView::Preset::lateral);
-  const QImage lateral = shot("lateral");
+  const QImage lateral = acquired_view("lateral");
   EXPECT_GT(pixels_apart(overview, ap), 5000);
   EXPECT_GT(pixels_apart(ap, lateral), 5000);
   view_.set_preset(SceneView::Preset::free);
-  EXPECT_EQ(pixels_apart(shot("overview"), overview), 0);
+  EXPECT_EQ(pixels_apart(acquired_view("overview"), overview), 0);
 }
 
 TEST_F(ShownScene, ToolRobotAndBonesMove) {
   view_.show_bones(bones());
   LiveScene now = live();
   view_.set_preset(SceneView::Preset::lateral);
-  const QImage bare = shot("bones_lateral");
+  const QImage bare = acquired_view("bones_lateral");
   view_.show_live(now);
-  const QImage with_tool = shot("tool_lateral");
+  const QImage with_tool = acquired_view("tool_lateral");
   EXPECT_GT(pixels_apart(bare, with_tool), 200);
   now.calibrator_from_tip->translation.x() += 8;
   view_.show_live(now);
-  EXPECT_GT(pixels_apart(shot("tool_moved"), with_tool), 100);
+  EXPECT_GT(pixels_apart(acquired_view("tool_moved"), with_tool), 100);
   view_.set_preset(SceneView::Preset::free);
-  const QImage still = shot("robot");
+  const QImage still = acquired_view("robot");
   (*now.joints)[0] += 0.2;
   view_.show_live(now);
-  const QImage turned = shot("robot_turned");
+  const QImage turned = acquired_view("robot_turned");
   EXPECT_GT(pixels_apart(still, turned), 100);
   now.calibrator_from_tibia_now = RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
   view_.show_live(now);
-  EXPECT_GT(pixels_apart(shot("tibia_moved"), turned), 100);
+  EXPECT_GT(pixels_apart(acquired_view("tibia_moved"), turned), 100);
   view_.show_live({});
   view_.show_bones({});
   view_.show_result(nullptr, simulated().given.calibrator);
-  EXPECT_LT(colours_in(shot("empty")), 150u);  // the triad's letters
+  EXPECT_LT(colours_in(acquired_view("empty")), 150u);  // the triad's letters
 }
 
-TEST_F(ShownScene, TreSliceLiesInThePicture) {
+TEST_F(ShownScene, TreSliceLiesInTheImage) {
   view_.show_bones(bones());
   view_.set_preset(SceneView::Preset::ap);
-  const QImage without = shot("bones_ap");
+  const QImage without = acquired_view("bones_ap");
   view_.show_tre(tre(), SliceAxis::z, 40);
-  const QImage with = shot("tre_ap");
+  const QImage with = acquired_view("tre_ap");
   EXPECT_GT(pixels_apart(without, with), 10000);
   view_.set_preset(SceneView::Preset::free);
   view_.show_tre(tre(), SliceAxis::x, 0);
-  shot("tre_overview");
+  acquired_view("tre_overview");
   view_.set_preset(SceneView::Preset::ap);
   view_.show_tre({}, SliceAxis::z, 40);
-  EXPECT_EQ(pixels_apart(shot("tre_gone"), without), 0);
+  EXPECT_EQ(pixels_apart(acquired_view("tre_gone"), without), 0);
 }
 
 TEST_F(ShownScene, SurvivesTwoHundredRandomEvents) {
@@ -166,12 +166,12 @@ TEST_F(ShownScene, SurvivesTwoHundredRandomEvents) {
   }
   EXPECT_FALSE(view_.obstacle());
   QTest::keyClick(&view_, Qt::Key_3);
-  EXPECT_GT(colours_in(shot("after_events")), 50u);
+  EXPECT_GT(colours_in(acquired_view("after_events")), 50u);
 }
 
 TEST_F(ShownScene, LivesOnInAnotherWindow) {
   view_.set_preset(SceneView::Preset::ap);
-  const QImage before = shot("before_move");
+  const QImage before = acquired_view("before_move");
   {
     QWidget window;
     window.resize(420, 420);
@@ -180,23 +180,23 @@ TEST_F(ShownScene, LivesOnInAnotherWindow) {
     view_.show();
     window.show();
     ASSERT_TRUE(QTest::qWaitForWindowExposed(&window));
-    EXPECT_LT(pixels_apart(shot("after_move"), before), 100);
+    EXPECT_LT(pixels_apart(acquired_view("after_move"), before), 100);
     view_.setParent(nullptr);
   }
   view_.show();
   ASSERT_TRUE(QTest::qWaitForWindowExposed(&view_));
-  EXPECT_GT(colours_in(shot("after_return")), 50u);
+  EXPECT_GT(colours_in(acquired_view("after_return")), 50u);
 }
 
 TEST_F(ShownScene, RedrawIsQuick) {
   view_.show_bones(bones());
   view_.show_tre(tre(), SliceAxis::z, 40);
   view_.show_live(live());
-  shot("all");
+  acquired_view("all");
   QTest::keyClick(&view_, Qt::Key_4);
-  shot("all_near");
+  acquired_view("all_near");
   view_.show_tre({}, SliceAxis::z, 40);
-  shot("near");
+  acquired_view("near");
   view_.show_tre(tre(), SliceAxis::z, 40);
   std::vector<double> times;
   for (int i = 0; i < 100; ++i) {

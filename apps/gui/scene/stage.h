@@ -30,7 +30,7 @@ class Stage {
   void set_live(const LiveScene& live);
 
   void resize(int width, int height) { window_->SetSize(width, height); }
-  /// Draws into the framebuffer of this number, the picture's first row first as QImage has it.
+  /// Draws into the framebuffer of this number, the image's first row first as QImage has it.
   void render_upside_down(const SceneCamera& camera, unsigned framebuffer);
 
  private:

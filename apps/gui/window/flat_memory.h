@@ -5,7 +5,7 @@
 
 namespace helicarm::gui {
 
-/// Pictures come and go in many threads for hours: their memory goes back to the system at once, and threads
+/// Images come and go in many threads for hours: their memory goes back to the system at once, and threads
 /// share their heaps. To be called before the first of them.
 inline void keep_memory_flat() {
 #ifdef __GLIBC__

@@ -5,7 +5,7 @@
 #include <QPainter>
 #include <QToolTip>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 #include "gui/window/style.h"
 
 namespace helicarm::gui {

@@ -3,7 +3,7 @@
 
 #include <QWidget>
 
-#include "gui/desk/desk.h"
+#include "gui/controller/controller.h"
 
 namespace helicarm::gui {
 

@@ -14,7 +14,7 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 #include "gui/window/style.h"
 #include "helicarm/geometry/epipolar.h"
 
@@ -22,7 +22,7 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int live_ms = 20;
-/// The scene is drawn by software as a rule, and needs less haste than the pictures.
+/// The scene is drawn by software as a rule, and needs less haste than the images.
 constexpr unsigned scene_every = 4;
 /// Of the calibrator's middle: where an end may lie along its ray.
 constexpr double epipolar_reach_mm = 150;
@@ -48,13 +48,13 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
   setAcceptDrops(true);
   build();
   build_menus();
-  connect(&desk_, &Desk::changed, this, &MainWindow::show_state);
-  connect(&desk_, &Desk::refused, this, [this](Phase phase, const QString& why) {
+  connect(&controller_, &Controller::changed, this, &MainWindow::show_state);
+  connect(&controller_, &Controller::refused, this, [this](Phase phase, const QString& why) {
     moved_on_ = false;
     show_phase(phase);
     statusBar()->showMessage(why);
   });
-  connect(&desk_, &Desk::exported, this,
+  connect(&controller_, &Controller::exported, this,
           [this](const QString& folder) { statusBar()->showMessage(tr("Written to %1").arg(folder)); });
   connect(&timer_, &QTimer::timeout, this, &MainWindow::show_live);
   timer_.start(live_ms);
@@ -78,7 +78,7 @@ void MainWindow::build() {
   stop->setProperty("class", "stop");
   stop->setToolTip(tr("Stops the robot at once (space bar)"));
   stop->setFocusPolicy(Qt::NoFocus);
-  connect(stop, &QPushButton::pressed, &desk_, &Desk::stop);
+  connect(stop, &QPushButton::pressed, &controller_, &Controller::stop);
   top->addWidget(stop);
   column->addLayout(top);
   connect(strip_, &StepStrip::chosen, this, [this](Phase phase) {
@@ -99,13 +99,13 @@ void MainWindow::build() {
   scene_->setObjectName("scene");
   right->addWidget(scene_);
   pages_ = new QStackedWidget;
-  auto* acquire = new AcquirePage(desk_, this);
-  auto* rectify = new RectifyPage(desk_, this);
-  plan_ = new PlanPage(desk_, this);
-  navigate_ = new NavigatePage(desk_, this);
-  auto* verify = new VerifyPage(desk_, this);
-  for (Page* page : std::initializer_list<Page*>{acquire, rectify, new CalibratePage(desk_, this), plan_,
-                                                 navigate_, verify}) {
+  auto* acquire = new AcquirePage(controller_, this);
+  auto* rectify = new RectifyPage(controller_, this);
+  plan_ = new PlanPage(controller_, this);
+  navigate_ = new NavigatePage(controller_, this);
+  auto* verify = new VerifyPage(controller_, this);
+  for (Page* page : std::initializer_list<Page*>{acquire, rectify, new CalibratePage(controller_, this),
+                                                 plan_, navigate_, verify}) {
     auto* scrolled = new QScrollArea;
     scrolled->setWidgetResizable(true);
     scrolled->setFrameShape(QFrame::NoFrame);
@@ -161,42 +161,42 @@ void MainWindow::build_status() {
   auto* cancel = new QPushButton(tr("Ca&ncel"));
   cancel->setObjectName("cancel");
   cancel->setStyleSheet("padding: 1px 12px;");
-  connect(cancel, &QPushButton::clicked, &desk_, &Desk::cancel);
+  connect(cancel, &QPushButton::clicked, &controller_, &Controller::cancel);
   row->addWidget(cancel);
   statusBar()->addPermanentWidget(busy_);
 }
 
 void MainWindow::show_state() {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   const auto cards = steps_of(state);
   strip_->show_steps(cards);
   if (!state.busy && !moved_on_) show_phase(open_phase(cards, state.hand_eye_rms_mm.has_value()));
   if (state.busy) moved_on_ = false;
   for (Page* page : all_pages_) page->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
-  rehearsal_menu_->setEnabled(state.source == Source::virtual_room);
+  rehearsal_menu_->setEnabled(state.source == Source::virtual_or);
   busy_->setVisible(state.busy.has_value());
   const bool replays = state.source == Source::files && replay_dock_->isVisible();
   recording_->setText(replays ? tr("▶ replay") : tr("● recording"));
-  recording_->setVisible(replays || state.source == Source::virtual_room || state.source == Source::devices);
+  recording_->setVisible(replays || state.source == Source::virtual_or || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
   if (state.busy)
     statusBar()->showMessage(text(state.doing));
   else if (state.refusals.empty())
     statusBar()->clearMessage();
-  show_pictures();
+  show_images();
   show_picks();
 }
 
-void MainWindow::show_pictures() {
-  const DeskState& state = desk_.state();
+void MainWindow::show_images() {
+  const ApplicationState& state = controller_.state();
   if (shown_ == state.result && shown_source_ == state.source) return;
   shown_ = state.result;
   shown_source_ = state.source;
-  show_recorded();  // of a case that is open now, never over other pictures
+  show_recorded();  // of a case that is open now, never over other images
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     const bool has = shown_ && i < shown_->views.size();
-    if (has && shown_->views[i].exposure)
+    if (has && shown_->views[i].xray_image)
       xrays_[i]->show_view(shown_, i);
     else
       xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-rays here")
@@ -211,16 +211,16 @@ void MainWindow::show_pictures() {
 }
 
 void MainWindow::show_picks() {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   const auto wanted = state.measured && phase_ == Phase::plan ? plan_->target() : std::nullopt;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    if (!shown_ || i >= shown_->views.size() || !shown_->views[i].exposure) continue;
+    if (!shown_ || i >= shown_->views.size() || !shown_->views[i].xray_image) continue;
     const ViewResult& view = shown_->views[i];
     std::vector<FreshPick> picks;
     for (const Pick& pick : state.picks)
       if (pick.view == view.name && next_pick(state)) picks.push_back({text(pick.name), pick.uv_raw});
     xrays_[i]->set_picks(std::move(picks));
-    xrays_[i]->set_picking(wanted.has_value() && desk_.takes_picks());
+    xrays_[i]->set_picking(wanted.has_value() && controller_.takes_picks());
     const auto path = state.path.by_view.find(view.name);
     xrays_[i]->set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
 
@@ -254,20 +254,20 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   pick.view = shown_->views[view].name;
   pick.uv_raw = {raw.x(), raw.y()};
   if (plan_->snaps()) pick.snap = Snap::ball;
-  if (desk_.state().source != Source::files) pick.moves_with = wanted->bone;
-  desk_.pick(std::move(pick));
+  if (controller_.state().source != Source::files) pick.moves_with = wanted->bone;
+  controller_.pick(std::move(pick));
   plan_->placed(wanted->point);
 }
 
 void MainWindow::show_live() {
-  live_ = desk_.live();
-  if (live_.stale) desk_.drop_plan(*live_.stale);
+  live_ = controller_.live();
+  if (live_.stale) controller_.drop_plan(*live_.stale);
   live_bar_->show_live(live_);
   navigate_->show_live(live_);
   const ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
   if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    std::optional<PictureLine> line;
+    std::optional<ImageLine> line;
     if (tool && shown_ && i < shown_->views.size())
       if (const auto seen = tool->by_view.find(shown_->views[i].name); seen != tool->by_view.end())
         line = seen->second;
@@ -275,7 +275,7 @@ void MainWindow::show_live() {
   }
   if (++looks_ % scene_every != 0) return;
   LiveScene scene;
-  scene.path = desk_.state().path.in_calibrator;
+  scene.path = controller_.state().path.in_calibrator;
   if (tool && tool->calibrator_from_tip) {
     scene.calibrator_from_tip = tool->calibrator_from_tip;
     (live_.bone == Bone::femur ? scene.calibrator_from_tibia_now : scene.calibrator_from_femur_now) =
@@ -291,10 +291,10 @@ void MainWindow::show_live() {
 bool MainWindow::eventFilter(QObject* watched, QEvent* event) {
   if (event->type() == QEvent::KeyPress || event->type() == QEvent::ShortcutOverride) {
     const auto* key = static_cast<QKeyEvent*>(event);
-    const Source source = desk_.state().source;
+    const Source source = controller_.state().source;
     // The space bar belongs to the robot's stop; Enter presses buttons instead.
-    if (key->key() == Qt::Key_Space && (source == Source::virtual_room || source == Source::devices)) {
-      if (event->type() == QEvent::KeyPress && !key->isAutoRepeat()) desk_.stop();
+    if (key->key() == Qt::Key_Space && (source == Source::virtual_or || source == Source::devices)) {
+      if (event->type() == QEvent::KeyPress && !key->isAutoRepeat()) controller_.stop();
       event->accept();
       return true;
     }

@@ -7,7 +7,7 @@
 #include <QStackedWidget>
 #include <filesystem>
 
-#include "gui/desk/desk.h"
+#include "gui/controller/controller.h"
 #include "gui/replay/recent.h"
 #include "gui/replay/replay_panel.h"
 #include "gui/replay/settings_dialog.h"
@@ -29,7 +29,7 @@ class MainWindow : public QMainWindow {
   explicit MainWindow(std::filesystem::path sessions, QWidget* parent = nullptr);
   ~MainWindow() override;
 
-  Desk& desk() { return desk_; }
+  Controller& controller() { return controller_; }
   StepStrip& strip() { return *strip_; }
   XrayView& xray(std::size_t number) { return *xrays_.at(number); }
   SceneView& scene() { return *scene_; }
@@ -63,7 +63,7 @@ class MainWindow : public QMainWindow {
   void remember(Folder kind, const std::filesystem::path& folder);
 
   void show_state();
-  void show_pictures();
+  void show_images();
   void show_picks();
   void show_phase(Phase phase);
   void place_pick(std::size_t view, const QPointF& raw);
@@ -80,7 +80,7 @@ class MainWindow : public QMainWindow {
   std::filesystem::path sessions_;
   QSettings recent_;
   Settings settings_;
-  Desk desk_;
+  Controller controller_;
   QTimer timer_;
 
   StepStrip* strip_ = nullptr;

@@ -11,7 +11,7 @@
 #include <QStatusBar>
 #include <QThreadPool>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 #include "gui/window/main_window.h"
 #include "helicarm/pipeline/run_case.h"
 
@@ -26,15 +26,15 @@ QString text(const fs::path& path) { return QString::fromStdString(path.string()
 fs::path path_of(const QString& words) { return words.toStdString(); }
 
 /// X-rays that lie in a folder without a case.json, by name.
-std::vector<fs::path> pictures_in(const fs::path& folder) {
-  std::vector<fs::path> pictures;
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> images;
   std::error_code unreadable;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
     if (const fs::path kind = entry.path().extension();
         kind == ".dcm" || kind == ".png" || kind == ".tif" || kind == ".tiff")
-      pictures.push_back(entry.path());
-  std::ranges::sort(pictures);
-  return pictures;
+      images.push_back(entry.path());
+  std::ranges::sort(images);
+  return images;
 }
 
 /// A dialog that leaves the window, and STOP in it, in reach.
@@ -93,22 +93,22 @@ void MainWindow::build_menus() {
   build_rehearsal_menu();
 
   QMenu* help = menuBar()->addMenu(tr("&Help"));
-  const auto tell = [this](const QString& title, const QString& words) {
+  const auto notify = [this](const QString& title, const QString& words) {
     show_beside(new QMessageBox(QMessageBox::Information, title, words, QMessageBox::Close, this));
   };
-  help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [tell] {
-    tell(tr("Keys"),
-         tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
-            "Enter: press; hold it on a yellow button\n"
-            "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
-            "On an X-ray: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
-            "M magnifier, W contrast, H marks\n\n"
-            "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R back\n\n"
-            "Replay: J and L step, K plays"));
+  help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [notify] {
+    notify(tr("Keys"),
+           tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
+              "Enter: press; hold it on a yellow button\n"
+              "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
+              "On an X-ray: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
+              "M magnifier, W contrast, H marks\n\n"
+              "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R back\n\n"
+              "Replay: J and L step, K plays"));
   });
-  help->addAction(tr("&About"), this, [tell] {
-    tell(tr("About helicarm"),
-         tr("helicarm %1\nResearch instrument, not a medical device.").arg(HELICARM_VERSION));
+  help->addAction(tr("&About"), this, [notify] {
+    notify(tr("About helicarm"),
+           tr("helicarm %1\nResearch instrument, not a medical device.").arg(HELICARM_VERSION));
   });
 }
 
@@ -127,12 +127,12 @@ void MainWindow::build_rehearsal_menu() {
     action->setCheckable(true);
     action->setObjectName(fault);
     connect(action, &QAction::toggled, this,
-            [this, name = std::string(fault)](bool on) { desk_.set_fault(name, on); });
+            [this, name = std::string(fault)](bool on) { controller_.set_fault(name, on); });
   }
   rehearsal_menu_->addSeparator();
   rehearsal_menu_->addAction(tr("&Move the leg by some millimetres"), this, [this] {
-    desk_.move_bone("femur", {2, -1.5, 1});
-    desk_.move_bone("tibia", {-1, 2, 1.5});
+    controller_.move_bone("femur", {2, -1.5, 1});
+    controller_.move_bone("tibia", {-1, 2, 1.5});
   });
 }
 
@@ -155,8 +155,8 @@ fs::path MainWindow::new_session() const {
 }
 
 void MainWindow::ask_rehearsal() {
-  const Source source = desk_.state().source;
-  if (source != Source::virtual_room && source != Source::devices) return open_rehearsal();
+  const Source source = controller_.state().source;
+  if (source != Source::virtual_or && source != Source::devices) return open_rehearsal();
   auto* question = new QMessageBox(QMessageBox::Question, tr("New rehearsal"),
                                    tr("End this operation? Its record is kept."),
                                    QMessageBox::Yes | QMessageBox::No, this);
@@ -172,14 +172,14 @@ void MainWindow::ask_folder() {
 }
 
 void MainWindow::open_rehearsal() {
-  operating_room::VirtualRoomOptions room = settings_.room;
-  room.tracker_port = room.rtde_port = room.dashboard_port = room.script_port = 0;
+  virtual_devices::VirtualDevicesOptions virtual_or = settings_.virtual_or;
+  virtual_or.tracker_port = virtual_or.rtde_port = virtual_or.dashboard_port = virtual_or.script_port = 0;
   const fs::path folder = new_session();
-  desk_.open_room(room, settings_.plan, folder);
+  controller_.open_virtual_or(virtual_or, settings_.plan, folder);
 }
 
 void MainWindow::open_plan(const fs::path& plan) {
-  desk_.open_devices(plan, settings_.receiver, new_session());
+  controller_.open_devices(plan, settings_.receiver, new_session());
 }
 
 void MainWindow::open_paths(const std::vector<fs::path>& paths) {
@@ -187,12 +187,12 @@ void MainWindow::open_paths(const std::vector<fs::path>& paths) {
   if (paths.size() == 1 && fs::exists(first / "session.log")) return open_session(first);
   if (paths.size() == 1 && fs::is_directory(first)) {
     const std::vector<fs::path> loose =
-        fs::exists(first / "case.json") ? std::vector<fs::path>{} : pictures_in(first);
-    if (!loose.empty()) return desk_.open_pictures(loose);
+        fs::exists(first / "case.json") ? std::vector<fs::path>{} : images_in(first);
+    if (!loose.empty()) return controller_.open_images(loose);
     remember(Folder::cases, first);
-    return desk_.open_case(first);
+    return controller_.open_case(first);
   }
-  desk_.open_pictures(paths);
+  controller_.open_images(paths);
 }
 
 void MainWindow::open_session(const fs::path& session) {
@@ -206,8 +206,8 @@ void MainWindow::show_moment(int index) {
   if (!replay_->timeline() || index < 0) return;
   const auto then = state_at(*replay_->timeline(), std::size_t(index));
   if (!then) return say(then.error());
-  if (then->case_folder && then->measured && desk_.state().folder != *then->case_folder)
-    desk_.open_case(*then->case_folder);
+  if (then->case_folder && then->measured && controller_.state().folder != *then->case_folder)
+    controller_.open_case(*then->case_folder);
   show_recorded();
 }
 
@@ -215,8 +215,8 @@ void MainWindow::show_recorded() {
   recorded_.reset();
   if (!replay_->timeline() || replay_->moment() < 0) return;
   const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
-  const bool is_shown =
-      then && then->case_folder && desk_.state().folder == *then->case_folder && desk_.state().measured;
+  const bool is_shown = then && then->case_folder && controller_.state().folder == *then->case_folder &&
+                        controller_.state().measured;
   if (!is_shown || !then->registered_at) return;
   if (!recorded_tool_ || recorded_at_ != then->registered_at || recorded_of_ != shown_) {
     const auto tool = tool_of(*replay_->timeline(), *then, *shown_);
@@ -230,14 +230,14 @@ void MainWindow::show_recorded() {
 
 void MainWindow::ask_and_export() {
   ask_files(this, tr("Folder for the report and the results"), QFileDialog::Directory, {},
-            [this](const std::vector<fs::path>& chosen) { desk_.export_to(chosen.front()); });
+            [this](const std::vector<fs::path>& chosen) { controller_.export_to(chosen.front()); });
 }
 
 void MainWindow::save_screenshot() {
   auto* dialog = new QFileDialog(this, tr("Screenshot"), "helicarm.png", tr("PNG (*.png)"));
   dialog->setAcceptMode(QFileDialog::AcceptSave);
-  connect(dialog, &QFileDialog::fileSelected, this, [this, picture = grab().toImage()](const QString& name) {
-    if (!picture.save(name)) say({Reason::cannot_write, name.toStdString() + ": cannot write"});
+  connect(dialog, &QFileDialog::fileSelected, this, [this, image = grab().toImage()](const QString& name) {
+    if (!image.save(name)) say({Reason::cannot_write, name.toStdString() + ": cannot write"});
   });
   show_beside(dialog);
 }
@@ -246,7 +246,7 @@ void MainWindow::ask_settings() {
   auto* dialog = new SettingsDialog(settings_, this);
   connect(dialog, &QDialog::accepted, this, [this, dialog] {
     settings_ = dialog->settings();
-    desk_.set_options(settings_.run);
+    controller_.set_options(settings_.run);
     statusBar()->showMessage(
         tr("Measurement: from the next one on. The rest: from the next rehearsal or connection on."));
   });
@@ -254,8 +254,8 @@ void MainWindow::ask_settings() {
 }
 
 void MainWindow::show_tre() {
-  const Eigen::Vector3d middle = middle_of(desk_.state().calibrator);
-  if (!cut_ || !shown_ || !desk_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
+  const Eigen::Vector3d middle = middle_of(controller_.state().calibrator);
+  if (!cut_ || !shown_ || !controller_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
   if (tre_of_ == shown_)
     return scene_->show_tre(tre_, cut_->axis, middle[int(cut_->axis)] + cut_->from_middle_mm);
   scene_->show_tre({}, SliceAxis::z, 0);
@@ -291,7 +291,7 @@ void MainWindow::dropEvent(QDropEvent* event) {
 }
 
 void MainWindow::closeEvent(QCloseEvent* event) {
-  desk_.stop();
+  controller_.stop();
   QMainWindow::closeEvent(event);
 }
 

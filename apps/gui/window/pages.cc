@@ -13,7 +13,8 @@
 
 namespace helicarm::gui {
 
-Page::Page(const QString& lead, Desk& desk, QWidget* parent) : QWidget(parent), desk_(desk) {
+Page::Page(const QString& lead, Controller& controller, QWidget* parent)
+    : QWidget(parent), controller_(controller) {
   auto* column = new QVBoxLayout(this);
   column->setContentsMargins(8, 4, 8, 4);
   auto* words = new QLabel(lead);
@@ -53,12 +54,12 @@ QTableWidget* Page::add_table(const QStringList& columns, const char* name) {
   return table;
 }
 
-AcquirePage::AcquirePage(Desk& desk, QWidget* parent)
-    : Page(tr("Take an AP and a lateral X-ray of the knee with the calibrator on it."), desk, parent) {
-  shots_ = new QWidget;
-  new QVBoxLayout(shots_);
-  shots_->layout()->setContentsMargins(0, 0, 0, 0);
-  layout()->addWidget(shots_);
+AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
+    : Page(tr("Take an AP and a lateral X-ray of the knee with the calibrator on it."), controller, parent) {
+  acquisitions_ = new QWidget;
+  new QVBoxLayout(acquisitions_);
+  acquisitions_->layout()->setContentsMargins(0, 0, 0, 0);
+  layout()->addWidget(acquisitions_);
   ways_in_ = new QWidget;
   auto* row = new QHBoxLayout(ways_in_);
   row->setContentsMargins(0, 0, 0, 0);
@@ -75,26 +76,26 @@ AcquirePage::AcquirePage(Desk& desk, QWidget* parent)
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
-void AcquirePage::show_state(const DeskState& state) {
+void AcquirePage::show_state(const ApplicationState& state) {
   if (views_ != state.views || state.source == Source::files) {
     views_ = state.source == Source::files ? std::vector<std::string>{} : state.views;
-    qDeleteAll(shots_->findChildren<QPushButton*>());
+    qDeleteAll(acquisitions_->findChildren<QPushButton*>());
     for (const std::string& point : state.check_points) {
       auto* button = new QPushButton(tr("The pointer is on check point %1").arg(text(point)));
       button->setToolTip(tr("Before the first X-ray, and again before the robot goes to this bone"));
-      shots_->layout()->addWidget(button);
-      connect(button, &QPushButton::clicked, this, [this, point] { desk_.touch(point); });
+      acquisitions_->layout()->addWidget(button);
+      connect(button, &QPushButton::clicked, this, [this, point] { controller_.touch(point); });
     }
     for (const std::string& view : views_) {
-      const bool own = state.source == Source::virtual_room;
+      const bool own = state.source == Source::virtual_or;
       auto* button = new QPushButton((own ? tr("Shoot %1") : tr("The next X-ray is %1")).arg(text(view)));
       button->setObjectName("shoot" + text(view));
-      shots_->layout()->addWidget(button);
+      acquisitions_->layout()->addWidget(button);
       connect(button, &QPushButton::clicked, this,
-              [this, view, own] { own ? desk_.shoot(view) : desk_.expect(view); });
+              [this, view, own] { own ? controller_.shoot(view) : controller_.expect(view); });
     }
   }
-  for (QPushButton* button : shots_->findChildren<QPushButton*>()) button->setEnabled(!state.busy);
+  for (QPushButton* button : acquisitions_->findChildren<QPushButton*>()) button->setEnabled(!state.busy);
   ways_in_->setVisible(state.source == Source::none && !state.busy);
   where_->setText(state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
                   : state.source == Source::devices
@@ -102,10 +103,10 @@ void AcquirePage::show_state(const DeskState& state) {
                       : QString());
 }
 
-RectifyPage::RectifyPage(Desk& desk, QWidget* parent)
+RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
     : Page(tr("The intensifier bends the picture; the plate's dots tell how. The map is right where little "
               "is left over."),
-           desk, parent) {
+           controller, parent) {
   auto* row = new QHBoxLayout;
   auto* group = new QButtonGroup(this);
   for (const auto& [layer, words, name] : {std::tuple(Layer::raw, tr("Raw"), "layerRaw"),
@@ -122,7 +123,7 @@ RectifyPage::RectifyPage(Desk& desk, QWidget* parent)
   table_ = add_table({tr("View"), tr("Dots"), tr("Bent px"), tr("Left px"), tr("Held out")}, "rectifyTable");
 }
 
-void RectifyPage::show_state(const DeskState& state) {
+void RectifyPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   if (state.result)
     for (const ViewResult& view : state.result->views)
@@ -135,15 +136,15 @@ void RectifyPage::show_state(const DeskState& state) {
   fill(table_, rows);
 }
 
-CalibratePage::CalibratePage(Desk& desk, QWidget* parent)
-    : Page(tr("The twelve balls, named without a click, tell where each X-ray was taken from."), desk,
+CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
+    : Page(tr("The twelve balls, named without a click, tell where each X-ray was taken from."), controller,
            parent) {
   views_ = add_table({tr("View"), tr("Balls"), tr("Residual px"), tr("fx px"), tr("Source mm")}, "viewTable");
   views_->setFixedHeight(104);
   balls_ = add_table({tr("Ball"), tr("View"), tr("State"), tr("Sigma px"), tr("Residual px")}, "ballTable");
 }
 
-void CalibratePage::show_state(const DeskState& state) {
+void CalibratePage::show_state(const ApplicationState& state) {
   static const std::map<FiducialStatus, QString> words{{FiducialStatus::used, tr("used")},
                                                        {FiducialStatus::occluded, tr("hidden")},
                                                        {FiducialStatus::outside, tr("outside")},

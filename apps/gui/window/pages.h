@@ -7,36 +7,36 @@
 #include <QPushButton>
 #include <QTableWidget>
 
-#include "gui/desk/desk.h"
+#include "gui/controller/controller.h"
 #include "gui/scene/tre_slice.h"
 #include "gui/window/hold_button.h"
 #include "gui/xray/layers.h"
 
 namespace helicarm::gui {
 
-/// What can be done in a step: a page each beside the pictures. Pages ask the desk; they hold nothing that
+/// What can be done in a step: a page each beside the images. Pages ask the desk; they hold nothing that
 /// the desk does not know.
 class Page : public QWidget {
   Q_OBJECT
 
  public:
-  Page(const QString& lead, Desk& desk, QWidget* parent);
-  virtual void show_state(const DeskState& state) = 0;
+  Page(const QString& lead, Controller& controller, QWidget* parent);
+  virtual void show_state(const ApplicationState& state) = 0;
 
  protected:
   QPushButton* add_button(const QString& text, const char* name, std::function<void()> act);
   HoldButton* add_hold(const QString& text, const char* name, std::function<void()> act);
   QTableWidget* add_table(const QStringList& columns, const char* name);
 
-  Desk& desk_;
+  Controller& controller_;
 };
 
 class AcquirePage : public Page {
   Q_OBJECT
 
  public:
-  AcquirePage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  AcquirePage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
 
  signals:
   void rehearsal_wanted();
@@ -45,17 +45,17 @@ class AcquirePage : public Page {
  private:
   QWidget* ways_in_;
   std::vector<std::string> views_;
-  QWidget* shots_;
+  QWidget* acquisitions_;
   QLabel* where_;
 };
 
-/// Figures of stage 1 by view, and which layer of the picture is shown.
+/// Figures of stage 1 by view, and which layer of the image is shown.
 class RectifyPage : public Page {
   Q_OBJECT
 
  public:
-  RectifyPage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  RectifyPage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
 
  signals:
   void layer_wanted(helicarm::gui::Layer layer);
@@ -68,8 +68,8 @@ class CalibratePage : public Page {
   Q_OBJECT
 
  public:
-  CalibratePage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  CalibratePage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
 
  private:
   QTableWidget* views_;
@@ -88,8 +88,8 @@ class PlanPage : public Page {
   Q_OBJECT
 
  public:
-  PlanPage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  PlanPage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
   /// The end that the next click places; the next one to come, or the one chosen in the table.
   std::optional<WantedPick> target() const;
   bool snaps() const { return snap_->isChecked(); }
@@ -116,8 +116,8 @@ class NavigatePage : public Page {
   Q_OBJECT
 
  public:
-  NavigatePage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  NavigatePage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
   void show_live(const LiveState& live);
 
  private:
@@ -136,8 +136,8 @@ class VerifyPage : public Page {
   Q_OBJECT
 
  public:
-  VerifyPage(Desk& desk, QWidget* parent);
-  void show_state(const DeskState& state) override;
+  VerifyPage(Controller& controller, QWidget* parent);
+  void show_state(const ApplicationState& state) override;
 
  signals:
   void report_wanted();

@@ -4,7 +4,7 @@
 #include <QToolButton>
 #include <QWidget>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 
 namespace helicarm::gui {
 

@@ -26,16 +26,16 @@ TEST_F(Window, SilentTrackerIsShownUntilItSpeaksAgain) {
   const auto light = [&](const char* name) { return lamp(name).light; };
   ASSERT_TRUE(wait("tool is green and the robot locked",
                    [&] { return light("tool") == Light::green && light("robot") == Light::amber; }));
-  window_->desk().set_fault("silent", true);
+  window_->controller().set_fault("silent", true);
   EXPECT_TRUE(wait("femur and tool are red",
                    [&] { return light("femur") == Light::red && light("tool") == Light::red; }));
-  window_->desk().set_fault("silent", false);
+  window_->controller().set_fault("silent", false);
   EXPECT_TRUE(wait("femur is green", [&] { return light("femur") == Light::green; }));
 }
 
 TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
-  window_->desk().set_virtual_freshness({});
-  ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->desk().set_fault("cut_cable", true); },
+  window_->controller().set_virtual_freshness({});
+  ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); },
                                          "the robot's states have stopped coming"));
   ASSERT_TRUE(wait_for_phase(LinkPhase::disconnected));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
@@ -43,36 +43,36 @@ TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
   EXPECT_FALSE(lamp("robot").why.isEmpty());
   for (const char* forbidden : {"register", "planWay", "go", "withdraw"})
     EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
-  window_->desk().set_fault("cut_cable", false);
+  window_->controller().set_fault("cut_cable", false);
   // Connected again it is still locked: only a person frees it.
   ASSERT_TRUE(wait_for_phase(LinkPhase::idle));
   EXPECT_TRUE(unlock());
 }
 
-TEST_F(Window, CArmThatHangsUpIsShownAndTheNextPictureIsTaken) {
+TEST_F(Window, CArmThatDisconnectsIsShownAndTheNextImageIsTaken) {
   open_rehearsal();
   EXPECT_EQ(lamp("C-arm").light, Light::off);
-  window_->desk().set_fault("breaks_off", true);
+  window_->controller().set_fault("breaks_off", true);
   click("shootAP");
   ASSERT_TRUE(wait_idle());
   EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
   EXPECT_TRUE(wait("the C-arm is red", [&] { return lamp("C-arm").light == Light::red; }));
   EXPECT_EQ(lamp("C-arm").text, "broke off");
-  window_->desk().set_fault("breaks_off", false);
+  window_->controller().set_fault("breaks_off", false);
   ASSERT_TRUE(attempt(
       "AP is taken", [&] { click("shootAP"); },
-      [&] { return state().result->views[0].exposure != nullptr; }));
+      [&] { return state().result->views[0].xray_image != nullptr; }));
   EXPECT_EQ(lamp("C-arm").light, Light::green);
   EXPECT_NE(card(Phase::acquire).mood, StepMood::refused);
 }
 
 TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
-  window_->desk().set_virtual_freshness({});
-  ASSERT_NO_FATAL_FAILURE(
-      stop_in_motion([&] { window_->desk().set_fault("silent", true); }, "the newest pose of \"tool\""));
+  window_->controller().set_virtual_freshness({});
+  ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->controller().set_fault("silent", true); },
+                                         "the newest pose of \"tool\""));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_FALSE(state().hand_eye_rms_mm);
-  window_->desk().set_fault("silent", false);
+  window_->controller().set_fault("silent", false);
 }
 
 TEST_F(Window, StopWorksBesideEveryDialog) {
@@ -90,7 +90,7 @@ TEST_F(Window, StopWorksBesideEveryDialog) {
   stop_in_motion(stop_beside_settings, "this program's user");
 }
 
-TEST_F(Window, CancelEndsTheWaitForAPicture) {
+TEST_F(Window, CancelEndsTheWaitForAImage) {
   open_rehearsal();
   auto* cancel = find("cancel");
   EXPECT_FALSE(cancel->isVisible());
@@ -112,7 +112,7 @@ TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
   EXPECT_EQ(card(Phase::rectify).mood, StepMood::refused);
   EXPECT_THAT(card(Phase::rectify).why.toStdString(), HasSubstr("blank_image"));
   EXPECT_FALSE(state().measured);
-  window_->desk().export_to(folder_ / "export");
+  window_->controller().export_to(folder_ / "export");
   ASSERT_TRUE(wait_idle());
   EXPECT_FALSE(fs::exists(folder_ / "export"));
 }

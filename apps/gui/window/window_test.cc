@@ -81,7 +81,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
 
   std::printf("longest hold-up of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
               WatchedApplication::longest_what.c_str());
-  window_->desk().export_to(folder_ / "export");
+  window_->controller().export_to(folder_ / "export");
   ASSERT_TRUE(wait_idle());
   for (const char* file : {"report.html", "report.pdf", "result.json"})
     EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
@@ -112,12 +112,12 @@ TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
   auto* go = find<HoldButton>("go");
   ASSERT_TRUE(go->isEnabled());
   QTest::keyPress(go, Qt::Key_Return);  // and held
-  window_->desk().move_bone("femur", {3, 0, 0});
+  window_->controller().move_bone("femur", {3, 0, 0});
   ASSERT_TRUE(wait("the path is taken away", [&] { return !state().order && !state().busy; }));
   EXPECT_FALSE(go->isEnabled());
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));
-  EXPECT_NE(window_->desk().live().robot.phase, LinkPhase::moving);
+  EXPECT_NE(window_->controller().live().robot.phase, LinkPhase::moving);
 }
 
 TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
@@ -127,7 +127,7 @@ TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   QTest::mouseClick(unlock, Qt::LeftButton);
   QTest::keyClick(unlock, Qt::Key_Return);
   QTest::qWait(HoldButton::hold_ms + 200);
-  EXPECT_EQ(window_->desk().live().robot.phase, LinkPhase::idle);
+  EXPECT_EQ(window_->controller().live().robot.phase, LinkPhase::idle);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 #include "gui/window/main_window.h"
 #include "helicarm/core/files.h"
 
@@ -54,7 +54,7 @@ class Window : public testing::Test {
     fs::create_directories(folder_);
     QSettings().clear();
     window_ = std::make_unique<MainWindow>(folder_ / "sessions");
-    window_->desk().set_virtual_freshness(patient);
+    window_->controller().set_virtual_freshness(patient);
     window_->resize(1280, 800);
     window_->show();
     EXPECT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
@@ -65,9 +65,9 @@ class Window : public testing::Test {
     fs::remove_all(folder_);
   }
 
-  const DeskState& state() { return window_->desk().state(); }
+  const ApplicationState& state() { return window_->controller().state(); }
   StepCard card(Phase phase) { return window_->strip().button(phase)->card(); }
-  LiveState live() { return window_->desk().live(); }
+  LiveState live() { return window_->controller().live(); }
   Lamp lamp(const QString& name) {
     for (const Lamp& lamp : live().lamps)
       if (lamp.name == name) return lamp;
@@ -76,7 +76,7 @@ class Window : public testing::Test {
   }
   /// What the window knows at this moment, for a wait that ended in vain.
   std::string seen() {
-    const DeskState& now = state();
+    const ApplicationState& now = state();
     const LiveState devices = live();
     std::string text = now.busy ? fmt::format("busy: \"{}\"", now.doing) : "idle";
     for (const StepCard& step : steps_of(now))
@@ -192,7 +192,7 @@ class Window : public testing::Test {
   void register_in_rehearsal() {
     open_rehearsal();
     shoot_both();
-    window_->desk().take_offered_picks();
+    window_->controller().take_offered_picks();
     ASSERT_TRUE(
         wait("the picks are located", [&] { return state().result->points.size() > 3 && !state().busy; }));
     register_robot();
@@ -206,13 +206,13 @@ class Window : public testing::Test {
 
   void open_rehearsal() {
     window_->open_rehearsal();
-    ASSERT_TRUE(wait("the rehearsal is open",
-                     [&] { return state().source == Source::virtual_room && !state().busy; }));
+    ASSERT_TRUE(
+        wait("the rehearsal is open", [&] { return state().source == Source::virtual_or && !state().busy; }));
   }
   void shoot_both() {
     ASSERT_TRUE(attempt(
         "AP is taken", [&] { click("shootAP"); },
-        [&] { return state().result->views[0].exposure != nullptr; }));
+        [&] { return state().result->views[0].xray_image != nullptr; }));
     auto* lateral = find("shootLAT");
     ASSERT_TRUE(attempt(
         "LAT is taken",
@@ -220,7 +220,7 @@ class Window : public testing::Test {
           lateral->setFocus();
           QTest::keyClick(lateral, Qt::Key_Return);
         },
-        [&] { return state().result->views[1].exposure != nullptr; }));
+        [&] { return state().result->views[1].xray_image != nullptr; }));
     ASSERT_TRUE(wait("the views are measured", [&] { return state().measured && !state().busy; }));
   }
   fs::path case_folder(int number) { return state().folder / ("case-" + std::to_string(number)); }

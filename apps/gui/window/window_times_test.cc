@@ -39,7 +39,7 @@ class PoseToPixels : public QObject {
 };
 
 /// Times, for a person: HELICARM_TIMING=1.
-TEST_F(Window, TellsItsTimes) {
+TEST_F(Window, ReportsItsTimes) {
   if (std::getenv("HELICARM_TIMING") == nullptr) GTEST_SKIP() << "only with HELICARM_TIMING";
   QElapsedTimer since;
   since.start();
@@ -50,7 +50,7 @@ TEST_F(Window, TellsItsTimes) {
   std::printf("window on the screen after %lld ms\n", since.elapsed());
   fresh.open_rehearsal();
   ASSERT_TRUE(
-      wait("the rehearsal is open", [&] { return fresh.desk().state().source == Source::virtual_room; }));
+      wait("the rehearsal is open", [&] { return fresh.controller().state().source == Source::virtual_or; }));
   std::printf("rehearsal ready after %lld ms\n", since.elapsed());
   fresh.close();
 
@@ -75,15 +75,15 @@ TEST_F(Window, TellsItsTimes) {
   }
   PoseToPixels pixels(*window_);
   QTest::qWait(10000);
-  const auto tell = [](const char* what, std::vector<double>& ms) {
+  const auto notify = [](const char* what, std::vector<double>& ms) {
     std::ranges::sort(ms);
     std::printf("%s: median %.1f ms, 95 %% below %.1f, worst %.1f (%zu)\n", what, ms[ms.size() / 2],
                 ms[ms.size() * 95 / 100], ms.back(), ms.size());
   };
-  tell("all that is live shown anew, the scene every fourth time", redraw);
-  tell("both X-rays and the scene redrawn", whole);
-  tell("scene drawn", scene);
-  tell("from the tracker's pose to the tool's line on the screen", pixels.latencies_ms);
+  notify("all that is live shown anew, the scene every fourth time", redraw);
+  notify("both X-rays and the scene redrawn", whole);
+  notify("scene drawn", scene);
+  notify("from the tracker's pose to the tool's line on the screen", pixels.latencies_ms);
   std::printf("longest hold-up of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
               WatchedApplication::longest_what.c_str());
 }
@@ -96,17 +96,17 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
   since.start();
   register_in_rehearsal();
   const auto done = [&] { ASSERT_TRUE(wait_idle()); };
-  Desk& desk = window_->desk();
+  Controller& controller = window_->controller();
   int outcomes = 0;
   for (int round = 0; since.elapsed() < std::atof(minutes) * 60000; ++round) {
-    if (live().robot.phase != LinkPhase::ready) desk.unlock("soak"), done();
-    if (state().tool_is_out) desk.withdraw(), done();
+    if (live().robot.phase != LinkPhase::ready) controller.unlock("soak"), done();
+    if (state().tool_is_out) controller.withdraw(), done();
     if (round % 10 == 9) {
       shoot_both();
-      desk.take_offered_picks(), done();
+      controller.take_offered_picks(), done();
     }
-    desk.plan_tunnel(state().tunnels[std::size_t(round % 2)].name), done();
-    desk.go(), done();
+    controller.plan_tunnel(state().tunnels[std::size_t(round % 2)].name), done();
+    controller.go(), done();
     outcomes += state().tool_is_out && state().refusals.empty();
     std::printf("%5.1f min: %.1f MB, %d outcomes of %d\n", double(since.elapsed()) / 60000, resident_mb(),
                 outcomes, round + 1);

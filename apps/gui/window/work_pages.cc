@@ -4,17 +4,17 @@
 #include <QVBoxLayout>
 #include <algorithm>
 
-#include "gui/desk/steps.h"
+#include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
 #include "helicarm/pipeline/accuracy.h"
 
 namespace helicarm::gui {
 
-PlanPage::PlanPage(Desk& desk, QWidget* parent)
+PlanPage::PlanPage(Controller& controller, QWidget* parent)
     : Page(
           tr("Click each tunnel end in both X-rays; the dashed line in the second one says where it can be."),
-          desk, parent) {
+          controller, parent) {
   next_ = new QLabel;
   next_->setObjectName("nextPick");
   next_->setWordWrap(true);
@@ -35,10 +35,11 @@ PlanPage::PlanPage(Desk& desk, QWidget* parent)
   snap_->setChecked(true);
   layout()->addWidget(snap_);
   auto* row = new QHBoxLayout;
-  offered_ = add_button(tr("Take the &plan's picks"), "offeredPicks", [this] { desk_.take_offered_picks(); });
+  offered_ =
+      add_button(tr("Take the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
   auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
     ends_->clearSelection();
-    desk_.clear_picks();
+    controller_.clear_picks();
   });
   for (QWidget* button : {offered_, clear}) row->addWidget(button);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
@@ -61,28 +62,28 @@ void PlanPage::add_map() {
   auto* words = new QLabel;
   for (QWidget* part : std::initializer_list<QWidget*>{map, axis, place, words}) row->addWidget(part);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
-  const auto tell = [this, map, axis, place, words] {
+  const auto notify = [this, map, axis, place, words] {
     for (QWidget* part : std::initializer_list<QWidget*>{axis, place}) part->setEnabled(map->isChecked());
     words->setText(tr("%1 mm").arg(place->value()));
     emit map_wanted(map->isChecked()
                         ? std::optional(TreCut{SliceAxis(axis->currentIndex()), double(place->value())})
                         : std::nullopt);
   };
-  connect(map, &QCheckBox::toggled, this, tell);
-  connect(axis, &QComboBox::currentIndexChanged, this, tell);
-  connect(place, &QSlider::valueChanged, this, tell);
-  tell();
+  connect(map, &QCheckBox::toggled, this, notify);
+  connect(axis, &QComboBox::currentIndexChanged, this, notify);
+  connect(place, &QSlider::valueChanged, this, notify);
+  notify();
 }
 
 std::optional<WantedPick> PlanPage::target() const {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   if (!chosen_) return next_pick(state);
   for (const PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
   return std::nullopt;
 }
 
-void PlanPage::show_state(const DeskState& state) {
+void PlanPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   for (const PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
@@ -109,7 +110,7 @@ void PlanPage::show_state(const DeskState& state) {
 }
 
 void PlanPage::tell_next() {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   if (!state.measured) return next_->setText(tr("The X-rays come first."));
   if (chosen_)
     return next_->setText(tr("%1 is chosen: click its new place in each X-ray.").arg(text(*chosen_)));
@@ -126,22 +127,22 @@ void PlanPage::tell_next() {
 }
 
 void PlanPage::placed(const std::string& point) {
-  if (chosen_ != point || ++placed_of_chosen_ < desk_.state().views.size()) return;
+  if (chosen_ != point || ++placed_of_chosen_ < controller_.state().views.size()) return;
   ends_->clearSelection();
 }
 
-NavigatePage::NavigatePage(Desk& desk, QWidget* parent)
+NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
     : Page(tr("Nothing moves unless you hold a yellow button until it is full. The space bar stops the "
               "robot."),
-           desk, parent) {
+           controller, parent) {
   says_ = new QLabel;
   says_->setObjectName("robotSays");
   says_->setWordWrap(true);
   layout()->addWidget(says_);
   unlock_ = add_hold(tr("1  &Unlock the robot: I have looked, nobody is near"), "unlock",
-                     [this] { desk_.unlock("the person at the screen"); });
+                     [this] { controller_.unlock("the person at the screen"); });
   register_ = add_hold(tr("2  &Register it: about a dozen small moves about its tip"), "register",
-                       [this] { desk_.register_robot(); });
+                       [this] { controller_.register_robot(); });
   tour_ = new QLabel;
   tour_->setWordWrap(true);
   tour_->hide();
@@ -151,15 +152,15 @@ NavigatePage::NavigatePage(Desk& desk, QWidget* parent)
   tunnel_->setAccessibleName(tr("Tunnel"));
   layout()->addWidget(tunnel_);
   connect(tunnel_, &QComboBox::currentTextChanged, this,
-          [this](const QString& name) { desk_.follow(name.toStdString()); });
+          [this](const QString& name) { controller_.follow(name.toStdString()); });
   plan_ = add_button(tr("3  Plan the &way and show it in both X-rays"), "planWay",
-                     [this] { desk_.plan_tunnel(tunnel_->currentText().toStdString()); });
-  go_ = add_hold(tr("4  &Go there"), "go", [this] { desk_.go(); });
-  withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { desk_.withdraw(); });
+                     [this] { controller_.plan_tunnel(tunnel_->currentText().toStdString()); });
+  go_ = add_hold(tr("4  &Go there"), "go", [this] { controller_.go(); });
+  withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
 
-void NavigatePage::show_state(const DeskState& state) {
+void NavigatePage::show_state(const ApplicationState& state) {
   QStringList names;
   for (const PlannedTunnel& tunnel : state.tunnels) names << text(tunnel.name);
   QStringList shown;
@@ -181,7 +182,7 @@ void NavigatePage::show_live(const LiveState& live) {
 }
 
 QString NavigatePage::next_step() const {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   if (state.source == Source::files || state.source == Source::none)
     return tr("Pictures from files: there is no robot to steer.");
   if (state.busy) return text(state.doing);
@@ -211,7 +212,7 @@ QString NavigatePage::next_step() const {
 }
 
 void NavigatePage::allow() {
-  const DeskState& state = desk_.state();
+  const ApplicationState& state = controller_.state();
   const bool free = !state.busy && state.source != Source::files && state.source != Source::none;
   const bool ready = free && phase_ == LinkPhase::ready;
   const bool placed = state.measured && !next_pick(state);
@@ -223,18 +224,18 @@ void NavigatePage::allow() {
   withdraw_->setEnabled(ready && state.tool_is_out);
 }
 
-VerifyPage::VerifyPage(Desk& desk, QWidget* parent)
+VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
     : Page(tr("How far (mm) the tool's axis runs from each end by tracker and X-rays, and how far it may be; "
               "then "
               "in the X-rays alone: Eq. 17 in px and mm, and in space."),
-           desk, parent) {
+           controller, parent) {
   table_ = add_table({tr("Tunnel, end"), tr("Off"), tr("Expect"), tr("px"), tr("mm"), tr("Space")},
                      "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });
 }
 
-void VerifyPage::show_state(const DeskState& state) {
+void VerifyPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   for (const auto& [name, outcome] : state.outcomes)
     for (const auto& [end, miss, in_xrays] : {std::tuple(tr("start"), &outcome.start, &Verification::start),

@@ -13,7 +13,7 @@ std::shared_ptr<const LoadedLayer> computed(const ViewResult& view, Layer layer)
   auto loaded = std::make_shared<LoadedLayer>();
   loaded->layer = layer_at_hand(view, layer);
   loaded->pixels = layer_of(view, layer);
-  loaded->usual = usual_window(loaded->pixels, view.exposure ? view.exposure->lowest : 0);
+  loaded->usual = usual_window(loaded->pixels, view.xray_image ? view.xray_image->lowest : 0);
   return loaded;
 } catch (const std::exception&) {
   return nullptr;

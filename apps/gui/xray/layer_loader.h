@@ -10,7 +10,7 @@
 
 namespace helicarm::gui {
 
-/// A layer's picture and the window that suits it.
+/// A layer's image and the window that suits it.
 struct LoadedLayer {
   Layer layer;
   Image<float> pixels;

@@ -10,25 +10,25 @@ namespace helicarm::gui {
 Layer layer_at_hand(const ViewResult& view, Layer wanted) { return view.rectification ? wanted : Layer::raw; }
 
 Image<float> layer_of(const ViewResult& view, Layer layer) {
-  if (!view.exposure) return {};
+  if (!view.xray_image) return {};
   const auto& rectification = view.rectification;
   switch (layer_at_hand(view, layer)) {
     case Layer::raw:
       break;
     case Layer::rectified:
-      return resample(*view.exposure, rectification->map);
+      return resample(*view.xray_image, rectification->map);
     case Layer::inpainted: {
-      Exposure hidden = *view.exposure;
-      hidden.pixels = inpainted(view.exposure->pixels, rectification->plate_dots);
+      XrayImage hidden = *view.xray_image;
+      hidden.pixels = inpainted(view.xray_image->pixels, rectification->plate_dots);
       return resample(hidden, rectification->map);
     }
   }
-  return view.exposure->pixels;
+  return view.xray_image->pixels;
 }
 
-QImage windowed(const Image<float>& picture, GreyWindow window) {
-  if (picture.empty()) return {};
-  auto grey = std::make_unique<Image<std::uint8_t>>(eight_bit(picture, window));
+QImage windowed(const Image<float>& image, GreyWindow window) {
+  if (image.empty()) return {};
+  auto grey = std::make_unique<Image<std::uint8_t>>(eight_bit(image, window));
   const uchar* pixels = grey->row(0);
   const int width = grey->width(), height = grey->height();
   const auto discard = [](void* owner) { delete static_cast<Image<std::uint8_t>*>(owner); };

@@ -14,11 +14,11 @@ enum class Layer { raw, rectified, inpainted };
 /// The layer that is there to show: the raw one where the view is not rectified.
 Layer layer_at_hand(const ViewResult& view, Layer wanted);
 
-/// The layer's picture; empty where there is no exposure. May take a tenth of a second.
+/// The layer's image; empty where there is no exposure. May take a tenth of a second.
 Image<float> layer_of(const ViewResult& view, Layer layer);
 
-/// The picture through a grey window. The window itself comes from `usual_window`
+/// The image through a grey window. The window itself comes from `usual_window`
 /// (helicarm/image/grey_window.h).
-QImage windowed(const Image<float>& picture, GreyWindow window);
+QImage windowed(const Image<float>& image, GreyWindow window);
 
 }  // namespace helicarm::gui

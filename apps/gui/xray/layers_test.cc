@@ -9,18 +9,18 @@ namespace helicarm::gui {
 namespace {
 
 /// Mean grey value within two pixels of a place.
-double grey_at(const Image<float>& picture, const Eigen::Vector2d& place) {
+double grey_at(const Image<float>& view_image, const Eigen::Vector2d& place) {
   double sum = 0;
   for (int dv = -2; dv <= 2; ++dv)
     for (int du = -2; du <= 2; ++du)
-      sum += double(picture(int(place.x() + 0.5) + du, int(place.y() + 0.5) + dv));
+      sum += double(view_image(int(place.x() + 0.5) + du, int(place.y() + 0.5) + dv));
   return sum / 25;
 }
 
 TEST(LayerOf, RawIsTheExposureItself) {
   const ViewResult& view = simulated_result()->views[0];
   const Image<float> raw = layer_of(view, Layer::raw);
-  EXPECT_TRUE(std::ranges::equal(raw.pixels(), view.exposure->pixels.pixels()));
+  EXPECT_TRUE(std::ranges::equal(raw.pixels(), view.xray_image->pixels.pixels()));
 }
 
 TEST(LayerOf, RectifiedShowsTheBallsWhereTheyWereMeasured) {
@@ -57,9 +57,9 @@ TEST(LayerOf, InpaintedHidesThePlateAndLeavesTheBalls) {
 }
 
 TEST(LayerOf, AViewThatIsNotRectifiedHasOnlyItsRawLayer) {
-  Exposure exposure;
-  exposure.pixels = Image<float>(4, 3, 7);
-  const ViewResult view{"AP", std::make_shared<const Exposure>(std::move(exposure)), {}, {}, {}};
+  XrayImage xray_image;
+  xray_image.pixels = Image<float>(4, 3, 7);
+  const ViewResult view{"AP", std::make_shared<const XrayImage>(std::move(xray_image)), {}, {}, {}};
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
     EXPECT_EQ(layer_at_hand(view, layer), Layer::raw);
     EXPECT_EQ(layer_of(view, layer).width(), 4);
@@ -68,9 +68,9 @@ TEST(LayerOf, AViewThatIsNotRectifiedHasOnlyItsRawLayer) {
 }
 
 TEST(Windowed, HoldsThePixelsAtAnyWidth) {
-  Image<float> picture(5, 2);
-  for (int u = 0; u < 5; ++u) picture(u, 1) = float(u);
-  const QImage image = windowed(picture, {0, 4});
+  Image<float> view_image(5, 2);
+  for (int u = 0; u < 5; ++u) view_image(u, 1) = float(u);
+  const QImage image = windowed(view_image, {0, 4});
   ASSERT_EQ(image.size(), QSize(5, 2));
   for (int u = 0; u < 5; ++u) EXPECT_EQ(image.pixelColor(u, 1).red(), 255 * u / 4) << u;
   EXPECT_EQ(image.pixelColor(3, 0).red(), 0);

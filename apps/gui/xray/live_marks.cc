@@ -8,7 +8,7 @@
 
 namespace helicarm::gui {
 
-void LiveMarks::set_tool(const std::optional<PictureLine>& rectified, const QString& note) {
+void LiveMarks::set_tool(const std::optional<ImageLine>& rectified, const QString& note) {
   tool_ = {rectified ? PixelPath{rectified->back, rectified->tip} : PixelPath{}};
   note_ = note;
 }
@@ -33,7 +33,7 @@ void LiveMarks::carry(const ViewResult& view, Layer layer) {
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
 }
 
-void LiveMarks::paint(QPainter& painter, const PictureFrame& frame) const {
+void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
   for (const PixelPath& piece : epipolar_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
   for (const PixelPath& piece : path_.in_layer) paint_path(painter, piece, frame, QPen(ink::residual, 2.2));

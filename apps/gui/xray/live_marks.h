@@ -3,9 +3,9 @@
 
 #include <QPainter>
 
+#include "gui/xray/image_frame.h"
 #include "gui/xray/marks.h"
-#include "gui/xray/picture_frame.h"
-#include "helicarm/verification/picture_line.h"
+#include "helicarm/verification/image_line.h"
 
 namespace helicarm::gui {
 
@@ -15,21 +15,21 @@ struct FreshPick {
   Eigen::Vector2d raw;
 };
 
-/// What comes and goes over the picture: as it was given (picks raw, the rest rectified) and in the layer's
+/// What comes and goes over the image: as it was given (picks raw, the rest rectified) and in the layer's
 /// pixels.
 class LiveMarks {
  public:
   void set_epipolar(PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
   void set_path(PixelPath rectified) { path_ = {std::move(rectified)}; }
   bool has_tool() const { return !tool_.given.empty(); }
-  void set_tool(const std::optional<PictureLine>& rectified, const QString& note);
+  void set_tool(const std::optional<ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
   /// Another layer: what was carried into the former one is so no longer.
   void forget_layer();
   /// Carries into the layer what is not yet; to be called after a change.
   void carry(const ViewResult& view, Layer layer);
-  void paint(QPainter& painter, const PictureFrame& frame) const;
+  void paint(QPainter& painter, const ImageFrame& frame) const;
 
  private:
   struct Carried {

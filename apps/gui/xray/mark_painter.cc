@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "gui/xray/label_placer.h"
-#include "helicarm/report/picture.h"
+#include "helicarm/report/rectified_image.h"
 
 namespace helicarm::gui {
 namespace {
@@ -52,12 +52,12 @@ void arrow(QPainter& painter, const QPointF& from, const QPointF& way) {
   });
 }
 
-/// Marks that are drawn at the same size however the picture is zoomed, unless it is zoomed far in.
-double ball_radius(const PictureFrame& frame, int picture_width) {
-  return std::max(8.0, 15 / 1024.0 * picture_width * frame.scale);
+/// Marks that are drawn at the same size however the image is zoomed, unless it is zoomed far in.
+double ball_radius(const ImageFrame& frame, int image_width) {
+  return std::max(8.0, 15 / 1024.0 * image_width * frame.scale);
 }
 
-void paint_balls(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, double radius) {
+void paint_balls(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, double radius) {
   for (const BallMark& ball : marks.balls) {
     const QPointF at = frame.to_widget(ball.place);
     if (ball.used)
@@ -71,8 +71,8 @@ void paint_balls(QPainter& painter, const ViewMarks& marks, const PictureFrame& 
 }
 
 /// Arrows from the balls and a bar that says how long they are.
-void paint_residuals(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame,
-                     const QRectF& bounds, LabelPlacer& labels) {
+void paint_residuals(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, const QRectF& bounds,
+                     LabelPlacer& labels) {
   constexpr double longest_arrow = 45;
   const double largest = largest_residual(marks);
   if (!(largest > 0)) return;
@@ -105,15 +105,15 @@ void paint_point(QPainter& painter, const PointMark& point, const QPointF& at) {
 
 }  // namespace
 
-void paint_path(QPainter& painter, const PixelPath& path, const PictureFrame& frame, const QPen& pen) {
+void paint_path(QPainter& painter, const PixelPath& path, const ImageFrame& frame, const QPen& pen) {
   QPolygonF line;
   for (const Eigen::Vector2d& place : path) line << frame.to_widget(place);
   edged(painter, pen, [&] { painter.drawPolyline(line); });
 }
 
-void paint_marks(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, int picture_width,
+void paint_marks(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, int image_width,
                  const QRectF& bounds) {
-  const double radius = ball_radius(frame, picture_width);
+  const double radius = ball_radius(frame, image_width);
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(ink::plate, 1));
   for (const DotMark& dot : marks.plate_dots) {

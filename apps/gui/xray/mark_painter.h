@@ -4,7 +4,7 @@
 #include <QColor>
 #include <QPainter>
 
-#include "gui/xray/picture_frame.h"
+#include "gui/xray/image_frame.h"
 #include "helicarm/report/marks.h"
 
 namespace helicarm::gui {
@@ -16,11 +16,11 @@ inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197,
     epipolar(94, 234, 242), quiet(200, 208, 220);
 }  // namespace ink
 
-/// Draws what the stages found. Lines keep their width at any zoom; `picture_width` sets the balls' circles.
-void paint_marks(QPainter& painter, const ViewMarks& marks, const PictureFrame& frame, int picture_width,
+/// Draws what the stages found. Lines keep their width at any zoom; `image_width` sets the balls' circles.
+void paint_marks(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, int image_width,
                  const QRectF& bounds);
 
 /// A line with a dark edge, so that it shows on bright ground too.
-void paint_path(QPainter& painter, const PixelPath& path, const PictureFrame& frame, const QPen& pen);
+void paint_path(QPainter& painter, const PixelPath& path, const ImageFrame& frame, const QPen& pen);
 
 }  // namespace helicarm::gui

@@ -44,27 +44,27 @@ ViewMarks marks_of(const Result& result, std::size_t view, Layer layer) {
 
 std::optional<Vector2d> in_layer(const ViewResult& view, Layer layer, const Vector2d& rectified) {
   if (!view.rectification || layer != Layer::raw) return rectified;
-  return raw_in_picture(view.rectification->map, rectified);
+  return raw_in_image(view.rectification->map, rectified);
 }
 
 std::vector<PixelPath> in_layer(const ViewResult& view, Layer layer, const PixelPath& rectified) {
   if (view.rectification && layer == Layer::raw) return raw_paths(view.rectification->map, rectified);
-  if (!view.exposure) return {};
-  const Image<float>& pixels = view.exposure->pixels;
+  if (!view.xray_image) return {};
+  const Image<float>& pixels = view.xray_image->pixels;
   return raw_paths(identity_map(pixels.width(), pixels.height(), {}), rectified);
 }
 
 std::optional<Vector2d> raw_from_layer(const ViewResult& view, Layer layer, const Vector2d& place) {
-  if (is_mapped(view, layer)) return raw_in_picture(view.rectification->map, place);
-  if (!view.exposure) return std::nullopt;
-  const Image<float>& pixels = view.exposure->pixels;
+  if (is_mapped(view, layer)) return raw_in_image(view.rectification->map, place);
+  if (!view.xray_image) return std::nullopt;
+  const Image<float>& pixels = view.xray_image->pixels;
   const bool inside = place.x() >= -0.5 && place.y() >= -0.5 && place.x() <= pixels.width() - 0.5 &&
                       place.y() <= pixels.height() - 0.5;
   return inside ? std::optional(place) : std::nullopt;
 }
 
 std::optional<Vector2d> layer_from_raw(const ViewResult& view, Layer layer, const Vector2d& raw) {
-  return is_mapped(view, layer) ? rectified_in_picture(view.rectification->map, raw) : std::optional(raw);
+  return is_mapped(view, layer) ? rectified_in_image(view.rectification->map, raw) : std::optional(raw);
 }
 
 std::optional<MarkUnderCursor> mark_near(const ViewMarks& marks, const Vector2d& place, double reach_px) {

@@ -13,12 +13,12 @@ namespace helicarm::gui {
 ViewMarks marks_of(const Result& result, std::size_t view, Layer layer);
 
 /// A place or a path in rectified pixels, in those of the layer; nothing where the map does not reach. A path
-/// is cut where it leaves the picture.
+/// is cut where it leaves the image.
 std::optional<Eigen::Vector2d> in_layer(const ViewResult& view, Layer layer,
                                         const Eigen::Vector2d& rectified);
 std::vector<PixelPath> in_layer(const ViewResult& view, Layer layer, const PixelPath& rectified);
 
-/// To raw pixels and back; nothing off the picture or where the map does not reach.
+/// To raw pixels and back; nothing off the image or where the map does not reach.
 std::optional<Eigen::Vector2d> raw_from_layer(const ViewResult& view, Layer layer,
                                               const Eigen::Vector2d& place);
 std::optional<Eigen::Vector2d> layer_from_raw(const ViewResult& view, Layer layer,

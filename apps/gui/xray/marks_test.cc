@@ -49,7 +49,7 @@ TEST(InLayer, ThereAndBackIsTheSamePixel) {
   EXPECT_EQ(in_layer(view, Layer::rectified, place), place);
 }
 
-TEST(InLayer, PathsEndAtThePicture) {
+TEST(InLayer, PathsEndAtTheImage) {
   const ViewResult& view = simulated_result()->views[0];
   for (const Layer layer : {Layer::raw, Layer::rectified}) {
     const auto paths = in_layer(view, layer, PixelPath{{-9000, 256}, {9000, 256}});

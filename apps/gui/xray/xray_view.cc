@@ -8,11 +8,11 @@ namespace helicarm::gui {
 namespace {
 
 /// Whether two views show the same pixels, so that zoom and window may stay.
-bool same_picture(const ViewResult& a, const ViewResult& b) {
-  return a.exposure && b.exposure && a.name == b.name &&
-         a.exposure->acquisition.instance_key == b.exposure->acquisition.instance_key &&
-         a.exposure->pixels.width() == b.exposure->pixels.width() &&
-         a.exposure->pixels.height() == b.exposure->pixels.height();
+bool same_image(const ViewResult& a, const ViewResult& b) {
+  return a.xray_image && b.xray_image && a.name == b.name &&
+         a.xray_image->acquisition.instance_key == b.xray_image->acquisition.instance_key &&
+         a.xray_image->pixels.width() == b.xray_image->pixels.width() &&
+         a.xray_image->pixels.height() == b.xray_image->pixels.height();
 }
 
 }  // namespace
@@ -31,10 +31,10 @@ void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index
   if (!result || index >= result->views.size()) return clear(tr("No picture yet"));
   const ViewResult& next = result->views[index];
   const QString name = QString::fromStdString(next.name);
-  if (!next.exposure || next.exposure->pixels.empty())
+  if (!next.xray_image || next.xray_image->pixels.empty())
     return clear(name.isEmpty() ? tr("No picture yet") : tr("No picture yet: shoot %1").arg(name));
-  const bool stays = result_ && same_picture(view(), next);
-  // Until the same picture's layer is there anew, the former one stands: nothing flickers.
+  const bool stays = result_ && same_image(view(), next);
+  // Until the same image's layer is there anew, the former one stands: nothing flickers.
   const bool stands = stays && shown_ && layer_at_hand(next, shown_->layer) == shown_->layer;
   auto layer = stands ? shown_ : nullptr;
   QImage grey = stands ? grey_ : QImage();
@@ -90,7 +90,7 @@ void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
     if (const auto raw = raw_from_layer(view(), shown_->layer, *cursor_))
       cursor_ = layer_from_raw(view(), layer->layer, *raw);
   shown_ = layer;
-  window_picture();
+  window_image();
   marks_ = marks_of(*result_, view_, shown_->layer);
   setAccessibleDescription(described(marks_));
   if (fits_) fit();
@@ -108,7 +108,7 @@ std::optional<GreyWindow> XrayView::window() const {
 void XrayView::set_window(GreyWindow window) {
   window_ = window;
   if (!shown_) return;
-  window_picture();
+  window_image();
   Q_EMIT window_changed(window);
 }
 
@@ -145,7 +145,7 @@ void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
   carry_live();
 }
 
-void XrayView::set_tool(std::optional<PictureLine> rectified, const QString& note) {
+void XrayView::set_tool(std::optional<ImageLine> rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
   carry_live();
@@ -156,7 +156,7 @@ void XrayView::set_picks(std::vector<FreshPick> raw) {
   carry_live();
 }
 
-void XrayView::window_picture() {
+void XrayView::window_image() {
   // Qt scales this format three times as fast as grey.
   grey_ = windowed(shown_->pixels, *window()).convertToFormat(QImage::Format_RGB32);
   redraw_still();
@@ -167,11 +167,11 @@ void XrayView::carry_live() {
   update();
 }
 
-QSizeF XrayView::picture_size() const { return shown_ ? QSizeF(grey_.size()) : QSizeF(1, 1); }
+QSizeF XrayView::image_size() const { return shown_ ? QSizeF(grey_.size()) : QSizeF(1, 1); }
 
 std::optional<QPointF> XrayView::raw_at(const QPointF& place) const {
   if (!shown_) return std::nullopt;
-  const auto raw = raw_from_layer(view(), shown_->layer, frame_.to_picture(place));
+  const auto raw = raw_from_layer(view(), shown_->layer, frame_.to_image(place));
   return raw ? std::optional(QPointF(raw->x(), raw->y())) : std::nullopt;
 }
 
@@ -183,7 +183,7 @@ std::optional<QPointF> XrayView::place_of(const QPointF& raw_pixel) const {
 
 void XrayView::fit() {
   fits_ = true;
-  frame_ = PictureFrame::fitted(picture_size(), size());
+  frame_ = ImageFrame::fitted(image_size(), size());
   redraw_still();
 }
 

@@ -43,12 +43,12 @@ class XrayView : public QWidget {
   /// What is drawn over the view: rectified pixels, but for picks.
   void set_epipolar(std::vector<Eigen::Vector2d> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
-  void set_tool(std::optional<PictureLine> rectified, const QString& note);
+  void set_tool(std::optional<ImageLine> rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
   /// Whether the wanted layer is still being computed; until then the former one is shown.
   bool is_computing() const { return computing_; }
-  /// Raw pixel at a place of the widget and back; nothing off the picture.
+  /// Raw pixel at a place of the widget and back; nothing off the image.
   std::optional<QPointF> raw_at(const QPointF& place) const;
   std::optional<QPointF> place_of(const QPointF& raw_pixel) const;
 
@@ -85,9 +85,9 @@ class XrayView : public QWidget {
   };
 
   const ViewResult& view() const { return result_->views[view_]; }
-  QSizeF picture_size() const;
+  QSizeF image_size() const;
   void take(const std::shared_ptr<const LoadedLayer>& layer);
-  void window_picture();
+  void window_image();
   void carry_live();
   void redraw_still();
   void zoom(double factor, const QPointF& about);
@@ -113,8 +113,8 @@ class XrayView : public QWidget {
   QImage grey_;
   ViewMarks marks_;
   LiveMarks live_;
-  PictureFrame frame_;
-  QPixmap still_;  ///< picture and marks as they stand; null: to be drawn anew
+  ImageFrame frame_;
+  QPixmap still_;  ///< image and marks as they stand; null: to be drawn anew
 
   Drag drag_;
   std::optional<QPointF> mouse_;

@@ -32,9 +32,9 @@ std::optional<QPointF> way_of(int key) {
 
 void XrayView::zoom(double factor, const QPointF& about) {
   if (!shown_) return;
-  const double smallest = 0.5 * PictureFrame::fitted(picture_size(), size()).scale;
+  const double smallest = 0.5 * ImageFrame::fitted(image_size(), size()).scale;
   fits_ = false;
-  frame_ = frame_.zoomed(factor, about, smallest).within(picture_size(), size());
+  frame_ = frame_.zoomed(factor, about, smallest).within(image_size(), size());
   redraw_still();
 }
 
@@ -42,7 +42,7 @@ void XrayView::pan(const QPointF& by) {
   if (!shown_) return;
   fits_ = false;
   frame_.origin += by;
-  frame_ = frame_.within(picture_size(), size());
+  frame_ = frame_.within(image_size(), size());
   redraw_still();
 }
 
@@ -146,7 +146,7 @@ void XrayView::move_cursor(const QPointF& by) {
   if (!shown_) return;
   const QPointF from = cursor_ ? frame_.to_widget(*cursor_) : QRectF(rect()).center();
   const Eigen::Vector2d size(grey_.width() - 1, grey_.height() - 1);
-  cursor_ = frame_.to_picture(from + by).cwiseMax(0).cwiseMin(size);
+  cursor_ = frame_.to_image(from + by).cwiseMax(0).cwiseMin(size);
   const QPointF at = frame_.to_widget(*cursor_);
   const QRectF sight = QRectF(rect()).adjusted(20, 20, -20, -20);
   if (!sight.contains(at)) pan(sight.center() - at);
@@ -159,7 +159,7 @@ void XrayView::pick_at(const QPointF& place) {
 
 void XrayView::hover_at(const QPointF& place) {
   constexpr double reach = 14;  // on the screen
-  if (shown_) hover_over(mark_near(marks_, frame_.to_picture(place), reach / frame_.scale));
+  if (shown_) hover_over(mark_near(marks_, frame_.to_image(place), reach / frame_.scale));
 }
 
 void XrayView::hover_over(const std::optional<MarkUnderCursor>& mark) {

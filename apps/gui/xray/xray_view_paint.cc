@@ -11,12 +11,12 @@ namespace {
 
 const QColor ground(13, 16, 21);
 
-void draw_picture(QPainter& painter, const QImage& picture, const PictureFrame& frame) {
+void draw_image(QPainter& painter, const QImage& image, const ImageFrame& frame) {
   painter.save();
   painter.setRenderHint(QPainter::SmoothPixmapTransform);
   painter.translate(frame.origin);
   painter.scale(frame.scale, frame.scale);
-  painter.drawImage(QPointF(-0.5, -0.5), picture);
+  painter.drawImage(QPointF(-0.5, -0.5), image);
   painter.restore();
 }
 
@@ -61,7 +61,7 @@ void XrayView::paint_still() {
   still_.fill(ground);
   if (!shown_) return;
   QPainter painter(&still_);
-  draw_picture(painter, grey_, frame_);
+  draw_image(painter, grey_, frame_);
   if (!marks_visible_) return;
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setFont(label_font(font()));
@@ -77,7 +77,7 @@ void XrayView::paint_magnifier(QPainter& painter) const {
   painter.save();
   painter.setClipPath(glass);
   painter.fillRect(glass.boundingRect(), ground);
-  draw_picture(painter, grey_, {power * frame_.scale, at + power * (frame_.origin - at)});
+  draw_image(painter, grey_, {power * frame_.scale, at + power * (frame_.origin - at)});
   painter.restore();
   open_cross(painter, at, 8, 30, Qt::white);
   painter.setBrush(Qt::NoBrush);

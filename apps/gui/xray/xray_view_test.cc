@@ -67,22 +67,22 @@ TEST_F(XrayViewTest, AClickArrivesAsARawPixelInEveryLayerAtAnyZoom) {
 
 TEST_F(XrayViewTest, WhatIsDrawnStandsWhereAClickOnItGoes) {
   Result bare;
-  Exposure dot;
+  XrayImage dot;
   dot.pixels = Image<float>(33, 33, 1);
   dot.pixels(20, 9) = 100;
-  bare.views.push_back({"dot", std::make_shared<const Exposure>(std::move(dot)), {}, {}, {}});
+  bare.views.push_back({"dot", std::make_shared<const XrayImage>(std::move(dot)), {}, {}, {}});
   view.show_view(std::make_shared<const Result>(std::move(bare)), 0);
   settle();
   view.set_window({1, 100});
   view.clearFocus();
-  const QImage picture = view.grab().toImage().convertToFormat(QImage::Format_Grayscale8);
+  const QImage image = view.grab().toImage().convertToFormat(QImage::Format_Grayscale8);
   const QPointF expected = *view.place_of({20, 9});
   QPointF sum;
   double weight = 0;
   for (int y = -40; y <= 40; ++y)
     for (int x = -40; x <= 40; ++x) {
       const QPoint at = expected.toPoint() + QPoint(x, y);
-      const double grey = picture.pixelColor(at).red();
+      const double grey = image.pixelColor(at).red();
       sum += grey * (QPointF(at) + QPointF(0.5, 0.5));
       weight += grey;
     }
@@ -191,7 +191,7 @@ TEST_F(XrayViewTest, ClearForgetsEverything) {
   QSignalSpy spy(&view, &XrayView::picked);
   QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
   for (int which : {Qt::Key_H, Qt::Key_L, Qt::Key_0, Qt::Key_W, Qt::Key_Plus, Qt::Key_Return}) key(which);
-  view.set_tool(PictureLine{{1, 2}, {3, 4}}, "note");
+  view.set_tool(ImageLine{{1, 2}, {3, 4}}, "note");
   view.grab();
   EXPECT_EQ(spy.count(), 0);
 }
@@ -257,7 +257,7 @@ TEST_F(XrayViewTest, RandomInputDoesNotCrash) {
         view.set_picking(below(2));
         break;
       case 6:
-        view.set_tool(PictureLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
+        view.set_tool(ImageLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
         break;
       default:
         key(keys[below(int(std::size(keys)))], with[below(3)]);

@@ -16,8 +16,9 @@ namespace {
 
 constexpr std::size_t least_fiducials = 6;
 constexpr std::size_t comfortable_fiducials = 8;
-constexpr double least_rho = 1e-8;   // 1 / mm: a source 100 km away
-constexpr double belied_sigmas = 3;  // standard deviations of chi2 beyond which the sigmas are not believed
+constexpr double least_rho = 1e-8;  // 1 / mm: a source 100 km away
+constexpr double inconsistent_sigmas =
+    3;  // standard deviations of chi2 beyond which the sigmas are not believed
 
 tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
   failure.view = view;
@@ -36,7 +37,7 @@ Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<Poin
                                const Eigen::Vector3d& centre) {
   if (view.start) return dlt_condition(pairs).map([&](double) { return centred(*view.start, centre); });
   return dlt_homogeneous(pairs).map(
-      [&](const DltResult& dlt) { return drawn_to_prior(centred(dlt.view, centre), view.prior); });
+      [&](const DltResult& dlt) { return shrunk_to_prior(centred(dlt.view, centre), view.prior); });
 }
 
 /// Splits each sigma into the ball's own and the map's, which is shared: its covariance is made of
@@ -146,8 +147,8 @@ double excess_of(double chi2, int dof) {
   return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
 }
 
-void rescale_if_belied(CalibrationResult& result) {
-  if (result.dof < 1 || excess_of(result.chi2, result.dof) < belied_sigmas) return;
+void inflate_if_inconsistent(CalibrationResult& result) {
+  if (result.dof < 1 || excess_of(result.chi2, result.dof) < inconsistent_sigmas) return;
   result.variance_scale = result.chi2 / result.dof;
   result.joint_covariance *= result.variance_scale;
   for (CalibratedView& view : result.views) view.covariance *= result.variance_scale;
@@ -234,7 +235,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     view->covariance = block_of(result.joint_covariance, i);
     result.views.push_back(*std::move(view));
   }
-  rescale_if_belied(result);
+  inflate_if_inconsistent(result);
   add_scale_error(result, options.common.scale_sigma);
   warn_of_few(result);
   return result;

@@ -19,7 +19,7 @@ std::vector<ViewFiducials> pair_of_views(double sigma, std::uint64_t trial) {
           pictured("LAT", paper_view(std::numbers::pi / 2), sigma, random)};
 }
 
-TEST(Calibrate, NearlyExactPicturesGiveTheViewsBack) {
+TEST(Calibrate, NearlyExactImagesGiveTheViewsBack) {
   auto views = pair_of_views(1e-6, 0);
   const auto result = calibrate(views, {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
@@ -52,14 +52,14 @@ TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
     auto views = pair_of_views(0.2, std::uint64_t(trial));
     RandomStream random(13, 0, std::uint64_t(trial));
     const double common = 5 * random.normal();
-    options.common = {{Departure{5, 3}, Departure{8, 4}}};
+    options.common = {{IntrinsicsVariation{5, 3}, IntrinsicsVariation{8, 4}}};
     const Eigen::Vector3d per_axis_mm = tolerance_mm * Eigen::Vector3d(1, 2, 0.5);
     if (tolerance_mm > 0) options.common.ball_covariance_mm2.assign(12, per_axis_mm.cwiseAbs2().asDiagonal());
     const auto near = [&](double value, double sigma) { return value + sigma * random.normal(); };
     const Eigen::Vector2d middle(near(512, 8), near(512, 8));
     for (auto& view : views)
       view.prior = {near(6000 + common, 3), Eigen::Vector2d(near(middle.x(), 4), near(middle.y(), 4)), 1,
-                    Belief{near(1, 1e-3), 1e-3}, Belief{near(0, 1e-3), 1e-3}};
+                    NormalPrior{near(1, 1e-3), 1e-3}, NormalPrior{near(0, 1e-3), 1e-3}};
     for (std::size_t k = 0; k < 12; ++k) {
       const Eigen::Vector3d off =
           per_axis_mm.cwiseProduct(Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
@@ -91,8 +91,8 @@ TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
   const auto exact = calibrate(views, {});
   CalibrationOptions options;
   options.common.scale_sigma = scale_sigma;
-  const auto doubtful = calibrate(views, options);
-  ASSERT_TRUE(exact && doubtful);
+  const auto uncertain = calibrate(views, options);
+  ASSERT_TRUE(exact && uncertain);
   auto larger = views;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Fiducial& f : views[0].fiducials) mean += f.centre_in_calibrator / 12;
@@ -107,7 +107,7 @@ TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
         (scaled->views[std::size_t(i)].view.camera_from_world.translation -
          exact->views[std::size_t(i)].view.camera_from_world.translation) /
         (scale - 1);
-  const Eigen::MatrixXd added = doubtful->joint_covariance - exact->joint_covariance;
+  const Eigen::MatrixXd added = uncertain->joint_covariance - exact->joint_covariance;
   const Eigen::MatrixXd expected = scale_sigma * scale_sigma * change * change.transpose();
   EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm());
 }
@@ -139,7 +139,7 @@ TEST(Calibrate, ErrorsThatTheMapSharesAreInTheCovariance) {
         for (Eigen::Index i = 0; i < n; ++i) view.fiducials[std::size_t(i)].uv[axis] += error(i);
       }
       for (auto& f : view.fiducials) f.sigma_px = std::hypot(own, map);
-      view.prior.aspect = Belief{1, 1e-3};
+      view.prior.aspect = NormalPrior{1, 1e-3};
       view.map_covariance_px2 = covariance;
     }
     const auto distance2 = [&] {
@@ -212,7 +212,7 @@ TEST(Calibrate, GoodBallsAreKept) {
   EXPECT_LE(rejected, 1);
 }
 
-TEST(Calibrate, BeliedSigmasEnlargeTheCovarianceAndWarn) {
+TEST(Calibrate, InconsistentSigmasInflateTheCovarianceAndWarn) {
   auto views = pair_of_views(0.5, 1);
   for (auto& view : views)
     for (auto& f : view.fiducials) f.sigma_px = 0.1;

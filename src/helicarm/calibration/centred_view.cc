@@ -44,7 +44,7 @@ CentredView moved(const CentredView& view, const ViewStep& step) {
   return next;
 }
 
-Picture picture_of(const CentredView& c, const Eigen::Vector3d& point_in_world) {
+ImageCoordinates image_of(const CentredView& c, const Eigen::Vector3d& point_in_world) {
   const Eigen::Vector3d d = c.rotation * (point_in_world - c.centre);
   const double depth = 1 + c.rho * d.z();
   const double gx = (d.x() - c.qx * d.z()) / depth;
@@ -54,15 +54,17 @@ Picture picture_of(const CentredView& c, const Eigen::Vector3d& point_in_world) 
   by_d << c.ax, c.skew, -c.ax * c.qx - c.skew * c.qy - c.rho * along_u,  //
       0, c.ay, -c.ay * (c.qy + c.rho * gy);
   by_d /= depth;
-  Picture picture{
-      {c.uc + along_u, c.vc + c.ay * gy}, decltype(Picture::by_step)::Zero(), by_d * c.rotation, depth};
-  picture.by_step.diagonal<0>() << gx, gy;
-  picture.by_step.diagonal<2>() << 1, 1;
-  picture.by_step.middleCols<3>(4) = -by_d * cross_matrix(d);
-  picture.by_step.col(7) = -d.z() / depth * Eigen::Vector2d(along_u, c.ay * gy);
-  picture.by_step.middleCols<2>(8) = -d.z() * by_d.leftCols<2>();
-  picture.by_step(0, 10) = gy;
-  return picture;
+  ImageCoordinates image{{c.uc + along_u, c.vc + c.ay * gy},
+                         decltype(ImageCoordinates::by_step)::Zero(),
+                         by_d * c.rotation,
+                         depth};
+  image.by_step.diagonal<0>() << gx, gy;
+  image.by_step.diagonal<2>() << 1, 1;
+  image.by_step.middleCols<3>(4) = -by_d * cross_matrix(d);
+  image.by_step.col(7) = -d.z() / depth * Eigen::Vector2d(along_u, c.ay * gy);
+  image.by_step.middleCols<2>(8) = -d.z() * by_d.leftCols<2>();
+  image.by_step(0, 10) = gy;
+  return image;
 }
 
 ViewCovariance parameters_by_step(const CentredView& c) {

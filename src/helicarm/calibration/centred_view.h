@@ -17,7 +17,7 @@ struct CentredView {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< in the world, mm
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< camera_from_world
   double ax = 0, ay = 0;                                   ///< magnification, px / mm
-  double uc = 0, vc = 0;                                   ///< picture of the centre, px
+  double uc = 0, vc = 0;                                   ///< image of the centre, px
   double rho = 0;                                          ///< 1 / mm
   double qx = 0, qy = 0;  ///< tangent of the centre's angle off the central ray
   double skew = 0;        ///< px / mm
@@ -30,13 +30,13 @@ CentredView centred(const View& view, const Eigen::Vector3d& centre);
 View uncentred(const CentredView& view);
 CentredView moved(const CentredView& view, const ViewStep& step);
 
-struct Picture {
+struct ImageCoordinates {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, view_parameters> by_step;
   Eigen::Matrix<double, 2, 3> by_place;
   double relative_depth;  ///< over that of the centre; positive before the source
 };
-Picture picture_of(const CentredView& view, const Eigen::Vector3d& point_in_world);
+ImageCoordinates image_of(const CentredView& view, const Eigen::Vector3d& point_in_world);
 
 /// d (the parameters of `CalibratedView::covariance`) / d step.
 ViewCovariance parameters_by_step(const CentredView& view);

@@ -36,25 +36,25 @@ TEST(CentredView, IsTheSameCamera) {
   const CentredView view = centred(example, centre);
   EXPECT_LT((uncentred(view).projection() - example.projection()).norm(), 1e-8);
   const Eigen::Vector3d point(-20, 40, 70);
-  EXPECT_LT((picture_of(view, point).pixel - example.project(point)).norm(), 1e-10);
+  EXPECT_LT((image_of(view, point).pixel - example.project(point)).norm(), 1e-10);
 }
 
-TEST(CentredView, PictureJacobianAgreesWithDifferences) {
+TEST(CentredView, ImageJacobianAgreesWithDifferences) {
   const CentredView view = centred(example, centre);
   const Eigen::Vector3d point(-20, 40, 70);
-  const auto jacobian = picture_of(view, point).by_step;
+  const auto jacobian = image_of(view, point).by_step;
   for (int i = 0; i < view_parameters; ++i) {
     const ViewStep step = step_sizes(i) * ViewStep::Unit(i);
     const Eigen::Vector2d slope =
-        (picture_of(moved(view, step), point).pixel - picture_of(moved(view, -step), point).pixel) /
+        (image_of(moved(view, step), point).pixel - image_of(moved(view, -step), point).pixel) /
         (2 * step_sizes(i));
     EXPECT_LT((slope - jacobian.col(i)).norm(), 1e-6 * (1 + jacobian.col(i).norm())) << i;
   }
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d step = 1e-4 * Eigen::Vector3d::Unit(axis);
     const Eigen::Vector2d slope =
-        (picture_of(view, point + step).pixel - picture_of(view, point - step).pixel) / 2e-4;
-    EXPECT_LT((slope - picture_of(view, point).by_place.col(axis)).norm(), 1e-6) << axis;
+        (image_of(view, point + step).pixel - image_of(view, point - step).pixel) / 2e-4;
+    EXPECT_LT((slope - image_of(view, point).by_place.col(axis)).norm(), 1e-6) << axis;
   }
 }
 
@@ -81,30 +81,30 @@ TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
     EXPECT_LT((slope - jacobian.col(i)).norm(), 1e-5 * (1 + jacobian.col(i).norm())) << i;
   }
   const CentredView view = centred(example, centre);
-  EXPECT_LT((jacobian * parameters_by_step(view) - picture_of(view, point).by_step).norm(), 1e-4);
+  EXPECT_LT((jacobian * parameters_by_step(view) - image_of(view, point).by_step).norm(), 1e-4);
 }
 
-TEST(DrawnToPrior, TakesTheKnownIntrinsicsAndKeepsThePictures) {
+TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
   const CentredView view = centred(example, centre);
-  const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, Belief{0.97, 0.01}};
-  const CentredView drawn = drawn_to_prior(view, prior);
+  const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, NormalPrior{0.97, 0.01}};
+  const CentredView drawn = shrunk_to_prior(view, prior);
   const Intrinsics k = uncentred(drawn).intrinsics;
   EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
   EXPECT_NEAR(-k.fx / k.fy, 0.97, 1e-12);
   EXPECT_NEAR(k.u0, 512, 1e-9);
   EXPECT_NEAR(k.v0, 515, 1e-9);
   for (const Eigen::Vector3d& point : {Eigen::Vector3d(-20, 40, 70), {30, 30, 10}})
-    EXPECT_LT((picture_of(drawn, point).pixel - picture_of(view, point).pixel).norm(), 2);
+    EXPECT_LT((image_of(drawn, point).pixel - image_of(view, point).pixel).norm(), 2);
 }
 
 TEST(PriorRows, JacobianAgreesWithDifferences) {
   View other = example;
   other.intrinsics = {6100, 6150, 515, 505, 0};
   const std::vector<CentredView> views{centred(example, centre), centred(other, centre)};
-  const IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, Belief{1, 0.01}, Belief{0, 0.01}};
+  const IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, NormalPrior{1, 0.01}, NormalPrior{0, 0.01}};
   const std::vector<IntrinsicsPrior> priors{prior, prior};
-  const MachinePrior machine{Departure{10, 2}, Departure{7, 4}};
-  const PriorRows rows = prior_rows(views, priors, machine);
+  const CArmPrior c_arm{IntrinsicsVariation{10, 2}, IntrinsicsVariation{7, 4}};
+  const PriorRows rows = prior_rows(views, priors, c_arm);
   EXPECT_EQ(rows.residuals.size(), 2 * (2 + 1 + 2));
   for (int i = 0; i < 2 * view_parameters; ++i) {
     const double size = step_sizes(i % view_parameters);
@@ -114,23 +114,23 @@ TEST(PriorRows, JacobianAgreesWithDifferences) {
     down[std::size_t(i / view_parameters)] =
         moved(views[std::size_t(i / view_parameters)], -size * ViewStep::Unit(i % view_parameters));
     const Eigen::VectorXd slope =
-        (prior_rows(up, priors, machine).residuals - prior_rows(down, priors, machine).residuals) /
-        (2 * size);
+        (prior_rows(up, priors, c_arm).residuals - prior_rows(down, priors, c_arm).residuals) / (2 * size);
     EXPECT_LT((slope - rows.jacobian.col(i)).norm(), 1e-5 * (1 + rows.jacobian.col(i).norm())) << i;
   }
 }
 
-TEST(PriorRows, DeparturesOfTwoViewsGoTogether) {
+TEST(PriorRows, VariationsOfTwoViewsGoTogether) {
   const std::vector<CentredView> views{centred(example, centre), centred(example, centre)};
   IntrinsicsPrior prior{6200, std::nullopt, 4};
   prior.skew.reset();
   const double first = (6100 - 6200) / 4.0;
-  const PriorRows rows = prior_rows(views, std::vector{prior, prior}, {Departure{10, 2}, std::nullopt});
+  const PriorRows rows =
+      prior_rows(views, std::vector{prior, prior}, {IntrinsicsVariation{10, 2}, std::nullopt});
   // Both views depart alike: a common cause, not two.
   EXPECT_NEAR(rows.residuals.squaredNorm(), first * first / (100 + 4.0 / 2), 1e-9);
 }
 
-TEST(PriorRows, MirroredViewDepartsTheOtherWay) {
+TEST(PriorRows, MirroredViewVariesTheOtherWay) {
   View plain = example, mirrored = example;
   plain.intrinsics.fx = 6000;
   plain.intrinsics.u0 = 512 + 30;
@@ -139,7 +139,7 @@ TEST(PriorRows, MirroredViewDepartsTheOtherWay) {
   IntrinsicsPrior prior{std::nullopt, Eigen::Vector2d(512, 512), 4};
   prior.skew.reset();
   const PriorRows rows = prior_rows(std::vector{centred(plain, centre), centred(mirrored, centre)},
-                                    std::vector{prior, prior}, {std::nullopt, Departure{7, 4}});
+                                    std::vector{prior, prior}, {std::nullopt, IntrinsicsVariation{7, 4}});
   EXPECT_NEAR(rows.residuals.squaredNorm(), 7.5 * 7.5 / (49 + 16.0 / 2), 1e-9);
 }
 

@@ -11,7 +11,7 @@ namespace helicarm {
 namespace {
 
 /// The balls' sigmas are believed as if they came from so many degrees of freedom.
-constexpr double belief_in_sigma = 8;
+constexpr double prior_of_sigma = 8;
 constexpr double least_freedom = 1e-6;  // a residual that its own ball pulls to zero tells nothing
 
 /// How much chi2 would fall without an observation whose residual and freedom (the part of the unit
@@ -48,8 +48,8 @@ std::optional<Worst> worst_of(const std::vector<ViewProblem>& problems, const Re
 
 /// Probability of so large a fall of chi2 by chance: the tail of an F(2, dof) distribution.
 double chance_of(double fall, double chi2_after, int dof_after) {
-  const double dof = belief_in_sigma + dof_after;
-  const double variance = std::max(1.0, (belief_in_sigma + chi2_after) / dof);
+  const double dof = prior_of_sigma + dof_after;
+  const double variance = std::max(1.0, (prior_of_sigma + chi2_after) / dof);
   return std::pow(1 + fall / variance / dof, -dof / 2);
 }
 

@@ -36,11 +36,11 @@ class Rows {
     for (const CentredView& view : views) known_.push_back(known_of(view));
   }
 
-  void add_own(std::size_t view, Eigen::Index which, const Belief& belief) {
-    residuals_.push_back((known_[view].values(which) - belief.value) / belief.sigma);
+  void add_own(std::size_t view, Eigen::Index which, const NormalPrior& normal_prior) {
+    residuals_.push_back((known_[view].values(which) - normal_prior.value) / normal_prior.sigma);
     rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_))
         .segment<view_parameters>(view_parameters * Eigen::Index(view)) =
-        known_[view].by_step.row(which) / belief.sigma;
+        known_[view].by_step.row(which) / normal_prior.sigma;
   }
 
   /// A quantity's departures from nominal in some views, which have covariance common^2 + of_view^2 [i = j].
@@ -49,7 +49,8 @@ class Rows {
     double value;
     double unit;
   };
-  void add_common(const std::vector<Nominal>& nominal, Eigen::Index which, const Departure& departure) {
+  void add_common(const std::vector<Nominal>& nominal, Eigen::Index which,
+                  const IntrinsicsVariation& variation) {
     const auto count = Eigen::Index(nominal.size());
     Eigen::VectorXd residuals(count);
     Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(count, columns_);
@@ -59,8 +60,8 @@ class Rows {
       rows.row(i).segment<view_parameters>(view_parameters * Eigen::Index(view)) =
           known_[view].by_step.row(which) / unit;
     }
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, departure.common * departure.common);
-    covariance.diagonal().array() += departure.of_view * departure.of_view;
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, variation.common * variation.common);
+    covariance.diagonal().array() += variation.of_view * variation.of_view;
     const Eigen::LLT<Eigen::MatrixXd> root(covariance);
     root.matrixL().solveInPlace(residuals);
     root.matrixL().solveInPlace(rows);
@@ -86,7 +87,7 @@ class Rows {
 
 }  // namespace
 
-CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior) {
+CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior) {
   const double magnification = (std::abs(view.ax) + view.ay) / 2;
   if (prior.aspect) {
     view.ay = 2 * magnification / (1 + prior.aspect->value);
@@ -104,7 +105,7 @@ CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior) {
 }
 
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
-                     const MachinePrior& machine) {
+                     const CArmPrior& c_arm) {
   Rows rows(views);
   std::vector<Rows::Nominal> focals, principals_u, principals_v;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -113,15 +114,15 @@ PriorRows prior_rows(std::span<const CentredView> views, std::span<const Intrins
     if (prior.skew) rows.add_own(i, skew, *prior.skew);
     if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});
     if (!prior.principal_px) continue;
-    // In a mirrored picture the machine's own departure points the other way.
+    // In a mirrored image the machine's own departure points the other way.
     const double hand = views[i].ax < 0 ? -1 : 1;
     principals_u.push_back({i, prior.principal_px->x(), hand * prior.unit_px});
     principals_v.push_back({i, prior.principal_px->y(), prior.unit_px});
   }
-  if (machine.focal) rows.add_common(focals, focal, *machine.focal);
-  if (machine.principal) {
-    rows.add_common(principals_u, principal_u, *machine.principal);
-    rows.add_common(principals_v, principal_v, *machine.principal);
+  if (c_arm.focal) rows.add_common(focals, focal, *c_arm.focal);
+  if (c_arm.principal) {
+    rows.add_common(principals_u, principal_u, *c_arm.principal);
+    rows.add_common(principals_v, principal_v, *c_arm.principal);
   }
   return rows.finish();
 }

@@ -12,7 +12,7 @@
 namespace helicarm {
 
 /// What is known of a number beforehand: a normal distribution.
-struct Belief {
+struct NormalPrior {
   double value = 0;
   double sigma = 0;
 };
@@ -21,36 +21,36 @@ struct Belief {
 struct IntrinsicsPrior {
   std::optional<double> focal_px = {};  ///< nominal mean of |fx| and fy
   std::optional<Eigen::Vector2d> principal_px = {};
-  double unit_px = 1;  ///< the unit of MachinePrior in this view: px / mm on the receiver, or 1
-  std::optional<Belief> aspect = {};              ///< |fx| / fy: 1 for square pixels
-  std::optional<Belief> skew = Belief{0, 1e-12};  ///< over fy. Nothing: free
+  double unit_px = 1;  ///< the unit of CArmPrior in this view: px / mm on the receiver, or 1
+  std::optional<NormalPrior> aspect = {};                   ///< |fx| / fy: 1 for square pixels
+  std::optional<NormalPrior> skew = NormalPrior{0, 1e-12};  ///< over fy. Nothing: free
 };
 
 /// How a quantity departs from its nominal value: by an amount common to all views of a machine, and by what
 /// each view adds (sag). Standard deviations.
-struct Departure {
+struct IntrinsicsVariation {
   double common;
   double of_view;
 };
 
 /// How far a machine's intrinsics may be from nominal, in each view's unit (mm on the receiver). Nothing: not
 /// known.
-struct MachinePrior {
-  std::optional<Departure> focal;
-  std::optional<Departure> principal;  ///< per axis
+struct CArmPrior {
+  std::optional<IntrinsicsVariation> focal;
+  std::optional<IntrinsicsVariation> principal;  ///< per axis
 };
 
 /// What all views share.
 struct CommonPrior {
-  MachinePrior machine;
+  CArmPrior c_arm;
   /// Of each ball's place about the file's, mm^2, without the error of the scale; empty: exact.
   std::vector<Eigen::Matrix3d> ball_covariance_mm2 = {};
   double scale_sigma = 0;  ///< relative standard deviation of the calibrator's scale about the balls' mean
 };
 
-/// A start whose intrinsics the balls hardly fix, brought to what is known of them; its pictures change
+/// A start whose intrinsics the balls hardly fix, brought to what is known of them; its images change
 /// little.
-CentredView drawn_to_prior(CentredView view, const IntrinsicsPrior& prior);
+CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior);
 
 /// The priors as rows of a least-squares problem: `residuals` over `jacobian` by the steps of all views. Each
 /// row is worth one observation.
@@ -60,6 +60,6 @@ struct PriorRows {
 };
 
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
-                     const MachinePrior& machine);
+                     const CArmPrior& c_arm);
 
 }  // namespace helicarm

@@ -36,21 +36,21 @@ Eigen::Index map_modes(const ViewProblem& problem) {
 /// Rows at given views and departures; false where a point is not before its source. Without priors rho may
 /// pass through zero on the way: nothing happens there.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
-  std::vector<IntrinsicsPrior> beliefs;
+  std::vector<IntrinsicsPrior> normal_priors;
   Eigen::Index count = 0;
   for (const ViewProblem& problem : problems) {
-    beliefs.push_back(problem.prior);
+    normal_priors.push_back(problem.prior);
     count += 2 * Eigen::Index(problem.observations.size());
   }
-  const PriorRows priors = prior_rows(at.views, beliefs, common.machine);
+  const PriorRows priors = prior_rows(at.views, normal_priors, common.c_arm);
   const bool has_source =
       std::all_of(at.views.begin(), at.views.end(), [](const auto& v) { return v.rho > 0; });
-  const bool needs_source =
-      common.machine.focal || common.machine.principal ||
-      std::any_of(beliefs.begin(), beliefs.end(), [](const auto& belief) { return belief.aspect; });
+  const bool needs_source = common.c_arm.focal || common.c_arm.principal ||
+                            std::any_of(normal_priors.begin(), normal_priors.end(),
+                                        [](const auto& normal_prior) { return normal_prior.aspect; });
   if (needs_source && !has_source) return false;
   const Eigen::Index steps = view_parameters * Eigen::Index(problems.size());
-  const Eigen::Index own = at.departures.size();
+  const Eigen::Index own = at.variations.size();
   at.residuals.resize(count + priors.residuals.size() + own);
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
   const bool tolerant = is_tolerant(problems);
@@ -61,26 +61,26 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
     for (const Observation& seen : problems[i].observations) {
       const Eigen::Index ball = 3 * Eigen::Index(seen.ball);
       Eigen::Vector3d place = seen.point_in_world;
-      if (tolerant) place += seen.place_root * at.departures.segment<3>(ball);
-      Picture picture = picture_of(at.views[i], place);
-      if (!(picture.relative_depth > 0)) return false;
+      if (tolerant) place += seen.place_root * at.variations.segment<3>(ball);
+      ImageCoordinates image = image_of(at.views[i], place);
+      if (!(image.relative_depth > 0)) return false;
       for (Eigen::Index axis = 0; axis < (modes > 0 ? 2 : 0); ++axis) {
         const Eigen::Index first = map + axis * modes;
-        picture.pixel[axis] += seen.by_map.dot(at.departures.segment(first, modes));
+        image.pixel[axis] += seen.by_map.dot(at.variations.segment(first, modes));
         at.jacobian.block(row + axis, steps + first, 1, modes) = seen.by_map / seen.sigma_px;
       }
-      at.residuals.segment<2>(row) = (picture.pixel - seen.pixel) / seen.sigma_px;
+      at.residuals.segment<2>(row) = (image.pixel - seen.pixel) / seen.sigma_px;
       at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
-          picture.by_step / seen.sigma_px;
+          image.by_step / seen.sigma_px;
       if (tolerant)
-        at.jacobian.block<2, 3>(row, steps + ball) = picture.by_place * seen.place_root / seen.sigma_px;
+        at.jacobian.block<2, 3>(row, steps + ball) = image.by_place * seen.place_root / seen.sigma_px;
       row += 2;
     }
     map += 2 * modes;
   }
   at.residuals.segment(count, priors.residuals.size()) = priors.residuals;
   at.jacobian.block(count, 0, priors.residuals.size(), steps) = priors.jacobian;
-  at.residuals.tail(own) = at.departures;
+  at.residuals.tail(own) = at.variations;
   at.jacobian.bottomRightCorner(own, own).setIdentity();
   at.chi2 = at.residuals.squaredNorm();
   at.dof = int(at.jacobian.rows() - at.jacobian.cols());
@@ -91,7 +91,7 @@ void move(const Refinement& from, const Eigen::VectorXd& step, Refinement& to) {
   for (std::size_t i = 0; i < from.views.size(); ++i)
     to.views.push_back(
         moved(from.views[i], step.segment<view_parameters>(view_parameters * Eigen::Index(i))));
-  to.departures = from.departures + step.tail(from.departures.size());
+  to.variations = from.variations + step.tail(from.variations.size());
 }
 
 tl::unexpected<Failure> open_views(const Refinement& at) {
@@ -117,7 +117,7 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
     at.views.push_back(problem.start);
     own += 2 * map_modes(problem);
   }
-  at.departures = Eigen::VectorXd::Zero(own);
+  at.variations = Eigen::VectorXd::Zero(own);
   if (!evaluate(problems, common, at)) return open_views(at);
   double damping = 1e-3;
   bool done = false;

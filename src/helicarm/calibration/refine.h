@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// A ball's place (mm) and picture (px), with the picture's standard deviation per axis.
+/// A ball's place (mm) and image (px), with the image's standard deviation per axis.
 struct Observation {
   std::size_t ball;  ///< the same in all views
   Eigen::Vector3d point_in_world;
@@ -33,7 +33,7 @@ struct ViewProblem {
 /// v.
 struct Refinement {
   std::vector<CentredView> views;
-  Eigen::VectorXd departures;  ///< of balls and maps
+  Eigen::VectorXd variations;  ///< of balls and maps
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
   Eigen::MatrixXd covariance;  ///< of all columns, the sigmas taken at their word

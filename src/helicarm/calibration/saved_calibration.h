@@ -13,7 +13,7 @@ namespace helicarm {
 
 /// A calibration as a result file holds it.
 struct SavedCalibration : Calibration {
-  std::vector<std::optional<DistortionMap>> maps;  ///< per view; nothing where the picture was not rectified
+  std::vector<std::optional<DistortionMap>> maps;  ///< per view; nothing where the image was not rectified
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map) and "calibration"

@@ -111,7 +111,7 @@ std::string_view code(Reason reason) {
       return "tag_disagrees";
     case Reason::spacing_missing:
       return "spacing_missing";
-    case Reason::lossy_picture:
+    case Reason::lossy_image:
       return "lossy_picture";
     case Reason::uid_reused:
       return "uid_reused";

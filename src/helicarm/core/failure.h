@@ -70,13 +70,13 @@ enum class Reason {
   bone_taken_as_fixed,
   tag_disagrees,
   spacing_missing,
-  lossy_picture,
+  lossy_image,
   uid_reused,
   few_fiducials,
   rules_broken,
 };
 
-/// Machine-readable code of a reason, e.g. "too_few_fiducials".
+/// C-arm history-readable code of a reason, e.g. "too_few_fiducials".
 std::string_view code(Reason reason);
 
 /// 2 for unreadable input or wrong usage, 3 for a refusal.

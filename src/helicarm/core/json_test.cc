@@ -73,7 +73,7 @@ TEST(JsonReader, ValueOutsideItsRangeNamesFieldValueAndLimit) {
   EXPECT_EQ(failure.message, "x.json: \"size\": 400 is outside 0.5 to 30");
 }
 
-TEST(JsonReader, KeyNobodyAskedForIsUnknown) {
+TEST(JsonReader, KeyNoOneAskedForIsUnknown) {
   const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) {
     r.number("size", {0, 9});
   });

@@ -7,7 +7,7 @@
 namespace helicarm {
 
 /// The radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian
-/// and scaled to 1 at the centre of the sharp picture. Tabulated over s = distance / radius.
+/// and scaled to 1 at the centre of the sharp image. Tabulated over s = distance / radius.
 class BallProfile {
  public:
   /// `blur`: standard deviation of the Gaussian over the ball's radius. `absorbance`: attenuation times

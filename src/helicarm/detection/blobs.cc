@@ -18,11 +18,11 @@ constexpr double ratio = 1.2599210498948732;  // 2^(1/3)
 
 /// Least answer worth a look: so many times the robust spread of the answers over a coarse grid (nought left
 /// out: black surround), but never more than a quarter of the strongest, for plates that are full of holes.
-float threshold(const cv::Mat& picture, double sigmas) {
+float threshold(const cv::Mat& view_image, double sigmas) {
   std::vector<float> values;
-  for (int v = 3; v < picture.rows; v += 5)
-    for (int u = 3; u < picture.cols; u += 5)
-      if (const float x = std::abs(picture.at<float>(v, u)); x > 0) values.push_back(x);
+  for (int v = 3; v < view_image.rows; v += 5)
+    for (int u = 3; u < view_image.cols; u += 5)
+      if (const float x = std::abs(view_image.at<float>(v, u)); x > 0) values.push_back(x);
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   const auto strong = values.begin() + static_cast<std::ptrdiff_t>(values.size() - 1 - values.size() / 1000);

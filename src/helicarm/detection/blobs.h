@@ -17,7 +17,7 @@ struct BlobOptions {
   Polarity polarity = Polarity::dark;
   double min_radius_px = 2;
   double max_radius_px = 40;
-  double threshold_sigma = 6;  ///< over the noise of the filtered picture
+  double threshold_sigma = 6;  ///< over the noise of the filtered image
   double max_elongation = 4;   ///< ratio of principal curvatures above which a blob is a line or an edge
   std::size_t max_count = 8000;
 };

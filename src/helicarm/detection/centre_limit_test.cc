@@ -5,7 +5,7 @@
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 #include "helicarm/detection/find_dots.h"
 
 namespace helicarm {
@@ -29,44 +29,44 @@ struct Situation {
 
 double detector_sigma(const Situation& s) { return s.fwhm_px / 2.3548; }
 
-/// What decides the picture, and may all be unknown: six of the background, then each ball's contrast,
+/// What decides the image, and may all be unknown: six of the background, then each ball's contrast,
 /// centre and radius.
 using Truth = Eigen::VectorXd;
 
 /// Expected quanta of a square with some balls, before the detector blurs them.
 Image<float> expected(const Truth& truth) {
-  Image<float> picture(side, side);
+  Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) {
       const double x = (u - 0.5 * side) / side;
       const double y = (v - 0.5 * side) / side;
-      picture(u, v) = static_cast<float>(truth[0] + truth[1] * x + truth[2] * y + truth[3] * x * x +
-                                         truth[4] * x * y + truth[5] * y * y);
+      image(u, v) = static_cast<float>(truth[0] + truth[1] * x + truth[2] * y + truth[3] * x * x +
+                                       truth[4] * x * y + truth[5] * y * y);
     }
   for (Eigen::Index k = 6; k < truth.size(); k += 4) {
     drawn::Shade shade(side, side);
     drawn::add_ball(shade, {truth[k + 1], truth[k + 2]}, truth[k + 3], focus_px, absorbance);
     for (int v = 0; v < side; ++v)
-      for (int u = 0; u < side; ++u) picture(u, v) *= static_cast<float>(1 - truth[k] * double(shade(u, v)));
+      for (int u = 0; u < side; ++u) image(u, v) *= static_cast<float>(1 - truth[k] * double(shade(u, v)));
   }
-  return picture;
+  return image;
 }
 
-Image<float> blurred(Image<float> picture, const Situation& s) {
-  cv::Mat mat = as_mat(picture);
+Image<float> blurred(Image<float> image, const Situation& s) {
+  cv::Mat mat = as_mat(image);
   if (s.fwhm_px > 0) cv::GaussianBlur(mat, mat, {}, detector_sigma(s), 0, cv::BORDER_REFLECT);
-  return picture;
+  return image;
 }
 
 Image<float> exposed(const Image<float>& expected_quanta, const Situation& s, RandomStream& random) {
-  Image<float> picture = expected_quanta;
-  for (float& quantum : picture.pixels())  // so many that Poisson's distribution is Gauss's
+  Image<float> image = expected_quanta;
+  for (float& quantum : image.pixels())  // so many that Poisson's distribution is Gauss's
     quantum = std::max(0.f, quantum + std::sqrt(quantum) * static_cast<float>(random.normal()));
-  picture = blurred(std::move(picture), s);
-  for (float& grey : picture.pixels())
+  image = blurred(std::move(image), s);
+  for (float& grey : image.pixels())
     grey = static_cast<float>(grey_per_quantum) *
            (grey + static_cast<float>(electronic) * static_cast<float>(random.normal()));
-  return picture;
+  return image;
 }
 
 /// The bound on the first ball's standard deviation per axis from the pixels of the fit's own window, all
@@ -130,7 +130,7 @@ BallProfile profile_of(const Situation& s) {
   return BallProfile(std::hypot(focus_px, detector_sigma(s), std::sqrt(1.0 / 12)) / s.radius, absorbance);
 }
 
-/// Fits the first ball of many pictures: `fit(exposure, corner)` says how, the corner being that of its
+/// Fits the first ball of many images: `fit(exposure, corner)` says how, the corner being that of its
 /// square.
 template <class Fit>
 Answer tried(const Situation& s, const std::vector<Vector2d>& further_balls, Fit&& fit) {
@@ -157,10 +157,10 @@ Answer tried(const Situation& s, const std::vector<Vector2d>& further_balls, Fit
     for (int v = 0; v < all.height(); ++v)
       for (int u = 0; u < all.width(); ++u) all(u, v) = one(u % side, v % side);
     for (int trial = 0; trial < 4; ++trial) {
-      const Exposure exposure = drawn::exposure(exposed(all, s, random));
+      const XrayImage xray_image = drawn::xray_image(exposed(all, s, random));
       for (int tile = 0; tile < tiles * tiles; ++tile) {
         const Vector2d place = side * Vector2d(tile % tiles, tile / tiles) + centre;
-        const std::optional<Dot> dot = fit(exposure, place);
+        const std::optional<Dot> dot = fit(xray_image, place);
         EXPECT_TRUE(dot);
         if (!dot) continue;
         const double square = (dot->centre_px - place).squaredNorm();
@@ -192,11 +192,11 @@ TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreTrue) {
   const Situation s = GetParam();
   const BallProfile profile = profile_of(s);
   std::optional<NoiseCorrelation> noise;
-  const Answer answer = tried(s, {}, [&](const Exposure& exposure, const Vector2d& place) {
-    DotFitOptions options = fit_options_for(exposure);
-    if (!noise) noise = noise_correlation(exposure, options.floor, options.ceiling);
+  const Answer answer = tried(s, {}, [&](const XrayImage& xray_image, const Vector2d& place) {
+    DotFitOptions options = fit_options_for(xray_image);
+    if (!noise) noise = noise_correlation(xray_image, options.floor, options.ceiling);
     options.noise = *noise;
-    return fit_dot(exposure.pixels, start_at(place, s.radius), profile, {}, options);
+    return fit_dot(xray_image.pixels, start_at(place, s.radius), profile, {}, options);
   });
   record(answer);
   EXPECT_LT(answer.over_bound, 1.2);
@@ -215,10 +215,10 @@ TEST_P(OverlapLimit, OverlapOfHalfARadiusCostsLittle) {
   const Situation s = GetParam();
   const Vector2d beside = 1.5 * s.radius * Vector2d(0.8, 0.6);
   DotLook look{profile_of(s), {}};
-  const Answer answer = tried(s, {beside}, [&](const Exposure& exposure, const Vector2d& place) {
-    look.options = fit_options_for(exposure);
+  const Answer answer = tried(s, {beside}, [&](const XrayImage& xray_image, const Vector2d& place) {
+    look.options = fit_options_for(xray_image);
     const std::vector<Dot> both{start_at(place, s.radius), start_at(place + beside, s.radius)};
-    const auto dots = refit_dots(exposure, {both[0]}, look, both);
+    const auto dots = refit_dots(xray_image, {both[0]}, look, both);
     return dots.empty() ? std::nullopt : std::optional(dots[0]);
   });
   record(answer);

@@ -8,7 +8,7 @@
 
 #include "helicarm/detection/ball_profile.h"
 #include "helicarm/detection/dot_patch.h"
-#include "helicarm/detection/products.h"
+#include "helicarm/detection/normal_equations.h"
 
 namespace helicarm {
 

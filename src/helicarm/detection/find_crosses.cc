@@ -40,7 +40,7 @@ struct Arms {
   double depth;  ///< of the fainter
 };
 
-/// Directions in which the picture is dark on both sides of a place, at two distances.
+/// Directions in which the image is dark on both sides of a place, at two distances.
 std::optional<Arms> arms_at(const Image<float>& image, const Vector2d& place, double radius, double sign,
                             const CrossOptions& options) {
   std::array<double, ring_steps> dark{};
@@ -111,19 +111,20 @@ struct Pixel {
 };
 
 /// Whether a pixel lies outside the field or in its blurred rim.
-bool at_the_rim(const Exposure& exposure, int u, int v) {
+bool at_the_rim(const XrayImage& xray_image, int u, int v) {
   constexpr int rim_px = 3;  // the screen's blur and the ramp of the field's edge
-  const float black = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);  // as in usable.cc
-  const Image<float>& image = exposure.pixels;
+  const float black =
+      xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);  // as in usable.cc
+  const Image<float>& image = xray_image.pixels;
   for (int y = -rim_px; y <= rim_px; ++y)
     for (int x = -rim_px; x <= rim_px; ++x)
       if (image.contains(u + x, v + y) && image(u + x, v + y) <= black) return true;
   return false;
 }
 
-std::optional<Dot> fit_wires(const Exposure& exposure, const Vector2d& start, double half_width,
+std::optional<Dot> fit_wires(const XrayImage& xray_image, const Vector2d& start, double half_width,
                              const Arms& arms, std::span<const Disc> discs) {
-  const Image<float>& image = exposure.pixels;
+  const Image<float>& image = xray_image.pixels;
   const int u0 = static_cast<int>(std::lround(start.x()));
   const int v0 = static_cast<int>(std::lround(start.y()));
   const double window = 4 * half_width + 4;
@@ -136,7 +137,7 @@ std::optional<Dot> fit_wires(const Exposure& exposure, const Vector2d& start, do
         const bool hidden = std::any_of(discs.begin(), discs.end(), [&](const Disc& disc) {
           return (disc.centre - Vector2d(u0 + x, v0 + y)).squaredNorm() < disc.radius * disc.radius;
         });
-        if (hidden || at_the_rim(exposure, u0 + x, v0 + y)) continue;
+        if (hidden || at_the_rim(xray_image, u0 + x, v0 + y)) continue;
         pixels.push_back({double(x), double(y), double(image(u0 + x, v0 + y)), 1});
         mean += pixels.back().grey;
       }
@@ -223,13 +224,13 @@ std::optional<Dot> fit_wires(const Exposure& exposure, const Vector2d& start, do
 
 }  // namespace
 
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle,
+std::optional<Dot> fit_cross(const XrayImage& xray_image, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs) {
-  return fit_wires(exposure, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast},
+  return fit_wires(xray_image, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast},
                    discs);
 }
 
-std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options) {
+std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& options) {
   BlobOptions blob_options;
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = 0.5 * options.min_width_px;
@@ -237,14 +238,14 @@ std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& opti
   blob_options.max_elongation = 12;  // wires that cross at a slant
   const double sign = options.polarity == Polarity::dark ? 1 : -1;
   std::vector<Dot> crosses;
-  for (const Dot& blob : find_blobs(exposure.pixels, blob_options)) {
+  for (const Dot& blob : find_blobs(xray_image.pixels, blob_options)) {
     const double half_width =
         std::clamp(0.75 * blob.radius_px, 0.5 * options.min_width_px, 0.5 * options.max_width_px);
-    const auto arms = arms_at(exposure.pixels, blob.centre_px, 3 * half_width + 3, sign, options);
+    const auto arms = arms_at(xray_image.pixels, blob.centre_px, 3 * half_width + 3, sign, options);
     if (!arms) continue;
     Arms signed_arms = *arms;
     signed_arms.depth *= sign;
-    const auto cross = fit_wires(exposure, blob.centre_px, half_width, signed_arms, {});
+    const auto cross = fit_wires(xray_image, blob.centre_px, half_width, signed_arms, {});
     if (!cross || cross->sigma_px > options.max_sigma_px) continue;
     const auto twin = std::find_if(crosses.begin(), crosses.end(), [&](const Dot& other) {
       return (other.centre_px - cross->centre_px).norm() <

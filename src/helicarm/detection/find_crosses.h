@@ -8,7 +8,7 @@
 #include "helicarm/detection/blobs.h"
 #include "helicarm/detection/dot.h"
 #include "helicarm/detection/fit_dot.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
@@ -23,11 +23,11 @@ struct CrossOptions {
 /// Crossings of two wires, each with the sub-pixel place where the wires' axes meet. `radius_px` is half the
 /// wires' width. Round dots, single wires and wire ends are no crossings; black pixels (outside
 /// the field) and those beside them tell nothing.
-std::vector<Dot> find_crosses(const Exposure& exposure, const CrossOptions& options);
+std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& options);
 
 /// The crossing near `start` (place, half width, contrast) of two wires that run about along the given angles
 /// (radians), or nothing where the pixels do not show one. The discs are left out.
-std::optional<Dot> fit_cross(const Exposure& exposure, const Dot& start, double first_angle,
+std::optional<Dot> fit_cross(const XrayImage& xray_image, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs);
 
 }  // namespace helicarm

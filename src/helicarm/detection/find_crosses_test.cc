@@ -6,18 +6,18 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm {
 namespace {
 
 using Eigen::Vector2d;
 
-Exposure noisy(const drawn::Shade& shade, double contrast = 1200) {
+XrayImage noisy(const drawn::Shade& shade, double contrast = 1200) {
   RandomStream random(4, 2);
-  Image<float> picture = drawn::grey(shade, contrast);
-  drawn::add_noise(picture, 12, random);
-  return drawn::exposure(std::move(picture));
+  Image<float> image = drawn::grey(shade, contrast);
+  drawn::add_noise(image, 12, random);
+  return drawn::xray_image(std::move(image));
 }
 
 drawn::Wire wire_through(const Vector2d& place, double angle_deg, double half = 45) {

@@ -9,11 +9,11 @@
 namespace helicarm {
 namespace {
 
-/// Noise of a linear picture grows with its root, so the search runs on the root; a logarithmic one stays.
-Image<float> even_noise(const Exposure& exposure) {
-  Image<float> even = exposure.pixels;
-  if (!exposure.acquisition.logarithmic.value_or(false))
-    for (float& grey : even.pixels()) grey = std::sqrt(std::max(0.0f, grey - exposure.lowest));
+/// Noise of a linear image grows with its root, so the search runs on the root; a logarithmic one stays.
+Image<float> even_noise(const XrayImage& xray_image) {
+  Image<float> even = xray_image.pixels;
+  if (!xray_image.acquisition.logarithmic.value_or(false))
+    for (float& grey : even.pixels()) grey = std::sqrt(std::max(0.0f, grey - xray_image.lowest));
   return even;
 }
 
@@ -41,9 +41,9 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
 }
 
 /// Behind its neighbours' discs, or together with those that overlap it, whichever tells the centre better.
-std::optional<Dot> refit(const Exposure& exposure, const Dot& dot, const DotLook& look,
+std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotLook& look,
                          const std::vector<Dot>& neighbours) {
-  auto best = fit_dot(exposure.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options);
+  auto best = fit_dot(xray_image.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options);
   std::vector<Dot> group{dot};
   std::vector<Dot> others;
   for (const Dot& other : neighbours) {
@@ -60,32 +60,32 @@ std::optional<Dot> refit(const Exposure& exposure, const Dot& dot, const DotLook
     const auto beside = discs_beside(member, others);
     discs.insert(discs.end(), beside.begin(), beside.end());
   }
-  const auto together = fit_dots_together(exposure.pixels, group, profiles, discs, look.options);
+  const auto together = fit_dots_together(xray_image.pixels, group, profiles, discs, look.options);
   if (together && (!best || together->front().sigma_px < best->sigma_px)) best = together->front();
   return best;
 }
 
 }  // namespace
 
-DotFitOptions fit_options_for(const Exposure& exposure) {
+DotFitOptions fit_options_for(const XrayImage& xray_image) {
   DotFitOptions options;
-  options.floor = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);
-  options.ceiling = exposure.highest;
+  options.floor = xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);
+  options.ceiling = xray_image.highest;
   return options;
 }
 
-NoiseCorrelation noise_correlation(const Exposure& exposure) {
-  const DotFitOptions limits = fit_options_for(exposure);
-  return noise_correlation(exposure, limits.floor, limits.ceiling);
+NoiseCorrelation noise_correlation(const XrayImage& xray_image) {
+  const DotFitOptions limits = fit_options_for(xray_image);
+  return noise_correlation(xray_image, limits.floor, limits.ceiling);
 }
 
-DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, std::vector<Dot> dots) {
+DotLook estimate_look(const XrayImage& xray_image, const NoiseCorrelation& noise, std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(),
                    [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
-  DotFitOptions options = fit_options_for(exposure);
+  DotFitOptions options = fit_options_for(xray_image);
   options.rough = 0.1;  // the dots have been fitted before
   double blur = 1;
   double absorbance = 2;
@@ -93,7 +93,7 @@ DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, s
     const BallProfile profile(blur / radius, absorbance);
     double sum = 0;
     for (const Dot& dot : dots) {
-      const auto fitted = fit_dot(exposure.pixels, dot, profile, {}, options);
+      const auto fitted = fit_dot(xray_image.pixels, dot, profile, {}, options);
       sum += fitted ? fitted->sigma_px : 1.0;
     }
     return sum;
@@ -126,17 +126,17 @@ DotLook estimate_look(const Exposure& exposure, const NoiseCorrelation& noise, s
   return {BallProfile(blur / radius, absorbance), options};
 }
 
-std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) {
+std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& options) {
   BlobOptions blob_options;
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = options.min_radius_px;
   blob_options.max_radius_px = options.max_radius_px;
-  const std::vector<Dot> blobs = find_blobs(even_noise(exposure), blob_options);
-  DotFitOptions fit = fit_options_for(exposure);
+  const std::vector<Dot> blobs = find_blobs(even_noise(xray_image), blob_options);
+  DotFitOptions fit = fit_options_for(xray_image);
   fit.tolerance = 0.1;  // the profile is only a guess so far, and so is the place
   fit.margin_share = 0.35;
   fit.margin_px = 3.5;
-  const double least_contrast = options.min_contrast_share * double(exposure.highest - exposure.lowest);
+  const double least_contrast = options.min_contrast_share * double(xray_image.highest - xray_image.lowest);
   std::vector<BallProfile> profiles;  // by the radius' octave: the blur is about a pixel whatever the size
   for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5)
     profiles.emplace_back(1 / radius, 2.0);
@@ -144,7 +144,8 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   for (const Dot& blob : blobs) {
     const auto octave =
         static_cast<std::size_t>(std::max(0.0, std::round(std::log(blob.radius_px / 1.5) / std::log(1.5))));
-    const auto dot = fit_dot(exposure.pixels, blob, profiles[std::min(octave, profiles.size() - 1)], {}, fit);
+    const auto dot =
+        fit_dot(xray_image.pixels, blob, profiles[std::min(octave, profiles.size() - 1)], {}, fit);
     if (!dot || dot->sigma_px > options.max_sigma_px || dot->misfit > options.max_misfit) continue;
     if (dot->radius_px < 0.8 * options.min_radius_px || dot->radius_px > 1.2 * options.max_radius_px)
       continue;
@@ -156,10 +157,11 @@ std::vector<Dot> find_dots(const Exposure& exposure, const DotOptions& options) 
   return without_doubles(std::move(dots));
 }
 
-std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& options, double clear_sigma_px) {
+std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& options,
+                                 double clear_sigma_px) {
   constexpr double same_size = 1.15;
-  std::vector<Dot> found = find_dots(exposure, options);
-  const NoiseCorrelation noise = noise_correlation(exposure);
+  std::vector<Dot> found = find_dots(xray_image, options);
+  const NoiseCorrelation noise = noise_correlation(xray_image);
   std::stable_sort(found.begin(), found.end(),
                    [](const Dot& a, const Dot& b) { return a.radius_px < b.radius_px; });
   std::vector<Dot> clear;
@@ -167,18 +169,18 @@ std::vector<Dot> find_clear_dots(const Exposure& exposure, const DotOptions& opt
     const auto last = std::find_if(
         first, found.end(), [&](const Dot& dot) { return dot.radius_px > same_size * first->radius_px; });
     const std::vector<Dot> size(first, last);
-    for (const Dot& dot : refit_dots(exposure, size, estimate_look(exposure, noise, size), found))
+    for (const Dot& dot : refit_dots(xray_image, size, estimate_look(xray_image, noise, size), found))
       if (dot.sigma_px < clear_sigma_px && dot.misfit < options.max_misfit) clear.push_back(dot);
     first = last;
   }
   return clear;
 }
 
-std::vector<Dot> refit_dots(const Exposure& exposure, const std::vector<Dot>& dots, const DotLook& look,
+std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots, const DotLook& look,
                             const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
-    if (const auto better = refit(exposure, dot, look, neighbours)) refitted.push_back(*better);
+    if (const auto better = refit(xray_image, dot, look, neighbours)) refitted.push_back(*better);
   return refitted;
 }
 

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm {
 namespace {
@@ -36,10 +36,10 @@ drawn::Shade shade_of(const std::vector<Ball>& balls) {
   return shade;
 }
 
-Exposure noisy(Image<float> picture, double sigma = 15) {
+XrayImage noisy(Image<float> image, double sigma = 15) {
   RandomStream random(4, 2);
-  drawn::add_noise(picture, sigma, random);
-  return drawn::exposure(std::move(picture));
+  drawn::add_noise(image, sigma, random);
+  return drawn::xray_image(std::move(image));
 }
 
 double distance(const std::vector<Dot>& dots, const Vector2d& place) {
@@ -77,23 +77,23 @@ TEST(FindDots, VeryNoisyEmptyFieldHasNextToNone) {
 }
 
 TEST(FindDots, RoundFieldsEdgeIsNoDot) {
-  Image<float> picture(256, 256);
+  Image<float> image(256, 256);
   for (int v = 0; v < 256; ++v)
     for (int u = 0; u < 256; ++u)
-      picture(u, v) = std::hypot(u - 128, v - 128) < 110 ? 2500 - 0.03f * float(u * u + v) : -1e3f;
-  EXPECT_TRUE(find_dots(noisy(std::move(picture)), {}).empty());
+      image(u, v) = std::hypot(u - 128, v - 128) < 110 ? 2500 - 0.03f * float(u * u + v) : -1e3f;
+  EXPECT_TRUE(find_dots(noisy(std::move(image)), {}).empty());
 }
 
 TEST(FindDots, BrightHolesAreFoundAsBrightOnly) {
   const std::vector<Ball> holes = some_balls();
-  const Exposure exposure = noisy(drawn::grey(shade_of(holes), -1000));
+  const XrayImage xray_image = noisy(drawn::grey(shade_of(holes), -1000));
   DotOptions bright;
   bright.polarity = Polarity::bright;
-  const auto dots = find_dots(exposure, bright);
+  const auto dots = find_dots(xray_image, bright);
   EXPECT_EQ(dots.size(), holes.size());
   for (const Ball& hole : holes) EXPECT_LT(distance(dots, hole.centre), 0.1);
   for (const Dot& dot : dots) EXPECT_LT(dot.contrast, 0);
-  EXPECT_TRUE(find_dots(exposure, {}).empty());
+  EXPECT_TRUE(find_dots(xray_image, {}).empty());
 }
 
 TEST(FindDots, SingleWireIsNoDot) {
@@ -102,25 +102,25 @@ TEST(FindDots, SingleWireIsNoDot) {
   EXPECT_TRUE(find_dots(noisy(drawn::grey(shade, 1200)), {}).empty());
 }
 
-TEST(FindDots, PictureTooSmallForAnyHasNone) {
-  EXPECT_TRUE(find_dots(drawn::exposure(Image<float>(8, 8, 1000)), {}).empty());
-  EXPECT_TRUE(find_dots(drawn::exposure(Image<float>(1, 1, 1000)), {}).empty());
+TEST(FindDots, ImageTooSmallForAnyHasNone) {
+  EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(8, 8, 1000)), {}).empty());
+  EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(1, 1, 1000)), {}).empty());
 }
 
 TEST(EstimateLook, RefitWithTheBallsOwnLookIsExact) {
   std::vector<Ball> balls = some_balls();
   for (Ball& ball : balls) ball.radius = 6;
-  const Exposure exposure = noisy(drawn::grey(shade_of(balls), 1200), 4);
-  const auto rough = find_dots(exposure, {});
-  const DotLook look = estimate_look(exposure, noise_correlation(exposure), rough);
+  const XrayImage xray_image = noisy(drawn::grey(shade_of(balls), 1200), 4);
+  const auto rough = find_dots(xray_image, {});
+  const DotLook look = estimate_look(xray_image, noise_correlation(xray_image), rough);
   EXPECT_NEAR(look.profile.blur() * 6, std::sqrt(0.81 + 1.0 / 12), 0.3);
-  const auto dots = refit_dots(exposure, rough, look, rough);
+  const auto dots = refit_dots(xray_image, rough, look, rough);
   ASSERT_EQ(dots.size(), balls.size());
   for (const Ball& ball : balls) EXPECT_LT(distance(dots, ball.centre), 0.02);
 }
 
 TEST(EstimateLook, NoDotsGiveAnOrdinaryLook) {
-  const DotLook look = estimate_look(drawn::exposure(Image<float>(64, 64, 1000)), {}, {});
+  const DotLook look = estimate_look(drawn::xray_image(Image<float>(64, 64, 1000)), {}, {});
   EXPECT_GT(look.profile.blur(), 0);
 }
 

@@ -44,7 +44,7 @@ Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, con
   add(DotModel::hidden, options.hidden_share, options.hidden_sigma);
   for (std::size_t j = 0; j < model.dots(); ++j)
     for (std::size_t i = 0; i < j; ++i) {
-      // Nothing in a logarithmic picture, the product of both shares in a linear one.
+      // Nothing in a logarithmic image, the product of both shares in a linear one.
       const double both =
           double(p[DotModel::contrast_of(i)]) * double(p[DotModel::contrast_of(j)]) / double(p[0]);
       add(model.overlap_of(i, j), 0.5 * both, std::abs(both) + 1e-6);
@@ -55,7 +55,7 @@ Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, con
 /// Variances of a centre, mean of both axes.
 struct CentreError {
   double by_noise;
-  double one_sided;
+  double jackknife;
 };
 
 /// The spread of a centre when each octant in turn is left out (delete-a-group jackknife; `pulls`: what each
@@ -109,14 +109,14 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
   // The centres as sums over pixels, side by side.
   PixelRows influence(2 * static_cast<Index>(model.dots()), n);
   Eigen::VectorXd by_priors(influence.rows());
-  Eigen::VectorXd one_sided(influence.rows());
+  Eigen::VectorXd jackknife(influence.rows());
   for (Index row = 0; row < influence.rows(); ++row) {
     const Vector of_centre =
         inverse.col(DotModel::contrast_of(static_cast<std::size_t>(row / 2)) + 1 + row % 2);
     influence.row(row) = of_centre.cast<float>().transpose() * model.rows.topRows(parameters);
     by_priors[row] = of_centre.cwiseAbs2().dot(pull);
     const Eigen::ArrayXf weighted = influence.row(row).transpose().array() * weight;
-    one_sided[row] =
+    jackknife[row] =
         jackknife_variance(patch, weighted * residual, weighted * influence.row(row).transpose().array());
   }
   influence.array().rowwise() *= level.transpose();
@@ -129,7 +129,7 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
   for (Index row = 0; row < influence.rows(); row += 2)
     errors.push_back(
         {0.5 * variance * (spread(row, row) + spread(row + 1, row + 1) + by_priors.segment<2>(row).sum()),
-         0.5 * one_sided.segment<2>(row).sum()});
+         0.5 * jackknife.segment<2>(row).sum()});
   return errors;
 }
 
@@ -243,7 +243,7 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     dot.centre_px = Eigen::Vector2d(u, v) + p.segment<2>(contrast_index + 1).cast<double>();
     dot.radius_px = double(p[contrast_index + 3]);
     dot.sigma_px = std::sqrt(errors[k].by_noise);
-    dot.one_sided_px = std::sqrt(errors[k].one_sided);
+    dot.jackknife_px = std::sqrt(errors[k].jackknife);
     dot.contrast = contrast * double(patch->scale);
     dot.misfit = std::sqrt(squares / double(patch->count)) / std::abs(contrast);
     if (!dot.centre_px.allFinite() || !std::isfinite(dot.sigma_px)) return std::nullopt;

@@ -45,7 +45,7 @@ std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const Ba
 constexpr std::size_t max_dots_together = 4;
 
 /// As `fit_dot`, several dots at once, for those that overlap. What two absorb in common is fitted along:
-/// nothing in a logarithmic picture, their product in a linear one.
+/// nothing in a logarithmic image, their product in a linear one.
 std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std::span<const Dot> starts,
                                                   std::span<const BallProfile> profiles,
                                                   std::span<const Disc> others, const DotFitOptions& options);

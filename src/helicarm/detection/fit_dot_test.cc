@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm {
 namespace {
@@ -33,19 +33,18 @@ drawn::Shade ball(const Vector2d& centre, double radius) {
 
 /// The ball takes a share of the background...
 Image<float> multiplied(const drawn::Shade& shade, const Background& background, double share) {
-  Image<float> picture(side, side);
+  Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
-    for (int u = 0; u < side; ++u)
-      picture(u, v) = float(background(u, v) * (1 - share * double(shade(u, v))));
-  return picture;
+    for (int u = 0; u < side; ++u) image(u, v) = float(background(u, v) * (1 - share * double(shade(u, v))));
+  return image;
 }
 
-/// ... or, in a logarithmic picture, the same everywhere.
+/// ... or, in a logarithmic image, the same everywhere.
 Image<float> subtracted(const drawn::Shade& shade, const Background& background, double contrast) {
-  Image<float> picture(side, side);
+  Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
-    for (int u = 0; u < side; ++u) picture(u, v) = float(background(u, v) - contrast * double(shade(u, v)));
-  return picture;
+    for (int u = 0; u < side; ++u) image(u, v) = float(background(u, v) - contrast * double(shade(u, v)));
+  return image;
 }
 
 BallProfile profile_for(double radius) {
@@ -53,12 +52,12 @@ BallProfile profile_for(double radius) {
 }
 
 /// From a rough start, as the search gives it.
-std::optional<Dot> fit(const Image<float>& picture, const Vector2d& centre, double radius,
+std::optional<Dot> fit(const Image<float>& image, const Vector2d& centre, double radius,
                        std::vector<Disc> others = {}, DotFitOptions options = {}) {
   Dot start;
   start.centre_px = centre + Vector2d(0.3, -0.25);
   start.radius_px = 1.06 * radius;
-  return fit_dot(picture, start, profile_for(radius), others, options);
+  return fit_dot(image, start, profile_for(radius), others, options);
 }
 
 double error(const std::optional<Dot>& dot, const Vector2d& centre) {
@@ -66,16 +65,15 @@ double error(const std::optional<Dot>& dot, const Vector2d& centre) {
 }
 
 /// Greatest error over sub-pixel places.
-double worst(double radius, double noise,
-             const std::function<Image<float>(const drawn::Shade&)>& picture_of) {
+double worst(double radius, double noise, const std::function<Image<float>(const drawn::Shade&)>& image_of) {
   RandomStream random(5, 1);
   double most = 0;
   for (const double x : {0.0, 0.25, 0.5, 0.8})
     for (const double y : {0.0, 0.35, 0.6}) {
       const Vector2d centre = middle + Vector2d(x, y);
-      Image<float> picture = picture_of(ball(centre, radius));
-      drawn::add_noise(picture, noise, random);
-      most = std::max(most, error(fit(picture, centre, radius), centre));
+      Image<float> image = image_of(ball(centre, radius));
+      drawn::add_noise(image, noise, random);
+      most = std::max(most, error(fit(image, centre, radius), centre));
     }
   return most;
 }
@@ -109,18 +107,18 @@ TEST_P(FitDotOfRadius, MaskedNeighbourDoesNotPull) {
   const Vector2d other = centre + 2.1 * radius * Vector2d(0.8, 0.6);
   drawn::Shade shade = ball(centre, radius);
   drawn::add_ball(shade, other, radius, blur_px, absorbance);
-  const Image<float> picture = subtracted(shade, even, 800);
-  EXPECT_LT(error(fit(picture, centre, radius, {{other, radius + 2}}), centre), 0.02);
+  const Image<float> image = subtracted(shade, even, 800);
+  EXPECT_LT(error(fit(image, centre, radius, {{other, radius + 2}}), centre), 0.02);
 }
 
 TEST_P(FitDotOfRadius, SaturatedOnOneSide) {
   const double radius = GetParam();
   const Vector2d centre = middle + Vector2d(0.2, 0.4);
-  Image<float> picture = subtracted(ball(centre, radius), sloping, 800);
+  Image<float> image = subtracted(ball(centre, radius), sloping, 800);
   DotFitOptions options;
   options.ceiling = 2030;
-  for (float& grey : picture.pixels()) grey = std::min(grey, options.ceiling);
-  EXPECT_LT(error(fit(picture, centre, radius, {}, options), centre), 0.05);
+  for (float& grey : image.pixels()) grey = std::min(grey, options.ceiling);
+  EXPECT_LT(error(fit(image, centre, radius, {}, options), centre), 0.05);
 }
 
 TEST_P(FitDotOfRadius, RadiusAndContrastAreTheDrawnOnes) {
@@ -140,9 +138,9 @@ TEST_P(FitDotOfRadius, SigmaIsHonest) {
     const Vector2d centre = middle + Vector2d(random.uniform(), random.uniform());
     const Image<float> clean = subtracted(ball(centre, radius), sloping, 800);
     for (int k = 0; k < 20; ++k) {
-      Image<float> picture = clean;
-      drawn::add_noise(picture, 40, random);
-      const auto dot = fit(picture, centre, radius);
+      Image<float> image = clean;
+      drawn::add_noise(image, 40, random);
+      const auto dot = fit(image, centre, radius);
       ASSERT_TRUE(dot);
       squares += (dot->centre_px - centre).squaredNorm() / (dot->sigma_px * dot->sigma_px);
       trials += 2;
@@ -155,7 +153,7 @@ TEST_P(FitDotOfRadius, SigmaIsHonest) {
 
 INSTANTIATE_TEST_SUITE_P(Radii, FitDotOfRadius, testing::Values(2.7, 5.5, 13.0));
 
-TEST(FitDot, KeepsTheRadiusWhereTold) {
+TEST(FitDot, KeepsTheRadiusWhereReported) {
   DotFitOptions options;
   options.free_radius = false;
   const auto dot = fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options);
@@ -164,10 +162,10 @@ TEST(FitDot, KeepsTheRadiusWhereTold) {
   EXPECT_LT(error(dot, middle), 0.02);
 }
 
-TEST(FitDot, RefusesAPlaceOutsideThePicture) {
-  const Image<float> picture = subtracted(ball(middle, 5.5), even, 800);
-  EXPECT_FALSE(fit(picture, {-3, 20}, 5.5));
-  EXPECT_FALSE(fit(picture, {20, 200}, 5.5));
+TEST(FitDot, RefusesAPlaceOutsideTheImage) {
+  const Image<float> image = subtracted(ball(middle, 5.5), even, 800);
+  EXPECT_FALSE(fit(image, {-3, 20}, 5.5));
+  EXPECT_FALSE(fit(image, {20, 200}, 5.5));
 }
 
 TEST(FitDot, RefusesABlankPatch) {
@@ -194,10 +192,10 @@ TEST(FitDot, RefusesAStartWithoutRadius) {
 }
 
 /// A dark band over a part of one side of the ball, as a shutter's soft edge or a faint wire makes it.
-Image<float> with_band(Image<float> picture, double from_u, double depth) {
+Image<float> with_band(Image<float> image, double from_u, double depth) {
   for (int v = 0; v < side; ++v)
-    for (int u = 0; u < side; ++u) picture(u, v) -= float(depth / (1 + std::exp(from_u - u)));
-  return picture;
+    for (int u = 0; u < side; ++u) image(u, v) -= float(depth / (1 + std::exp(from_u - u)));
+  return image;
 }
 
 TEST(FitDot, WhatOnlyOneSideSaysShowsInTheError) {

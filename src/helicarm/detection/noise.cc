@@ -77,10 +77,10 @@ const Lags& lags_of_quadratics() {
   return sum;
 }
 
-std::optional<Lags> lags_of_block(const Exposure& exposure, int u, int v, float floor, float ceiling) {
+std::optional<Lags> lags_of_block(const XrayImage& xray_image, int u, int v, float floor, float ceiling) {
   Block block;
   for (int j = 0; j < side; ++j) {
-    const float* row = exposure.pixels.row(v + j) + u;
+    const float* row = xray_image.pixels.row(v + j) + u;
     for (int i = 0; i < side; ++i) block(j, i) = row[i];
   }
   if (block.minCoeff() <= floor || block.maxCoeff() >= ceiling) return std::nullopt;
@@ -111,15 +111,15 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-NoiseCorrelation noise_correlation(const Exposure& exposure, float floor, float ceiling) {
-  constexpr int blocks = 8;  // along each side of the picture
+NoiseCorrelation noise_correlation(const XrayImage& xray_image, float floor, float ceiling) {
+  constexpr int blocks = 8;  // along each side of the image
   constexpr std::size_t enough = 8;
-  const int step_u = std::max(side, exposure.pixels.width() / blocks);
-  const int step_v = std::max(side, exposure.pixels.height() / blocks);
+  const int step_u = std::max(side, xray_image.pixels.width() / blocks);
+  const int step_v = std::max(side, xray_image.pixels.height() / blocks);
   std::vector<Lags> all;
-  for (int v = (step_v - side) / 2; v + side <= exposure.pixels.height(); v += step_v)
-    for (int u = (step_u - side) / 2; u + side <= exposure.pixels.width(); u += step_u)
-      if (const auto lags = lags_of_block(exposure, u, v, floor, ceiling)) all.push_back(*lags);
+  for (int v = (step_v - side) / 2; v + side <= xray_image.pixels.height(); v += step_v)
+    for (int u = (step_u - side) / 2; u + side <= xray_image.pixels.width(); u += step_u)
+      if (const auto lags = lags_of_block(xray_image, u, v, floor, ceiling)) all.push_back(*lags);
   NoiseCorrelation noise;
   if (all.size() < enough) return noise;
   // The half with the least else in it.

@@ -3,9 +3,9 @@
 
 namespace helicarm {
 
-Candidates detect_candidates(const Exposure& exposure, const Rectification& rectification) {
+Candidates detect_candidates(const XrayImage& xray_image, const Rectification& rectification) {
   if (rectification.other_dots) return {*rectification.other_dots};
-  return {dots_except(find_dots(exposure, metal_search(exposure, rectification.metal)),
+  return {dots_except(find_dots(xray_image, metal_search(xray_image, rectification.metal)),
                       rectification.plate_dots)};
 }
 

@@ -14,6 +14,6 @@ struct Candidates {
 };
 
 /// Stage 2 (2.1): what the rectification found on its way is not searched for again.
-Candidates detect_candidates(const Exposure& exposure, const Rectification& rectification);
+Candidates detect_candidates(const XrayImage& xray_image, const Rectification& rectification);
 
 }  // namespace helicarm

@@ -36,7 +36,7 @@ Vector2d traced_offset(const DistortionMap& map, const View& view, const Vector3
   return sum / mass;
 }
 
-/// 13 px at the edge of a picture of 1024, as intensifiers have it, on half the size.
+/// 13 px at the edge of an image of 1024, as intensifiers have it, on half the size.
 DistortionMap pincushion() {
   DistortionMap map = identity_map(512, 512, {});
   map.order = 3;

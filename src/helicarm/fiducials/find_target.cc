@@ -187,8 +187,8 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background] * patch.scale;
   fit.sigma_px = std::sqrt(
-      believed_variance(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
-                        jackknife_variance(patch, p)));
+      prior_variance(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
+                     jackknife_variance(patch, p)));
   fit.noise = std::sqrt(variance) * patch.scale;
   fit.misfit = double(patch.rows.row(n_parameters).norm()) / std::sqrt(double(residuals.size())) /
                std::max(1e-9, std::abs(p[n_background]));
@@ -196,19 +196,19 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
 }
 
 /// The pixels within a few pixels of the metal: further off the background is another one.
-Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const Vector2d& centre,
-                       double half_width, const PathPicture& picture, std::span<const Disc> others,
+Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, const Vector2d& centre,
+                       double half_width, const PathImage& view_image, std::span<const Disc> others,
                        const NoiseCorrelation& noise, const std::string& name) {
-  const SolidTemplate neighbourhood(picture, 1, 2.5);
+  const SolidTemplate candidate_grid(view_image, 1, 2.5);
   const auto not_seen = [&] {
     return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
   };
   const Vector2d raw = map.raw_from_rectified(centre);
-  if (!raw.allFinite() || !exposure.pixels.contains(static_cast<int>(raw.x()), static_cast<int>(raw.y())))
+  if (!raw.allFinite() || !xray_image.pixels.contains(static_cast<int>(raw.x()), static_cast<int>(raw.y())))
     return not_seen();
   const auto inverse = LocalInverse::make(map, raw, half_width);
   if (!inverse) return not_seen();
-  const DotFitOptions limits = fit_options_for(exposure);
+  const DotFitOptions limits = fit_options_for(xray_image);
   const int half = static_cast<int>(std::ceil(half_width));
   Patch patch{{}, {}, {}, {}, {}, 1, half_width, 2 * half + 1, noise};
   const int u0 = static_cast<int>(std::lround(raw.x()));
@@ -218,10 +218,10 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
   for (int v = v0 - half; v <= v0 + half; ++v)
     for (int u = u0 - half; u <= u0 + half; ++u) {
       const Vector2d offset = (*inverse)(Vector2d(u, v)) - centre;
-      if (offset.norm() > half_width || neighbourhood.at(offset).value < 0.01) continue;
+      if (offset.norm() > half_width || candidate_grid.at(offset).value < 0.01) continue;
       ++inside;
-      if (!exposure.pixels.contains(u, v)) continue;
-      const float grey = exposure.pixels(u, v);
+      if (!xray_image.pixels.contains(u, v)) continue;
+      const float grey = xray_image.pixels(u, v);
       if (grey <= limits.floor || grey >= limits.ceiling) continue;
       const bool hidden = std::any_of(others.begin(), others.end(), [&](const Disc& disc) {
         return (disc.centre - Vector2d(u, v)).squaredNorm() < disc.radius * disc.radius;
@@ -250,9 +250,9 @@ Expected<Patch> gather(const Exposure& exposure, const DistortionMap& map, const
 
 }  // namespace
 
-Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                const CalibratorTarget& target, std::span<const Disc> others,
-                                const NoiseCorrelation& noise) {
+Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMap& map, const View& view,
+                                 const CalibratorTarget& target, std::span<const Disc> others,
+                                 const NoiseCorrelation& noise) {
   const double depth = view.depth(target.point_in_calibrator);
   if (!(depth > 0))
     return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
@@ -265,12 +265,12 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
                               ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
                               : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
-  const PathPicture picture = picture_of_target(target, view, half_width + max_shift_px);
-  const auto patch = gather(exposure, map, centre, half_width, picture, others, noise, target.name);
+  const PathImage view_image = image_of_target(target, view, half_width + max_shift_px);
+  const auto patch = gather(xray_image, map, centre, half_width, view_image, others, noise, target.name);
   if (!patch) return tl::unexpected<Failure>(patch.error());
   std::optional<Fit> best;
   const auto consider = [&](double attenuation, double blur) {
-    const auto fit = fit_template(*patch, SolidTemplate(picture, attenuation, blur));
+    const auto fit = fit_template(*patch, SolidTemplate(view_image, attenuation, blur));
     const bool better = fit && (!best || fit->noise < best->noise);
     if (better) best = fit;
     return better;
@@ -286,28 +286,28 @@ Expected<SeenPoint> find_target(const Exposure& exposure, const DistortionMap& m
                 fmt::format("{}: is not to be seen where the view puts it", target.name));
   const Vector2d uv = centre + best->shift;
   const double map_sigma = map.sigma_px(uv);
-  return SeenPoint{
+  return ImagePoint{
       map.raw_from_rectified(uv), uv,
       std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
-Expected<SeenPoint> see_click(const DistortionMap& map, const Vector2d& click_raw,
-                              std::optional<double> sigma_px) {
+Expected<ImagePoint> see_click(const DistortionMap& map, const Vector2d& click_raw,
+                               std::optional<double> sigma_px) {
   const auto uv = map.rectified_from_raw(click_raw);
   if (!uv)
     return fail(Reason::not_seen, fmt::format("({:.1f}, {:.1f}) lies where the map cannot be inverted",
                                               click_raw.x(), click_raw.y()));
-  return SeenPoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
+  return ImagePoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
 }
 
-Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& map, const View& view,
-                                 double depth_mm, const Vector2d& click_raw, double diameter_mm,
-                                 const NoiseCorrelation& noise) {
+Expected<ImagePoint> snap_to_ball(const XrayImage& xray_image, const DistortionMap& map, const View& view,
+                                  double depth_mm, const Vector2d& click_raw, double diameter_mm,
+                                  const NoiseCorrelation& noise) {
   Dot start;
   start.radius_px = 0.5 * diameter_mm * std::abs(view.intrinsics.fy) / depth_mm;
   const double reach = std::max(5.0, start.radius_px);
   const BallProfile profile(0.9 / start.radius_px, 3);
-  DotFitOptions options = fit_options_for(exposure);
+  DotFitOptions options = fit_options_for(xray_image);
   options.noise = noise;
   DotFitOptions wide = options;
   wide.tolerance = 0.1;
@@ -318,10 +318,10 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
     for (int k = 0; k < (r > 0 ? 6 : 1); ++k) {
       start.centre_px =
           click_raw + r * start.radius_px * Vector2d(std::cos(1.0472 * k), std::sin(1.0472 * k));
-      const auto rough = fit_dot(exposure.pixels, start, profile, {}, wide);
+      const auto rough = fit_dot(xray_image.pixels, start, profile, {}, wide);
       if (!rough || (rough->centre_px - click_raw).norm() > reach) continue;
       if (std::abs(rough->radius_px / start.radius_px - 1) > 0.3 || rough->misfit > 0.35) continue;
-      const auto fine = fit_dot(exposure.pixels, *rough, profile, {}, options);
+      const auto fine = fit_dot(xray_image.pixels, *rough, profile, {}, options);
       const Dot& dot = fine ? *fine : *rough;
       if (!best || dot.misfit < best->misfit) best = dot;
     }
@@ -333,9 +333,9 @@ Expected<SeenPoint> snap_to_ball(const Exposure& exposure, const DistortionMap& 
   const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
   const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
   const double map_sigma = map.sigma_px(uv);
-  return SeenPoint{raw, uv,
-                   std::sqrt(best->error_px() * best->error_px() + map_sigma * map_sigma +
-                             sigma_floor_px * sigma_floor_px)};
+  return ImagePoint{raw, uv,
+                    std::sqrt(best->error_px() * best->error_px() + map_sigma * map_sigma +
+                              sigma_floor_px * sigma_floor_px)};
 }
 
 }  // namespace helicarm

@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/fiducials/solid_template.h"
-#include "helicarm/rectification/simulated_exposure_test.h"
-#include "helicarm/simulation/develop.h"
+#include "helicarm/rectification/simulated_image_test.h"
+#include "helicarm/simulation/detector_response.h"
 #include "helicarm/simulation/render_view.h"
 
 namespace helicarm {
@@ -20,7 +20,7 @@ using simulation::SimulatedView;
 using simulation::Visibility;
 
 /// A flat panel, so that rectified, ideal and raw pixels are the same; the lateral view is mirrored.
-const SimulatedCase& room() {
+const SimulatedCase& simulated_case() {
   static const SimulatedCase simulated =
       small_case(9, simulation::CaseKind::flat, {simulation::Fault::mirrored});
   return simulated;
@@ -28,14 +28,14 @@ const SimulatedCase& room() {
 
 DistortionMap straight() { return identity_map(512, 512, {}); }
 
-/// One target of each kind in soft tissue that grows thicker sideways, in a picture of 256 pixels.
+/// One target of each kind in soft tissue that grows thicker sideways, in an image of 256 pixels.
 struct Bench {
   View view{{3300, 3300, 127, 126}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
   std::vector<CalibratorTarget> targets = {
       {"ball", {-12.3, -10.1, 3}, TargetKind::ball, 3, {}, 0},
       {"cross", {9.7, -8.2, -4}, TargetKind::cross, 2, {Vector3d(0.8, 0.6, 0), Vector3d(-0.6, 0.8, 0)}, 16},
       {"end", {-9.2, 11.4, 5}, TargetKind::line_end, 2, {Vector3d(0.96, 0.28, 0)}, 20}};
-  Exposure exposure;
+  XrayImage xray_image;
 
   explicit Bench(bool mirrored) {
     const simulation::Body tissue{
@@ -51,14 +51,14 @@ struct Bench {
         simulation::steel("end", {wire(2, targets[2].directions[0], 0, 20)})};
     simulation::VirtualDetector detector;
     detector.width = detector.height = 256;
-    auto pixels = simulation::develop(simulation::render_view(scene, detector, view), {}, 1, 1);
+    auto pixels = simulation::detector_response(simulation::render_view(scene, detector, view), {}, 1, 1);
     if (mirrored) {
       pixels = simulation::mirrored(pixels);
       view.intrinsics.fx = -view.intrinsics.fx;
       view.intrinsics.u0 = 255 - view.intrinsics.u0;
     }
-    exposure.pixels = Image<float>(256, 256);
-    std::copy(pixels.pixels().begin(), pixels.pixels().end(), exposure.pixels.pixels().begin());
+    xray_image.pixels = Image<float>(256, 256);
+    std::copy(pixels.pixels().begin(), pixels.pixels().end(), xray_image.pixels.pixels().begin());
   }
 };
 
@@ -69,8 +69,8 @@ void expect_found(std::size_t k) {
     View off = bench.view;
     off.intrinsics.u0 += 1.3;
     off.intrinsics.v0 -= 0.8;
-    const auto found = find_target(bench.exposure, identity_map(256, 256, {}), off, bench.targets[k], {},
-                                   noise_correlation(bench.exposure));
+    const auto found = find_target(bench.xray_image, identity_map(256, 256, {}), off, bench.targets[k], {},
+                                   noise_correlation(bench.xray_image));
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_LT((found->uv - bench.view.project(bench.targets[k].point_in_calibrator)).norm(), 0.1) << mirrored;
     EXPECT_EQ(found->uv, found->uv_raw);
@@ -83,62 +83,63 @@ TEST(FindTarget, CrossWithinATenthOfAPixel) { expect_found(1); }
 TEST(FindTarget, LineEndWithinATenthOfAPixel) { expect_found(2); }
 
 TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
-  for (const SimulatedView& view : room().views)
+  for (const SimulatedView& view : simulated_case().views)
     for (const std::size_t k : {1u, 2u}) {
       if (view.targets[k].visibility != Visibility::clear) continue;
-      const auto found = find_target(exposure_of(view), straight(), view.shot.stored_view(),
-                                     room().calibrator.targets[k], {}, noise_correlation(exposure_of(view)));
+      const auto found =
+          find_target(exposure_of(view), straight(), view.true_view.stored_view(),
+                      simulated_case().calibrator.targets[k], {}, noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << found.error().message;
       EXPECT_LT((found->uv - view.targets[k].ideal).norm(), 0.1)
-          << view.shot.name << " " << view.targets[k].name;
+          << view.true_view.name << " " << view.targets[k].name;
     }
 }
 
 TEST(FindTarget, NothingThereIsNotFound) {
-  CalibratorTarget absent = room().calibrator.targets[0];
+  CalibratorTarget absent = simulated_case().calibrator.targets[0];
   absent.point_in_calibrator += Vector3d(14, 5, -20);
-  const auto found = find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(),
-                                 absent, {}, {});
+  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(),
+                                 simulated_case().views[0].true_view.stored_view(), absent, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
 
-TEST(FindTarget, OutsideThePictureIsNotSeen) {
-  CalibratorTarget outside = room().calibrator.targets[0];
+TEST(FindTarget, OutsideTheImageIsNotSeen) {
+  CalibratorTarget outside = simulated_case().calibrator.targets[0];
   outside.point_in_calibrator += Vector3d(0, 400, 0);
-  const auto found = find_target(exposure_of(room().views[0]), straight(), room().views[0].shot.stored_view(),
-                                 outside, {}, {});
+  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(),
+                                 simulated_case().views[0].true_view.stored_view(), outside, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::not_seen);
 }
 
 TEST(FindTarget, BehindTheSourceIsRefused) {
-  const View view = room().views[0].shot.stored_view();
-  CalibratorTarget behind = room().calibrator.targets[0];
+  const View view = simulated_case().views[0].true_view.stored_view();
+  CalibratorTarget behind = simulated_case().calibrator.targets[0];
   behind.point_in_calibrator = view.camera_from_world.inverse() * Vector3d(0, 0, -50);
-  const auto found = find_target(exposure_of(room().views[0]), straight(), view, behind, {}, {});
+  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(), view, behind, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::behind_source);
 }
 
 TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
-  for (const SimulatedView& view : room().views) {
-    const View stored = view.shot.stored_view();
+  for (const SimulatedView& view : simulated_case().views) {
+    const View stored = view.true_view.stored_view();
     for (const auto& ball : view.balls) {
       if (ball.visibility != Visibility::clear) continue;
       const auto found =
           snap_to_ball(exposure_of(view), straight(), stored, stored.depth(ball.in_calibrator),
                        ball.raw + Vector2d(2.1, -1.6), 4, noise_correlation(exposure_of(view)));
-      ASSERT_TRUE(found) << view.shot.name << " " << ball.name;
-      EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.shot.name << " " << ball.name;
+      ASSERT_TRUE(found) << view.true_view.name << " " << ball.name;
+      EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.true_view.name << " " << ball.name;
     }
   }
 }
 
 TEST(SnapToBall, NoBallNearTheClickIsNotFound) {
-  const SimulatedView& view = room().views[0];
+  const SimulatedView& view = simulated_case().views[0];
   const auto found =
-      snap_to_ball(exposure_of(view), straight(), view.shot.stored_view(), 640, {20, 20}, 4, {});
+      snap_to_ball(exposure_of(view), straight(), view.true_view.stored_view(), 640, {20, 20}, 4, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
@@ -171,7 +172,7 @@ TEST(PathInTarget, LineEndsFlatAtItsPoint) {
 
 TEST(SolidTemplate, SlopeMatchesNumbers) {
   const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  const SolidTemplate shade(picture_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
+  const SolidTemplate shade(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
   const double h = 0.01;
   for (double x = -9.13; x < 9; x += 1.7)
     for (double y = -9.13; y < 9; y += 1.7)
@@ -183,10 +184,10 @@ TEST(SolidTemplate, SlopeMatchesNumbers) {
       }
 }
 
-TEST(SolidTemplate, IsNoughtOutsideItsPicture) {
+TEST(SolidTemplate, IsNoughtOutsideItsImage) {
   const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  EXPECT_EQ(
-      SolidTemplate(picture_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1).at({90, 0}).value, 0);
+  EXPECT_EQ(SolidTemplate(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1).at({90, 0}).value,
+            0);
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the ne
 
 /// Cauchy's weights: one false match among the true ones must not bend the fit to itself. Nor must the three
 /// that made the pose and fit it best: what lies within a third of the gate counts alike.
-void doubt_the_far(std::vector<Sighting>& sightings, const View& view, double gate_px) {
-  for (auto& s : sightings)
+void test_the_far(std::vector<WeightedCorrespondence>& correspondences, const View& view, double gate_px) {
+  for (auto& s : correspondences)
     s.sigma_px = std::hypot(s.sigma_px, gate_px / 3, (view.project(s.point) - s.uv).norm());
 }
 
@@ -63,14 +63,15 @@ double log_factorial(double n) {
 
 /// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the
 /// field, ln depth even over its span, any number of balls visible and then any of them, mirrored or not.
-double log_odds(const Scene& scene, const std::vector<Sighting>& sightings, const PoseFit& fit) {
+double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& correspondences,
+                const PoseFit& fit) {
   const double n = static_cast<double>(scene.candidates.size());
   const double b = static_cast<double>(scene.balls.size());
-  const double m = static_cast<double>(sightings.size());
+  const double m = static_cast<double>(correspondences.size());
   const double log_2pi = std::log(2 * std::numbers::pi);
   const double field_area = std::numbers::pi * scene.field_radius_px * scene.field_radius_px;
   double odds = -0.5 * fit.chi2;
-  for (const auto& s : sightings) odds += std::log(field_area / (s.sigma_px * s.sigma_px)) - log_2pi;
+  for (const auto& s : correspondences) odds += std::log(field_area / (s.sigma_px * s.sigma_px)) - log_2pi;
   odds += log_factorial(n - m) - log_factorial(n);  // which candidates, in order
   odds += log_factorial(m) + log_factorial(b - m) - log_factorial(b) - std::log(b + 1);  // which balls
   const double z = fit.view.camera_from_world.translation.z();
@@ -132,7 +133,7 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
 }
 
 /// Squared distance of a ball from where the others put it, in sigmas: its residual, studentised.
-double departure2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
+double variation2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
   const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
   const Eigen::Vector3d& centre = scene.balls[ball].centre;
   const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
@@ -148,7 +149,7 @@ double departure2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
 std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) {
   std::vector<std::pair<double, int>> off2;
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
-    if (h.candidate_of_ball[k] >= 0) off2.push_back({departure2(scene, h, k), static_cast<int>(k)});
+    if (h.candidate_of_ball[k] >= 0) off2.push_back({variation2(scene, h, k), static_cast<int>(k)});
   std::sort(off2.rbegin(), off2.rend());
   std::vector<int> balls;
   for (const auto& [distance2, ball] : off2)
@@ -158,14 +159,15 @@ std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) 
 
 }  // namespace
 
-std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball) {
-  std::vector<Sighting> sightings;
+std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
+                                                       const std::vector<int>& candidate_of_ball) {
+  std::vector<WeightedCorrespondence> correspondences;
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     if (candidate_of_ball[k] < 0) continue;
     const auto& seen = scene.candidates[candidate_of_ball[k]];
-    sightings.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
+    correspondences.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
   }
-  return sightings;
+  return correspondences;
 }
 
 Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
@@ -195,11 +197,11 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
     auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
-    auto sightings = sightings_of(scene, h.candidate_of_ball);
-    h.matched = static_cast<int>(sightings.size());
+    auto correspondences = correspondences_of(scene, h.candidate_of_ball);
+    h.matched = static_cast<int>(correspondences.size());
     if (h.matched < least) return h;
-    if (!narrow) doubt_the_far(sightings, h.fit.view, gate_px);
-    h.fit = fit_pose(h.fit.view, sightings, scene.camera, narrow ? fit_steps : 5);
+    if (!narrow) test_the_far(correspondences, h.fit.view, gate_px);
+    h.fit = fit_pose(h.fit.view, correspondences, scene.camera, narrow ? fit_steps : 5);
   }
   while (h.fit.chi2 > match_sigmas * match_sigmas) {  // no ball's removal can take away more
     const auto off = beyond(scene, h, match_sigmas);
@@ -212,20 +214,20 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
 }
 
 void weigh(const Scene& scene, Hypothesis& h) {
-  const auto sightings = sightings_of(scene, h.candidate_of_ball);
-  h.matched = static_cast<int>(sightings.size());
+  const auto correspondences = correspondences_of(scene, h.candidate_of_ball);
+  h.matched = static_cast<int>(correspondences.size());
   h.residual2_px2 = 0;
-  for (const auto& s : sightings) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
+  for (const auto& s : correspondences) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
   const auto radii = radius_verdict(scene, h);
   h.radius_excess = radii.excess;
-  h.log_odds = log_odds(scene, sightings, h.fit) + radii.log_odds;
+  h.log_odds = log_odds(scene, correspondences, h.fit) + radii.log_odds;
 }
 
-std::vector<int> doubted(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
+std::vector<int> inflated(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
 
 Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
   h.candidate_of_ball[ball] = -1;
-  h.fit = fit_pose(h.fit.view, sightings_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
+  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
   return h;
 }
 
@@ -234,13 +236,14 @@ std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int b
   for (int& named : all.candidate_of_ball)
     if (named == candidate) named = -1;
   all.candidate_of_ball[ball] = candidate;
-  all.fit = fit_pose(h.fit.view, sightings_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+  all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
   std::vector<Hypothesis> rivals{all};
-  for (const int other : doubted(scene, all)) {
+  for (const int other : inflated(scene, all)) {
     if (other == ball) continue;
     Hypothesis rival = without(scene, all, other);
     rivals.push_back(rival);
-    for (auto off = doubted(scene, rival); !off.empty() && off.front() != ball; off = doubted(scene, rival)) {
+    for (auto off = inflated(scene, rival); !off.empty() && off.front() != ball;
+         off = inflated(scene, rival)) {
       rival = without(scene, std::move(rival), off.front());
       rivals.push_back(rival);
     }

@@ -66,7 +66,8 @@ std::vector<int> match(const Scene& scene, const View& view, double gate_px);
 constexpr int fit_steps = 10;  ///< at most
 
 /// The matched balls, as a fit wants them.
-std::vector<Sighting> sightings_of(const Scene& scene, const std::vector<int>& candidate_of_ball);
+std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
+                                                       const std::vector<int>& candidate_of_ball);
 
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
@@ -81,7 +82,7 @@ void weigh(const Scene& scene, Hypothesis& h);
 /// The balls that lie off where the others put them, by 3.3 sigma of their candidates and of the prediction:
 /// one true ball of 230, and each false disc that anyone could tell from a ball (4 sigma, less what the
 /// systematic error adds). The farthest comes first.
-std::vector<int> doubted(const Scene& scene, const Hypothesis& h);
+std::vector<int> inflated(const Scene& scene, const Hypothesis& h);
 
 /// `h` without a ball, fitted anew but not weighed.
 Hypothesis without(const Scene& scene, Hypothesis h, int ball);

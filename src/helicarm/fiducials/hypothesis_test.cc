@@ -14,7 +14,7 @@ namespace {
 
 using namespace label_scene;
 
-/// A clean picture from the side in which candidate k is ball k.
+/// A clean image from the side in which candidate k is ball k.
 struct Drawn {
   Scene scene;
   View view;
@@ -49,8 +49,8 @@ TEST(Hypothesis, DoubtIsTheDistanceFromAFitToTheOthers) {
     ASSERT_EQ(h.matched, off_px > 2.5 ? 11 : 12);
     Hypothesis all = h;
     all.candidate_of_ball[4] = 4;
-    all.fit = fit_pose(h.fit.view, sightings_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
-    const auto balls = doubted(scene, all);
+    all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+    const auto balls = inflated(scene, all);
     const PoseFit others = without(scene, all, 4).fit;
     const Eigen::Vector2d off = scene.candidates[4].uv - others.view.project(scene.balls[4].centre);
     const Eigen::Matrix2d noise = 0.25 * Eigen::Matrix2d::Identity();
@@ -70,13 +70,13 @@ TEST(Hypothesis, OddsWriteNoGlobalVariable) {
   EXPECT_EQ(signgam, untouched);
 }
 
-TEST(Hypothesis, AFalseDiscInAHiddenBallsSteadIsARivalsLoss) {
+TEST(Hypothesis, AnOutlierInAHiddenBallsSteadIsARivalsLoss) {
   auto [scene, view] = drawn();
   scene.candidates[7].uv += Eigen::Vector2d(0, 3.5);
   Hypothesis h = settle(scene, view);
   h.candidate_of_ball.assign(12, -1);
   for (const int k : {0, 2, 5, 7, 9, 11}) h.candidate_of_ball[k] = k;
-  h.fit = fit_pose(h.fit.view, sightings_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
+  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
   const auto rivals = with_pair(scene, h, 4, 4);
   EXPECT_TRUE(std::any_of(rivals.begin(), rivals.end(), [](const Hypothesis& rival) {
     return rival.candidate_of_ball[4] == 4 && rival.candidate_of_ball[7] == -1 && rival.matched == 6;

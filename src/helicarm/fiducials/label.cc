@@ -78,18 +78,18 @@ void drop_covered(const Scene& scene, Hypothesis& h) {
   for (std::size_t k = 0; k < named.size(); ++k) {
     if (named[k] < 0) continue;
     const auto& own = scene.candidates[named[k]];
-    bool doubtful = false;
+    bool uncertain = false;
     for (std::size_t other = 0; other < named.size(); ++other) {
       if (named[other] >= 0) continue;
       const Eigen::Vector2d uv = h.fit.view.project(scene.balls[other].centre);
-      doubtful |= (uv - own.uv).norm() < 0.5 * own.radius_px;
+      uncertain |= (uv - own.uv).norm() < 0.5 * own.radius_px;
     }
     const Eigen::Vector2d uv = h.fit.view.project(scene.balls[k].centre);
     for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
       const auto& other = scene.candidates[i];
-      doubtful |= static_cast<int>(i) != named[k] && (other.uv - uv).norm() < 5 * other.sigma_px;
+      uncertain |= static_cast<int>(i) != named[k] && (other.uv - uv).norm() < 5 * other.sigma_px;
     }
-    if (doubtful) h.candidate_of_ball[k] = -1;
+    if (uncertain) h.candidate_of_ball[k] = -1;
   }
 }
 
@@ -145,7 +145,7 @@ tl::unexpected<Failure> too_few(int balls, int candidates) {
 bool misfits(const Scene& scene, const Hypothesis& h) {
   if (deviate(h.fit.chi2, 2 * h.matched - 6) < most_deviation) return false;
   Hypothesis kept = h;
-  if (const auto off = doubted(scene, h); !off.empty()) kept = without(scene, h, off.front());
+  if (const auto off = inflated(scene, h); !off.empty()) kept = without(scene, h, off.front());
   const int named = count_named(kept);
   return named < std::max(least_balls, h.matched - 1) ||
          deviate(kept.fit.chi2, 2 * named - 6) > most_deviation;
@@ -203,7 +203,7 @@ Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& opt
   const int matched = best.matched;
   const int n = static_cast<int>(scene.candidates.size());
   // All in doubt go, since it need not be the farthest that is false; what they would be instead is weighed.
-  for (auto off = doubted(scene, best); !off.empty(); off = doubted(scene, best)) {
+  for (auto off = inflated(scene, best); !off.empty(); off = inflated(scene, best)) {
     for (const int ball : off) best = without(scene, std::move(best), ball);
     if (count_named(best) < least_balls) return too_few(count_named(best), n);
     weigh(scene, best);
@@ -224,7 +224,8 @@ Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& opt
                    {"margin_needed", asked}});
     }
   }
-  best.fit = fit_pose(best.fit.view, sightings_of(scene, best.candidate_of_ball), scene.camera, fit_steps);
+  best.fit =
+      fit_pose(best.fit.view, correspondences_of(scene, best.candidate_of_ball), scene.camera, fit_steps);
   return best;
 }
 

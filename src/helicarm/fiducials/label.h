@@ -35,7 +35,7 @@ struct LabellingOptions {
 
 struct Labelling {
   std::vector<int> candidate_of_ball;  ///< -1: not seen
-  View view;                           ///< estimate, world = calibrator; a mirrored picture has fx < 0
+  View view;                           ///< estimate, world = calibrator; a mirrored image has fx < 0
   bool mirrored = false;
   int matched = 0;
   int false_blobs = 0;     ///< candidates that are no ball
@@ -49,7 +49,7 @@ struct Labelling {
 
 /// Names the calibrator's balls among the candidates, from any side, with no starting pose, mirrored or not.
 /// Refuses with too_few_fiducials (fewer than six balls to be recognised), ambiguous_labels (another
-/// labelling, or the mirror image, explains the picture almost as well) or calibrator_mismatch (no pose shows
+/// labelling, or the mirror image, explains the image almost as well) or calibrator_mismatch (no pose shows
 /// these balls here).
 Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
                                 const LabellingPrior& prior, const LabellingOptions& options = {});

@@ -40,14 +40,14 @@ std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionM
   return balls;
 }
 
-LabellingPrior prior_of(const Exposure& exposure, const DistortionMap& map) {
+LabellingPrior prior_of(const XrayImage& xray_image, const DistortionMap& map) {
   LabellingPrior prior;
-  const auto& distance = exposure.acquisition.source_detector_mm;
+  const auto& distance = xray_image.acquisition.source_detector_mm;
   if (distance && map.rectified_pixel_mm && map.rectified_plane == RectifiedPlane::detector)
     prior.focal_px = *distance / *map.rectified_pixel_mm;
-  prior.principal_px = {0.5 * (exposure.pixels.width() - 1), 0.5 * (exposure.pixels.height() - 1)};
-  prior.principal_sigma_px = 0.03 * exposure.pixels.width();
-  prior.field_radius_px = 0.5 * std::hypot(exposure.pixels.width(), exposure.pixels.height());
+  prior.principal_px = {0.5 * (xray_image.pixels.width() - 1), 0.5 * (xray_image.pixels.height() - 1)};
+  prior.principal_sigma_px = 0.03 * xray_image.pixels.width();
+  prior.field_radius_px = 0.5 * std::hypot(xray_image.pixels.width(), xray_image.pixels.height());
   return prior;
 }
 
@@ -58,10 +58,10 @@ double predicted_radius(const View& view, const CalibratorBall& ball) {
 /// The named balls fitted with a profile of their own, and the others looked for where the pose puts them.
 class BallFitter {
  public:
-  BallFitter(const Exposure& exposure, const Rectification& rectification, const Candidates& candidates,
+  BallFitter(const XrayImage& xray_image, const Rectification& rectification, const Candidates& candidates,
              const std::vector<Dot>& named)
-      : exposure_(exposure),
-        look_(estimate_look(exposure, rectification.noise, named)),
+      : exposure_(xray_image),
+        look_(estimate_look(xray_image, rectification.noise, named)),
         neighbours_(candidates.dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
@@ -81,7 +81,7 @@ class BallFitter {
     start.centre_px = raw;
     start.radius_px = radius;
     const auto dot = fit(start);
-    return dot && is_believable(*dot, start, typical_contrast_) ? dot : std::nullopt;
+    return dot && is_plausible(*dot, start, typical_contrast_) ? dot : std::nullopt;
   }
 
   bool is_black(const Vector2d& raw) const {
@@ -90,21 +90,21 @@ class BallFitter {
   }
 
  private:
-  const Exposure& exposure_;
+  const XrayImage& exposure_;
   DotLook look_;
   std::vector<Dot> neighbours_;
   double typical_contrast_ = 0;
 };
 
-bool inside(const Exposure& exposure, const Vector2d& raw, double margin) {
-  return raw.x() >= margin && raw.y() >= margin && raw.x() <= exposure.pixels.width() - 1 - margin &&
-         raw.y() <= exposure.pixels.height() - 1 - margin;
+bool inside(const XrayImage& xray_image, const Vector2d& raw, double margin) {
+  return raw.x() >= margin && raw.y() >= margin && raw.x() <= xray_image.pixels.width() - 1 - margin &&
+         raw.y() <= xray_image.pixels.height() - 1 - margin;
 }
 
 /// Why a ball that the pose puts here was not seen.
-FiducialStatus absence(const Exposure& exposure, const BallFitter& fitter, const Vector2d& raw, double radius,
-                       const std::vector<Dot>& named) {
-  if (!inside(exposure, raw, 0.5 * radius) || fitter.is_black(raw)) return FiducialStatus::outside;
+FiducialStatus absence(const XrayImage& xray_image, const BallFitter& fitter, const Vector2d& raw,
+                       double radius, const std::vector<Dot>& named) {
+  if (!inside(xray_image, raw, 0.5 * radius) || fitter.is_black(raw)) return FiducialStatus::outside;
   const bool behind = std::any_of(named.begin(), named.end(), [&](const Dot& other) {
     return (other.centre_px - raw).norm() < 1.2 * other.radius_px;
   });
@@ -127,14 +127,14 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
 }
 
 /// In the paper's mode a ball lies where the Hough transform sees its circle.
-std::vector<Dot> hough_circles(const Exposure& exposure, const std::vector<Dot>& named) {
+std::vector<Dot> hough_circles(const XrayImage& xray_image, const std::vector<Dot>& named) {
   double least = 1e9;
   double most = 0;
   for (const Dot& dot : named) {
     least = std::min(least, dot.radius_px);
     most = std::max(most, dot.radius_px);
   }
-  return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.8 * least, 1.2 * most);
+  return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.8 * least, 1.2 * most);
 }
 
 std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) {
@@ -151,14 +151,14 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm) {
   return {1.03 * 0.5 * least / pixel_mm, 2.7 * 0.5 * most / pixel_mm};
 }
 
-bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contrast) {
+bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast) {
   return (fitted.centre_px - predicted.centre_px).norm() <= rescue_reach_px && fitted.sigma_px <= 0.4 &&
          std::abs(fitted.radius_px / predicted.radius_px - 1) <= 0.12 && fitted.misfit <= 0.35 &&
          fitted.contrast * typical_contrast >= 0 &&
          std::abs(fitted.contrast) >= 0.25 * std::abs(typical_contrast);
 }
 
-Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rectification& rectification,
+Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const Rectification& rectification,
                                             const Candidates& candidates, const Calibrator& calibrator,
                                             const FiducialOptions& options) {
   const DistortionMap& map = rectification.map;
@@ -171,7 +171,7 @@ Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rect
   }
   LabellingOptions labelling_options;
   if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
-  LabellingPrior prior = prior_of(exposure, map);
+  LabellingPrior prior = prior_of(xray_image, map);
   prior.mirrored = options.mirrored;
   if (options.radius_bias) {
     prior.radius_bias = *options.radius_bias;
@@ -190,9 +190,9 @@ Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rect
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
-  const BallFitter fitter(exposure, rectification, candidates, named);
+  const BallFitter fitter(xray_image, rectification, candidates, named);
   const std::vector<Dot> circles =
-      method == Method::paper ? hough_circles(exposure, named) : std::vector<Dot>{};
+      method == Method::paper ? hough_circles(xray_image, named) : std::vector<Dot>{};
 
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const CalibratorBall& ball = calibrator.balls[k];
@@ -205,12 +205,12 @@ Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rect
     std::optional<Dot> dot;
     if (candidate >= 0)
       dot = fitter.fit(balls[static_cast<std::size_t>(candidate)]);
-    else if (inside(exposure, raw, 2))
+    else if (inside(xray_image, raw, 2))
       dot = fitter.rescue(raw, radius);
     if (dot && method == Method::paper) dot = circle_near(circles, *dot);
     if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
     if (fiducial.status != FiducialStatus::used)
-      fiducial.status = absence(exposure, fitter, raw, radius, named);
+      fiducial.status = absence(xray_image, fitter, raw, radius, named);
     found.fiducials.push_back(fiducial);
   }
   for (std::size_t i = 0; i < balls.size(); ++i) {

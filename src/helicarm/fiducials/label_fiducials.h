@@ -23,7 +23,7 @@ struct LabelledFiducials {
   double margin = 0;          ///< log odds of the labelling against the best other one
   int runner_up_matched = 0;  ///< balls that the best other one names; 0: there is none
   double runner_up_rms_px = 0;
-  double radius_bias = 0;  ///< of the balls' radii in the picture, relative
+  double radius_bias = 0;  ///< of the balls' radii in the image, relative
   std::vector<Warning> warnings;
 };
 
@@ -33,7 +33,7 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
 
 /// Whether what was fitted where a pose puts a ball is believed to be it: near the place, of the size, the
 /// polarity and a quarter of the contrast at least that the other balls have.
-bool is_believable(const Dot& fitted, const Dot& predicted, double typical_contrast);
+bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast);
 
 struct FiducialOptions {
   Method method = Method::best;
@@ -47,7 +47,7 @@ struct FiducialOptions {
 /// Stage 3 (2.3.4): labels the calibrator's balls among the candidates, fits again those that the search
 /// missed at their predicted places, and gives for each of the others the reason why it is not used. Refuses
 /// as `label_balls`.
-Expected<LabelledFiducials> label_fiducials(const Exposure& exposure, const Rectification& rectification,
+Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const Rectification& rectification,
                                             const Candidates& candidates, const Calibrator& calibrator,
                                             const FiducialOptions& options);
 

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/rectification/simulated_exposure_test.h"
+#include "helicarm/rectification/simulated_image_test.h"
 
 namespace helicarm {
 namespace {
@@ -18,30 +18,30 @@ using simulation::SimulatedView;
 using simulation::Visibility;
 
 const SimulatedCase& sound_case() {
-  static const SimulatedCase room = small_case(6, CaseKind::accuracy);
-  return room;
+  static const SimulatedCase simulated_case = small_case(6, CaseKind::accuracy);
+  return simulated_case;
 }
 
 /// The lateral view mirrored, two stray balls, two of the calibrator's lost.
 const SimulatedCase& faulty_case() {
-  static const SimulatedCase room =
+  static const SimulatedCase simulated_case =
       small_case(8, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
-  return room;
+  return simulated_case;
 }
 
-Expected<LabelledFiducials> label(const Exposure& exposure, const Rectification& rectification,
+Expected<LabelledFiducials> label(const XrayImage& xray_image, const Rectification& rectification,
                                   const Calibrator& calibrator, const FiducialOptions& options = {}) {
-  return label_fiducials(exposure, rectification, detect_candidates(exposure, rectification), calibrator,
+  return label_fiducials(xray_image, rectification, detect_candidates(xray_image, rectification), calibrator,
                          options);
 }
 
-LabelledFiducials found_in(const SimulatedCase& room, const SimulatedView& view,
+LabelledFiducials found_in(const SimulatedCase& simulated_case, const SimulatedView& view,
                            Method method = Method::best) {
-  const Exposure exposure = exposure_of(view);
+  const XrayImage xray_image = exposure_of(view);
   RectificationOptions options;
   options.method = method;
-  const Rectification rectification = rectify(exposure, *room.plate, options).value();
-  return label(exposure, rectification, room.calibrator, {method}).value();
+  const Rectification rectification = rectify(xray_image, *simulated_case.plate, options).value();
+  return label(xray_image, rectification, simulated_case.calibrator, {method}).value();
 }
 
 /// Every used ball is where it truly is, and every clear one is used.
@@ -70,9 +70,9 @@ TEST(LabelFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
 }
 
 TEST(LabelFiducials, RectifiedPlaceIsTheRawOnesOwn) {
-  const Exposure exposure = exposure_of(sound_case().views[0]);
-  const Rectification rectification = rectify(exposure, plate48(), {}).value();
-  const auto found = label(exposure, rectification, sound_case().calibrator);
+  const XrayImage xray_image = exposure_of(sound_case().views[0]);
+  const Rectification rectification = rectify(xray_image, plate48(), {}).value();
+  const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   for (const Fiducial& fiducial : found->fiducials)
     if (fiducial.status == FiducialStatus::used) {
@@ -93,9 +93,9 @@ TEST(LabelFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
     const LabelledFiducials found = found_in(faulty_case(), view);
     for (const Fiducial& fiducial : found.fiducials)
       if (fiducial.label == "P4" || fiducial.label == "P9") {
-        EXPECT_NE(fiducial.status, FiducialStatus::used) << view.shot.name << " " << fiducial.label;
+        EXPECT_NE(fiducial.status, FiducialStatus::used) << view.true_view.name << " " << fiducial.label;
       }
-    EXPECT_GE(found.false_blobs.size(), 1u) << view.shot.name;
+    EXPECT_GE(found.false_blobs.size(), 1u) << view.true_view.name;
     for (const Dot& blob : found.false_blobs)
       for (const Fiducial& fiducial : found.fiducials)
         if (fiducial.status == FiducialStatus::used) {
@@ -105,38 +105,38 @@ TEST(LabelFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
 }
 
 TEST(LabelFiducials, BallOutOfTheFieldIsOutside) {
-  Exposure exposure = exposure_of(sound_case().views[0]);
+  XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& lost = sound_case().views[0].balls[5];
-  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  Rectification rectification = rectify(xray_image, plate48(), {}).value();
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u)
-      if ((Vector2d(u, v) - lost.raw).norm() < 10) exposure.pixels(u, v) = exposure.lowest;
+      if ((Vector2d(u, v) - lost.raw).norm() < 10) xray_image.pixels(u, v) = xray_image.lowest;
   std::erase_if(*rectification.other_dots,
                 [&](const Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
-  const auto found = label(exposure, rectification, sound_case().calibrator);
+  const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found) << found.error().message;
   for (const Fiducial& fiducial : found->fiducials)
     EXPECT_EQ(fiducial.status == FiducialStatus::outside, fiducial.label == lost.name) << fiducial.label;
 }
 
 TEST(LabelFiducials, BallTheSearchMissedIsRescued) {
-  const Exposure exposure = exposure_of(sound_case().views[0]);
+  const XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& ball = sound_case().views[0].balls[6];
   ASSERT_EQ(ball.visibility, Visibility::clear);
-  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  Rectification rectification = rectify(xray_image, plate48(), {}).value();
   std::erase_if(*rectification.other_dots,
                 [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
-  const auto found = label(exposure, rectification, sound_case().calibrator);
+  const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->fiducials[6].status, FiducialStatus::used);
   EXPECT_LT((found->fiducials[6].uv_raw - ball.raw).norm(), 0.1);
 }
 
 TEST(LabelFiducials, WithoutCandidatesIsRefused) {
-  const Exposure exposure = exposure_of(sound_case().views[0]);
-  Rectification rectification = rectify(exposure, plate48(), {}).value();
+  const XrayImage xray_image = exposure_of(sound_case().views[0]);
+  Rectification rectification = rectify(xray_image, plate48(), {}).value();
   rectification.other_dots->clear();
-  const auto found = label(exposure, rectification, sound_case().calibrator);
+  const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
 }

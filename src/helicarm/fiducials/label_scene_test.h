@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random pictures of a calibrator for the labelling's tests.
+// Random images of a calibrator for the labelling's tests.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/label.h"
-#include "helicarm/simulation/discs.h"
+#include "helicarm/simulation/synthetic_detections.h"
 
 namespace helicarm::label_scene {
 
@@ -40,7 +40,7 @@ inline Calibrator scattered(int balls, std::uint64_t seed) {
 
 inline const LabellingPrior nominal{.focal_px = 4345, .principal_px = {511.5, 511.5}, .field_radius_px = 504};
 
-struct Picture : simulation::DiscView {
+struct SyntheticImage : simulation::SyntheticView {
   std::vector<BallCandidate> candidates;
 
   double axis_deg() const {  ///< between the central ray and the calibrator's z
@@ -48,22 +48,24 @@ struct Picture : simulation::DiscView {
   }
 };
 
-inline Picture picture_of(const Calibrator& calibrator, const simulation::DiscOptions& options,
-                          RandomStream& random) {
-  Picture picture{simulation::random_discs(calibrator, options, random), {}};
-  for (const auto& disc : picture.discs)
-    picture.candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
-  return picture;
+inline SyntheticImage image_of(const Calibrator& calibrator,
+                               const simulation::SyntheticDetectionOptions& options, RandomStream& random) {
+  SyntheticImage view_image{simulation::synthetic_detections(calibrator, options, random), {}};
+  for (const auto& disc : view_image.detections)
+    view_image.candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
+  return view_image;
 }
 
 /// Whether the mirroring is right and each named ball's candidate is that ball's disc or lies where it is.
-inline bool right(const Labelling& labelling, const Picture& picture, const Calibrator& calibrator) {
-  bool all = labelling.mirrored == picture.mirrored();
+inline bool right(const Labelling& labelling, const SyntheticImage& view_image,
+                  const Calibrator& calibrator) {
+  bool all = labelling.mirrored == view_image.mirrored();
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const int i = labelling.candidate_of_ball[k];
-    if (i < 0 || picture.discs[i].ball == static_cast<int>(k)) continue;
-    const Eigen::Vector2d exact = picture.view.project(calibrator.balls[k].centre_in_calibrator);
-    all &= (picture.discs[i].uv - exact).norm() < 4 * std::hypot(picture.discs[i].sigma_px, 0.2);
+    if (i < 0 || view_image.detections[i].ball == static_cast<int>(k)) continue;
+    const Eigen::Vector2d exact = view_image.view.project(calibrator.balls[k].centre_in_calibrator);
+    all &=
+        (view_image.detections[i].uv - exact).norm() < 4 * std::hypot(view_image.detections[i].sigma_px, 0.2);
   }
   return all;
 }

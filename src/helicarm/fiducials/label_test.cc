@@ -13,7 +13,7 @@ namespace {
 
 using namespace label_scene;
 
-using simulation::DiscOptions;
+using simulation::SyntheticDetectionOptions;
 
 struct Tally {
   int good_views = 0;  ///< with eight balls or more
@@ -22,32 +22,33 @@ struct Tally {
 };
 
 /// Random views with 0 to 6 balls hidden and 0 to 10 false discs.
-Picture any_picture(const Calibrator& calibrator, std::uint64_t trial, double noise_px) {
+SyntheticImage any_image(const Calibrator& calibrator, std::uint64_t trial, double noise_px) {
   RandomStream random(1, 1, trial);
   const int hidden = static_cast<int>(random.index(7));
-  const int false_discs = static_cast<int>(random.index(11));
-  return picture_of(calibrator, {.hidden = hidden, .false_discs = false_discs, .noise_px = noise_px}, random);
+  const int outliers = static_cast<int>(random.index(11));
+  return image_of(calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = noise_px}, random);
 }
 
 Tally monte_carlo(const Calibrator& calibrator, int trials, double noise_px,
                   const LabellingPrior& prior = nominal) {
   Tally tally;
   for (int trial = 0; trial < trials; ++trial) {
-    const auto picture = any_picture(calibrator, trial, noise_px);
-    const auto labelling = label_balls(calibrator, picture.candidates, prior);
-    tally.good_views += picture.visible >= 8;
-    tally.good_solved += picture.visible >= 8 && labelling;
-    tally.wrong += labelling && !right(*labelling, picture, calibrator);
+    const auto view_image = any_image(calibrator, trial, noise_px);
+    const auto labelling = label_balls(calibrator, view_image.candidates, prior);
+    tally.good_views += view_image.visible >= 8;
+    tally.good_solved += view_image.visible >= 8 && labelling;
+    tally.wrong += labelling && !right(*labelling, view_image, calibrator);
   }
   return tally;
 }
 
-Expected<Labelling> label_one(const Calibrator& seen, const Calibrator& file, const DiscOptions& options,
-                              std::uint64_t trial, Picture* out = nullptr) {
+Expected<Labelling> label_one(const Calibrator& seen, const Calibrator& file,
+                              const SyntheticDetectionOptions& options, std::uint64_t trial,
+                              SyntheticImage* out = nullptr) {
   RandomStream random(2, 1, trial);
-  const auto picture = picture_of(seen, options, random);
-  if (out) *out = picture;
-  return label_balls(file, picture.candidates, nominal);
+  const auto view_image = image_of(seen, options, random);
+  if (out) *out = view_image;
+  return label_balls(file, view_image.candidates, nominal);
 }
 
 TEST(LabelBalls, FineCentresFromAnySideAreNeverNamedWrong) {
@@ -65,9 +66,9 @@ TEST(LabelBalls, NoisyCentresFromAnySideAreNeverNamedWrong) {
 TEST(LabelBalls, PartsOfTheTruthGiveWayToAllOfIt) {
   // In these the first fit misses true balls that lie within its own error, or names a few of them as others.
   for (const int trial : {241, 1639, 3544, 3976, 4259, 4680}) {
-    const auto picture = any_picture(udcsc(), trial, 0.5);
-    const auto labelling = label_balls(udcsc(), picture.candidates, nominal);
-    EXPECT_TRUE(labelling && right(*labelling, picture, udcsc())) << trial;
+    const auto view_image = any_image(udcsc(), trial, 0.5);
+    const auto labelling = label_balls(udcsc(), view_image.candidates, nominal);
+    EXPECT_TRUE(labelling && right(*labelling, view_image, udcsc())) << trial;
   }
 }
 
@@ -80,12 +81,12 @@ TEST(LabelBalls, ImitatedBallsDoNotBendTheNames) {
                           Hard{2, 6155}, Hard{2, 6880}, Hard{5, 47}, Hard{5, 7049}}) {
     RandomStream random(hard.seed, 2000, hard.number);  // as the study draws it
     const int hidden = static_cast<int>(random.index(7));
-    const int false_discs = static_cast<int>(random.index(11));
-    const auto picture = picture_of(
-        udcsc(), {.hidden = hidden, .false_discs = false_discs, .kind = simulation::FalseDiscs::imitating},
+    const int outliers = static_cast<int>(random.index(11));
+    const auto view_image = image_of(
+        udcsc(), {.hidden = hidden, .outliers = outliers, .kind = simulation::OutlierKind::imitating},
         random);
-    const auto labelling = label_balls(udcsc(), picture.candidates, nominal);
-    EXPECT_TRUE(!labelling || right(*labelling, picture, udcsc())) << hard.seed << " " << hard.number;
+    const auto labelling = label_balls(udcsc(), view_image.candidates, nominal);
+    EXPECT_TRUE(!labelling || right(*labelling, view_image, udcsc())) << hard.seed << " " << hard.number;
   }
 }
 
@@ -99,9 +100,9 @@ TEST(LabelBalls, ArbitraryPhantomsOfTwoBallSizes) {
 
 TEST(LabelBalls, FindsTheMirroringAndThePose) {
   for (const bool mirrored : {false, true}) {
-    Picture picture;
+    SyntheticImage view_image;
     const auto labelling =
-        label_one(helix(), helix(), {.false_discs = 4, .noise_px = 0.1, .mirrored = mirrored}, 4, &picture);
+        label_one(helix(), helix(), {.outliers = 4, .noise_px = 0.1, .mirrored = mirrored}, 4, &view_image);
     ASSERT_TRUE(labelling);
     EXPECT_EQ(labelling->mirrored, mirrored);
     EXPECT_EQ(labelling->view.intrinsics.fx < 0, mirrored);
@@ -109,7 +110,7 @@ TEST(LabelBalls, FindsTheMirroringAndThePose) {
     EXPECT_GT(labelling->view.depth({0, 0, 0}), 0);
     for (std::size_t k = 0; k < 12; ++k) {
       const Eigen::Vector3d centre = helix().balls[k].centre_in_calibrator;
-      EXPECT_LT((labelling->view.project(centre) - picture.view.project(centre)).norm(), 0.5);
+      EXPECT_LT((labelling->view.project(centre) - view_image.view.project(centre)).norm(), 0.5);
     }
   }
 }
@@ -128,10 +129,10 @@ TEST(LabelBalls, HelixFromAnotherStartingAngleIsRefusedFromTheSide) {
   int mismatches = 0;
   int views = 0;
   for (int trial = 0; trial < 60; ++trial) {
-    Picture picture;
+    SyntheticImage view_image;
     const auto labelling =
-        label_one(helix(3 * pi / 4), helix(), {.false_discs = 2, .noise_px = 0.1}, trial, &picture);
-    if (picture.axis_deg() < 60) continue;
+        label_one(helix(3 * pi / 4), helix(), {.outliers = 2, .noise_px = 0.1}, trial, &view_image);
+    if (view_image.axis_deg() < 60) continue;
     ++views;
     mismatches += !labelling && labelling.error().reason == Reason::calibrator_mismatch;
     EXPECT_FALSE(labelling) << trial;
@@ -143,10 +144,10 @@ TEST(LabelBalls, HelixFromAnotherStartingAngleIsRefusedFromTheSide) {
 TEST(LabelBalls, HelixOfAnotherHeightIsRefusedFromTheSide) {
   int views = 0;
   for (int trial = 0; trial < 25; ++trial) {
-    Picture picture;
+    SyntheticImage view_image;
     const auto labelling =
-        label_one(helix(pi / 6, 90.2), helix(), {.false_discs = 2, .noise_px = 0.1}, trial, &picture);
-    if (picture.axis_deg() < 60) continue;
+        label_one(helix(pi / 6, 90.2), helix(), {.outliers = 2, .noise_px = 0.1}, trial, &view_image);
+    if (view_image.axis_deg() < 60) continue;
     ++views;
     EXPECT_FALSE(labelling) << trial;
   }
@@ -158,8 +159,7 @@ TEST(LabelBalls, FiveBallsAreTooFew) {
     const auto alone = label_one(helix(), helix(), {.hidden = 7, .noise_px = 0.1}, trial);
     ASSERT_FALSE(alone);
     EXPECT_EQ(alone.error().reason, Reason::too_few_fiducials);
-    const auto cluttered =
-        label_one(helix(), helix(), {.hidden = 7, .false_discs = 4, .noise_px = 0.1}, trial);
+    const auto cluttered = label_one(helix(), helix(), {.hidden = 7, .outliers = 4, .noise_px = 0.1}, trial);
     ASSERT_FALSE(cluttered);
     EXPECT_EQ(cluttered.error().reason, Reason::too_few_fiducials);
     EXPECT_EQ(cluttered.error().figures.at("n"), 5);
@@ -169,7 +169,7 @@ TEST(LabelBalls, FiveBallsAreTooFew) {
 TEST(LabelBalls, ClutterAloneIsNoCalibrator) {
   for (int trial = 0; trial < 10; ++trial) {
     const auto labelling =
-        label_one(helix(), helix(), {.hidden = 12, .false_discs = 14, .noise_px = 0.3}, trial);
+        label_one(helix(), helix(), {.hidden = 12, .outliers = 14, .noise_px = 0.3}, trial);
     ASSERT_FALSE(labelling);
     EXPECT_NE(labelling.error().reason, Reason::ambiguous_labels);
   }
@@ -183,15 +183,15 @@ TEST(LabelBalls, PlaneOfBallsLeavesTheMirroringOpen) {
   }
   for (int trial = 0; trial < 10; ++trial) {
     RandomStream random(3, 1, trial);
-    const auto picture = picture_of(calibrator, {.noise_px = 0.1}, random);
+    const auto view_image = image_of(calibrator, {.noise_px = 0.1}, random);
     std::vector<BallCandidate> plane;
-    for (std::size_t i = 0; i < picture.candidates.size(); ++i) {
-      const int k = picture.discs[i].ball;
-      if (k >= 0 && k < 7) plane.push_back(picture.candidates[i]);
+    for (std::size_t i = 0; i < view_image.candidates.size(); ++i) {
+      const int k = view_image.detections[i].ball;
+      if (k >= 0 && k < 7) plane.push_back(view_image.candidates[i]);
     }
     const auto labelling = label_balls(calibrator, plane, nominal);
     ASSERT_FALSE(labelling) << trial;
-    if (plane.size() == 7 && picture.axis_deg() < 45) {
+    if (plane.size() == 7 && view_image.axis_deg() < 45) {
       EXPECT_EQ(labelling.error().reason, Reason::ambiguous_labels) << labelling.error().message;
     }
   }
@@ -204,15 +204,15 @@ TEST(LabelBalls, RadiusBiasFoundInOneViewServesTheNext) {
   int after = 0;
   for (int trial = 0; trial < 300; ++trial) {
     RandomStream random(4, 1, trial);
-    const auto picture = picture_of(helix(), {.hidden = 2, .noise_px = 0.5}, random);
-    if (picture.axis_deg() > 12) continue;
-    before += label_balls(helix(), picture.candidates, nominal).has_value();
+    const auto view_image = image_of(helix(), {.hidden = 2, .noise_px = 0.5}, random);
+    if (view_image.axis_deg() > 12) continue;
+    before += label_balls(helix(), view_image.candidates, nominal).has_value();
     LabellingPrior told = nominal;
-    told.radius_bias = picture.radius_bias;
+    told.radius_bias = view_image.radius_bias;
     told.radius_bias_sigma = 0.007;
-    const auto labelling = label_balls(helix(), picture.candidates, told);
+    const auto labelling = label_balls(helix(), view_image.candidates, told);
     after += labelling.has_value();
-    EXPECT_TRUE(!labelling || right(*labelling, picture, helix()));
+    EXPECT_TRUE(!labelling || right(*labelling, view_image, helix()));
   }
   EXPECT_GT(after, before);
 }

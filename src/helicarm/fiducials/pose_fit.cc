@@ -16,22 +16,22 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 using Four = Eigen::Array4d;
 
 /// Four sightings side by side; of the last four some may have no weight.
-struct FourSightings {
+struct FourCorrespondences {
   Four x, y, z, u, v, weight;
 };
 
-std::vector<FourSightings> in_fours(const std::vector<Sighting>& sightings) {
-  std::vector<FourSightings> fours((sightings.size() + 3) / 4);
+std::vector<FourCorrespondences> in_fours(const std::vector<WeightedCorrespondence>& correspondences) {
+  std::vector<FourCorrespondences> fours((correspondences.size() + 3) / 4);
   for (std::size_t i = 0; i < 4 * fours.size(); ++i) {
-    const Sighting& s = sightings[std::min(i, sightings.size() - 1)];
-    FourSightings& four = fours[i / 4];
+    const WeightedCorrespondence& s = correspondences[std::min(i, correspondences.size() - 1)];
+    FourCorrespondences& four = fours[i / 4];
     const auto lane = static_cast<Eigen::Index>(i % 4);
     four.x[lane] = s.point.x();
     four.y[lane] = s.point.y();
     four.z[lane] = s.point.z();
     four.u[lane] = s.uv.x();
     four.v[lane] = s.uv.y();
-    four.weight[lane] = i < sightings.size() ? 1 / s.sigma_px : 0;
+    four.weight[lane] = i < correspondences.size() ? 1 / s.sigma_px : 0;
   }
   return fours;
 }
@@ -68,7 +68,8 @@ void add(Products& sums, const Row& row) {
 /// whole vectors.
 using Normal = Eigen::Matrix<double, 12, 10>;
 
-Normal normal_equations(const View& view, const std::vector<FourSightings>& fours, const CameraPrior& prior) {
+Normal normal_equations(const View& view, const std::vector<FourCorrespondences>& fours,
+                        const CameraPrior& prior) {
   constexpr std::array<int, 8> of_u{0, 1, 2, 3, 5, 6, 7, 9};
   constexpr std::array<int, 8> of_v{0, 1, 2, 4, 5, 6, 8, 9};
   Products u_sums;
@@ -78,7 +79,7 @@ Normal normal_equations(const View& view, const std::vector<FourSightings>& four
   const Eigen::Vector3d& t = view.camera_from_world.translation;
   const Intrinsics& k = view.intrinsics;
   bool before_source = true;
-  for (const FourSightings& s : fours) {
+  for (const FourCorrespondences& s : fours) {
     const Four x = r(0, 0) * s.x + r(0, 1) * s.y + r(0, 2) * s.z;
     const Four y = r(1, 0) * s.x + r(1, 1) * s.y + r(1, 2) * s.z;
     const Four z = r(2, 0) * s.x + r(2, 1) * s.y + r(2, 2) * s.z;
@@ -101,10 +102,10 @@ Normal normal_equations(const View& view, const std::vector<FourSightings>& four
     }
   }
   const std::array<double, 3> sigma{prior.focal_sigma, prior.principal_sigma_px, prior.principal_sigma_px};
-  const std::array<double, 3> departure{std::log(k.fy / prior.focal_px), k.u0 - prior.principal_px.x(),
+  const std::array<double, 3> variation{std::log(k.fy / prior.focal_px), k.u0 - prior.principal_px.x(),
                                         k.v0 - prior.principal_px.y()};
   for (int i = 0; i < 3; ++i) {
-    const double excess = departure[i] / sigma[i];
+    const double excess = variation[i] / sigma[i];
     normal(6 + i, 6 + i) += 1 / (sigma[i] * sigma[i]);
     normal(9, 6 + i) += excess / sigma[i];
     normal(9, 9) += excess * excess;
@@ -147,9 +148,9 @@ View moved(const View& view, const Vector9& step) {
 
 }  // namespace
 
-PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, const CameraPrior& prior,
-                 int most_steps) {
-  const auto fours = in_fours(sightings);
+PoseFit fit_pose(const View& start, const std::vector<WeightedCorrespondence>& correspondences,
+                 const CameraPrior& prior, int most_steps) {
+  const auto fours = in_fours(correspondences);
   PoseFit fit{start};
   Normal normal = normal_equations(fit.view, fours, prior);
   double damping = 1e-6;

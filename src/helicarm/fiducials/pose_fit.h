@@ -19,7 +19,7 @@ struct CameraPrior {
 };
 
 /// A point of the world seen in the image.
-struct Sighting {
+struct WeightedCorrespondence {
   Eigen::Vector3d point;
   Eigen::Vector2d uv;
   double sigma_px;  ///< per axis
@@ -37,7 +37,7 @@ Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d&
 
 /// The most probable pose, focal length and principal point (square pixels, the mirroring of `start` kept),
 /// by Levenberg-Marquardt from `start`. The covariance is finite only with three or more sightings.
-PoseFit fit_pose(const View& start, const std::vector<Sighting>& sightings, const CameraPrior& prior,
-                 int most_steps);
+PoseFit fit_pose(const View& start, const std::vector<WeightedCorrespondence>& correspondences,
+                 const CameraPrior& prior, int most_steps);
 
 }  // namespace helicarm

@@ -20,9 +20,9 @@ View truth() {
   return view;
 }
 
-std::vector<Sighting> sightings(int n, double sigma_px) {
+std::vector<WeightedCorrespondence> correspondences(int n, double sigma_px) {
   RandomStream random(5, 0);
-  std::vector<Sighting> all;
+  std::vector<WeightedCorrespondence> all;
   for (int i = 0; i < n; ++i) {
     const Eigen::Vector3d point(random.uniform(-50, 50), random.uniform(-50, 50), random.uniform(-50, 50));
     const Eigen::Vector2d noise(random.normal(), random.normal());
@@ -41,13 +41,13 @@ View nudged(View view) {
 }
 
 TEST(FitPose, ResidualsFallToTheNoise) {
-  const auto fit = fit_pose(nudged(truth()), sightings(12, 0.1), prior, 30);
+  const auto fit = fit_pose(nudged(truth()), correspondences(12, 0.1), prior, 30);
   EXPECT_LT(fit.chi2, 40);
   EXPECT_LT((fit.view.project({10, 20, 30}) - truth().project({10, 20, 30})).norm(), 0.2);
 }
 
 TEST(FitPose, KeepsTheMirroring) {
-  auto seen = sightings(12, 0.1);
+  auto seen = correspondences(12, 0.1);
   for (auto& s : seen) s.uv.x() = 2 * truth().intrinsics.u0 - s.uv.x();
   View start = nudged(truth());
   start.intrinsics.fx = -start.intrinsics.fx;
@@ -59,7 +59,7 @@ TEST(FitPose, KeepsTheMirroring) {
 
 TEST(FitPose, GradientVanishesAtTheFit) {
   // chi2 rises whichever way the pose is moved: an oracle that shares no derivative with the fit.
-  const auto seen = sightings(9, 0.5);
+  const auto seen = correspondences(9, 0.5);
   const auto fit = fit_pose(nudged(truth()), seen, prior, 50);
   for (int axis = 0; axis < 3; ++axis) {
     for (const double way : {-1.0, 1.0}) {
@@ -78,7 +78,7 @@ TEST(FitPose, GradientVanishesAtTheFit) {
 TEST(PredictionCovariance, IsWhatNoiseMakesOfThePrediction) {
   // Over many fits to the same points: the simple way to the same numbers.
   const Eigen::Vector3d elsewhere(40, -60, 10);
-  const auto seen = sightings(8, 0.5);
+  const auto seen = correspondences(8, 0.5);
   const PoseFit fit = fit_pose(truth(), seen, prior, 20);
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   constexpr int fits = 2000;
@@ -100,8 +100,8 @@ TEST(PredictionCovariance, IsWhatNoiseMakesOfThePrediction) {
 }
 
 TEST(FitPose, TwiceTheNoiseMakesTheVolumeLarger) {
-  const auto fine = fit_pose(truth(), sightings(12, 0.1), prior, 20);
-  const auto coarse = fit_pose(truth(), sightings(12, 0.2), prior, 20);
+  const auto fine = fit_pose(truth(), correspondences(12, 0.1), prior, 20);
+  const auto coarse = fit_pose(truth(), correspondences(12, 0.2), prior, 20);
   // Six of the nine unknowns are measured: the camera's three come mostly from their prior.
   EXPECT_GT(coarse.log_volume - fine.log_volume, 5 * std::log(2.0));
   EXPECT_LT(coarse.log_volume - fine.log_volume, 9 * std::log(2.0));

@@ -42,7 +42,7 @@ LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
     : scene_(scene),
       focals_px_(std::move(focals_px)),
       flat_px_(0.04 * scene.field_radius_px),
-      sieve_(scene) {}
+      filter_(scene) {}
 
 bool LabelSearch::try_triple(std::array<int, 3> candidates) {
   std::sort(candidates.begin(), candidates.end());
@@ -57,7 +57,7 @@ bool LabelSearch::try_triple(std::array<int, 3> candidates) {
 
 void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_px) {
   const Eigen::Vector2d& centre = scene_.camera.principal_px;
-  for (const SiftedPose& pose : sieve_.sift(candidates, focal_px, wanted())) {
+  for (const PoseHypothesis& pose : filter_.filter(candidates, focal_px, wanted())) {
     if (scene_.mirrored && pose.mirrored != *scene_.mirrored) continue;
     std::array<Eigen::Vector2d, 3> image;
     std::array<Eigen::Vector3d, 3> points;

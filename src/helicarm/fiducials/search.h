@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "helicarm/fiducials/hypothesis.h"
-#include "helicarm/fiducials/pose_sieve.h"
+#include "helicarm/fiducials/hypothesis_filter.h"
 
 namespace helicarm {
 
@@ -50,7 +50,7 @@ class LabelSearch {
   const Scene& scene_;
   std::vector<double> focals_px_;
   double flat_px_;  ///< least height of an image triangle
-  PoseSieve sieve_;
+  HypothesisFilter filter_;
   std::set<std::array<int, 3>> triples_;  ///< tried
   std::set<std::vector<int>> tried_;      ///< matches of the poses settled
   std::vector<Rough> met_;

@@ -81,34 +81,34 @@ double path_in_target(const CalibratorTarget& target, const Vector3d& point, con
   return 0;
 }
 
-PathPicture picture_of_target(const CalibratorTarget& target, const View& view, double half_width_px) {
-  const int middle = static_cast<int>(std::ceil(half_width_px * PathPicture::per_pixel));
+PathImage image_of_target(const CalibratorTarget& target, const View& view, double half_width_px) {
+  const int middle = static_cast<int>(std::ceil(half_width_px * PathImage::per_pixel));
   const int side = 2 * middle + 1;
-  PathPicture picture{Image<float>(side, side), middle};
+  PathImage view_image{Image<float>(side, side), middle};
   const Vector2d centre = view.project(target.point_in_calibrator);
   const Vector3d source = view.source_in_world();
   const Eigen::Matrix3d direction_from_pixel =
       view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
   for (int j = 0; j < side; ++j)
     for (int i = 0; i < side; ++i) {
-      const Vector2d pixel = centre + Vector2d(i - middle, j - middle) / PathPicture::per_pixel;
+      const Vector2d pixel = centre + Vector2d(i - middle, j - middle) / PathImage::per_pixel;
       const Vector3d along = (direction_from_pixel * pixel.homogeneous()).normalized();
-      picture.path_mm(i, j) = static_cast<float>(path_in_target(target, source, along));
+      view_image.path_mm(i, j) = static_cast<float>(path_in_target(target, source, along));
     }
-  return picture;
+  return view_image;
 }
 
-SolidTemplate::SolidTemplate(const PathPicture& picture, double attenuation_per_mm, double blur_px)
-    : shade_(picture.path_mm), middle_(picture.middle) {
+SolidTemplate::SolidTemplate(const PathImage& view_image, double attenuation_per_mm, double blur_px)
+    : shade_(view_image.path_mm), middle_(view_image.middle) {
   for (float& path : shade_.pixels())
     if (path > 0) path = -std::expm1(-static_cast<float>(attenuation_per_mm) * path);
   cv::Mat mat = as_mat(shade_);
-  cv::GaussianBlur(mat, mat, {}, blur_px * PathPicture::per_pixel, 0, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(mat, mat, {}, blur_px * PathImage::per_pixel, 0, cv::BORDER_REPLICATE);
 }
 
 SolidTemplate::Sample SolidTemplate::at(const Vector2d& offset) const {
-  const double x = offset.x() * PathPicture::per_pixel + middle_;
-  const double y = offset.y() * PathPicture::per_pixel + middle_;
+  const double x = offset.x() * PathImage::per_pixel + middle_;
+  const double y = offset.y() * PathImage::per_pixel + middle_;
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));
   if (i < 0 || j < 0 || i + 1 >= shade_.width() || j + 1 >= shade_.height()) return {0, Vector2d::Zero()};
@@ -118,9 +118,8 @@ SolidTemplate::Sample SolidTemplate::at(const Vector2d& offset) const {
   const double b = double(shade_(i + 1, j));
   const double c = double(shade_(i, j + 1));
   const double d = double(shade_(i + 1, j + 1));
-  return {
-      (1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d),
-      PathPicture::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
+  return {(1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d),
+          PathImage::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
 }
 
 }  // namespace helicarm

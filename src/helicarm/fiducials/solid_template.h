@@ -15,18 +15,18 @@ double path_in_target(const CalibratorTarget& target, const Eigen::Vector3d& poi
                       const Eigen::Vector3d& along);
 
 /// Paths through a target's metal (mm) on a grid of rectified pixels about the image of its point.
-struct PathPicture {
+struct PathImage {
   static constexpr int per_pixel = 2;  ///< grid steps in a pixel
   Image<float> path_mm;
   int middle;  ///< grid index of the point's image
 };
 
-PathPicture picture_of_target(const CalibratorTarget& target, const View& view, double half_width_px);
+PathImage image_of_target(const CalibratorTarget& target, const View& view, double half_width_px);
 
 /// The share of the rays that a target absorbs, 1 - exp(-attenuation x path), blurred.
 class SolidTemplate {
  public:
-  SolidTemplate(const PathPicture& picture, double attenuation_per_mm, double blur_px);
+  SolidTemplate(const PathImage& view_image, double attenuation_per_mm, double blur_px);
 
   struct Sample {
     double value;

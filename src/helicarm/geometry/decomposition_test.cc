@@ -41,7 +41,7 @@ TEST(Decompose, AnyScaleAndSignGivesTheViewBack) {
   }
 }
 
-TEST(Decompose, MirroredPictureHasNegativeFxAndPositiveDepth) {
+TEST(Decompose, MirroredImageHasNegativeFxAndPositiveDepth) {
   RandomStream random(2, 0);
   View mirrored = random_view(random, true);
   const auto view = decompose(-mirrored.projection(), Eigen::Vector3d::Zero());
@@ -52,7 +52,7 @@ TEST(Decompose, MirroredPictureHasNegativeFxAndPositiveDepth) {
   EXPECT_GT(view->camera_from_world.rotation.determinant(), 0);
 }
 
-TEST(Decompose, WithoutAPointThePictureIsTakenAsNotMirrored) {
+TEST(Decompose, WithoutAPointTheImageIsTakenAsNotMirrored) {
   RandomStream random(3, 0);
   for (double sign : {1.0, -1.0}) {
     const auto view = decompose(sign * random_view(random, false).projection());

@@ -11,7 +11,7 @@
 
 namespace helicarm {
 
-/// A point of known place (mm) and its picture (px).
+/// A point of known place (mm) and its image (px).
 struct PointPair {
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d pixel;

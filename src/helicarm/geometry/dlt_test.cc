@@ -55,7 +55,7 @@ DltFactors normal_equations(const std::vector<PointPair>& pairs) {
   return solution.col(0).cast<double>();
 }
 
-TEST(Dlt, ExactPicturesGiveTheViewBack) {
+TEST(Dlt, ExactImagesGiveTheViewBack) {
   for (const View& truth : {paper_view(0), paper_view(std::numbers::pi / 2)})
     for (int n : {6, 12, 20}) {
       const auto pairs = pictured(truth, helix(n));
@@ -84,7 +84,7 @@ TEST(Dlt, FactorsAndProjectionAreTheSameThing) {
   EXPECT_LT((projection_from_factors(*factors) * p(2, 3) - p).norm(), 1e-9);
 }
 
-TEST(Dlt, MirroredPictureHasNegativeFx) {
+TEST(Dlt, MirroredImageHasNegativeFx) {
   View truth = paper_view(0.5);
   truth.intrinsics.fx *= -1;
   const auto result = dlt_least_squares(pictured(truth, helix(12)));
@@ -106,7 +106,7 @@ TEST(Dlt, OriginInTheSourcePlaneIsSingularOnlyAsPrinted) {
   EXPECT_LT((result->view.projection() - truth.projection()).norm() / truth.projection().norm(), 1e-8);
 }
 
-TEST(Dlt, CoplanarAndCollinearPointsAreRefusedHoweverNoisyThePicture) {
+TEST(Dlt, CoplanarAndCollinearPointsAreRefusedHoweverNoisyTheImage) {
   for (double sigma : {0.0, 1.0}) {
     auto flat = helix(12), line = helix(12);
     for (auto& p : flat) p.z() = 0.3 * p.x() - 0.2 * p.y();
@@ -141,7 +141,7 @@ TEST(Dlt, FivePointsAndNanAreRefused) {
   EXPECT_EQ(dlt_homogeneous(pairs).error().reason, Reason::not_finite);
 }
 
-TEST(Dlt, PicturesAllInOnePixelAreRefused) {
+TEST(Dlt, ImagesAllInOnePixelAreRefused) {
   auto pairs = pictured(paper_view(0), helix(8));
   for (auto& p : pairs) p.pixel = {5, 5};
   EXPECT_EQ(dlt_homogeneous(pairs).error().reason, Reason::coplanar_fiducials);

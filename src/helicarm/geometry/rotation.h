@@ -35,8 +35,8 @@ Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation);
 /// The proper rotation nearest to a matrix (least squares).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
-/// A 4x4 from a file or a stream as a rigid motion: rounding (|R'R - I| <= 1e-3) is mended, anything else is
-/// `bad_value` (scale, shear, mirror, last row) or `not_finite`. `what` begins the message.
+/// A 4x4 from a file or a stream as a rigid motion: rounding (|R'R - I| <= 1e-3) is corrected, anything else
+/// is `bad_value` (scale, shear, mirror, last row) or `not_finite`. `what` begins the message.
 Expected<RigidTransform> rigid_transform_from(const Eigen::Matrix4d& matrix, const std::string& what);
 
 }  // namespace helicarm

@@ -23,7 +23,7 @@ void expect_rotation(const Eigen::Matrix3d& r) {
   EXPECT_GT(r.determinant(), 0);
 }
 
-TEST(Euler, MendedEquationFiveIsARotationForAllAngles) {
+TEST(Euler, CorrectedEquationFiveIsARotationForAllAngles) {
   RandomStream random(1, 0);
   for (int i = 0; i < 200; ++i)
     expect_rotation(
@@ -79,7 +79,7 @@ Eigen::Matrix4d some_pose() {
   return RigidTransform{rotation_from_euler(0.3, -0.4, 2), Eigen::Vector3d(10, -20, 800)}.matrix();
 }
 
-TEST(RigidTransformFrom, RoundingIsMended) {
+TEST(RigidTransformFrom, RoundingIsCorrected) {
   Eigen::Matrix4d rounded = some_pose();
   rounded = (rounded * 1e4).array().round() / 1e4;
   const auto pose = rigid_transform_from(rounded, "pose");

@@ -21,18 +21,19 @@ constexpr int most_iterations = 20;
 
 constexpr double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
-double largest_gap(std::span<const Sight> sights) {
+double largest_gap(std::span<const RayObservation> ray_observations) {
   double largest = 0;
-  for (std::size_t i = 0; i < sights.size(); ++i)
+  for (std::size_t i = 0; i < ray_observations.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      largest = std::max(largest, gap_between(ray_through(sights[i].view, sights[i].pixel),
-                                              ray_through(sights[j].view, sights[j].pixel)));
+      largest =
+          std::max(largest, gap_between(ray_through(ray_observations[i].view, ray_observations[i].pixel),
+                                        ray_through(ray_observations[j].view, ray_observations[j].pixel)));
   return largest;
 }
 
-Expected<void> check_place(std::span<const Sight> sights, const Eigen::Vector3d& point) {
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    const View& view = sights[i].view;
+Expected<void> check_place(std::span<const RayObservation> ray_observations, const Eigen::Vector3d& point) {
+  for (std::size_t i = 0; i < ray_observations.size(); ++i) {
+    const View& view = ray_observations[i].view;
     const double distance = (point - view.source_in_world()).norm();
     if (!(distance < farthest_mm))
       return fail(Reason::point_at_infinity,
@@ -72,44 +73,47 @@ Eigen::Matrix<double, 2, 3> projection_jacobian(const View& view, const Eigen::V
   return by_camera / p.z() * view.camera_from_world.rotation;
 }
 
-double widest_angle(std::span<const Sight> sights) {
+double widest_angle(std::span<const RayObservation> ray_observations) {
   double widest = 0;
-  for (std::size_t i = 0; i < sights.size(); ++i)
+  for (std::size_t i = 0; i < ray_observations.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      widest = std::max(widest, angle_between(ray_through(sights[i].view, sights[i].pixel),
-                                              ray_through(sights[j].view, sights[j].pixel)));
+      widest =
+          std::max(widest, angle_between(ray_through(ray_observations[i].view, ray_observations[i].pixel),
+                                         ray_through(ray_observations[j].view, ray_observations[j].pixel)));
   return widest;
 }
 
-Expected<Intersection> intersect(std::span<const Sight> sights, const Eigen::MatrixXd& covariance_px2) {
-  const auto n = Eigen::Index(sights.size());
+Expected<Intersection> intersect(std::span<const RayObservation> ray_observations,
+                                 const Eigen::MatrixXd& covariance_px2) {
+  const auto n = Eigen::Index(ray_observations.size());
   if (n < 2)
     return fail(Reason::not_seen, "the point is seen in fewer than two views", {{"views", double(n)}});
-  const double angle_deg = degrees(widest_angle(sights));
+  const double angle_deg = degrees(widest_angle(ray_observations));
   if (!(angle_deg >= least_angle_deg))
     return fail(Reason::parallel_rays,
                 fmt::format("the rays are {:.3g} degrees apart, limit {:g}", angle_deg, least_angle_deg),
                 {{"angle_deg", angle_deg}});
   std::vector<Projection> projections;
   std::vector<Eigen::Vector2d> pixels;
-  for (const Sight& sight : sights) {
+  for (const RayObservation& sight : ray_observations) {
     projections.push_back(sight.view.projection());
     pixels.push_back(sight.pixel);
   }
   auto start = intersect_linear(projections, pixels);
   if (!start) return tl::unexpected<Failure>(start.error());
-  if (auto placed = check_place(sights, *start); !placed) return tl::unexpected<Failure>(placed.error());
+  if (auto placed = check_place(ray_observations, *start); !placed)
+    return tl::unexpected<Failure>(placed.error());
 
   const Eigen::MatrixXd floor = least_sigma_px * least_sigma_px * Eigen::MatrixXd::Identity(2 * n, 2 * n);
   const Eigen::LLT<Eigen::MatrixXd> root(covariance_px2 + floor);
   if (root.info() != Eigen::Success)
     return fail(Reason::bad_value, "the covariance of the pixels is not positive");
-  Intersection result{*start, {}, largest_gap(sights), 0};
+  Intersection result{*start, {}, largest_gap(ray_observations), 0};
   for (int i = 0; i < most_iterations; ++i) {
     Eigen::MatrixX3d jacobian(2 * n, 3);
     Eigen::VectorXd residual(2 * n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      const Sight& sight = sights[std::size_t(k)];
+      const RayObservation& sight = ray_observations[std::size_t(k)];
       jacobian.middleRows<2>(2 * k) = projection_jacobian(sight.view, result.point);
       residual.segment<2>(2 * k) = sight.pixel - sight.view.project(result.point);
     }
@@ -121,7 +125,7 @@ Expected<Intersection> intersect(std::span<const Sight> sights, const Eigen::Mat
     result.covariance = (jacobian.transpose() * jacobian).inverse();
     result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
     result.point += step;
-    if (auto placed = check_place(sights, result.point); !placed)
+    if (auto placed = check_place(ray_observations, result.point); !placed)
       return tl::unexpected<Failure>(placed.error());
     if (step.norm() <= 1e-12 * (1 + result.point.norm())) break;
   }

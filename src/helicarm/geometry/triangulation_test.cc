@@ -19,33 +19,35 @@ View view_at(double alpha) {
   return {{6000, 6000, 512, 512, 0}, {rotation_from_euler(alpha, 0, 0), {0, 0, 800}}};
 }
 
-std::vector<Sight> sights_of(const Eigen::Vector3d& point, std::initializer_list<double> alphas) {
-  std::vector<Sight> sights;
-  for (double alpha : alphas) sights.push_back({view_at(alpha), view_at(alpha).project(point)});
-  return sights;
+std::vector<RayObservation> observations_of(const Eigen::Vector3d& point,
+                                            std::initializer_list<double> alphas) {
+  std::vector<RayObservation> ray_observations;
+  for (double alpha : alphas) ray_observations.push_back({view_at(alpha), view_at(alpha).project(point)});
+  return ray_observations;
 }
 
-Eigen::MatrixXd white(const std::vector<Sight>& sights, double sigma) {
-  const auto n = 2 * Eigen::Index(sights.size());
+Eigen::MatrixXd white(const std::vector<RayObservation>& ray_observations, double sigma) {
+  const auto n = 2 * Eigen::Index(ray_observations.size());
   return sigma * sigma * Eigen::MatrixXd::Identity(n, n);
 }
 
 TEST(Intersect, ExactPixelsGiveThePointFromTwoOrMoreViews) {
   const Eigen::Vector3d point(20, -35, 48);
-  for (const auto& sights : {sights_of(point, {0, 1.57}), sights_of(point, {0, 0.6, 1.3, 2})}) {
-    const auto found = intersect(sights, white(sights, 0));
+  for (const auto& ray_observations :
+       {observations_of(point, {0, 1.57}), observations_of(point, {0, 0.6, 1.3, 2})}) {
+    const auto found = intersect(ray_observations, white(ray_observations, 0));
     ASSERT_TRUE(found.has_value()) << found.error().message;
     EXPECT_LT((found->point - point).norm(), 1e-9);
     EXPECT_LT(found->ray_gap_mm, 1e-9);
   }
 }
 
-TEST(IntersectLinear, MendedEquationEightTakesFactorsOrProjections) {
+TEST(IntersectLinear, CorrectedEquationEightTakesFactorsOrProjections) {
   const Eigen::Vector3d point(20, -35, 48);
-  const auto sights = sights_of(point, {0, 1.57});
+  const auto ray_observations = observations_of(point, {0, 1.57});
   std::vector<Projection> as_printed;
   std::vector<Eigen::Vector2d> pixels;
-  for (const Sight& s : sights) {
+  for (const RayObservation& s : ray_observations) {
     as_printed.push_back(projection_from_factors(*factors_from_projection(s.view.projection())));
     pixels.push_back(s.pixel);
   }
@@ -67,7 +69,7 @@ TEST(ProjectionJacobian, AgreesWithDifferences) {
 
 TEST(Intersect, NoisyPixelsScatterAsPredicted) {
   const Eigen::Vector3d point(20, -35, 48);
-  const auto truth = sights_of(point, {0, 1.2});
+  const auto truth = observations_of(point, {0, 1.2});
   Eigen::MatrixXd covariance = white(truth, 1);
   covariance(0, 0) = 9;  // one coordinate is worse
   const Eigen::MatrixXd root = covariance.llt().matrixL();
@@ -78,10 +80,10 @@ TEST(Intersect, NoisyPixelsScatterAsPredicted) {
     Eigen::Vector4d noise;
     for (double& x : noise) x = random.normal();
     noise = root * noise;
-    auto sights = truth;
-    sights[0].pixel += noise.head<2>();
-    sights[1].pixel += noise.tail<2>();
-    const auto found = intersect(sights, covariance);
+    auto ray_observations = truth;
+    ray_observations[0].pixel += noise.head<2>();
+    ray_observations[1].pixel += noise.tail<2>();
+    const auto found = intersect(ray_observations, covariance);
     ASSERT_TRUE(found.has_value());
     error2 += (found->point - point).squaredNorm() / trials;
     chi2 += found->chi2 / trials;
@@ -93,15 +95,15 @@ TEST(Intersect, NoisyPixelsScatterAsPredicted) {
 
 TEST(Intersect, BadPlacesAreNamedWithFigures) {
   const Eigen::Vector3d point(20, -35, 48);
-  const auto one = sights_of(point, {0});
+  const auto one = observations_of(point, {0});
   EXPECT_EQ(intersect(one, white(one, 1)).error().reason, Reason::not_seen);
-  const auto same = sights_of(point, {0.3, 0.3});
+  const auto same = observations_of(point, {0.3, 0.3});
   EXPECT_EQ(intersect(same, white(same, 1)).error().reason, Reason::parallel_rays);
-  const auto close = sights_of(point, {0, 0.01});
+  const auto close = observations_of(point, {0, 0.01});
   EXPECT_LT(intersect(close, white(close, 1)).error().figures.at("angle_deg"), 1);
 
   // Two sources side by side, rays spread apart: the lines meet behind.
-  std::vector<Sight> apart{
+  std::vector<RayObservation> apart{
       {{{6000, 6000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {50, 0, 800}}}, {-500, 512}},
       {{{6000, 6000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {-50, 0, 800}}}, {1500, 512}}};
   EXPECT_EQ(intersect(apart, white(apart, 1)).error().reason, Reason::behind_source);

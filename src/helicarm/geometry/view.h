@@ -10,7 +10,7 @@ namespace helicarm {
 /// 3x4, maps world (mm) to homogeneous pixels.
 using Projection = Eigen::Matrix<double, 3, 4>;
 
-/// Pinhole intrinsics in pixels (Eq. 4: fx = f/dx, fy = f/dy). A mirrored picture has fx < 0.
+/// Pinhole intrinsics in pixels (Eq. 4: fx = f/dx, fy = f/dy). A mirrored image has fx < 0.
 struct Intrinsics {
   double fx = 0;
   double fy = 0;

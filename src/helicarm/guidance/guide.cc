@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 
 #include "helicarm/geometry/triangulation.h"
-#include "helicarm/guidance/traced_point.h"
+#include "helicarm/guidance/propagated_point.h"
 
 namespace helicarm {
 namespace {
@@ -32,19 +32,19 @@ Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eige
 
 /// The rays met in the bone's frame, each brought there by its own moment's readings: their errors enter with
 /// the weight that each ray has in the intersection.
-TracedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
+PropagatedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
   std::vector<Eigen::Matrix3d> information;
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const DatedView& view : point.views) {
     information.push_back(information_of_ray(view, bone, point.point_in_anchor));
     sum += information.back();
   }
-  TracedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
+  PropagatedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
   const Eigen::Matrix3d scale = sum.inverse();
   for (std::size_t i = 0; i < point.views.size(); ++i) {
     const Poses& poses = point.views[i].poses;
     const int moment = static_cast<int>(i);
-    TracedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}, {}};
+    PropagatedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}, {}};
     ray = enter_tracker(std::move(ray), *poses.tracker_from_calibrator,
                         readings.at(Marker::calibrator, moment));
     ray = leave_tracker(std::move(ray), *poses.tracker_from(bone), readings.at(marker_of(bone), moment));
@@ -64,25 +64,25 @@ View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone
 
 Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, const Poses& poses,
                                const TrackerNoise& noise) {
-  TracedPoint point{point_in_bone, Eigen::Matrix3d::Zero(), {}, {}};
+  PropagatedPoint point{point_in_bone, Eigen::Matrix3d::Zero(), {}, {}};
   point = enter_tracker(std::move(point), *poses.tracker_from(bone), {marker_of(bone), 0});
   point = leave_tracker(std::move(point), *poses.tracker_from_calibrator, {Marker::calibrator, 0});
   return point.total_covariance(noise);
 }
 
-GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
+PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
   const Readings readings(noise.samples);
   const Poses then = point.views.empty() ? Poses{} : point.views.front().poses;
-  GuidedPoint guided;
-  const auto put = [&](const TracedPoint& at, auto& place, auto& covariance) {
+  PointInFrames guided;
+  const auto put = [&](const PropagatedPoint& at, auto& place, auto& covariance) {
     place = at.point;
     covariance = at.total_covariance(noise);
   };
 
-  std::optional<TracedPoint> in_tracker_then;
-  std::optional<TracedPoint> in_tracker_now;
+  std::optional<PropagatedPoint> in_tracker_then;
+  std::optional<PropagatedPoint> in_tracker_now;
   if (point.anchor) {
-    const TracedPoint in_bone = met_in_bone(point, *point.anchor, readings);
+    const PropagatedPoint in_bone = met_in_bone(point, *point.anchor, readings);
     const Marker marker = marker_of(*point.anchor);
     in_tracker_then = enter_tracker(in_bone, *then.tracker_from(*point.anchor), readings.at(marker, 0));
     put(leave_tracker(*in_tracker_then, *then.tracker_from_calibrator, readings.at(Marker::calibrator, 0)),
@@ -90,7 +90,7 @@ GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& 
     if (const auto& tracker_from_bone = now.tracker_from(*point.anchor))
       in_tracker_now = enter_tracker(in_bone, *tracker_from_bone, readings.at(marker, present));
   } else {
-    const TracedPoint in_calibrator{
+    const PropagatedPoint in_calibrator{
         point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
     put(in_calibrator, guided.in_calibrator, guided.covariance_in_calibrator);
     if (then.tracker_from_calibrator)
@@ -106,9 +106,9 @@ GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& 
     put(leave_tracker(*in_tracker_then, *then.tracker_from_tibia, readings.at(Marker::tibia, 0)),
         guided.in_tibia, guided.covariance_in_tibia);
   if (in_tracker_now && now.tracker_from_tool) {
-    guided.traced_to_tool =
+    guided.propagated_to_tool =
         leave_tracker(*in_tracker_now, *now.tracker_from_tool, readings.at(Marker::tool, present));
-    put(*guided.traced_to_tool, guided.in_tool, guided.covariance_in_tool);
+    put(*guided.propagated_to_tool, guided.in_tool, guided.covariance_in_tool);
   }
   return guided;
 }

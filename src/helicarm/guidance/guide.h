@@ -8,7 +8,7 @@
 
 #include "helicarm/geometry/view.h"
 #include "helicarm/guidance/poses.h"
-#include "helicarm/guidance/traced_point.h"
+#include "helicarm/guidance/propagated_point.h"
 
 namespace helicarm {
 
@@ -31,7 +31,7 @@ struct XrayPoint {
 
 /// A point carried calibrator -> tracker -> bone -> now -> tool (Eq. 16); absent where a reading is missing.
 /// The covariances hold the tracker's noise too.
-struct GuidedPoint {
+struct PointInFrames {
   Eigen::Vector3d in_calibrator = Eigen::Vector3d::Zero();  ///< at the first view's moment
   Eigen::Matrix3d covariance_in_calibrator = Eigen::Matrix3d::Zero();
   std::optional<Eigen::Vector3d> in_femur;
@@ -40,11 +40,11 @@ struct GuidedPoint {
   std::optional<Eigen::Matrix3d> covariance_in_femur;
   std::optional<Eigen::Matrix3d> covariance_in_tibia;
   std::optional<Eigen::Matrix3d> covariance_in_tool;
-  std::optional<TracedPoint> traced_to_tool;  ///< with all that it shares with other points
+  std::optional<PropagatedPoint> propagated_to_tool;  ///< with all that it shares with other points
 };
 
-/// The same picture seen from a bone: world = bone. Intersecting in such views lets the bone move between
-/// exposures.
+/// The same image seen from a bone: world = bone. Intersecting in such views lets the bone move between
+/// acquisitions.
 View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone);
 
 /// What the tracker's noise in one exposure's readings does to the place in the calibrator of a point of the
@@ -53,6 +53,6 @@ Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, 
                                const TrackerNoise& noise);
 
 /// Eq. 16. A point that moves with no bone is taken to rest in the tracker's frame since the first view.
-GuidedPoint guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise);
+PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise);
 
 }  // namespace helicarm

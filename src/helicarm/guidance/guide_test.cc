@@ -41,7 +41,7 @@ TEST(Guide, PointOfAMovedFemurFollowsItToTheTool) {
   now.tracker_from_femur = *now.tracker_from_femur * bend;
   const XrayPoint point = femoral_point(all_poses(), all_poses());
 
-  const GuidedPoint guided = guide(point, now, {});
+  const PointInFrames guided = guide(point, now, {});
 
   EXPECT_TRUE(guided.in_calibrator.isApprox(Eigen::Vector3d(10, -5, 20), 1e-12));
   EXPECT_TRUE(guided.in_femur->isApprox(point.point_in_anchor, 1e-12));
@@ -54,7 +54,7 @@ TEST(Guide, PointWithoutABoneRestsInTheTracker) {
   const XrayPoint point{{10, -5, 20}, Eigen::Matrix3d::Zero(), {}, {{frontal(), all_poses(), 1}}};
   Poses now = all_poses();
   now.tracker_from_femur = motion(0, 0, 0, 90, {0, 0, 1});
-  const GuidedPoint guided = guide(point, now, {});
+  const PointInFrames guided = guide(point, now, {});
   const Eigen::Vector3d expected =
       tracker_from_tool.inverse() * (tracker_from_calibrator * Eigen::Vector3d(10, -5, 20));
   EXPECT_TRUE(guided.in_tool->isApprox(expected, 1e-12));
@@ -62,7 +62,7 @@ TEST(Guide, PointWithoutABoneRestsInTheTracker) {
 
 TEST(Guide, MissingReadingsLeavePlacesAbsent) {
   const XrayPoint point{{1, 2, 3}, Eigen::Matrix3d::Identity(), {}, {{frontal(), {}, 1}}};
-  const GuidedPoint guided = guide(point, all_poses(), {});
+  const PointInFrames guided = guide(point, all_poses(), {});
   EXPECT_FALSE(guided.in_femur);
   EXPECT_FALSE(guided.in_tibia);
   EXPECT_FALSE(guided.in_tool);
@@ -73,7 +73,7 @@ TEST(Guide, WithoutNoiseTheCovarianceOnlyTurns) {
   Poses poses = all_poses();
   XrayPoint point = femoral_point(poses, poses);
   point.covariance_in_anchor = Eigen::Vector3d(1, 4, 9).asDiagonal();
-  const GuidedPoint guided = guide(point, poses, {});
+  const PointInFrames guided = guide(point, poses, {});
   EXPECT_NEAR(guided.covariance_in_tool->trace(), 14, 1e-9);
   EXPECT_NEAR(guided.covariance_in_tool->determinant(), 36, 1e-9);
 }
@@ -125,7 +125,7 @@ TEST(Guide, CovarianceAgreesWithDrawnReadings) {
   point.covariance_in_anchor.setZero();
   const std::vector<Eigen::Vector3d> seen = {*calibrator_from(Bone::femur, first) * point.point_in_anchor,
                                              *calibrator_from(Bone::femur, second) * point.point_in_anchor};
-  const GuidedPoint guided = guide(point, first, noise);
+  const PointInFrames guided = guide(point, first, noise);
 
   constexpr int trials = 20000;
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();

@@ -13,7 +13,7 @@ std::optional<double> Tunnel::axis_sigma_deg() const {
   return std::sqrt(axis_covariance->trace()) * 180 / std::numbers::pi;
 }
 
-Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, const GuidedPoint& end,
+Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start, const PointInFrames& end,
                              const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise) {
   const bool ordered = start.in_tool && end.in_tool;
   const Eigen::Vector3d along =
@@ -30,9 +30,9 @@ Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, 
     tunnel.end_in_tool = end.in_tool;
     tunnel.axis_in_tool = along / length;
   }
-  if (start.traced_to_tool && end.traced_to_tool) {
+  if (start.propagated_to_tool && end.propagated_to_tool) {
     const Eigen::Matrix3d covariance =
-        covariance_between(*start.traced_to_tool, *end.traced_to_tool, calibration_covariance, noise);
+        covariance_between(*start.propagated_to_tool, *end.propagated_to_tool, calibration_covariance, noise);
     const Eigen::Vector3d axis = along / length;
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - axis * axis.transpose()) / length;
     tunnel.axis_covariance = across * covariance * across;

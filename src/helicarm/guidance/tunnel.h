@@ -30,7 +30,7 @@ inline constexpr double longest_tunnel_mm = 200;
 
 /// Refuses (bad_tunnel) a length outside these limits. The axis' covariance needs that of the calibration,
 /// which both ends share (empty: taken as exact).
-Expected<Tunnel> plan_tunnel(const std::string& name, const GuidedPoint& start, const GuidedPoint& end,
+Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start, const PointInFrames& end,
                              const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 
 }  // namespace helicarm

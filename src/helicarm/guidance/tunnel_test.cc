@@ -11,8 +11,8 @@
 namespace helicarm {
 namespace {
 
-GuidedPoint point_at(double x, bool in_tool) {
-  GuidedPoint point{};
+PointInFrames point_at(double x, bool in_tool) {
+  PointInFrames point{};
   point.in_calibrator = {0, 0, x};
   if (in_tool) point.in_tool = Eigen::Vector3d(x, 0, 0);
   return point;
@@ -44,15 +44,15 @@ TEST(PlanTunnel, LongerThanAKneeIsRefused) {
 }
 
 /// Two ends 30 mm apart along x that share a calibration of two numbers and one reading of the tool.
-GuidedPoint traced_point(double x, const Eigen::Matrix<double, 3, 2>& by_calibration,
-                         const Eigen::MatrixXd& calibration) {
-  TracedPoint at{{x, 0, 0}, Eigen::Matrix3d::Zero(), {}, by_calibration};
+PointInFrames propagated_point(double x, const Eigen::Matrix<double, 3, 2>& by_calibration,
+                               const Eigen::MatrixXd& calibration) {
+  PropagatedPoint at{{x, 0, 0}, Eigen::Matrix3d::Zero(), {}, by_calibration};
   at.covariance =
       0.01 * Eigen::Matrix3d::Identity() + by_calibration * calibration * by_calibration.transpose();
   at = leave_tracker(at, {}, {Marker::tool, 0});
-  GuidedPoint point{};
+  PointInFrames point{};
   point.in_tool = at.point;
-  point.traced_to_tool = at;
+  point.propagated_to_tool = at;
   return point;
 }
 
@@ -63,8 +63,8 @@ TEST(PlanTunnel, AxisErrorAgreesWithDrawnErrorsOfWhatBothEndsShare) {
   of_start << 1, 0.2, 0.5, 1, -0.3, 0.4;
   of_end << 0.9, 0.3, 0.7, 0.8, -0.1, 0.6;
   const TrackerNoise noise{0.1, 0.5, Samples::shared};
-  const auto tunnel = plan_tunnel("femur", traced_point(0, of_start, calibration),
-                                  traced_point(30, of_end, calibration), calibration, noise);
+  const auto tunnel = plan_tunnel("femur", propagated_point(0, of_start, calibration),
+                                  propagated_point(30, of_end, calibration), calibration, noise);
   ASSERT_TRUE(tunnel.has_value());
 
   constexpr int trials = 20000;
@@ -90,8 +90,8 @@ TEST(PlanTunnel, AxisErrorAgreesWithDrawnErrorsOfWhatBothEndsShare) {
 TEST(PlanTunnel, WhatMovesBothEndsAlikeDoesNotTurnTheAxis) {
   const Eigen::MatrixXd calibration = 25 * Eigen::Matrix2d::Identity();
   const Eigen::Matrix<double, 3, 2> shared = Eigen::Matrix<double, 3, 2>::Ones();
-  const auto tunnel = plan_tunnel("femur", traced_point(0, shared, calibration),
-                                  traced_point(30, shared, calibration), calibration, {});
+  const auto tunnel = plan_tunnel("femur", propagated_point(0, shared, calibration),
+                                  propagated_point(30, shared, calibration), calibration, {});
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_NEAR(*tunnel->axis_sigma_deg(), std::sqrt(2 * 2 * 0.01) / 30 * 180 / std::numbers::pi, 1e-9);
 }

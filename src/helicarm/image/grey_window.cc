@@ -6,9 +6,9 @@
 
 namespace helicarm {
 
-GreyWindow usual_window(const Image<float>& picture, float lowest) {
+GreyWindow usual_window(const Image<float>& grey_image, float lowest) {
   std::vector<float> values;
-  for (float value : picture.pixels())
+  for (float value : grey_image.pixels())
     if (value > lowest) values.push_back(value);
   if (values.empty()) return {lowest, lowest + 1};
   const auto at_share = [&](double share) {
@@ -20,10 +20,10 @@ GreyWindow usual_window(const Image<float>& picture, float lowest) {
   return {low, at_share(0.995)};
 }
 
-Image<std::uint8_t> eight_bit(const Image<float>& picture, GreyWindow window) {
-  Image<std::uint8_t> grey(picture.width(), picture.height());
+Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window) {
+  Image<std::uint8_t> grey(grey_image.width(), grey_image.height());
   const float scale = 255 / std::max(window.high - window.low, 1e-6f);
-  std::ranges::transform(picture.pixels(), grey.pixels().begin(), [&](float value) {
+  std::ranges::transform(grey_image.pixels(), grey.pixels().begin(), [&](float value) {
     return static_cast<std::uint8_t>(std::clamp((value - window.low) * scale, 0.0f, 255.0f));
   });
   return grey;

@@ -15,9 +15,9 @@ struct GreyWindow {
 
 /// The window that clips the darkest and brightest half percent of what is above `lowest`: the bare rim of an
 /// intensifier's field must not claim its ends.
-GreyWindow usual_window(const Image<float>& picture, float lowest);
+GreyWindow usual_window(const Image<float>& grey_image, float lowest);
 
-/// The picture for the eye: black at the window's low end, white at its high one.
-Image<std::uint8_t> eight_bit(const Image<float>& picture, GreyWindow window);
+/// The image for the eye: black at the window's low end, white at its high one.
+Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window);
 
 }  // namespace helicarm

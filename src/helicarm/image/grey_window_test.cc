@@ -7,23 +7,23 @@ namespace helicarm {
 namespace {
 
 TEST(UsualWindow, ClipsHalfAPercentOfTheFieldAndIgnoresItsRim) {
-  Image<float> picture(100, 30, 5);  // 2000 pixels of rim
-  for (int i = 0; i < 1000; ++i) picture(i % 100, i / 100) = float(100 + i);
-  const GreyWindow window = usual_window(picture, 5);
+  Image<float> grey_image(100, 30, 5);  // 2000 pixels of rim
+  for (int i = 0; i < 1000; ++i) grey_image(i % 100, i / 100) = float(100 + i);
+  const GreyWindow window = usual_window(grey_image, 5);
   EXPECT_NEAR(window.low, 105, 1);
   EXPECT_NEAR(window.high, 1094, 1);
 }
 
-TEST(UsualWindow, OfABarePictureShowsItBlack) {
+TEST(UsualWindow, OfABareImageShowsItBlack) {
   const Image<float> bare(8, 8, 3);
   const Image<std::uint8_t> grey = eight_bit(bare, usual_window(bare, 3));
   for (const std::uint8_t value : grey.pixels()) EXPECT_EQ(value, 0);
 }
 
 TEST(EightBit, RunsFromBlackToWhiteAndClips) {
-  Image<float> picture(5, 1);
-  for (int u = 0; u < 5; ++u) picture(u, 0) = float(10 * u);
-  const Image<std::uint8_t> grey = eight_bit(picture, {10, 30});
+  Image<float> grey_image(5, 1);
+  for (int u = 0; u < 5; ++u) grey_image(u, 0) = float(10 * u);
+  const Image<std::uint8_t> grey = eight_bit(grey_image, {10, 30});
   EXPECT_EQ(grey(0, 0), 0);
   EXPECT_EQ(grey(1, 0), 0);
   EXPECT_EQ(grey(2, 0), 127);
@@ -32,9 +32,9 @@ TEST(EightBit, RunsFromBlackToWhiteAndClips) {
 }
 
 TEST(EightBit, AWindowWithoutWidthIsAThreshold) {
-  Image<float> picture(2, 1);
-  picture(1, 0) = 2;
-  const Image<std::uint8_t> grey = eight_bit(picture, {1, 1});
+  Image<float> grey_image(2, 1);
+  grey_image(1, 0) = 2;
+  const Image<std::uint8_t> grey = eight_bit(grey_image, {1, 1});
   EXPECT_EQ(grey(0, 0), 0);
   EXPECT_EQ(grey(1, 0), 255);
 }

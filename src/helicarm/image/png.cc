@@ -59,7 +59,7 @@ void on_warning(png_structp, png_const_charp) {}
 
 bool read_header(Reading& reading) {
   if (setjmp(png_jmpbuf(reading.png))) return false;
-  png_set_user_limits(reading.png, max_picture_side, max_picture_side);
+  png_set_user_limits(reading.png, max_image_side, max_image_side);
   png_set_read_fn(reading.png, &reading, take);
   png_read_info(reading.png, reading.info);
   png_get_IHDR(reading.png, reading.info, &reading.width, &reading.height, &reading.bits, &reading.colour,
@@ -103,7 +103,7 @@ std::string encode_png(const cv::Mat& rgb) {
 
 bool is_png(std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); }
 
-Expected<GreyPicture> decode_png(std::string_view bytes, const std::string& origin) {
+Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin) {
   return guarded([&] {
     Reading reading{.rest = bytes, .message = {}, .row = {}};
     const auto check = [&](bool good) {
@@ -126,26 +126,26 @@ Expected<GreyPicture> decode_png(std::string_view bytes, const std::string& orig
     if (png_get_interlace_type(reading.png, reading.info) != PNG_INTERLACE_NONE)
       throw BadInput(Reason::unsupported, fmt::format("{}: an interlaced PNG", origin));
     const std::size_t channels = rgb ? 3 : 1, word = reading.bits == 16 ? 2 : 1;
-    if (std::size_t{reading.width} * reading.height * word > max_picture_bytes)
+    if (std::size_t{reading.width} * reading.height * word > max_image_bytes)
       throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels are more than {} bytes", origin,
-                                                   reading.width, reading.height, max_picture_bytes));
+                                                   reading.width, reading.height, max_image_bytes));
     check(start_rows(reading));
 
-    GreyPicture picture{{static_cast<int>(reading.width), static_cast<int>(reading.height)}, reading.bits};
+    GreyImage grey_image{{static_cast<int>(reading.width), static_cast<int>(reading.height)}, reading.bits};
     reading.row.resize(reading.width * channels * word);
-    for (int v = 0; v < picture.pixels.height(); ++v) {
+    for (int v = 0; v < grey_image.pixels.height(); ++v) {
       check(read_row(reading));
-      for (int u = 0; u < picture.pixels.width(); ++u) {
+      for (int u = 0; u < grey_image.pixels.width(); ++u) {
         const png_byte* at = reading.row.data() + static_cast<std::size_t>(u) * channels * word;
         if (rgb && (std::memcmp(at, at + word, word) != 0 || std::memcmp(at, at + 2 * word, word) != 0))
           throw BadInput(Reason::unsupported, fmt::format("{}: a colour picture; must be grey", origin));
         std::uint16_t value = *at;
         if (word == 2) std::memcpy(&value, at, 2);
-        picture.pixels(u, v) = value;
+        grey_image.pixels(u, v) = value;
       }
     }
     check(read_end(reading));
-    return picture;
+    return grey_image;
   });
 }
 

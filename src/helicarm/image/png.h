@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "helicarm/core/failure.h"
-#include "helicarm/image/grey_picture.h"
+#include "helicarm/image/grey_image.h"
 
 namespace helicarm {
 
@@ -20,6 +20,6 @@ bool is_png(std::string_view bytes);
 
 /// 8 or 16-bit grey, or RGB whose three channels are equal. Refuses: truncated, bad_size, bad_value
 /// (damaged), unsupported (palette, alpha, fewer than 8 bits, true colour). `origin` begins each message.
-Expected<GreyPicture> decode_png(std::string_view bytes, const std::string& origin);
+Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin);
 
 }  // namespace helicarm

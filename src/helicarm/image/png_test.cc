@@ -18,8 +18,8 @@ Image<T> noise(int width, int height) {
 }
 
 std::string_view reason(std::string_view bytes) {
-  const auto picture = decode_png(bytes, "x.png");
-  return picture ? "ok" : code(picture.error().reason);
+  const auto grey_image = decode_png(bytes, "x.png");
+  return grey_image ? "ok" : code(grey_image.error().reason);
 }
 
 std::string encoded(std::uint32_t format, int channels) {
@@ -77,14 +77,14 @@ TEST(Png, MutationsNeverCrash) {
   for (int trial = 0; trial < 2000; ++trial) {
     std::string bytes = whole;
     bytes[random.index(static_cast<std::uint32_t>(whole.size()))] = static_cast<char>(random.bits());
-    const auto picture = decode_png(bytes, "x.png");
-    if (picture) {
-      EXPECT_FALSE(picture->pixels.empty());
+    const auto grey_image = decode_png(bytes, "x.png");
+    if (grey_image) {
+      EXPECT_FALSE(grey_image->pixels.empty());
     }
   }
 }
 
-TEST(Png, HugeHeaderIsRefusedBeforeItIsBelieved) {
+TEST(Png, HugeHeaderIsRefusedBeforeItIsAccepted) {
   std::string bytes = encode_png(noise<std::uint8_t>(4, 4));
   bytes.replace(16, 8, std::string("\x7F\xFF\xFF\xFF\x7F\xFF\xFF\xFF", 8));
   EXPECT_NE(reason(bytes), "ok");

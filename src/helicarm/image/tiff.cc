@@ -100,12 +100,12 @@ void check_layout(const Layout& layout, TIFF* tiff, const std::string& origin) {
              layout.compression == COMPRESSION_PACKBITS || layout.compression == COMPRESSION_ADOBE_DEFLATE ||
              layout.compression == COMPRESSION_DEFLATE,
          "the TIFF's compression must be none, PackBits, LZW or deflate");
-  if (layout.width < 1 || layout.height < 1 || layout.width > max_picture_side ||
-      layout.height > max_picture_side ||
-      std::size_t{layout.width} * layout.height * (layout.bits / 8u) > max_picture_bytes)
+  if (layout.width < 1 || layout.height < 1 || layout.width > max_image_side ||
+      layout.height > max_image_side ||
+      std::size_t{layout.width} * layout.height * (layout.bits / 8u) > max_image_bytes)
     throw BadInput(Reason::bad_size,
                    fmt::format("{}: {} x {} pixels, limit {} a side and {} bytes", origin, layout.width,
-                               layout.height, max_picture_side, max_picture_bytes));
+                               layout.height, max_image_side, max_image_bytes));
 }
 
 }  // namespace
@@ -125,7 +125,7 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
   });
 }
 
-Expected<GreyPicture> decode_tiff(std::string_view bytes, int page, const std::string& origin) {
+Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin) {
   return guarded([&] {
     Source from{bytes};
     const File file = open(from, origin);
@@ -136,7 +136,7 @@ Expected<GreyPicture> decode_tiff(std::string_view bytes, int page, const std::s
 
     const std::size_t word = layout.bits / 8u;
     const unsigned top = layout.photometric == PHOTOMETRIC_MINISWHITE ? (1u << layout.bits) - 1 : 0;
-    GreyPicture picture{{static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits};
+    GreyImage grey_image{{static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits};
     std::vector<unsigned char> row(std::max<std::size_t>(
         layout.width * layout.channels * word, static_cast<std::size_t>(TIFFScanlineSize(file.get()))));
     for (std::uint32_t v = 0; v < layout.height; ++v) {
@@ -149,11 +149,11 @@ Expected<GreyPicture> decode_tiff(std::string_view bytes, int page, const std::s
           throw BadInput(Reason::unsupported, fmt::format("{}: a colour picture; must be grey", origin));
         std::uint16_t value = *at;
         if (word == 2) std::memcpy(&value, at, 2);
-        picture.pixels(static_cast<int>(u), static_cast<int>(v)) =
+        grey_image.pixels(static_cast<int>(u), static_cast<int>(v)) =
             static_cast<std::uint16_t>(top ? top - value : value);
       }
     }
-    return picture;
+    return grey_image;
   });
 }
 

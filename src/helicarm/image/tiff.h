@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "helicarm/core/failure.h"
-#include "helicarm/image/grey_picture.h"
+#include "helicarm/image/grey_image.h"
 
 namespace helicarm {
 
@@ -17,6 +17,6 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
 /// One page (0-based) of an unsigned 8 or 16-bit grey TIFF in strips, or RGB whose three channels are equal;
 /// uncompressed, PackBits, LZW or deflate. WhiteIsZero is inverted. Refuses: bad_size, bad_value (damaged or
 /// cut off), unsupported (palette, alpha, tiles, other sample types and compressions, true colour).
-Expected<GreyPicture> decode_tiff(std::string_view bytes, int page, const std::string& origin);
+Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin);
 
 }  // namespace helicarm

@@ -54,8 +54,8 @@ std::string encoded(Kind kind) {
 }
 
 std::string_view reason(const Kind& kind) {
-  const auto picture = decode_tiff(encoded(kind), 0, "x.tif");
-  return picture ? "ok" : code(picture.error().reason);
+  const auto grey_image = decode_tiff(encoded(kind), 0, "x.tif");
+  return grey_image ? "ok" : code(grey_image.error().reason);
 }
 
 TEST(Tiff, GreyComesBackExactly) {
@@ -66,10 +66,10 @@ TEST(Tiff, GreyComesBackExactly) {
         const std::string bytes =
             encoded({bits, channels, channels == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK, compression});
         ASSERT_TRUE(is_tiff(bytes));
-        const auto picture = decode_tiff(bytes, 0, "x.tif");
-        ASSERT_TRUE(picture) << picture.error().message;
-        EXPECT_EQ(picture->bits, bits);
-        EXPECT_EQ(picture->pixels(4, 2), 42);
+        const auto grey_image = decode_tiff(bytes, 0, "x.tif");
+        ASSERT_TRUE(grey_image) << grey_image.error().message;
+        EXPECT_EQ(grey_image->bits, bits);
+        EXPECT_EQ(grey_image->pixels(4, 2), 42);
       }
 }
 
@@ -94,9 +94,9 @@ TEST(Tiff, MutationsAndTruncationsNeverCrash) {
       bytes[8 + random.index(static_cast<std::uint32_t>(whole.size()) - 8)] =
           static_cast<char>(random.bits());
       if (random.index(4) == 0) bytes.resize(8 + random.index(static_cast<std::uint32_t>(whole.size()) - 8));
-      const auto picture = decode_tiff(bytes, 0, "x.tif");
-      if (picture) {
-        EXPECT_FALSE(picture->pixels.empty());
+      const auto grey_image = decode_tiff(bytes, 0, "x.tif");
+      if (grey_image) {
+        EXPECT_FALSE(grey_image->pixels.empty());
       }
     }
   }

@@ -40,12 +40,12 @@ Statistics fiducial_registration_error(const CalibrationResult& calibration) {
   std::vector<double> errors;
   const Calibration exact{calibration.views, {}};
   for (const Fiducial& ball : calibration.fiducials.front()) {
-    std::vector<PointPicture> pictures;
+    std::vector<PointObservation> observations;
     for (std::size_t i = 0; i < calibration.views.size(); ++i)
       for (const Fiducial& f : calibration.fiducials[i])
         if (f.label == ball.label && f.status == FiducialStatus::used)
-          pictures.push_back({i, f.uv, f.sigma_px * f.sigma_px * Eigen::Matrix2d::Identity()});
-    if (const auto located = locate(ball.label, PointSource::target, pictures, exact))
+          observations.push_back({i, f.uv, f.sigma_px * f.sigma_px * Eigen::Matrix2d::Identity()});
+    if (const auto located = locate(ball.label, PointSource::target, observations, exact))
       errors.push_back(target_error(*located, ball.centre_in_calibrator));
   }
   return statistics_of(errors);

@@ -14,12 +14,12 @@
 
 namespace helicarm {
 
-/// The picture of a point in one of the calibrated views.
-struct PointPicture {
+/// The image of a point in one of the calibrated views.
+struct PointObservation {
   std::size_t view;                            ///< index into the calibration
   Eigen::Vector2d uv;                          ///< rectified px
   Eigen::Matrix2d covariance_px2;              ///< zero: exact
-  RigidTransform calibrator_from_anchor = {};  ///< at the moment of this picture; see LocatedPoint
+  RigidTransform calibrator_from_anchor = {};  ///< at the moment of this image; see LocatedPoint
   /// What a wrong `calibrator_from_anchor` does to the point's place in the calibrator, mm^2. It counts in
   /// whether the rays meet; in the point's own covariance it is left to `guide`.
   Eigen::Matrix3d anchor_covariance = Eigen::Matrix3d::Zero();
@@ -27,7 +27,7 @@ struct PointPicture {
 
 enum class PointSource { pick, target };
 
-/// A point found in space. Its anchor is the frame in which it rests between the pictures: the calibrator, or
+/// A point found in space. Its anchor is the frame in which it rests between the images: the calibrator, or
 /// a bone that moves.
 struct LocatedPoint {
   std::string name;
@@ -47,7 +47,7 @@ struct LocatedPoint {
 /// Rays that miss each other by more than their errors allow show that one of them is not of this point: its
 /// covariance is then enlarged until they do. Refuses as `intersect`.
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
-                              std::span<const PointPicture> pictures, const Calibration& calibration);
+                              std::span<const PointObservation> observations, const Calibration& calibration);
 
 /// Covariance (mm^2) of a point that would be seen in all views with a given noise per axis: the predicted
 /// TRE is the root of its trace. Refuses as `locate`, `behind_source` where a view cannot see it.

@@ -24,12 +24,12 @@ View paper_view(double alpha) {
 const std::vector<View> truth{paper_view(0), paper_view(std::numbers::pi / 2)};
 const Eigen::Vector3d target(12, -20, 55);
 
-/// Twelve balls in each view, as in 2.3.3, and what the maker says of the machine.
+/// Twelve balls in each view, as in 2.3.3, and what the maker says of the c_arm.
 Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
   std::vector<ViewFiducials> views;
   for (const View& view : truth) {
     ViewFiducials seen{fmt::format("V{}", views.size()), {}};
-    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, Belief{1, 0.001}};
+    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, NormalPrior{1, 0.001}};
     for (int k = 0; k < 12; ++k) {
       const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);
       Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
@@ -42,17 +42,17 @@ Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random
   }
   CalibrationOptions options;
   options.rejection_probability = 0;
-  options.common.machine.principal = Departure{1000, 0.7};
+  options.common.c_arm.principal = IntrinsicsVariation{1000, 0.7};
   return calibrate(views, options);
 }
 
-std::vector<PointPicture> pictures_of(const Eigen::Vector3d& point, double sigma, RandomStream& random) {
-  std::vector<PointPicture> pictures;
+std::vector<PointObservation> images_of(const Eigen::Vector3d& point, double sigma, RandomStream& random) {
+  std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < truth.size(); ++i)
-    pictures.push_back({i,
-                        truth[i].project(point) + sigma * Eigen::Vector2d(random.normal(), random.normal()),
-                        sigma * sigma * Eigen::Matrix2d::Identity()});
-  return pictures;
+    observations.push_back(
+        {i, truth[i].project(point) + sigma * Eigen::Vector2d(random.normal(), random.normal()),
+         sigma * sigma * Eigen::Matrix2d::Identity()});
+  return observations;
 }
 
 TEST(Locate, EllipsoidsCoverAndErrorsReachThePredictedSize) {
@@ -65,7 +65,7 @@ TEST(Locate, EllipsoidsCoverAndErrorsReachThePredictedSize) {
       const auto calibration = noisy_calibration(ball_sigma, random);
       ASSERT_TRUE(calibration.has_value());
       const auto point =
-          locate("T", PointSource::target, pictures_of(target, pixel_sigma, random), *calibration);
+          locate("T", PointSource::target, images_of(target, pixel_sigma, random), *calibration);
       ASSERT_TRUE(point.has_value());
       const Eigen::Vector3d error = point->point_in_anchor - target;
       covered += error.dot(point->covariance_in_anchor.ldlt().solve(error)) < 7.8147;  // chi2, 3 dof, 95 %
@@ -82,7 +82,7 @@ Calibration exact_calibration() { return {{{"AP", truth[0], {}}, {"LAT", truth[1
 
 TEST(Locate, ExactPicksInAnExactCalibration) {
   RandomStream random(22, 0);
-  const auto point = locate("T", PointSource::pick, pictures_of(target, 0, random), exact_calibration());
+  const auto point = locate("T", PointSource::pick, images_of(target, 0, random), exact_calibration());
   ASSERT_TRUE(point.has_value());
   EXPECT_LT((point->point_in_anchor - target).norm(), 1e-9);
   EXPECT_EQ(point->views, (std::vector<std::string>{"AP", "LAT"}));
@@ -90,21 +90,22 @@ TEST(Locate, ExactPicksInAnExactCalibration) {
 
 TEST(Locate, PointThatMovesWithABoneIsFoundInTheBone) {
   const Eigen::Vector3d in_bone(3, 4, 5);
-  std::vector<PointPicture> pictures;
+  std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < 2; ++i) {
     const RigidTransform pose{rotation_from_euler(0.1 + 0.2 * double(i), 0.3, 0), {5, 10.0 * double(i), 40}};
-    pictures.push_back({i, truth[i].project(pose * in_bone), Eigen::Matrix2d::Identity(), pose});
+    observations.push_back({i, truth[i].project(pose * in_bone), Eigen::Matrix2d::Identity(), pose});
   }
-  const auto point = locate("T", PointSource::pick, pictures, exact_calibration());
+  const auto point = locate("T", PointSource::pick, observations, exact_calibration());
   ASSERT_TRUE(point.has_value());
   EXPECT_LT((point->point_in_anchor - in_bone).norm(), 1e-9);
 }
 
 TEST(Locate, OneViewIsNotEnough) {
   RandomStream random(23, 0);
-  auto pictures = pictures_of(target, 1, random);
-  pictures.pop_back();
-  EXPECT_EQ(locate("T", PointSource::pick, pictures, exact_calibration()).error().reason, Reason::not_seen);
+  auto observations = images_of(target, 1, random);
+  observations.pop_back();
+  EXPECT_EQ(locate("T", PointSource::pick, observations, exact_calibration()).error().reason,
+            Reason::not_seen);
 }
 
 TEST(PredictCovariance, IsThatOfALocatedPointAndGrowsAwayFromTheBalls) {

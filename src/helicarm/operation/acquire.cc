@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The operation's first step: which pictures are taken, and with which poses.
+// The operation's first step: which images are taken, and with which poses.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 #include "helicarm/operation/operation.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/operation/view_of.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm {
 namespace {
@@ -21,14 +21,14 @@ bool differ(const std::string& a, const std::string& b) { return !a.empty() && !
 }  // namespace
 
 void Operation::told_once(const std::string& warning) {
-  if (told_.insert(warning).second) tell_(Step::acquire, "warning: " + warning);
+  if (reported_.insert(warning).second) notify_(Step::acquire, "warning: " + warning);
 }
 
 double Operation::held_s(const Acquisition& shown, double arrival_s) const {
   return shown.acquired ? delays_.held_s(*shown.acquired, arrival_s) : 0;
 }
 
-/// This picture may show that earlier ones were held back: they are to be shot again.
+/// This image may show that earlier ones were held back: they are to be acquisition again.
 void Operation::weigh_delay(const std::string& view, const Acquisition& shown, double arrival_s) {
   if (!shown.acquired)
     return told_once("pictures carry no time of acquisition: one that lies in the C-arm is not noticed");
@@ -47,7 +47,7 @@ void Operation::weigh_delay(const std::string& view, const Acquisition& shown, d
     if (held <= longest_held_s) return false;
     const Failure why = held_back(earlier.name, held);
     record("refused", {{"view", earlier.name}, {"why", code(why.reason)}, {"figures", why.figures}});
-    tell_(Step::acquire, fmt::format("{}; expose it again", why.message));
+    notify_(Step::acquire, fmt::format("{}; expose it again", why.message));
     result_.reset();
     return true;
   });
@@ -81,15 +81,15 @@ void Operation::refuse_other_views(const std::string& view, const Acquisition& s
 Acquisition Operation::acquisition_of(std::string& view, const Arrival& arrival, double arrival_s) {
   if (arrival.repeated)
     throw BadInput(Reason::stale_pose, fmt::format("{}: this picture came before; expose anew", view));
-  const Acquisition shown = value_or_throw(read_exposure(arrival.path, view, 1)).acquisition;
+  const Acquisition shown = value_or_throw(read_xray_image(arrival.path, view, 1)).acquisition;
   refuse_other_views(view, shown);
-  if (const std::string shot = view_of(shown, view, views_to_come());
-      shot != view && std::ranges::none_of(views_, [&](const View& other) {
+  if (const std::string acquired_view = view_of(shown, view, views_to_come());
+      acquired_view != view && std::ranges::none_of(views_, [&](const View& other) {
         return !degrees_apart(shown, other.acquisition);
       })) {
-    tell_(Step::acquire, fmt::format("{}: came in place of {}, by the positioner's angle of {:g} degrees",
-                                     shot, view, *shown.primary_angle_deg));
-    view = shot;
+    notify_(Step::acquire, fmt::format("{}: came in place of {}, by the positioner's angle of {:g} degrees",
+                                       acquired_view, view, *shown.primary_angle_deg));
+    view = acquired_view;
   }
   weigh_delay(view, shown, arrival_s);
   return shown;
@@ -99,7 +99,7 @@ Expected<void> Operation::take(const std::string& wanted, const Arrival& arrival
   return guarded([&] {
     if (std::ranges::find(plan_.views, wanted) == plan_.views.end())
       throw BadInput(Reason::bad_value, fmt::format("{}: is no view of the plan", wanted));
-    tell_(Step::acquire, wanted);
+    notify_(Step::acquire, wanted);
     std::string view = wanted;
     const auto acquisition = guarded([&] { return acquisition_of(view, arrival, arrival_s); });
     if (!acquisition) {

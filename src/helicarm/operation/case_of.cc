@@ -21,10 +21,10 @@ Json without(Json json, const char* key) {
   return json;
 }
 
-Json picture_json(const CasePicture& picture) {
-  return {{"name", picture.name},
-          {"image", picture.name + ".dcm"},
-          {"poses", without(to_json(picture.poses), "tracker_from_tool")}};
+Json image_json(const CaseImage& image) {
+  return {{"name", image.name},
+          {"image", image.name + ".dcm"},
+          {"poses", without(to_json(image.poses), "tracker_from_tool")}};
 }
 
 Json tool_line_json(const ToolLine& line) {
@@ -50,7 +50,7 @@ std::string brought_along(const std::string& name_or_file, const fs::path& folde
 }  // namespace
 
 Expected<void> write_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                    const std::vector<CasePicture>& pictures, const Poses& now,
+                                    const std::vector<CaseImage>& images, const Poses& now,
                                     const std::vector<ToolLine>& tool_lines) {
   return guarded([&] {
     Json json = {{"format", "helicarm-case/1"},
@@ -65,10 +65,10 @@ Expected<void> write_operation_case(const fs::path& folder, const OperationPlan&
                  {"picks", plan.picks},
                  {"tunnels", Json::array()},
                  {"tool_lines", Json::array()}};
-    for (const CasePicture& picture : pictures) {
-      value_or_throw(write_file(folder / (picture.name + ".dcm"),
-                                value_or_throw(read_file(picture.picture, most_file_bytes))));
-      json["views"].push_back(picture_json(picture));
+    for (const CaseImage& image : images) {
+      value_or_throw(write_file(folder / (image.name + ".dcm"),
+                                value_or_throw(read_file(image.image, most_file_bytes))));
+      json["views"].push_back(image_json(image));
     }
     for (const PlannedTunnel& tunnel : plan.tunnels)
       if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))

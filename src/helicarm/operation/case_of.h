@@ -8,16 +8,16 @@
 namespace helicarm {
 
 /// A view as case.json tells it.
-struct CasePicture {
+struct CaseImage {
   std::string name;
-  std::filesystem::path picture;
+  std::filesystem::path image;
   Poses poses;
 };
 
-/// Makes `folder` a case of its own (docs/formats.md): pictures, calibrator, plate, case.json; tunnels whose
+/// Makes `folder` a case of its own (docs/formats.md): images, calibrator, plate, case.json; tunnels whose
 /// ends nobody picked yet are left out. Refuses cannot_write, missing_file.
 Expected<void> write_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
-                                    const std::vector<CasePicture>& pictures, const Poses& now,
+                                    const std::vector<CaseImage>& images, const Poses& now,
                                     const std::vector<ToolLine>& tool_lines);
 
 /// The digest is of the result without its timing: the same case gives the same one.

@@ -72,7 +72,7 @@ CArmStatus Connections::c_arm() const {
   return status;
 }
 
-std::optional<DatedArrival> Connections::next_picture(double patience_s) {
+std::optional<DatedArrival> Connections::next_image(double patience_s) {
   std::unique_lock lock(mutex_);
   if (!news_.wait_for(lock, std::chrono::duration<double>(patience_s), [&] { return !arrivals_.empty(); }))
     return std::nullopt;

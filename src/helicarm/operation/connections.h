@@ -15,17 +15,17 @@
 
 namespace helicarm {
 
-/// A picture and when it came (monotonic seconds).
+/// An image and when it came (monotonic seconds).
 struct DatedArrival {
   Arrival arrival;
   double time_s;
 };
 
-/// The C-arm as its receiver knows it: it calls when it has a picture, and is not heard of in between.
+/// The C-arm as its receiver knows it: it calls when it has an image, and is not heard of in between.
 struct CArmStatus {
-  std::optional<double> last_picture_s;  ///< monotonic seconds
-  std::optional<Failure> refused;        ///< a picture since then
-  bool broke_off = false;                ///< a connection since then was lost, or its request turned down
+  std::optional<double> last_image_s;  ///< monotonic seconds
+  std::optional<Failure> refused;      ///< an image since then
+  bool broke_off = false;              ///< a connection since then was lost, or its request turned down
 };
 
 /// How old what guides a robot may be, s. Only tests on a busy machine use other limits than these.
@@ -42,12 +42,12 @@ class Connections {
   /// Throws BadInput for a plan whose addresses are none.
   Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox, const FreshnessLimits& limits = {});
 
-  /// Takes pictures from now on. Refuses as DicomReceiver.
+  /// Takes images from now on. Refuses as DicomReceiver.
   Expected<void> listen(const ReceiverOptions& options);
   std::uint16_t receiver_port() const { return receiver_->port(); }
 
-  /// The oldest picture that nobody took yet; nothing if none comes within this time.
-  std::optional<DatedArrival> next_picture(double patience_s);
+  /// The oldest image that nobody took yet; nothing if none comes within this time.
+  std::optional<DatedArrival> next_image(double patience_s);
 
   const PoseBoard& board() const { return board_; }
   RobotLink& robot() { return robot_; }
@@ -62,7 +62,7 @@ class Connections {
   std::condition_variable news_;
   std::deque<DatedArrival> arrivals_;
   CArmStatus c_arm_;
-  std::uint64_t broken_before_ = 0;  ///< connections, when the last picture came
+  std::uint64_t broken_before_ = 0;  ///< connections, when the last image came
   PoseBoard board_;
   RobotLink robot_;
   std::unique_ptr<IgtlClient> tracker_;

@@ -80,7 +80,7 @@ Expected<void> Operation::check_plan(const RobotOrder& order) {
 
 Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
   return guarded([&] {
-    tell_(Step::navigate, order.name + ": withdraw");
+    notify_(Step::navigate, order.name + ": withdraw");
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "nothing is measured or registered yet");
     const PoseWindow window = look("withdraw");

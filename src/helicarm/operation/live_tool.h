@@ -21,8 +21,8 @@ struct TunnelAim {
 
 /// The tool as the newest poses show it.
 struct ToolOverlay {
-  std::map<std::string, PictureLine> by_view;  ///< rectified px (Eq. 6)
-  double age_s = 0;                            ///< of the older of the tool's and the bone's pose
+  std::map<std::string, ImageLine> by_view;  ///< rectified px (Eq. 6)
+  double age_s = 0;                          ///< of the older of the tool's and the bone's pose
   /// At the first view's exposure, had the tool moved with the bone; nothing where the bone was not seen.
   std::optional<RigidTransform> calibrator_from_tip = {};
   /// How the other bone has moved against this one since then, in the calibrator's frame; nothing where it
@@ -33,7 +33,7 @@ struct ToolOverlay {
 /// Follows the tool in measured X-rays. A value of its own: any thread may look, whatever the operation does.
 class LiveTool {
  public:
-  /// `exposures`: of each view of the result, in its order.
+  /// `acquisitions`: of each view of the result, in its order.
   LiveTool(const OperationPlan& plan, const Result& result, const std::vector<Poses>& exposures,
            const HandEye& hand_eye);
 

@@ -28,7 +28,7 @@ OperationPlan plan() {
 Result measured() {
   Result result;
   for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
-    PointResult point{name, PointSource::pick, Bone::femur, {}, GuidedPoint{}, 0, {}};
+    PointResult point{name, PointSource::pick, Bone::femur, {}, PointInFrames{}, 0, {}};
     point.place->in_femur = at;
     result.points.push_back(point);
   }
@@ -53,7 +53,7 @@ IgtlMessage message(const RigidTransform& femur, const RigidTransform& tool, dou
           IgtlTracking{{{"femur", 1, femur.matrix()}, {"tool", 1, tool.matrix()}}}};
 }
 
-TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
+TEST(LiveTool, ReportsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
   const OperationPlan planned = plan();
   const LiveTool live(planned, measured(), {exposure()}, exact_hand_eye());
   // The tip 3 mm beside the axis and 12 mm in, tilted by 0.2 rad, on a femur that has moved.
@@ -75,7 +75,7 @@ TEST(LiveTool, TellsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
   EXPECT_LT((overlay.by_view.at("AP").tip - measured().views[0].calibrated->view.project(tip)).norm(), 0.01);
 }
 
-TEST(LiveTool, TellsHowTheOtherBoneMovedAgainstThisOne) {
+TEST(LiveTool, ReportsHowTheOtherBoneMovedAgainstThisOne) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   // Both go along with the femur; the tibia bends on its own besides.
   const RigidTransform calibrator_then = *exposure().tracker_from_calibrator;

@@ -38,10 +38,11 @@ std::string_view name_of(Step step) {
 }
 
 Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const fs::path& folder,
-                                                      const PoseBoard& board, RobotLink& robot, Tell tell) {
+                                                      const PoseBoard& board, RobotLink& robot,
+                                                      Notify notify) {
   return guarded([&] {
     std::unique_ptr<Operation> operation(
-        new Operation(std::move(plan), folder, board, robot, std::move(tell)));
+        new Operation(std::move(plan), folder, board, robot, std::move(notify)));
     std::error_code ec;
     if (fs::create_directories(folder, ec)) fs::permissions(folder, fs::perms::owner_all, ec);
     operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
@@ -92,9 +93,9 @@ Expected<void> Operation::finish() {
 Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
   newest_.reset();
   const std::string name = fmt::format("case-{}", ++measurements_);
-  std::vector<CasePicture> pictures;
-  for (const View& view : views_) pictures.push_back({view.name, view.picture, view.poses});
-  value_or_throw(write_operation_case(folder_ / name, plan_, pictures, now, tool_lines));
+  std::vector<CaseImage> images;
+  for (const View& view : views_) images.push_back({view.name, view.image, view.poses});
+  value_or_throw(write_operation_case(folder_ / name, plan_, images, now, tool_lines));
   record("case", {{"folder", name}, {"case", value_or_throw(read_json(folder_ / name / "case.json"))}});
   CaseRun run = value_or_throw(run_operation_case(folder_ / name, plan_, cache_));
   record("result", {{"folder", name}, {"digest", run.digest}});
@@ -107,7 +108,7 @@ Expected<void> Operation::measure() {
   return guarded([&] {
     if (const auto missing = views_to_come(); !missing.empty())
       throw BadInput(Reason::usage, fmt::format("{}: its picture has not come", missing.front()));
-    tell_(Step::measure, fmt::format("{} views", views_.size()));
+    notify_(Step::measure, fmt::format("{} views", views_.size()));
     result_ = run({}, {});
   });
 }
@@ -124,7 +125,7 @@ Expected<std::vector<RobotOrder>> Operation::preview_tour() const {
 
 Expected<void> Operation::register_robot(const Confirm& confirm) {
   return guarded([&] {
-    tell_(Step::register_robot, "hand-eye calibration");
+    notify_(Step::register_robot, "hand-eye calibration");
     std::vector<HandEyePair> pairs;
     const RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
     const std::vector<RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
@@ -140,7 +141,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
       const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
           {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
-      tell_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
+      notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
     hand_eye_ = value_or_throw(calibrate_hand_eye(pairs));
     record("hand_eye", {{"pairs", to_json(pairs)}, {"found", to_json(*hand_eye_)}});
@@ -162,7 +163,7 @@ Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
                      fmt::format("{}: this check point must be touched again first", missing.front()));
     if (!result_) throw BadInput(Reason::usage, "nothing is measured yet");
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered yet");
-    tell_(Step::plan, name);
+    notify_(Step::plan, name);
     const PoseWindow window = look("plan");
     const Poses now = value_or_throw(poses_now(window, plan_.tracker));
     const TunnelAxis axis = axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
@@ -191,10 +192,10 @@ void Operation::draw_preview(const RobotOrder& order) const {
                                 overlay_png(*result_, i, shown->second)));
 }
 
-std::map<std::string, fs::path> Operation::pictures() const {
-  std::map<std::string, fs::path> pictures;
-  for (const View& view : views_) pictures[view.name] = view.picture;
-  return pictures;
+std::map<std::string, fs::path> Operation::images() const {
+  std::map<std::string, fs::path> images;
+  for (const View& view : views_) images[view.name] = view.image;
+  return images;
 }
 
 std::vector<Poses> Operation::exposures() const {
@@ -243,17 +244,18 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
     value_or_throw(check_plan(order));
     Planned& plan = planned_.at(order.name);
     in_place_.clear();
-    tell_(Step::navigate, order.name);
+    notify_(Step::navigate, order.name);
     const Measure measure = [&] {
       return guarded([&] {
-        return value_or_throw(sight(look("correct"), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
+        return value_or_throw(
+            measure_tool(look("correct"), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
       });
     };
     const auto loop = guarded([&] { return carry_out(order, token, measure, in_place(plan.watch)); });
     if (!loop && loop.error().reason == Reason::plan_stale) plan.stale = loop.error();
     value_or_throw(loop);
     record("navigated", {{"tunnel", order.name}, {"loop", to_json(*loop)}});
-    tell_(Step::verify, order.name);
+    notify_(Step::verify, order.name);
     TunnelOutcome outcome = check(tunnel);
     outcome.loop = *loop;
     return outcome;

@@ -12,12 +12,12 @@
 
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
+#include "helicarm/operation/image_delays.h"
 #include "helicarm/operation/live_tool.h"
-#include "helicarm/operation/picture_delays.h"
 #include "helicarm/operation/plan_watch.h"
 #include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/session/session_log.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
@@ -46,12 +46,12 @@ struct PathPreview {
 class Operation {
  public:
   /// Told each step as it begins and what came of it, for whoever watches.
-  using Tell = std::function<void(Step, const std::string& what)>;
+  using Notify = std::function<void(Step, const std::string& what)>;
 
   /// `folder` takes session.log and a folder for each measurement.
   static Expected<std::unique_ptr<Operation>> begin(
       OperationPlan plan, const std::filesystem::path& folder, const PoseBoard& board, RobotLink& robot,
-      Tell tell = [](Step, const std::string&) {});
+      Notify notify = [](Step, const std::string&) {});
 
   const OperationPlan& plan() const { return plan_; }
   /// Who confirms orders from now on, for the record.
@@ -60,26 +60,26 @@ class Operation {
   void interrupt() { end_.request_stop(); }
   /// Says in the record that the operation came to its end.
   Expected<void> finish();
-  /// Views that still want a picture, in the plan's order.
+  /// Views that still want an image, in the plan's order.
   std::vector<std::string> views_to_come() const;
 
-  /// Check points are touched before the first picture, and again before each order to a tunnel in their
+  /// Check points are touched before the first image, and again before each order to a tunnel in their
   /// bone. The first time learns where it is; then gives how far off the tip is, mm, and refuses
   /// residual_too_large over its limit: then marker and bone are no longer what they were, and only a new
-  /// operation helps. Refuses as `touched_in_bone`, and a first touch after a picture (usage).
+  /// operation helps. Refuses as `touched_in_bone`, and a first touch after an image (usage).
   Expected<double> touch(const std::string& check_point);
   /// Those that must be touched before this tunnel is planned.
   std::vector<std::string> checks_to_come(Bone bone) const;
 
-  /// Acquire: dates the picture by its arrival (monotonic seconds) and takes everything's pose for it; as the
+  /// Acquire: dates the image by its arrival (monotonic seconds) and takes everything's pose for it; as the
   /// view that its positioner's angle names, else as this one. Refuses as `poses_of_exposure`, a tunnel's
-  /// bone that was not seen (no_pose), a picture that came before or was held back in the C-arm (stale_pose:
+  /// bone that was not seen (no_pose), an image that came before or was held back in the C-arm (stale_pose:
   /// nobody knows where things were), that is another view's (views_too_close), or another patient's
-  /// (patient_mismatch). An earlier picture that turns out to have been held back is to come again.
+  /// (patient_mismatch). An earlier image that turns out to have been held back is to come again.
   Expected<void> take(const std::string& view, const Arrival& arrival, double arrival_s);
 
-  /// The pictures that were taken, by view.
-  std::map<std::string, std::filesystem::path> pictures() const;
+  /// The images that were taken, by view.
+  std::map<std::string, std::filesystem::path> images() const;
 
   /// Picks as in case.json, in place of the plan's.
   void pick(Json picks) { plan_.picks = std::move(picks); }
@@ -133,7 +133,7 @@ class Operation {
 
   struct View {
     std::string name;
-    std::filesystem::path picture;
+    std::filesystem::path image;
     Acquisition acquisition;
     double arrival_s;
     Poses poses;
@@ -147,12 +147,12 @@ class Operation {
   };
 
   Operation(OperationPlan plan, std::filesystem::path folder, const PoseBoard& board, RobotLink& robot,
-            Tell tell)
+            Notify notify)
       : plan_(std::move(plan)),
         folder_(std::move(folder)),
         board_(board),
         robot_(robot),
-        tell_(std::move(tell)) {}
+        notify_(std::move(notify)) {}
 
   const PlannedTunnel& tunnel_named(const std::string& name) const;
   void record(const std::string& kind, Json content);
@@ -177,13 +177,13 @@ class Operation {
   std::filesystem::path folder_;
   const PoseBoard& board_;
   RobotLink& robot_;
-  Tell tell_;
+  Notify notify_;
   std::stop_source end_;
   std::unique_ptr<SessionLog> log_;
   std::string who_ = "unknown";
   std::vector<View> views_;
-  PictureDelays delays_;
-  std::set<std::string> told_;
+  ImageDelays delays_;
+  std::set<std::string> reported_;
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< each check point the first time
   std::set<std::string> in_place_;  ///< check points touched again since the last order
   int measurements_ = 0;

@@ -18,9 +18,9 @@ constexpr Range millimetres{-100000, 100000};
 /// Made rigid where its digits are few; else as written, to the last bit, so that a record can be replayed.
 RigidTransform pose_from(JsonReader& reader, const char* key) {
   const Eigen::Matrix4d given = matrix_from(reader, key, millimetres);
-  const RigidTransform mended = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
+  const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
   constexpr double rounding = 1e-9;
-  return (mended.matrix() - given).cwiseAbs().maxCoeff() > rounding ? mended : exact_pose(given);
+  return (corrected.matrix() - given).cwiseAbs().maxCoeff() > rounding ? corrected : exact_pose(given);
 }
 
 /// Within the limits that the list of fields gives to the key.

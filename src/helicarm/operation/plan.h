@@ -74,12 +74,12 @@ struct PlanLimits {
 struct OperationPlan {
   std::string calibrator = "udcsc";  ///< a built-in's name or a file beside the plan
   std::optional<std::string> plate = "plate48";
-  std::vector<std::string> views{"AP", "LAT"};  ///< in the order of the exposures
+  std::vector<std::string> views{"AP", "LAT"};  ///< in the order of the acquisitions
   TrackerPlan tracker;
   RobotPlan robot;
   std::vector<PlannedTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
-  Json picks = Json::array();  ///< as in case.json; may come later, once the pictures are seen
+  Json picks = Json::array();  ///< as in case.json; may come later, once the images are seen
   double max_error_mm = 2;     ///< at 95 %: the robot goes by no point that may be further off
   PlanLimits limits;
 };

@@ -277,7 +277,7 @@ TEST(PlanWatch, BaseMovedBeforeTheOrderIsSeenInEveryDirection) {
   }
 }
 
-TEST(PlanWatch, BoneThatWasMovedWhileNobodyLookedIsSeen) {
+TEST(PlanWatch, BoneThatWasMovedWhileNoOneLookedIsSeen) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   scene.femur_moves = shift(40, 0, 0);
@@ -299,7 +299,7 @@ TEST(PlanWatch, CalibratorTakenForTheBoneIsSeen) {
   EXPECT_NEAR(holds.error().figures.at("distance_mm"), Vector3d(150, -40, 20).norm(), 1.5);
 }
 
-TEST(PlanWatch, JumpThatTheGateDoesNotBelieveYetStopsTheRobot) {
+TEST(PlanWatch, JumpThatTheGateDoesNotAcceptYetStopsTheRobot) {
   const Outcome jump =
       Scene().carry_out(planned(), from(on_the_axis_s, [](double) { return shift(40, 0, 0); }));
   expect_stop(jump, "femur moved", 0.2);

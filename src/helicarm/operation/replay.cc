@@ -16,7 +16,7 @@
 namespace helicarm {
 namespace {
 
-constexpr std::uintmax_t most_picture_bytes = std::uintmax_t{256} << 20;
+constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 
 /// The first fields in which two values differ, for a person.
 std::string where(const Json& then, const Json& now) {
@@ -43,7 +43,7 @@ class Replay {
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
     if (record.kind == "exposure") exposure(record, origin);
     if (record.kind == "touched") touched(record, origin);
-    if (record.kind == "case") pictures(record, origin);
+    if (record.kind == "case") images(record, origin);
     if (record.kind == "end") report.finished = true;
     if (record.kind == "result") result(record, origin);
     if (record.kind == "hand_eye") hand_eye(record, origin);
@@ -61,7 +61,7 @@ class Replay {
 
   void exposure(const SessionRecord& record, const std::string& origin) {
     ++report.exposures;
-    picture_digests_[record.content.at("view").get<std::string>()] = record.content.at("picture");
+    image_digests_[record.content.at("view").get<std::string>()] = record.content.at("picture");
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto poses = poses_of_exposure(window, plan_.tracker);
     compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
@@ -76,8 +76,8 @@ class Replay {
     compare(record.content.at("in_bone"), tip ? json_list(*tip) : Json(), origin, "touched point");
   }
 
-  /// The case must be the one recorded, and its pictures those that came.
-  void pictures(const SessionRecord& record, const std::string& origin) {
+  /// The case must be the one recorded, and its images those that came.
+  void images(const SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
     if (record.content.contains("case")) {
       const std::string name = folder + "/case.json";
@@ -87,10 +87,10 @@ class Replay {
       else if (*now != record.content.at("case"))
         differ(origin, fmt::format("{} was changed{}", name, where(record.content.at("case"), *now)));
     }
-    for (const auto& [view, recorded] : picture_digests_) {
-      ++report.pictures;
+    for (const auto& [view, recorded] : image_digests_) {
+      ++report.images;
       const std::string name = folder + "/" + view + ".dcm";
-      const auto file = read_file(value_or_throw(path_inside(session_, name)), most_picture_bytes);
+      const auto file = read_file(value_or_throw(path_inside(session_, name)), most_image_bytes);
       if (!file)
         differ(origin, file.error().message);
       else if (digest(*file) != recorded)
@@ -121,7 +121,7 @@ class Replay {
   std::filesystem::path session_;
   OperationPlan plan_;
   CalibrationCache cache_;
-  std::map<std::string, std::string> picture_digests_;
+  std::map<std::string, std::string> image_digests_;
 };
 
 }  // namespace

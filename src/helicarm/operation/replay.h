@@ -15,7 +15,7 @@ struct ReplayReport {
   bool torn = false;      ///< the program was killed while it wrote the last record
   bool finished = false;  ///< the operation came to its end
   std::size_t exposures = 0;
-  std::size_t pictures = 0;
+  std::size_t images = 0;
   std::size_t results = 0;
   std::size_t hand_eyes = 0;
   std::vector<std::string> differences;  ///< what came out otherwise than recorded
@@ -24,8 +24,8 @@ struct ReplayReport {
 /// Told before each record how many are done; answers whether to go on.
 using GoOn = std::function<bool(std::size_t done, std::size_t all)>;
 
-/// Recomputes an operation from its record: poses of the exposures from the tracker's samples, every case
-/// from its pictures (which must be those recorded), the hand-eye calibration from its pairs; all must come
+/// Recomputes an operation from its record: poses of the acquisitions from the tracker's samples, every case
+/// from its images (which must be those recorded), the hand-eye calibration from its pairs; all must come
 /// out to the last bit. Refuses as `read_session`, a record that holds nothing (bad_value), and where it may
 /// not go on (interrupted).
 Expected<ReplayReport> replay(

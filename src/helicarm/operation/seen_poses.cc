@@ -14,7 +14,7 @@
 namespace helicarm {
 namespace {
 
-/// A picture's way through the C-arm and a hospital's network.
+/// An image's way through the C-arm and a hospital's network.
 constexpr double longest_way_s = 1.5;
 constexpr double now_s = 0.75;  // told to end, nobody waits longer than a second
 /// The last samples of a window that ends now are still on their way.

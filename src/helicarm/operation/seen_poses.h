@@ -22,8 +22,8 @@ Json to_json(const PoseWindow& window);
 /// To the last bit. Fails as JsonReader.
 Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origin);
 
-/// The second and a half before a picture came: the shot lies somewhere in it. Longer by what the time of the
-/// shot is coarse, as its delay is then known no better.
+/// The second and a half before an image came: the acquisition lies somewhere in it. Longer by what the time
+/// of the acquisition is coarse, as its delay is then known no better.
 PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
                               double coarse_s = 0);
 /// The three quarters of a second from now on; waits until they are over.

@@ -62,24 +62,26 @@ RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool) {
   return hand_eye.flange_from_marker.inverse() * tool.flange_from_tcp;
 }
 
-Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, const HandEye& hand_eye,
-                         Bone bone, const RigidTransform& bone_from_target) {
+Expected<ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
+                                       const HandEye& hand_eye, Bone bone,
+                                       const RigidTransform& bone_from_target) {
   return guarded([&] {
     const std::string& bone_marker = plan.tracker.marker_of(bone);
     const SeenPose tool = value_or_throw(see_tool(window, plan.tracker, plan.tracker.tool));
     const SeenPose target = value_or_throw(see_tool(window, plan.tracker, bone_marker));
     const RigidTransform from_tcp = marker_from_tcp(hand_eye, plan.robot.tool);
-    Sighting sighting{tool.tracker_from_marker * from_tcp, target.tracker_from_marker * bone_from_target, {}};
+    ToolMeasurement measurement{
+        tool.tracker_from_marker * from_tcp, target.tracker_from_marker * bone_from_target, {}};
     const Matrix6d of_tool = carried(tool.tracker_from_marker.rotation * from_tcp.translation);
     const Matrix6d of_target = carried(target.tracker_from_marker.rotation * bone_from_target.translation);
     Matrix6d into_tool = Matrix6d::Zero();
     into_tool.topLeftCorner<3, 3>() = into_tool.bottomRightCorner<3, 3>() =
-        sighting.tracker_from_tcp.rotation.transpose();
-    sighting.covariance =
+        measurement.tracker_from_tcp.rotation.transpose();
+    measurement.covariance =
         into_tool *
         (of_tool * tool.scatter * of_tool.transpose() + of_target * target.scatter * of_target.transpose()) *
         into_tool.transpose();
-    return sighting;
+    return measurement;
   });
 }
 

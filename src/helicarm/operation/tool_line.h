@@ -6,7 +6,7 @@
 #include "helicarm/devices/tracker/hand_eye.h"
 #include "helicarm/operation/seen_poses.h"
 #include "helicarm/pipeline/result.h"
-#include "helicarm/verification/picture_line.h"
+#include "helicarm/verification/image_line.h"
 
 namespace helicarm {
 
@@ -27,8 +27,9 @@ TunnelAxis axis_in_base(const TunnelInBone& tunnel, const Poses& now, const Hand
 RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool);
 
 /// Where the bone that bears the target and the tool are by this window; covariance: the samples' scatter.
-Expected<Sighting> sight(const PoseWindow& window, const OperationPlan& plan, const HandEye& hand_eye,
-                         Bone bone, const RigidTransform& bone_from_target);
+Expected<ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
+                                       const HandEye& hand_eye, Bone bone,
+                                       const RigidTransform& bone_from_target);
 
 /// The tool's line as it would have stood at each view's exposure, had it moved with the bone: two points in
 /// the calibrator (3.3). Refuses no_pose where the bone was not seen then or is not now.
@@ -44,7 +45,7 @@ struct EndMiss {
   double predicted_mm() const { return std::sqrt(across_mm.squaredNorm() + covariance.trace()); }
 };
 
-/// `point_in_marker` and its covariance as `GuidedPoint` has them "in_tool".
+/// `point_in_marker` and its covariance as `PointInFrames` has them "in_tool".
 EndMiss end_miss(const Eigen::Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
                  const HandEye& hand_eye, const RobotTool& tool);
 

@@ -16,7 +16,7 @@ struct RuleOptions {
   double source_detector_mm = 1000;
   double source_calibrator_mm = 650;  ///< to the mean of the balls
   double field_mm = 228.6;            ///< diameter of the receiver
-  double range_deg = 5;  ///< of the turns about both axes of the picture over which no ball may hide another
+  double range_deg = 5;  ///< of the turns about both axes of the image over which no ball may hide another
   double target_radius_mm = 15;  ///< of the ball about the mean of the balls that the targets lie in
 };
 
@@ -45,7 +45,7 @@ struct DesignViews {
 DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options = {});
 
 /// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative where they
-/// overlap. The source turns about both axes of the picture within `range_deg`.
+/// overlap. The source turns about both axes of the image within `range_deg`.
 double smallest_gap_mm(const Calibrator& calibrator, const View& view, double range_deg);
 
 /// Depth of a point below the nearest face of the balls' convex hull, mm; negative outside.

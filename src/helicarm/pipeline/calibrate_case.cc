@@ -17,41 +17,42 @@ ViewFiducials fiducials_of(const LabelledView& view) {
   std::vector<Eigen::Vector2d> used;
   for (const Fiducial& ball : view.fiducials.fiducials)
     if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
-  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.exposure, map), view.fiducials.view,
+  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.xray_image, map), view.fiducials.view,
           map.covariance_px2(used)};
 }
 
 CommonPrior common_prior(const Calibrator& calibrator) {
-  return {unknown_machine(), ball_covariances(calibrator), calibrator.scale_sigma};
+  return {unknown_c_arm(), ball_covariances(calibrator), calibrator.scale_sigma};
 }
 
 /// What a C-arm's history says of these views; images that are in it already do not count.
-Expected<MachineKnowledge> recall_machine(const LabelledViews& views, const Machine& machine) {
+Expected<LearnedIntrinsics> recall_history(const LabelledViews& views, const CArmHistory& history) {
   const IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
       return fail(Reason::bad_value,
                   "a machine's history serves only images whose pixel size and source distance are known");
-  std::vector<MachineShot> earlier;
-  std::ranges::copy_if(machine.shots, std::back_inserter(earlier), [&](const MachineShot& shot) {
+  std::vector<HistoryEntry> earlier;
+  std::ranges::copy_if(history.entries, std::back_inserter(earlier), [&](const HistoryEntry& entry) {
     return std::ranges::none_of(views, [&](const LabelledView& view) {
-      return view.exposure->acquisition.instance_key == shot.picture;
+      return view.xray_image->acquisition.instance_key == entry.image;
     });
   });
-  return knowledge_of(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_machine());
+  return learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
 }
 
 /// What these views add to their C-arm's history; nothing where their residuals contradict the noise model.
-std::vector<MachineShot> new_shots(const CaseCalibration& calibration, const CommonPrior& common) {
-  std::vector<MachineShot> shots;
-  if (calibration.variance_scale != 1) return shots;
+std::vector<HistoryEntry> new_entries(const CaseCalibration& calibration, const CommonPrior& common) {
+  std::vector<HistoryEntry> entries;
+  if (calibration.variance_scale != 1) return entries;
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
     ViewFiducials view = fiducials_of(calibration.images[i]);
     view.fiducials = calibration.fiducials[i];
-    if (const auto shot = shot_of(view, calibration.images[i].exposure->acquisition.instance_key, common))
-      shots.push_back(*shot);
+    if (const auto entry =
+            history_entry_of(view, calibration.images[i].xray_image->acquisition.instance_key, common))
+      entries.push_back(*entry);
   }
-  return shots;
+  return entries;
 }
 
 /// Mean place of the balls that serve in any view.
@@ -69,25 +70,25 @@ Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
 
 Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
                                      const RunOptions& options) {
-  std::optional<MachineKnowledge> machine;
-  if (options.machine) {
-    const auto recalled = recall_machine(views, *options.machine);
+  std::optional<LearnedIntrinsics> history;
+  if (options.history) {
+    const auto recalled = recall_history(views, *options.history);
     if (!recalled) return tl::unexpected<Failure>(recalled.error());
-    machine = *recalled;
+    history = *recalled;
   }
   std::vector<ViewFiducials> fiducials;
   for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
   CalibrationOptions how;
   how.common = common_prior(given.calibrator);
-  if (machine) {
-    how.common.machine = machine->prior;
+  if (history) {
+    how.common.c_arm = history->prior;
     for (std::size_t i = 0; i < views.size(); ++i)
-      fiducials[i].prior = known_prior(fiducials[i].prior, *machine, views[i].fiducials.mirrored);
+      fiducials[i].prior = learned_prior(fiducials[i].prior, *history, views[i].fiducials.mirrored);
   }
   return (options.method == Method::paper ? calibrate_paper(fiducials, how) : calibrate(fiducials, how))
       .and_then([&](CalibrationResult result) {
         return check_views_apart(result.views, centre_of(result)).map([&] {
-          return CaseCalibration{std::move(result), {}, machine, {}, {}};
+          return CaseCalibration{std::move(result), {}, history, {}, {}};
         });
       });
 }
@@ -102,7 +103,7 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
     return tl::unexpected(std::move(refusal));
   }
   calibration->images = std::move(views);
-  if (options.machine) calibration->shots = new_shots(*calibration, common_prior(given.calibrator));
+  if (options.history) calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
   return *std::move(calibration);
 }
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/calibration/machine.h"
 #include "helicarm/pipeline/stages.h"
 
 namespace helicarm {
@@ -13,9 +13,9 @@ namespace helicarm {
 /// The views of a case, calibrated together, with the images they belong to: all that points are observed and
 /// located in. Held, it serves any number of picks and poses.
 struct CaseCalibration : CalibrationResult {
-  std::vector<LabelledView> images;         ///< one for each of `views`
-  std::optional<MachineKnowledge> machine;  ///< of the C-arm's history, where one was given
-  std::vector<MachineShot> shots;           ///< what these views add to it
+  std::vector<LabelledView> images;          ///< one for each of `views`
+  std::optional<LearnedIntrinsics> history;  ///< of the C-arm's history, where one was given
+  std::vector<HistoryEntry> entries;         ///< what these views add to it
   Timing timing_ms;
 };
 

@@ -22,7 +22,7 @@ struct CaseView {
   std::string name;
   std::filesystem::path image;
   std::optional<int> frame;                          ///< 1-based; needed only if the file has several
-  std::optional<std::filesystem::path> plate_image;  ///< the plate was shot apart
+  std::optional<std::filesystem::path> plate_image;  ///< the plate was acquisition apart
   std::optional<std::filesystem::path> map;          ///< the distortion is known
   std::optional<bool> mirrored;                      ///< what the C-arm is known to do
   Poses poses;                                       ///< at the moment of the exposure

@@ -19,7 +19,7 @@ void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, co
 std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   for (const ViewResult& view : views) {
-    if (view.exposure) append(warnings, view.exposure->warnings, view.name);
+    if (view.xray_image) append(warnings, view.xray_image->warnings, view.name);
     if (view.rectification) append(warnings, view.rectification->warnings, view.name);
     if (view.found) append(warnings, view.found->warnings, view.name);
   }
@@ -49,8 +49,8 @@ Result begun(const Case& given, const CaseCalibration& calibration, const RunOpt
   Result result = begun(given, options, std::move(views));
   append(result.warnings, calibration.warnings);
   result.joint_covariance = calibration.joint_covariance;
-  result.machine = calibration.machine;
-  result.shots = calibration.shots;
+  result.history = calibration.history;
+  result.entries = calibration.entries;
   result.timing_ms = calibration.timing_ms;
   return result;
 }

@@ -84,7 +84,7 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   const auto uid_of = [](const ViewResult& view) {
-    return view.exposure ? view.exposure->acquisition.uid_key : std::string();
+    return view.xray_image ? view.xray_image->acquisition.uid_key : std::string();
   };
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
@@ -124,7 +124,7 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
   bool all_mirrored = true;
   for (std::size_t i = 0; i < result.views.size(); ++i)
     all_mirrored &= result.views[i].found->mirrored && !given.views[i].mirrored &&
-                    !result.views[i].exposure->acquisition.flip_hint;
+                    !result.views[i].xray_image->acquisition.flip_hint;
   if (all_mirrored)
     warnings.push_back({Reason::tag_disagrees,
                         "all images look mirrored and no file says so: is the calibrator's file mirrored?",

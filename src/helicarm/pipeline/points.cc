@@ -14,11 +14,11 @@ namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
 
-Expected<SeenPoint> see_pick(const Pick& pick, const LabelledView& image, const View& camera,
-                             const Eigen::Vector3d& centre) {
+Expected<ImagePoint> see_pick(const Pick& pick, const LabelledView& image, const View& camera,
+                              const Eigen::Vector3d& centre) {
   const DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
-    auto seen = snap_to_ball(*image.exposure, map, camera, camera.depth(centre), pick.uv_raw,
+    auto seen = snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
                              pick.diameter_mm, image.rectification.noise);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
@@ -36,8 +36,8 @@ void check_inside(const Pick& pick, const DistortionMap& map) {
 }
 
 /// The dots of plate and calibrator, for a target's fit to leave out.
-std::vector<Disc> discs_of(const LabelledView& image, const View& camera,
-                           const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
+std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
+                                const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
   constexpr double rim_share = 0.1;  // of the radius: the blur of the ball's edge
   constexpr double rim_px = 1.5;     // of a plate's dot
   std::vector<Disc> discs;
@@ -62,7 +62,7 @@ struct Task {
 std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) {
   const std::size_t views = given.views.size();
   const auto add = [&](const std::string& name, PointSource source, std::optional<Bone> moves_with) {
-    points.push_back({name, source, moves_with, std::vector<std::optional<SeenPoint>>(views), {}, 0, {}});
+    points.push_back({name, source, moves_with, std::vector<std::optional<ImagePoint>>(views), {}, 0, {}});
     return points.size() - 1;
   };
   std::vector<Task> tasks;
@@ -96,23 +96,23 @@ std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
 Expected<Located> intersect_rays(const PointResult& point, const Case& given,
                                  const Calibration& calibration) {
   const auto anchor = anchor_of(point, given);
-  std::vector<PointPicture> pictures;
+  std::vector<PointObservation> observations;
   std::vector<DatedView> views;
   for (std::size_t i = 0; i < point.seen.size(); ++i) {
     if (!point.seen[i]) continue;
     const Poses& poses = given.views[i].poses;
     const double sigma = point.seen[i]->sigma_px;
-    pictures.push_back({i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
-                        anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
+    observations.push_back({i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
+                            anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
     views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
   }
-  auto located = locate(point.name, point.source, pictures, calibration);
+  auto located = locate(point.name, point.source, observations, calibration);
   // Readings of their own move each exposure's ray by itself; shared ones move all rays alike.
   if (located && anchor && given.tracker.samples == Samples::independent) {
-    for (PointPicture& picture : pictures)
-      picture.anchor_covariance =
-          noise_of_poses(located->point_in_anchor, *anchor, given.views[picture.view].poses, given.tracker);
-    located = locate(point.name, point.source, pictures, calibration);
+    for (PointObservation& observation : observations)
+      observation.anchor_covariance = noise_of_poses(located->point_in_anchor, *anchor,
+                                                     given.views[observation.view].poses, given.tracker);
+    located = locate(point.name, point.source, observations, calibration);
   }
   return located.map([&](const LocatedPoint& found) { return Located{found, anchor, views}; });
 }
@@ -135,10 +135,11 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
     const LabelledView& image = calibration.images[task.view];
     const View& camera = calibration.views[task.view].view;
     const auto seen =
-        task.pick ? see_pick(*task.pick, image, camera, centre)
-                  : find_target(*image.exposure, image.rectification.map, camera, *task.target,
-                                discs_of(image, camera, calibration.fiducials[task.view], given.calibrator),
-                                image.rectification.noise);
+        task.pick
+            ? see_pick(*task.pick, image, camera, centre)
+            : find_target(*image.xray_image, image.rectification.map, camera, *task.target,
+                          detections_of(image, camera, calibration.fiducials[task.view], given.calibrator),
+                          image.rectification.noise);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

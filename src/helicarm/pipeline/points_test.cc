@@ -14,9 +14,9 @@ RigidTransform motion(double x, double y, double z, double degrees, const Eigen:
 }
 
 /// A frontal and a lateral view, and a femur that bends between them.
-class TwoExposures : public testing::Test {
+class TwoViews : public testing::Test {
  protected:
-  TwoExposures() {
+  TwoViews() {
     CalibratedView frontal;
     frontal.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 0, {0, 0, 1})};
     CalibratedView lateral;
@@ -35,11 +35,11 @@ class TwoExposures : public testing::Test {
     return *calibrator_from(Bone::femur, given.views[view].poses) * point_in_femur;
   }
 
-  PointResult seen_point(std::optional<Bone> moves_with) const {
+  PointResult image_point(std::optional<Bone> moves_with) const {
     PointResult point{"FS", PointSource::pick, moves_with, {}, {}, 0, {}};
     for (std::size_t i = 0; i < 2; ++i) {
       const Eigen::Vector2d uv = calibration.views[i].view.project(in_calibrator(i));
-      point.seen.emplace_back(SeenPoint{uv, uv, 0.1});
+      point.seen.emplace_back(ImagePoint{uv, uv, 0.1});
     }
     return point;
   }
@@ -49,8 +49,8 @@ class TwoExposures : public testing::Test {
   Eigen::Vector3d point_in_femur{12, -7, 30};
 };
 
-TEST_F(TwoExposures, RaysMeetInTheFrameOfTheBoneThatMoved) {
-  std::vector<PointResult> points = {seen_point(Bone::femur)};
+TEST_F(TwoViews, RaysMeetInTheFrameOfTheBoneThatMoved) {
+  std::vector<PointResult> points = {image_point(Bone::femur)};
   EXPECT_TRUE(locate_points(given, calibration, points).empty());
   ASSERT_TRUE(points[0].place);
   EXPECT_LT((*points[0].place->in_femur - point_in_femur).norm(), 1e-6);
@@ -58,18 +58,18 @@ TEST_F(TwoExposures, RaysMeetInTheFrameOfTheBoneThatMoved) {
   EXPECT_LT(points[0].ray_gap_mm, 1e-6);
 }
 
-TEST_F(TwoExposures, RaysThatMissAreDoubted) {
-  std::vector<PointResult> points = {seen_point(std::nullopt)};
+TEST_F(TwoViews, RaysThatMissInflateTheCovariance) {
+  std::vector<PointResult> points = {image_point(std::nullopt)};
   const auto warnings = locate_points(given, calibration, points);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].reason, Reason::residual_too_large);
   EXPECT_GT(points[0].place->covariance_in_calibrator.trace(), 0.1);
 }
 
-TEST_F(TwoExposures, RaysMayMissByTheNoiseOfTheTracker) {
+TEST_F(TwoViews, RaysMayMissByTheNoiseOfTheTracker) {
   // The second exposure's reading of the femur is 0.7 mm wrong: far more than the pixels explain.
   given.views[1].poses.tracker_from_femur->translation += Eigen::Vector3d(0.4, 0.4, 0.4);
-  PointResult seen = seen_point(Bone::femur);
+  PointResult seen = image_point(Bone::femur);
   given.views[1].poses.tracker_from_femur->translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
   std::vector<PointResult> points = {seen};
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
@@ -81,9 +81,9 @@ TEST_F(TwoExposures, RaysMayMissByTheNoiseOfTheTracker) {
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
 }
 
-TEST_F(TwoExposures, BoneWithoutPosesIsTakenAsFixed) {
+TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
   given.views[1].poses = given.views[0].poses;
-  std::vector<PointResult> points = {seen_point(Bone::femur)};
+  std::vector<PointResult> points = {image_point(Bone::femur)};
   given.views[1].poses = {};
   const auto warnings = locate_points(given, calibration, points);
   ASSERT_EQ(warnings.size(), 1u);
@@ -91,8 +91,8 @@ TEST_F(TwoExposures, BoneWithoutPosesIsTakenAsFixed) {
   EXPECT_TRUE(points[0].place);
 }
 
-TEST_F(TwoExposures, PointSeenOnceIsNotLocated) {
-  std::vector<PointResult> points = {seen_point(Bone::femur)};
+TEST_F(TwoViews, PointSeenOnceIsNotLocated) {
+  std::vector<PointResult> points = {image_point(Bone::femur)};
   points[0].seen[1].reset();
   locate_points(given, calibration, points);
   EXPECT_FALSE(points[0].place);

@@ -8,34 +8,34 @@ namespace {
 
 // A source distance about 1000 mm that is true to about 1 %; a central ray within 12 mm of the middle; and
 // sag of up to 2 mm in the distance and 6 mm in the place between two views.
-constexpr Departure focal_mm{10, 1.4};
-constexpr Departure principal_mm{7, 4.2};
+constexpr IntrinsicsVariation focal_mm{10, 1.4};
+constexpr IntrinsicsVariation principal_mm{7, 4.2};
 constexpr double field_mm = 230;  // a receiver's width, where the pixel's size is not known
 constexpr double aspect_sigma = 0.001;
 
 /// Size of a rectified pixel on the receiver.
-std::optional<double> receiver_pixel_mm(const Exposure& exposure, const DistortionMap& map) {
+std::optional<double> receiver_pixel_mm(const XrayImage& xray_image, const DistortionMap& map) {
   if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
     return map.rectified_pixel_mm;
-  if (const auto& pixel = exposure.acquisition.pixel_mm) return pixel->mean();
+  if (const auto& pixel = xray_image.acquisition.pixel_mm) return pixel->mean();
   return std::nullopt;
 }
 
 }  // namespace
 
-IntrinsicsPrior intrinsics_prior(const Exposure& exposure, const DistortionMap& map) {
-  const auto pixel_mm = receiver_pixel_mm(exposure, map);
-  const auto& distance_mm = exposure.acquisition.source_detector_mm;
-  const auto& file_pixel = exposure.acquisition.pixel_mm;
+IntrinsicsPrior intrinsics_prior(const XrayImage& xray_image, const DistortionMap& map) {
+  const auto pixel_mm = receiver_pixel_mm(xray_image, map);
+  const auto& distance_mm = xray_image.acquisition.source_detector_mm;
+  const auto& file_pixel = xray_image.acquisition.pixel_mm;
   IntrinsicsPrior prior;
-  prior.unit_px = pixel_mm ? 1 / *pixel_mm : exposure.pixels.width() / field_mm;
+  prior.unit_px = pixel_mm ? 1 / *pixel_mm : xray_image.pixels.width() / field_mm;
   if (pixel_mm && distance_mm) prior.focal_px = *distance_mm / *pixel_mm;
-  prior.principal_px = {(exposure.pixels.width() - 1) / 2.0, (exposure.pixels.height() - 1) / 2.0};
+  prior.principal_px = {(xray_image.pixels.width() - 1) / 2.0, (xray_image.pixels.height() - 1) / 2.0};
   prior.aspect =
-      Belief{map.is_identity() && file_pixel ? file_pixel->y() / file_pixel->x() : 1, aspect_sigma};
+      NormalPrior{map.is_identity() && file_pixel ? file_pixel->y() / file_pixel->x() : 1, aspect_sigma};
   return prior;
 }
 
-MachinePrior unknown_machine() { return {focal_mm, principal_mm}; }
+CArmPrior unknown_c_arm() { return {focal_mm, principal_mm}; }
 
 }  // namespace helicarm

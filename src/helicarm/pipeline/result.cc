@@ -77,8 +77,8 @@ Json intrinsics_of(const ViewResult& view) {
   const DistortionMap& map = view.rectification->map;
   std::optional<double> pixel_mm;
   if (map.rectified_plane == RectifiedPlane::detector) pixel_mm = map.rectified_pixel_mm;
-  if (!pixel_mm && view.exposure && view.exposure->acquisition.pixel_mm)
-    pixel_mm = view.exposure->acquisition.pixel_mm->y();
+  if (!pixel_mm && view.xray_image && view.xray_image->acquisition.pixel_mm)
+    pixel_mm = view.xray_image->acquisition.pixel_mm->y();
   return {{"fx_px", k.fx},
           {"fy_px", k.fy},
           {"u0", k.u0},
@@ -89,8 +89,9 @@ Json intrinsics_of(const ViewResult& view) {
 
 Json json_of(const ViewResult& view) {
   Json json = {{"name", view.name}};
-  json["image_size"] =
-      view.exposure ? Json({view.exposure->pixels.width(), view.exposure->pixels.height()}) : Json(nullptr);
+  json["image_size"] = view.xray_image
+                           ? Json({view.xray_image->pixels.width(), view.xray_image->pixels.height()})
+                           : Json(nullptr);
   json["rectification"] = view.rectification ? json_of(*view.rectification) : Json(nullptr);
   json["fiducials"] = Json::array();
   if (view.found)
@@ -225,15 +226,15 @@ Json to_json(const Failure& failure) {
 
 namespace {
 
-Json json_of(const std::optional<MachineKnowledge>& machine) {
-  if (!machine) return nullptr;
-  const auto departure = [](const Departure& d) {
+Json json_of(const std::optional<LearnedIntrinsics>& history) {
+  if (!history) return nullptr;
+  const auto variation = [](const IntrinsicsVariation& d) {
     return Json{{"common_mm", d.common}, {"of_view_mm", d.of_view}};
   };
-  return Json{{"focal_mm", machine->mean_mm.x()},
-              {"principal_mm", vector(machine->mean_mm.tail<2>())},
-              {"focal_sigma", departure(*machine->prior.focal)},
-              {"principal_sigma", departure(*machine->prior.principal)}};
+  return Json{{"focal_mm", history->mean_mm.x()},
+              {"principal_mm", vector(history->mean_mm.tail<2>())},
+              {"focal_sigma", variation(*history->prior.focal)},
+              {"principal_sigma", variation(*history->prior.principal)}};
 }
 
 }  // namespace
@@ -255,7 +256,7 @@ Json to_json(const Result& result) {
   json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
                                                   ? matrix(result.joint_covariance)
                                                   : Json(nullptr)}};
-  json["machine"] = json_of(result.machine);
+  json["machine"] = json_of(result.history);
   json["points"] = list_of(result.points, result.views);
   json["accuracy"] = json_of(result.accuracy);
   json["tunnels"] = list_of(result.tunnels);

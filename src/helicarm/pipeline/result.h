@@ -8,8 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrated_view.h"
-#include "helicarm/calibration/machine.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/fiducials/find_target.h"
@@ -19,7 +19,7 @@
 #include "helicarm/pipeline/accuracy.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/verification/verify.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
@@ -28,13 +28,13 @@ struct RunOptions {
   std::optional<double>
       max_error_mm;      ///< refuse (uncertain) a point whose error exceeds this in more than 5 % of cases
   unsigned threads = 0;  ///< 0: all cores
-  std::optional<Machine> machine = {};  ///< the C-arm's history, which then serves as a prior
+  std::optional<CArmHistory> history = {};  ///< the C-arm's history, which then serves as a prior
 };
 
 /// All that the stages made of one exposure; what was not reached is absent.
 struct ViewResult {
   std::string name;
-  std::shared_ptr<const Exposure> exposure;
+  std::shared_ptr<const XrayImage> xray_image;
   std::optional<Rectification> rectification;
   std::optional<LabelledFiducials> found;  ///< after calibration with its residuals and rejections
   std::optional<CalibratedView> calibrated;
@@ -45,8 +45,8 @@ struct PointResult {
   std::string name;
   PointSource source;
   std::optional<Bone> moves_with;
-  std::vector<std::optional<SeenPoint>> seen;  ///< one per view
-  std::optional<GuidedPoint> place;
+  std::vector<std::optional<ImagePoint>> seen;  ///< one per view
+  std::optional<PointInFrames> place;
   double ray_gap_mm = 0;
   std::optional<Failure> reason;  ///< of an absent place
 };
@@ -78,9 +78,9 @@ struct Result {
   std::vector<Warning> notes;  ///< what holds for any data of this kind
   CalibratorSource calibrator;
   std::vector<ViewResult> views;
-  Eigen::MatrixXd joint_covariance;         ///< of all views' parameters; as CalibratedView::covariance
-  std::optional<MachineKnowledge> machine;  ///< what its history told, where one was given
-  std::vector<MachineShot> shots;           ///< what this case adds to it
+  Eigen::MatrixXd joint_covariance;          ///< of all views' parameters; as CalibratedView::covariance
+  std::optional<LearnedIntrinsics> history;  ///< what its history told, where one was given
+  std::vector<HistoryEntry> entries;         ///< what this case adds to it
   std::vector<PointResult> points;
   Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;

@@ -15,7 +15,7 @@ Result two_views() {
   for (const char* name : {"AP", "LAT"}) {
     ViewResult view;
     view.name = name;
-    view.exposure = std::make_shared<const Exposure>(Exposure{name, Image<float>(8, 6), 0, 4095, {}, {}});
+    view.xray_image = std::make_shared<const XrayImage>(XrayImage{name, Image<float>(8, 6), 0, 4095, {}, {}});
     view.rectification = Rectification{};
     view.found = LabelledFiducials{};
     Fiducial fiducial{"P1", Eigen::Vector3d::Zero()};
@@ -30,8 +30,8 @@ Result two_views() {
 
 TEST(ResultJson, HoldsEveryKeyOfTheContract) {
   Result result = two_views();
-  PointResult point{"FS", PointSource::pick, {}, {SeenPoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
-  point.place = GuidedPoint{};
+  PointResult point{"FS", PointSource::pick, {}, {ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
+  point.place = PointInFrames{};
   result.points.push_back(point);
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
   result.verifications.push_back({"drill", LineError{{1.0, {}}, 1, 2, 3}, LineError{{1.0, {}}, 1, 2, 3}});

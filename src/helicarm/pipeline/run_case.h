@@ -6,7 +6,7 @@
 
 namespace helicarm {
 
-/// The paper's method from pictures to tunnels. Data that allow no trustworthy answer give a result that says
+/// The paper's method from images to tunnels. Data that allow no trustworthy answer give a result that says
 /// so
 /// (`Result::failure`) and keeps what was known until then; only input that cannot be used (exit code 2)
 /// fails.

@@ -121,39 +121,39 @@ TEST_F(SimulatedNavigation, AnswerDoesNotDependOnTheThreads) {
     EXPECT_EQ(one->points[i].place->in_calibrator, two->points[i].place->in_calibrator);
 }
 
-TEST_F(SimulatedNavigation, SamePictureTwiceIsRefused) {
+TEST_F(SimulatedNavigation, SameImageTwiceIsRefused) {
   given_.views[1].image = given_.views[0].image;
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::views_too_close);
-  EXPECT_TRUE(result->views[0].exposure);
+  EXPECT_TRUE(result->views[0].xray_image);
 }
 
-std::shared_ptr<const Exposure> exposure_with(const std::string& instance_key, const std::string& uid_key) {
-  Exposure exposure;
-  exposure.pixels = Image<float>(64, 64);
-  exposure.highest = 4095;
-  exposure.acquisition.instance_key = instance_key;
-  exposure.acquisition.uid_key = uid_key;
-  return std::make_shared<const Exposure>(std::move(exposure));
+std::shared_ptr<const XrayImage> image_with(const std::string& instance_key, const std::string& uid_key) {
+  XrayImage xray_image;
+  xray_image.pixels = Image<float>(64, 64);
+  xray_image.highest = 4095;
+  xray_image.acquisition.instance_key = instance_key;
+  xray_image.acquisition.uid_key = uid_key;
+  return std::make_shared<const XrayImage>(std::move(xray_image));
 }
 
 TEST(CheckImages, BlankImageTwiceIsBlankFirst) {
-  const ReadView view{{"AP"}, exposure_with("one", "")};
+  const ReadView view{{"AP"}, image_with("one", "")};
   const auto checked = check_images_belong_together({view, view});
   ASSERT_FALSE(checked.has_value());
   EXPECT_EQ(checked.error().reason, Reason::blank_image);
 }
 
 TEST(CheckImages, DifferentImagesOfOneUidAreTwoWithAWarning) {
-  const ReadView ap{{"AP"}, exposure_with("one", "same")}, lat{{"LAT"}, exposure_with("other", "same")};
+  const ReadView ap{{"AP"}, image_with("one", "same")}, lat{{"LAT"}, image_with("other", "same")};
   EXPECT_TRUE(check_images_belong_together({ap, lat}).has_value());
   const auto warnings = reused_uids({reported(ap), reported(lat)});
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings.front().reason, Reason::uid_reused);
   EXPECT_TRUE(
-      reused_uids({reported(ap), reported(ReadView{{"LAT"}, exposure_with("other", "another")})}).empty());
+      reused_uids({reported(ap), reported(ReadView{{"LAT"}, image_with("other", "another")})}).empty());
 }
 
 TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {
@@ -178,7 +178,7 @@ TEST_F(SimulatedNavigation, TunnelFromAPointToItselfIsRefused) {
   EXPECT_EQ(result->failure->reason, Reason::bad_tunnel);
 }
 
-TEST_F(SimulatedNavigation, ClickOutsideThePictureIsBadInput) {
+TEST_F(SimulatedNavigation, ClickOutsideTheImageIsBadInput) {
   given_.picks[0].uv_raw = {700, 100};
   const auto result = run_case(given_, {});
   ASSERT_FALSE(result.has_value());
@@ -186,7 +186,7 @@ TEST_F(SimulatedNavigation, ClickOutsideThePictureIsBadInput) {
   EXPECT_EQ(result.error().view, given_.picks[0].view);
 }
 
-TEST_F(SimulatedNavigation, MissingPictureIsBadInput) {
+TEST_F(SimulatedNavigation, MissingImageIsBadInput) {
   given_.views[1].image = folder_ / "nowhere.dcm";
   const auto result = run_case(given_, {});
   ASSERT_FALSE(result.has_value());

@@ -8,7 +8,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
 #include "helicarm/rectification/usable.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm {
 namespace {
@@ -39,25 +39,25 @@ OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expecte
   return next;
 }
 
-Expected<DistortionMap> map_of(const Exposure& exposure, const CaseView& from,
+Expected<DistortionMap> map_of(const XrayImage& xray_image, const CaseView& from,
                                const std::optional<Plate>& plate, Method method) {
   if (from.map)
     return read_json(*from.map).and_then(
         [&](const Json& json) { return distortion_map_from_json(json, from.map->filename().string()); });
   if (from.plate_image)
-    return read_exposure(*from.plate_image, from.name, std::nullopt)
-        .and_then([&](const Exposure& apart) {
+    return read_xray_image(*from.plate_image, from.name, std::nullopt)
+        .and_then([&](const XrayImage& apart) {
           return rectify(apart, *plate, {method, {}});
         })
         .map([](const Rectification& apart) { return apart.map; });
-  return flat_panel_map(exposure);
+  return flat_panel_map(xray_image);
 }
 
-Expected<Rectification> rectify_view(const Exposure& exposure, const CaseView& from,
+Expected<Rectification> rectify_view(const XrayImage& xray_image, const CaseView& from,
                                      const std::optional<Plate>& plate, Method method) {
-  if (plate && !from.map && !from.plate_image) return rectify(exposure, *plate, {method, {}});
-  return map_of(exposure, from, plate, method).and_then([&](const DistortionMap& map) {
-    return with_map(exposure, map, plate);
+  if (plate && !from.map && !from.plate_image) return rectify(xray_image, *plate, {method, {}});
+  return map_of(xray_image, from, plate, method).and_then([&](const DistortionMap& map) {
+    return with_map(xray_image, map, plate);
   });
 }
 
@@ -73,8 +73,8 @@ bool is_plate_of_other_kind(const DetectedView& view, const Calibrator& calibrat
   Rectification inverted = view.rectification;
   inverted.metal = opposite(inverted.metal);
   inverted.other_dots.reset();
-  const auto labels = label_fiducials(*view.exposure, inverted, detect_candidates(*view.exposure, inverted),
-                                      calibrator, options);
+  const auto labels = label_fiducials(*view.xray_image, inverted,
+                                      detect_candidates(*view.xray_image, inverted), calibrator, options);
   return labels || is_ambiguous(labels);
 }
 
@@ -90,26 +90,26 @@ std::optional<double> common_radius_bias(const std::vector<Expected<LabelledFidu
 
 ViewResult reported(const NamedView& view) { return {view.name, {}, {}, {}, {}}; }
 
-ViewResult reported(const ReadView& view) { return {view.name, view.exposure, {}, {}, {}}; }
+ViewResult reported(const ReadView& view) { return {view.name, view.xray_image, {}, {}, {}}; }
 
 ViewResult reported(const RectifiedView& view) {
-  return {view.name, view.exposure, view.rectification, {}, {}};
+  return {view.name, view.xray_image, view.rectification, {}, {}};
 }
 
 ViewResult reported(const LabelledView& view) {
-  return {view.name, view.exposure, view.rectification, view.fiducials, {}};
+  return {view.name, view.xray_image, view.rectification, view.fiducials, {}};
 }
 
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      const Acquisition& a = views[j].exposure->acquisition;
-      const Acquisition& b = views[i].exposure->acquisition;
+      const Acquisition& a = views[j].xray_image->acquisition;
+      const Acquisition& b = views[i].xray_image->acquisition;
       if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
         return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
                                                           views[j].name, views[i].name));
       if (!a.instance_key.empty() && a.instance_key == b.instance_key)
-        return check_usable(*views[i].exposure).and_then([&]() -> Expected<void> {
+        return check_usable(*views[i].xray_image).and_then([&]() -> Expected<void> {
           return fail(Reason::views_too_close,
                       fmt::format("{} and {} are the same image", views[j].name, views[i].name));
         });
@@ -122,8 +122,8 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
   for (const CaseView& view : given.views) views.push_back({view.name});
   auto images = of_each(views.size(), options.threads, [&](std::size_t i) {
     const CaseView& from = given.views[i];
-    return read_exposure(from.image, from.name, from.frame).map([](Exposure exposure) {
-      return std::make_shared<const Exposure>(std::move(exposure));
+    return read_xray_image(from.image, from.name, from.frame).map([](XrayImage xray_image) {
+      return std::make_shared<const XrayImage>(std::move(xray_image));
     });
   });
   return joined<ReadView>(std::move(views), std::move(images))
@@ -139,7 +139,7 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
                                                     const RunOptions& options) {
   auto rectified = of_each(views.size(), options.threads, [&](std::size_t i) {
-    return rectify_view(*views[i].exposure, given.views[i], given.plate, options.method);
+    return rectify_view(*views[i].xray_image, given.views[i], given.plate, options.method);
   });
   return joined<RectifiedView>(std::move(views), std::move(rectified));
 }
@@ -147,7 +147,7 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case&,
                                                      const RunOptions& options) {
   auto candidates = of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<Candidates> {
-    return detect_candidates(*views[i].exposure, views[i].rectification);
+    return detect_candidates(*views[i].xray_image, views[i].rectification);
   });
   return joined<DetectedView>(std::move(views), std::move(candidates));
 }
@@ -156,7 +156,7 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
                                                  const RunOptions& options) {
   const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
     const FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
-    auto labels = label_fiducials(*views[i].exposure, views[i].rectification, views[i].candidates,
+    auto labels = label_fiducials(*views[i].xray_image, views[i].rectification, views[i].candidates,
                                   given.calibrator, how);
     if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given.calibrator, how))
       labels = fail(

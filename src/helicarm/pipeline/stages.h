@@ -17,7 +17,7 @@ struct NamedView {
   std::string name;
 };
 struct ReadView : NamedView {
-  std::shared_ptr<const Exposure> exposure;
+  std::shared_ptr<const XrayImage> xray_image;
 };
 struct RectifiedView : ReadView {
   Rectification rectification;
@@ -45,7 +45,7 @@ template <class T>
 using OrRefusal = tl::expected<T, Refusal>;
 
 /// The images' files. Refuses `patient_mismatch` where two images name different patients or studies, and
-/// `views_too_close` where two are one and the same image; fails as `read_exposure`.
+/// `views_too_close` where two are one and the same image; fails as `read_xray_image`.
 OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options);
 
 /// As `read_views` refuses.

@@ -107,13 +107,13 @@ Eigen::MatrixXd DistortionMap::covariance_px2(std::span<const Vector2d> rectifie
   return covariance;
 }
 
-std::optional<Vector2d> rectified_in_picture(const DistortionMap& map, const Vector2d& raw) {
+std::optional<Vector2d> rectified_in_image(const DistortionMap& map, const Vector2d& raw) {
   return map.shows(raw) ? map.rectified_from_raw(raw) : std::nullopt;
 }
 
-std::optional<Vector2d> raw_in_picture(const DistortionMap& map, const Vector2d& rectified) {
+std::optional<Vector2d> raw_in_image(const DistortionMap& map, const Vector2d& rectified) {
   const Vector2d raw = map.raw_from_rectified(rectified);
-  const auto back = rectified_in_picture(map, raw);
+  const auto back = rectified_in_image(map, raw);
   return back && (*back - rectified).norm() < 1e-6 ? std::optional(raw) : std::nullopt;
 }
 

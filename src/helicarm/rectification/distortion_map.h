@@ -41,10 +41,10 @@ struct DistortionMap {
   Eigen::Vector2d hull_high = Eigen::Vector2d::Zero();
   std::optional<double> rectified_pixel_mm;
   std::optional<RectifiedPlane> rectified_plane;
-  int width = 0;  ///< of the picture it belongs to
+  int width = 0;  ///< of the image it belongs to
   int height = 0;
 
-  /// Whether a raw place lies on the picture.
+  /// Whether a raw place lies on the image.
   bool shows(const Eigen::Vector2d& raw) const;
   bool is_identity() const { return order == 0; }
   Eigen::Vector2d raw_from_rectified(const Eigen::Vector2d& rectified) const;
@@ -58,10 +58,10 @@ struct DistortionMap {
   Eigen::MatrixXd covariance_px2(std::span<const Eigen::Vector2d> rectified) const;
 };
 
-/// Places carried across the map, and nothing for those off the picture or where the map folds: it is not
+/// Places carried across the map, and nothing for those off the image or where the map folds: it is not
 /// extrapolated, and what is given leads back.
-std::optional<Eigen::Vector2d> rectified_in_picture(const DistortionMap& map, const Eigen::Vector2d& raw);
-std::optional<Eigen::Vector2d> raw_in_picture(const DistortionMap& map, const Eigen::Vector2d& rectified);
+std::optional<Eigen::Vector2d> rectified_in_image(const DistortionMap& map, const Eigen::Vector2d& raw);
+std::optional<Eigen::Vector2d> raw_in_image(const DistortionMap& map, const Eigen::Vector2d& rectified);
 
 DistortionMap identity_map(int width, int height, std::optional<double> pixel_mm);
 

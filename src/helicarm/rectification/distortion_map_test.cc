@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Pincushion of some 15 px at the edge of a 512 px picture, a quadratic part and three kernels.
+/// Pincushion of some 15 px at the edge of a 512 px image, a quadratic part and three kernels.
 DistortionMap curved_map() {
   DistortionMap map;
   map.model = "for this test";
@@ -97,24 +97,24 @@ TEST(DistortionMap, SigmaIsTheBasisRowsForm) {
   EXPECT_EQ(map.sigma_px({100, 300}), 0);
 }
 
-TEST(DistortionMap, CarriesNothingThatIsOffThePicture) {
+TEST(DistortionMap, CarriesNothingThatIsOffTheImage) {
   const DistortionMap map = curved_map();
   for (const Vector2d& raw : {Vector2d(-0.4, 100), Vector2d(511.4, 511.4), Vector2d(300, 200)}) {
-    const auto there = rectified_in_picture(map, raw);
+    const auto there = rectified_in_image(map, raw);
     ASSERT_TRUE(there);
-    const auto back = raw_in_picture(map, *there);
+    const auto back = raw_in_image(map, *there);
     ASSERT_TRUE(back);
     EXPECT_LT((*back - raw).norm(), 1e-9);
   }
   for (const Vector2d& off : {Vector2d(-0.6, 100), Vector2d(100, 511.6), Vector2d(-300, 5000)})
-    EXPECT_FALSE(rectified_in_picture(map, off));
-  EXPECT_FALSE(raw_in_picture(map, {530, 530}));
-  EXPECT_FALSE(raw_in_picture(map, {1e6, -1e6}));
-  DistortionMap folded = map;  // x beyond its fold leads back into the picture
+    EXPECT_FALSE(rectified_in_image(map, off));
+  EXPECT_FALSE(raw_in_image(map, {530, 530}));
+  EXPECT_FALSE(raw_in_image(map, {1e6, -1e6}));
+  DistortionMap folded = map;  // x beyond its fold leads back into the image
   folded.coefficients(3, 0) = -100;
   const Vector2d beyond = folded.centre + folded.scale * Vector2d(2, 0);
   ASSERT_TRUE(folded.shows(folded.raw_from_rectified(beyond)));
-  EXPECT_FALSE(raw_in_picture(folded, beyond));
+  EXPECT_FALSE(raw_in_image(folded, beyond));
 }
 
 TEST(IdentityMap, LeavesPointsWhereTheyAre) {

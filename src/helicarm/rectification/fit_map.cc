@@ -198,7 +198,7 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   const int least_order = options.order.value_or(1);
   if (static_cast<Index>(dots.size()) < std::max<Index>(6, term_count(least_order) + 2)) return too_few();
 
-  // First on the plate, to learn the scale and turn at the middle of the picture.
+  // First on the plate, to learn the scale and turn at the middle of the image.
   std::vector<Vector2d> places = places_of(dots);
   Frame frame = frame_of(places);
   if (!(frame.scale > 0)) return too_few();

@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// Where a plate dot is on the plate and in the raw picture.
+/// Where a plate dot is on the plate and in the raw image.
 struct Correspondence {
   Eigen::Vector2d place_mm;
   Eigen::Vector2d raw_px;

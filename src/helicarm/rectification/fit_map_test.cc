@@ -155,7 +155,7 @@ Eigen::MatrixX2d drawn_field(const std::vector<Vector2d>& places, double length,
   return covariance.llt().matrixL() * white;
 }
 
-TEST(FitMap, ErrorBetweenDotsIsAsLargeAsTold) {
+TEST(FitMap, ErrorBetweenDotsIsAsLargeAsReported) {
   constexpr int draws = 40;
   const auto dots = plate(7, pincushion);
   const auto between = plate(6, pincushion);
@@ -216,7 +216,7 @@ TEST(FitMap, OutliersAreRejectedAndNothingElse) {
   EXPECT_LT(fit->map.residual_max_px, 0.2);
 }
 
-TEST(FitMap, KeepsOutliersWhereTold) {
+TEST(FitMap, KeepsOutliersWhereReported) {
   auto dots = plate(7, pincushion);
   dots[10].raw_px += Vector2d(4, -3);
   const auto fit = fit_map(dots, side, side, fixed(3));

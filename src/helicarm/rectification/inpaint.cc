@@ -22,7 +22,7 @@ Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots) 
   }
   Image<float> filled = image;
   cv::Mat target = as_mat(filled);
-  // Patch by patch: over a whole picture of holes OpenCV's front is a list that it walks from the start.
+  // Patch by patch: over a whole image of holes OpenCV's front is a list that it walks from the start.
   cv::Mat labels;
   cv::Mat boxes;
   cv::Mat centroids;

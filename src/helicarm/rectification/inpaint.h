@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// A copy of the picture with the dots hidden: filled from their rims inwards by fast marching (2.1, step 4;
+/// A copy of the image with the dots hidden: filled from their rims inwards by fast marching (2.1, step 4;
 /// Telea 2004). For the eye only: nothing is ever measured on it.
 Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots);
 

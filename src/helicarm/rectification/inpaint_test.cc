@@ -16,24 +16,24 @@ Dot dot_at(double u, double v, double radius) {
 }
 
 TEST(Inpainted, DotOnASlopeIsFilledWithTheSlope) {
-  Image<float> picture(80, 60);
+  Image<float> image(80, 60);
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u)
-      picture(u, v) = std::hypot(u - 40.0, v - 30.0) < 5 ? 10.f : 1000.f + 4.f * float(u);
-  const Image<float> filled = inpainted(picture, {dot_at(40, 30, 5)});
+      image(u, v) = std::hypot(u - 40.0, v - 30.0) < 5 ? 10.f : 1000.f + 4.f * float(u);
+  const Image<float> filled = inpainted(image, {dot_at(40, 30, 5)});
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u) EXPECT_NEAR(filled(u, v), 1000 + 4 * u, 25) << u << ' ' << v;
 }
 
 TEST(Inpainted, PixelsAwayFromTheDotsStayAsTheyWere) {
-  Image<float> picture(80, 60);
+  Image<float> image(80, 60);
   for (int v = 0; v < 60; ++v)
-    for (int u = 0; u < 80; ++u) picture(u, v) = float((u * 37 + v * 91) % 256);
-  const Image<float> filled = inpainted(picture, {dot_at(20, 20, 4)});
+    for (int u = 0; u < 80; ++u) image(u, v) = float((u * 37 + v * 91) % 256);
+  const Image<float> filled = inpainted(image, {dot_at(20, 20, 4)});
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u)
       if (std::hypot(u - 20.0, v - 20.0) > 9) {
-        EXPECT_EQ(filled(u, v), picture(u, v));
+        EXPECT_EQ(filled(u, v), image(u, v));
       }
 }
 

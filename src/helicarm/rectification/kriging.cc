@@ -111,9 +111,10 @@ Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const Matr
     };
     double x = std::log(energy / freedom);
     for (int i = 0; i < 20; ++i) {
-      const double belief = 2 / (log_variance_sigma * log_variance_sigma);
+      const double normal_prior = 2 / (log_variance_sigma * log_variance_sigma);
       const double pull = energy * std::exp(-x);
-      x -= std::clamp((freedom - pull + belief * (x - std::log(data.variance))) / (pull + belief), -1.0, 1.0);
+      x -= std::clamp((freedom - pull + normal_prior * (x - std::log(data.variance))) / (pull + normal_prior),
+                      -1.0, 1.0);
     }
     if (misfit(x) < best.misfit) best = {length, gain, std::exp(x), misfit(x)};
   }

@@ -30,7 +30,7 @@ struct IndexedLattice {
   double pitch_px = 0;  ///< mean near the middle
 };
 
-/// Places dots on a distorted lattice, with dots missing or extra, from the pictures's geometry alone: a
+/// Places dots on a distorted lattice, with dots missing or extra, from the images's geometry alone: a
 /// regular neighbourhood is taken as the seed and grown with the local spacing. The lattice axes are the ones
 /// nearest to +u and (square) +v, or (hexagonal) 60 degrees on from it. Fewer than 5 dots in place: an empty
 /// lattice.

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm {
 namespace {
@@ -17,10 +17,10 @@ TEST(FindDotsPaper, CirclesOfTheRightSizeWithinAPixelAndAHalf) {
   std::vector<Vector2d> places;
   for (int k = 0; k < 9; ++k) places.emplace_back(50.3 + 75.4 * (k % 3), 50.6 + 75.2 * (k / 3));
   for (const Vector2d& place : places) drawn::add_ball(shade, place, 8, 0.9, 3);
-  Image<float> picture = drawn::grey(shade, 1500);
+  Image<float> image = drawn::grey(shade, 1500);
   RandomStream random(1, 1);
-  drawn::add_noise(picture, 20, random);
-  const auto dots = find_dots_paper(picture, 0, 4095, 6, 10);
+  drawn::add_noise(image, 20, random);
+  const auto dots = find_dots_paper(image, 0, 4095, 6, 10);
   EXPECT_EQ(dots.size(), places.size());
   for (const Vector2d& place : places)
     EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {

@@ -87,7 +87,7 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   Vector2d seen_middle = Vector2d::Zero();
   for (const IndexedDot& d : lattice.dots)
     seen_middle += d.index.cast<double>() / double(lattice.dots.size());
-  // Where the middle of the plate falls in the picture: an affine map from index to pixel.
+  // Where the middle of the plate falls in the image: an affine map from index to pixel.
   Eigen::Matrix<double, Eigen::Dynamic, 3> design(lattice.dots.size(), 3);
   Eigen::MatrixX2d pixels(lattice.dots.size(), 2);
   for (Eigen::Index r = 0; r < design.rows(); ++r) {

@@ -18,7 +18,7 @@ constexpr double px_per_mm = 2;
 const Vector2d middle(255.5, 255.5);
 
 /// Pixels of all the plate's dots, the plate lying turned or mirrored by `way`.
-std::vector<Dot> picture(const Plate& plate, const Matrix2d& way = Matrix2d::Identity()) {
+std::vector<Dot> image(const Plate& plate, const Matrix2d& way = Matrix2d::Identity()) {
   std::vector<Dot> dots;
   for (const Vector2d& place : plate.dots_mm) {
     Dot dot;
@@ -67,7 +67,7 @@ TEST(MatchPlate, AllEightWaysOfASymmetricPlateGiveTheWayNearestRaw) {
     for (int quarter = 0; quarter < 4; ++quarter) {
       Matrix2d way = Eigen::Rotation2Dd(quarter * M_PI / 2).toRotationMatrix();
       way.col(0) *= mirror;
-      const auto dots = picture(plate48(), way);
+      const auto dots = image(plate48(), way);
       const auto matched = match(dots, plate48());
       ASSERT_TRUE(matched);
       EXPECT_EQ(matched->size(), 48u);
@@ -81,7 +81,7 @@ TEST(MatchPlate, PlateWithoutSymmetryShowsHowItLies) {
     for (int quarter = 0; quarter < 4; ++quarter) {
       Matrix2d way = Eigen::Rotation2Dd(quarter * M_PI / 2).toRotationMatrix();
       way.col(0) *= mirror;
-      const auto dots = picture(plate, way);
+      const auto dots = image(plate, way);
       const auto matched = match(dots, plate);
       ASSERT_TRUE(matched);
       EXPECT_EQ(matched->size(), plate.dots_mm.size());
@@ -90,7 +90,7 @@ TEST(MatchPlate, PlateWithoutSymmetryShowsHowItLies) {
 }
 
 TEST(MatchPlate, StrayInTheEmptyMiddleShiftsNothing) {
-  auto dots = picture(plate48());
+  auto dots = image(plate48());
   Dot stray;
   stray.centre_px = middle;
   dots.push_back(stray);
@@ -103,7 +103,7 @@ TEST(MatchPlate, StrayInTheEmptyMiddleShiftsNothing) {
 TEST(MatchPlate, MissingDotsShiftNothing) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     RandomStream random(seed, 1);
-    auto dots = picture(plate48());
+    auto dots = image(plate48());
     std::erase_if(dots, [&](const Dot&) { return random.uniform() < 0.3; });
     const auto matched = match(dots, plate48());
     ASSERT_TRUE(matched) << seed;
@@ -112,9 +112,9 @@ TEST(MatchPlate, MissingDotsShiftNothing) {
   }
 }
 
-TEST(MatchPlate, PartOfThePlateInThePictureIsPlacedByItsHole) {
+TEST(MatchPlate, PartOfThePlateInTheImageIsPlacedByItsHole) {
   // The three columns on the right are out of sight, the missing centre is not.
-  auto dots = picture(plate48());
+  auto dots = image(plate48());
   std::erase_if(dots, [](const Dot& dot) { return dot.centre_px.x() > middle.x() + 60; });
   const auto matched = match(dots, plate48());
   ASSERT_TRUE(matched);
@@ -124,7 +124,7 @@ TEST(MatchPlate, PartOfThePlateInThePictureIsPlacedByItsHole) {
 TEST(MatchPlate, HexagonalPlate) {
   const Plate plate = hexagonal();
   for (int sixth = 0; sixth < 6; ++sixth) {
-    const auto dots = picture(plate, Eigen::Rotation2Dd(sixth * M_PI / 3).toRotationMatrix());
+    const auto dots = image(plate, Eigen::Rotation2Dd(sixth * M_PI / 3).toRotationMatrix());
     const auto matched = match(dots, plate);
     ASSERT_TRUE(matched);
     EXPECT_EQ(matched->size(), plate.dots_mm.size());
@@ -135,7 +135,7 @@ TEST(MatchPlate, HexagonalPlate) {
 TEST(MatchPlate, TurnedCoordinatesInTheFileAreTheSamePlate) {
   Plate turned = lopsided();
   for (Vector2d& place : turned.dots_mm) place = Eigen::Rotation2Dd(0.2) * place + Vector2d(40, -10);
-  const auto dots = picture(turned);
+  const auto dots = image(turned);
   const auto matched = match(dots, turned);
   ASSERT_TRUE(matched);
   EXPECT_EQ(matched->size(), turned.dots_mm.size());
@@ -144,7 +144,7 @@ TEST(MatchPlate, TurnedCoordinatesInTheFileAreTheSamePlate) {
 
 TEST(MatchPlate, UnboundedLatticeTakesTheIndices) {
   Plate endless = plate48();
-  const auto dots = picture(endless);
+  const auto dots = image(endless);
   endless.dots_mm.clear();
   const auto matched = match(dots, endless);
   ASSERT_TRUE(matched);
@@ -157,7 +157,7 @@ TEST(MatchPlate, UnboundedLatticeTakesTheIndices) {
 TEST(MatchPlate, DotsWhereThePlateHasNoneAreRefused) {
   Plate small = plate48();
   std::erase_if(small.dots_mm, [](const Vector2d& p) { return p.cwiseAbs().maxCoeff() > 30; });
-  const auto matched = match(picture(plate48()), small);
+  const auto matched = match(image(plate48()), small);
   ASSERT_FALSE(matched);
   EXPECT_EQ(matched.error().reason, Reason::plate_mismatch);
   EXPECT_EQ(matched.error().figures.at("indexed"), 48);

@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 /// Between places so near each other the distortion bends a line by less than a tenth of a pixel.
 constexpr double step_px = 16;
 
-/// The part of a line, as shares from 0 to 1, in the picture, or within half a picture of it where a map
+/// The part of a line, as shares from 0 to 1, in the image, or within half an image of it where a map
 /// bends it: no map reaches farther.
 std::pair<double, double> part_near(const DistortionMap& map, const Vector2d& from, const Vector2d& to) {
   const Vector2d size(map.width, map.height);
@@ -37,7 +37,7 @@ std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Vecto
     if (!paths.back().empty()) paths.emplace_back();
   };
   const auto add = [&](const Vector2d& place) {
-    if (const auto raw = raw_in_picture(map, place))
+    if (const auto raw = raw_in_image(map, place))
       paths.back().push_back(*raw);
     else
       cut();

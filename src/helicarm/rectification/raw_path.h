@@ -11,8 +11,8 @@ namespace helicarm {
 /// A chain of straight pieces through pixels.
 using PixelPath = std::vector<Eigen::Vector2d>;
 
-/// How a path in rectified pixels runs through the raw picture: bent by the distortion, and cut where it
-/// leaves the picture or the map folds.
+/// How a path in rectified pixels runs through the raw image: bent by the distortion, and cut where it
+/// leaves the image or the map folds.
 std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Eigen::Vector2d> rectified);
 
 }  // namespace helicarm

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Pincushion of some 15 px at the edge of a 512 px picture.
+/// Pincushion of some 15 px at the edge of a 512 px image.
 DistortionMap pincushion() {
   DistortionMap map = identity_map(512, 512, {});
   map.order = 3;
@@ -51,7 +51,7 @@ TEST(RawPaths, FollowTheBentLine) {
   EXPECT_GT(straight, 2);
 }
 
-TEST(RawPaths, EndAtThePictureHoweverLongTheLine) {
+TEST(RawPaths, EndAtTheImageHoweverLongTheLine) {
   const DistortionMap map = pincushion();
   const auto paths = raw_paths(map, PixelPath{{-1e6, 256}, {1e6, 256}});
   ASSERT_EQ(paths.size(), 1u);
@@ -61,7 +61,7 @@ TEST(RawPaths, EndAtThePictureHoweverLongTheLine) {
   for (const Vector2d& place : paths[0]) EXPECT_TRUE(map.shows(place));
 }
 
-TEST(RawPaths, AreCutWhereTheyLeaveThePicture) {
+TEST(RawPaths, AreCutWhereTheyLeaveTheImage) {
   const DistortionMap map = identity_map(100, 100, {});
   const auto paths = raw_paths(map, PixelPath{{10, 10}, {10, 500}, {90, 500}, {90, 10}, {50, 10}});
   ASSERT_EQ(paths.size(), 2u);

@@ -21,18 +21,18 @@ using Eigen::Vector2d;
 
 constexpr double pitch_tolerance = 0.04;  // measured against expected
 constexpr std::size_t least_dots = 10;
-/// Where no plate is described, one may be in the picture all the same: more dots than a calibrator's balls
+/// Where no plate is described, one may be in the image all the same: more dots than a calibrator's balls
 /// and some stray ones could feign.
 constexpr std::size_t least_dots_of_any_plate = 20;
 const Plate any_plate{"", DotKind::balls, Lattice::square, {}, 2.5, {}, {}};
-constexpr double max_ball_radius = 0.04;  // of the picture's width: nothing larger is a ball
+constexpr double max_ball_radius = 0.04;  // of the image's width: nothing larger is a ball
 
-/// Pixels per plate millimetre in the middle of the picture, where the file and the plate tell.
-std::optional<double> expected_scale(const Exposure& exposure, const Plate& plate) {
-  const auto& pixel = exposure.acquisition.pixel_mm;
+/// Pixels per plate millimetre in the middle of the image, where the file and the plate tell.
+std::optional<double> expected_scale(const XrayImage& xray_image, const Plate& plate) {
+  const auto& pixel = xray_image.acquisition.pixel_mm;
   if (!pixel) return std::nullopt;
   const double height = plate.height_above_receiver_mm.value_or(0);
-  const double distance = exposure.acquisition.source_detector_mm.value_or(1000);
+  const double distance = xray_image.acquisition.source_detector_mm.value_or(1000);
   return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
 }
 
@@ -73,13 +73,13 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Fits the lattice's dots again with a profile of their own and their neighbours masked.
-DotLook sharpen(const Exposure& exposure, const NoiseCorrelation& noise, const std::vector<Dot>& all,
+DotLook sharpen(const XrayImage& xray_image, const NoiseCorrelation& noise, const std::vector<Dot>& all,
                 SeenLattice& seen) {
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
-  const DotLook look = estimate_look(exposure, noise, members);
+  const DotLook look = estimate_look(xray_image, noise, members);
   for (const IndexedDot& d : seen.lattice.dots) {
-    const auto refitted = refit_dots(exposure, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
+    const auto refitted = refit_dots(xray_image, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
     if (!refitted.empty() &&
         (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
@@ -99,18 +99,18 @@ Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, st
       {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
 }
 
-void set_metric(DistortionMap& map, const Exposure& exposure, const Plate& plate, double px_per_mm) {
+void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& plate, double px_per_mm) {
   if (!plate.pitch_mm) return;
   map.rectified_pixel_mm = 1 / px_per_mm;
   map.rectified_plane = RectifiedPlane::plate;
-  const auto& distance = exposure.acquisition.source_detector_mm;
+  const auto& distance = xray_image.acquisition.source_detector_mm;
   if (!distance || !plate.height_above_receiver_mm) return;
   *map.rectified_pixel_mm *= *distance / (*distance - *plate.height_above_receiver_mm);
   map.rectified_plane = RectifiedPlane::detector;
 }
 
 /// Plate dots that the search missed, fitted at the places where the map expects them.
-void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, const DotLook& look,
+void rescue(const XrayImage& xray_image, const Plate& plate, const MapFit& fit, const DotLook& look,
             const std::vector<Dot>& all, std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
@@ -122,7 +122,7 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
     Dot start;
     start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
     start.radius_px = radius;
-    const auto dot = refit_dots(exposure, {start}, look, all);
+    const auto dot = refit_dots(xray_image, {start}, look, all);
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
     if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
@@ -133,15 +133,16 @@ void rescue(const Exposure& exposure, const Plate& plate, const MapFit& fit, con
   }
 }
 
-std::vector<Dot> search(const Exposure& exposure, const Plate& plate, Polarity polarity, Method method,
+std::vector<Dot> search(const XrayImage& xray_image, const Plate& plate, Polarity polarity, Method method,
                         std::optional<double> scale) {
-  const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * exposure.pixels.width();
+  const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * xray_image.pixels.width();
   if (method == Method::best) {
-    DotOptions options = metal_search(exposure, polarity);
+    DotOptions options = metal_search(xray_image, polarity);
     if (scale) options.min_radius_px = std::max(options.min_radius_px, 0.75 * radius);
-    return find_dots(exposure, options);
+    return find_dots(xray_image, options);
   }
-  return find_dots_paper(exposure.pixels, exposure.lowest, exposure.highest, 0.7 * radius, 1.35 * radius);
+  return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.7 * radius,
+                         1.35 * radius);
 }
 
 struct Attempt {
@@ -151,11 +152,11 @@ struct Attempt {
   std::size_t size() const { return seen.lattice.dots.size(); }
 };
 
-/// Metal is dark and a hole bright, unless the whole picture is inverted.
-Attempt find_lattice(const Exposure& exposure, const Plate& plate, Method method,
+/// Metal is dark and a hole bright, unless the whole image is inverted.
+Attempt find_lattice(const XrayImage& xray_image, const Plate& plate, Method method,
                      std::optional<double> scale) {
   const auto attempt = [&](Polarity polarity) {
-    Attempt now{polarity, search(exposure, plate, polarity, method, scale), {}};
+    Attempt now{polarity, search(xray_image, plate, polarity, method, scale), {}};
     now.seen = seen_lattice(now.all, plate, scale);
     return now;
   };
@@ -167,11 +168,11 @@ Attempt find_lattice(const Exposure& exposure, const Plate& plate, Method method
 }
 
 /// Why the plate's lattice was not found: there is none, or one of the other kind.
-Failure without_lattice(const Exposure& exposure, Plate plate, Method method, std::optional<double> scale,
+Failure without_lattice(const XrayImage& xray_image, Plate plate, Method method, std::optional<double> scale,
                         std::size_t found) {
   const bool square = plate.lattice == Lattice::square;
   plate.lattice = square ? Lattice::hexagonal : Lattice::square;
-  const std::size_t of_other_kind = find_lattice(exposure, plate, method, scale).size();
+  const std::size_t of_other_kind = find_lattice(xray_image, plate, method, scale).size();
   if (of_other_kind >= least_dots)
     return {Reason::plate_mismatch,
             fmt::format("{} dots stand on a {} lattice, that of \"{}\" is {}", of_other_kind,
@@ -187,19 +188,19 @@ Failure without_lattice(const Exposure& exposure, Plate plate, Method method, st
 
 }  // namespace
 
-Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
+Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
                                 const RectificationOptions& options) {
-  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
-  const auto scale = expected_scale(exposure, plate);
-  const int width = exposure.pixels.width();
-  const int height = exposure.pixels.height();
-  Attempt attempt = find_lattice(exposure, plate, options.method, scale);
+  if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
+  const auto scale = expected_scale(xray_image, plate);
+  const int width = xray_image.pixels.width();
+  const int height = xray_image.pixels.height();
+  Attempt attempt = find_lattice(xray_image, plate, options.method, scale);
   if (attempt.size() < least_dots)
-    return tl::unexpected<Failure>(without_lattice(exposure, plate, options.method, scale, attempt.size()));
+    return tl::unexpected<Failure>(without_lattice(xray_image, plate, options.method, scale, attempt.size()));
 
-  const NoiseCorrelation noise = noise_correlation(exposure);
+  const NoiseCorrelation noise = noise_correlation(xray_image);
   std::optional<DotLook> look;
-  if (options.method == Method::best) look = sharpen(exposure, noise, attempt.all, attempt.seen);
+  if (options.method == Method::best) look = sharpen(xray_image, noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -220,14 +221,14 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
   if (look && dots.size() < plate.dots_mm.size()) {
-    rescue(exposure, plate, *fit, *look, attempt.all, dots, seen);
+    rescue(xray_image, plate, *fit, *look, attempt.all, dots, seen);
     if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
   }
 
   Rectification result;
   result.map = fit->map;
   result.noise = noise;
-  set_metric(result.map, exposure, plate, fit->px_per_mm);
+  set_metric(result.map, xray_image, plate, fit->px_per_mm);
   for (std::size_t i = 0; i < dots.size(); ++i) {
     if (!fit->used[i]) continue;
     result.plate_dots.push_back(dots[i]);
@@ -246,34 +247,34 @@ Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
   return result;
 }
 
-DistortionMap flat_panel_map(const Exposure& exposure) {
-  const auto& pixel = exposure.acquisition.pixel_mm;
-  return identity_map(exposure.pixels.width(), exposure.pixels.height(),
+DistortionMap flat_panel_map(const XrayImage& xray_image) {
+  const auto& pixel = xray_image.acquisition.pixel_mm;
+  return identity_map(xray_image.pixels.width(), xray_image.pixels.height(),
                       pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
 }
 
-DotOptions metal_search(const Exposure& exposure, Polarity metal) {
+DotOptions metal_search(const XrayImage& xray_image, Polarity metal) {
   DotOptions options;
   options.polarity = metal;
-  options.max_radius_px = std::max(16.0, max_ball_radius * exposure.pixels.width());
+  options.max_radius_px = std::max(16.0, max_ball_radius * xray_image.pixels.width());
   return options;
 }
 
-Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
+Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMap& map,
                                  const std::optional<Plate>& plate) {
-  if (map.width != exposure.pixels.width() || map.height != exposure.pixels.height())
+  if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
-                            exposure.pixels.width(), exposure.pixels.height()));
-  if (auto usable = check_usable(exposure); !usable) return tl::unexpected<Failure>(usable.error());
+                            xray_image.pixels.width(), xray_image.pixels.height()));
+  if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
   result.map = map;
-  result.noise = noise_correlation(exposure);
-  result.other_dots = find_dots(exposure, metal_search(exposure, result.metal));
+  result.noise = noise_correlation(xray_image);
+  result.other_dots = find_dots(xray_image, metal_search(xray_image, result.metal));
   const Plate sought = plate.value_or(any_plate);
   if (sought.kind == DotKind::holes) return result;
-  // A plate in the picture tells whether the map still holds: rectified, its dots must stand on a lattice.
-  const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(exposure, sought));
+  // A plate in the image tells whether the map still holds: rectified, its dots must stand on a lattice.
+  const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(xray_image, sought));
   if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
   std::vector<Dot> members;
@@ -300,12 +301,12 @@ Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& 
   return result;
 }
 
-Image<float> resample(const Exposure& exposure, const DistortionMap& map) {
-  if (map.is_identity()) return exposure.pixels;
+Image<float> resample(const XrayImage& xray_image, const DistortionMap& map) {
+  if (map.is_identity()) return xray_image.pixels;
   // The map is smooth: exact at every 8th pixel, bilinear between.
   constexpr int step = 8;
-  const int width = exposure.pixels.width();
-  const int height = exposure.pixels.height();
+  const int width = xray_image.pixels.width();
+  const int height = xray_image.pixels.height();
   cv::Mat coarse((height - 1) / step + 2, (width - 1) / step + 2, CV_32FC2);
   for (int j = 0; j < coarse.rows; ++j)
     for (int i = 0; i < coarse.cols; ++i) {
@@ -318,8 +319,8 @@ Image<float> resample(const Exposure& exposure, const DistortionMap& map) {
                  cv::BORDER_REPLICATE);
   Image<float> rectified(width, height);
   cv::Mat target = as_mat(rectified);
-  cv::remap(as_mat(exposure.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
-            double(exposure.lowest));
+  cv::remap(as_mat(xray_image.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+            double(xray_image.lowest));
   return rectified;
 }
 

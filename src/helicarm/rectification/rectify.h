@@ -11,13 +11,13 @@
 #include "helicarm/phantom/plate.h"
 #include "helicarm/rectification/distortion_map.h"
 #include "helicarm/rectification/fit_map.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
 enum class Method { best, paper };
 
-/// What stage 1 learns from one picture of the plate.
+/// What stage 1 learns from one image of the plate.
 struct Rectification {
   DistortionMap map;
   std::vector<Dot> plate_dots;      ///< used for the map
@@ -26,10 +26,10 @@ struct Rectification {
   std::optional<int> dots_expected;  ///< nothing for an unbounded lattice
   double raw_mean_px = 0;  ///< distance from raw to rectified over the dots used: the distortion itself
   double raw_max_px = 0;
-  Polarity metal = Polarity::dark;  ///< how metal shows in this picture
+  Polarity metal = Polarity::dark;  ///< how metal shows in this image
   /// Metal dots found on the way that are not the plate's; nothing where metal was not searched for.
   std::optional<std::vector<Dot>> other_dots;
-  NoiseCorrelation noise;  ///< of the picture
+  NoiseCorrelation noise;  ///< of the image
   std::vector<Warning> warnings;
 };
 
@@ -38,23 +38,23 @@ struct RectificationOptions {
   std::optional<int> order;  ///< fixed polynomial order; otherwise chosen by held-out error
 };
 
-/// Finds the plate in the picture and fits the map (2.1). Refuses a blank or saturated picture, a missing
+/// Finds the plate in the image and fits the map (2.1). Refuses a blank or saturated image, a missing
 /// plate and a plate whose lattice or pitch is not the file's.
-Expected<Rectification> rectify(const Exposure& exposure, const Plate& plate,
+Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
                                 const RectificationOptions& options);
 
 /// For a map known already (from a plate image taken apart, a file, or `flat_panel_map`). plate_mismatch
-/// where it is for another image size, or where a plate in the picture does not stand on a lattice after it.
-Expected<Rectification> with_map(const Exposure& exposure, const DistortionMap& map,
+/// where it is for another image size, or where a plate in the image does not stand on a lattice after it.
+Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMap& map,
                                  const std::optional<Plate>& plate);
 
 /// The identity, with the file's pixel size.
-DistortionMap flat_panel_map(const Exposure& exposure);
+DistortionMap flat_panel_map(const XrayImage& xray_image);
 
 /// How a dot search looks for metal of any size up to the largest ball's.
-DotOptions metal_search(const Exposure& exposure, Polarity metal);
+DotOptions metal_search(const XrayImage& xray_image, Polarity metal);
 
-/// The picture resampled to rectified pixels (Eq. 3), same size; outside the raw picture it is `lowest`.
-Image<float> resample(const Exposure& exposure, const DistortionMap& map);
+/// The image resampled to rectified pixels (Eq. 3), same size; outside the raw image it is `lowest`.
+Image<float> resample(const XrayImage& xray_image, const DistortionMap& map);
 
 }  // namespace helicarm

@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 #include "helicarm/rectification/lattice.h"
-#include "helicarm/rectification/simulated_exposure_test.h"
+#include "helicarm/rectification/simulated_image_test.h"
 
 namespace helicarm {
 namespace {
@@ -20,13 +20,13 @@ using Eigen::Vector2d;
 using simulation::SimulatedCase;
 using simulation::SimulatedView;
 
-const SimulatedCase& room() {
+const SimulatedCase& simulated_case() {
   static const SimulatedCase simulated = small_case(7, simulation::CaseKind::accuracy);
   return simulated;
 }
 
 const Rectification& rectified_ap() {
-  static const Rectification result = rectify(exposure_of(room().views[0]), plate48(), {}).value();
+  static const Rectification result = rectify(exposure_of(simulated_case().views[0]), plate48(), {}).value();
   return result;
 }
 
@@ -36,7 +36,7 @@ struct Misfit {
   double rms, max;
 };
 Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
-  const auto& distortion = view.shot.detector.distortion;
+  const auto& distortion = view.true_view.detector.distortion;
   std::vector<std::complex<double>> ideal;
   std::vector<std::complex<double>> rectified;
   for (int v = 0; v < 512; v += 16)
@@ -70,7 +70,7 @@ Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
 }
 
 TEST(Rectify, FindsEveryClearDotOfThePlate) {
-  const auto& dots = room().views[0].plate_dots;
+  const auto& dots = simulated_case().views[0].plate_dots;
   const auto clear = std::count_if(dots.begin(), dots.end(), [](const auto& dot) {
     return dot.visibility == simulation::Visibility::clear;
   });
@@ -82,7 +82,7 @@ TEST(Rectify, FindsEveryClearDotOfThePlate) {
 TEST(Rectify, DotsLieWithinATenthOfAPixelOfTheTruth) {
   int near = 0;
   for (const Dot& dot : rectified_ap().plate_dots)
-    for (const auto& truth : room().views[0].plate_dots)
+    for (const auto& truth : simulated_case().views[0].plate_dots)
       if (truth.visibility == simulation::Visibility::clear && (truth.raw - dot.centre_px).norm() < 0.1)
         ++near;
   EXPECT_GE(near, 0.9 * rectified_ap().dots_found);
@@ -100,8 +100,8 @@ TEST(Rectify, ResidualsAreSmallAndAddUp) {
   EXPECT_GT(result.raw_max_px, result.raw_mean_px);
 }
 
-TEST(Rectify, RectifiedPictureIsTheIdealOneUpToASimilarity) {
-  const Misfit best = misfit_of(rectified_ap().map, room().views[0]);
+TEST(Rectify, RectifiedImageIsTheIdealOneUpToASimilarity) {
+  const Misfit best = misfit_of(rectified_ap().map, simulated_case().views[0]);
   EXPECT_LT(best.rms, 0.2);
   EXPECT_LT(best.max, 0.6);
 }
@@ -109,27 +109,28 @@ TEST(Rectify, RectifiedPictureIsTheIdealOneUpToASimilarity) {
 TEST(Rectify, PixelSizeIsTheDetectors) {
   ASSERT_TRUE(rectified_ap().map.rectified_pixel_mm);
   EXPECT_EQ(rectified_ap().map.rectified_plane, RectifiedPlane::detector);
-  EXPECT_NEAR(*rectified_ap().map.rectified_pixel_mm / room().views[0].shot.pixel_mm(), 1, 0.01);
+  EXPECT_NEAR(*rectified_ap().map.rectified_pixel_mm / simulated_case().views[0].true_view.pixel_mm(), 1,
+              0.01);
 }
 
 TEST(Rectify, WithoutDistancePixelSizeIsThePlates) {
-  Exposure exposure = exposure_of(room().views[0]);
-  exposure.acquisition.source_detector_mm.reset();
-  const auto result = rectify(exposure, plate48(), {});
+  XrayImage xray_image = exposure_of(simulated_case().views[0]);
+  xray_image.acquisition.source_detector_mm.reset();
+  const auto result = rectify(xray_image, plate48(), {});
   ASSERT_TRUE(result);
   EXPECT_EQ(result->map.rectified_plane, RectifiedPlane::plate);
   EXPECT_NEAR(*result->map.rectified_pixel_mm * 997 / (997 - 15) / *rectified_ap().map.rectified_pixel_mm, 1,
               1e-3);
 }
 
-TEST(Rectify, InvertedPictureGivesTheSameMap) {
-  Exposure inverted = exposure_of(room().views[0]);
+TEST(Rectify, InvertedImageGivesTheSameMap) {
+  XrayImage inverted = exposure_of(simulated_case().views[0]);
   for (float& grey : inverted.pixels.pixels()) grey = inverted.highest - grey;
   const auto result = rectify(inverted, plate48(), {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->metal, Polarity::bright);
   double most = 0;
-  for (const auto& dot : room().views[0].plate_dots)
+  for (const auto& dot : simulated_case().views[0].plate_dots)
     if (const auto seen = rectified_ap().map.rectified_from_raw(dot.raw);
         seen && (dot.raw - Vector2d(256, 256)).norm() < 200)
       most = std::max(most, (result->map.raw_from_rectified(*seen) - dot.raw).norm());
@@ -139,19 +140,19 @@ TEST(Rectify, InvertedPictureGivesTheSameMap) {
 TEST(Rectify, PaperMethodIsAQuadraticAndWorse) {
   RectificationOptions options;
   options.method = Method::paper;
-  const auto result = rectify(exposure_of(room().views[0]), plate48(), options);
+  const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->map.order, 2);
   EXPECT_EQ(result->map.knots.rows(), 0);
   EXPECT_GE(result->dots_found, 25);
-  EXPECT_GT(misfit_of(result->map, room().views[0]).rms,
-            2 * misfit_of(rectified_ap().map, room().views[0]).rms);
+  EXPECT_GT(misfit_of(result->map, simulated_case().views[0]).rms,
+            2 * misfit_of(rectified_ap().map, simulated_case().views[0]).rms);
 }
 
 TEST(Rectify, OrderIsTheOneAskedFor) {
   RectificationOptions options;
   options.order = 4;
-  const auto result = rectify(exposure_of(room().views[0]), plate48(), options);
+  const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->map.order, 4);
   EXPECT_EQ(result->map.knots.rows(), 0);
@@ -161,7 +162,7 @@ TEST(Rectify, PlateOfAnotherPitchIsAMismatch) {
   Plate other = plate48();
   other.pitch_mm = 20;
   for (Vector2d& place : other.dots_mm) place *= 0.8;
-  const auto result = rectify(exposure_of(room().views[0]), other, {});
+  const auto result = rectify(exposure_of(simulated_case().views[0]), other, {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
   EXPECT_NEAR(result.error().figures.at("pitch_mm"), 25, 0.5);
@@ -171,7 +172,7 @@ TEST(Rectify, PlateOfTheOtherLatticeIsAMismatch) {
   Plate hexagonal = plate48();
   hexagonal.lattice = Lattice::hexagonal;
   hexagonal.dots_mm.clear();
-  const auto result = rectify(exposure_of(room().views[0]), hexagonal, {});
+  const auto result = rectify(exposure_of(simulated_case().views[0]), hexagonal, {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 
@@ -181,16 +182,16 @@ TEST(Rectify, PlateOfTheOtherLatticeIsAMismatch) {
       drawn::add_ball(shade,
                       Vector2d(191, 193) + 50 * lattice_point({column - row / 2, row}, Lattice::hexagonal), 5,
                       0.9, 3);
-  Image<float> picture = drawn::grey(shade, 1200);
+  Image<float> image = drawn::grey(shade, 1200);
   RandomStream random(1, 1);
-  drawn::add_noise(picture, 10, random);
-  const auto square = rectify(drawn::exposure(std::move(picture)), plate48(), {});
+  drawn::add_noise(image, 10, random);
+  const auto square = rectify(drawn::xray_image(std::move(image)), plate48(), {});
   ASSERT_FALSE(square);
   EXPECT_EQ(square.error().reason, Reason::plate_mismatch);
 }
 
 TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
-  for (const auto& ball : room().views[0].balls) {
+  for (const auto& ball : simulated_case().views[0].balls) {
     if (ball.visibility != simulation::Visibility::clear) continue;
     const auto& dots = *rectified_ap().other_dots;
     EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {
@@ -200,34 +201,34 @@ TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
 }
 
 /// Some dots here and there, on no lattice.
-Exposure strewn(const drawn::Shade& shade) {
-  Image<float> picture = drawn::grey(shade, 1200);
+XrayImage uniform(const drawn::Shade& shade) {
+  Image<float> image = drawn::grey(shade, 1200);
   RandomStream random(1, 1);
-  for (int v = 0; v < picture.height(); ++v)
-    for (int u = 0; u < picture.width(); ++u) picture(u, v) -= 2 * float(u);
-  drawn::add_noise(picture, 10, random);
-  return drawn::exposure(std::move(picture));
+  for (int v = 0; v < image.height(); ++v)
+    for (int u = 0; u < image.width(); ++u) image(u, v) -= 2 * float(u);
+  drawn::add_noise(image, 10, random);
+  return drawn::xray_image(std::move(image));
 }
 
-TEST(Rectify, PictureWithoutPlateIsRefused) {
+TEST(Rectify, ImageWithoutPlateIsRefused) {
   drawn::Shade shade(256, 256);
   for (const Vector2d& place : {Vector2d(60, 70), Vector2d(190, 40), Vector2d(140, 199), Vector2d(77, 150)})
     drawn::add_ball(shade, place, 5, 0.9, 3);
-  const auto result = rectify(strewn(shade), plate48(), {});
+  const auto result = rectify(uniform(shade), plate48(), {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_not_found);
 }
 
-Expected<Rectification> flat_panel(const Exposure& exposure) {
-  return with_map(exposure, flat_panel_map(exposure), {});
+Expected<Rectification> flat_panel(const XrayImage& xray_image) {
+  return with_map(xray_image, flat_panel_map(xray_image), {});
 }
 
-TEST(Rectify, BlankAndSaturatedPicturesAreRefused) {
-  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 1800)), plate48(), {}).error().reason,
+TEST(Rectify, BlankAndSaturatedImagesAreRefused) {
+  EXPECT_EQ(rectify(drawn::xray_image(Image<float>(256, 256, 1800)), plate48(), {}).error().reason,
             Reason::blank_image);
-  EXPECT_EQ(rectify(drawn::exposure(Image<float>(256, 256, 4095)), plate48(), {}).error().reason,
+  EXPECT_EQ(rectify(drawn::xray_image(Image<float>(256, 256, 4095)), plate48(), {}).error().reason,
             Reason::saturated);
-  EXPECT_EQ(flat_panel(drawn::exposure(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
+  EXPECT_EQ(flat_panel(drawn::xray_image(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
 }
 
 TEST(Rectify, PlateOfHoles) {
@@ -237,10 +238,10 @@ TEST(Rectify, PlateOfHoles) {
   drawn::Shade shade(384, 384);
   for (const Vector2d& place : plate.dots_mm)
     drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
-  Image<float> picture = drawn::grey(shade, -1200);
+  Image<float> image = drawn::grey(shade, -1200);
   RandomStream random(1, 1);
-  drawn::add_noise(picture, 10, random);
-  const auto result = rectify(drawn::exposure(std::move(picture)), plate, {});
+  drawn::add_noise(image, 10, random);
+  const auto result = rectify(drawn::xray_image(std::move(image)), plate, {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->dots_found, 48);
   EXPECT_EQ(result->metal, Polarity::dark);
@@ -249,7 +250,7 @@ TEST(Rectify, PlateOfHoles) {
 }
 
 TEST(WithMap, ItsOwnMapIsAcceptedAndTheBallsFound) {
-  const auto result = with_map(exposure_of(room().views[0]), rectified_ap().map, plate48());
+  const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, plate48());
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(to_json(result->map), to_json(rectified_ap().map));
   EXPECT_GE(result->other_dots->size(), 10u);
@@ -262,25 +263,25 @@ TEST(WithMap, MapOfAnotherAngleIsAMismatch) {
   Eigen::Matrix<double, 4, 2> twist;
   twist << 0, 3, -3, 0, 0, 3, -3, 0;
   turned.coefficients.middleRows(6, 4) += twist;
-  const auto result = with_map(exposure_of(room().views[0]), turned, plate48());
+  const auto result = with_map(exposure_of(simulated_case().views[0]), turned, plate48());
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
 TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
-  const auto result = with_map(exposure_of(room().views[0]), identity_map(1024, 1024, {}), {});
+  const auto result = with_map(exposure_of(simulated_case().views[0]), identity_map(1024, 1024, {}), {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
-TEST(FlatPanel, BentPlateInThePictureIsAMismatch) {
-  const auto result = flat_panel(exposure_of(room().views[0]));
+TEST(FlatPanel, BentPlateInTheImageIsAMismatch) {
+  const auto result = flat_panel(exposure_of(simulated_case().views[0]));
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
 TEST(WithMap, PlateThatIsNotDescribedIsSeenAllTheSame) {
-  const auto result = with_map(exposure_of(room().views[0]), rectified_ap().map, {});
+  const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LT(result->other_dots->size(), 25u);
 }
@@ -290,40 +291,40 @@ TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixels) {
   const auto result = flat_panel(exposure_of(flat.views[0]));
   ASSERT_TRUE(result);
   EXPECT_TRUE(result->map.is_identity());
-  EXPECT_NEAR(*result->map.rectified_pixel_mm, flat.views[0].shot.pixel_mm(), 1e-12);
+  EXPECT_NEAR(*result->map.rectified_pixel_mm, flat.views[0].true_view.pixel_mm(), 1e-12);
   EXPECT_FALSE(result->dots_expected);
 }
 
 TEST(Resample, TakesEachPixelFromWhereTheMapSays) {
-  Exposure ramp = exposure_of(room().views[0]);
+  XrayImage ramp = exposure_of(simulated_case().views[0]);
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u) ramp.pixels(u, v) = 1000 + 3 * float(u) - 2 * float(v);
   const DistortionMap& map = rectified_ap().map;
-  const Image<float> picture = resample(ramp, map);
+  const Image<float> image = resample(ramp, map);
   for (int v = 60; v < 450; v += 13)
     for (int u = 60; u < 450; u += 13) {
       const Vector2d raw = map.raw_from_rectified({u, v});
-      EXPECT_NEAR(picture(u, v), 1000 + 3 * raw.x() - 2 * raw.y(), 0.15);  // remap steps by 1/32 px
+      EXPECT_NEAR(image(u, v), 1000 + 3 * raw.x() - 2 * raw.y(), 0.15);  // remap steps by 1/32 px
     }
 }
 
-TEST(Resample, OutsideTheRawPictureIsBlack) {
-  Exposure white = exposure_of(room().views[0]);
+TEST(Resample, OutsideTheRawImageIsBlack) {
+  XrayImage white = exposure_of(simulated_case().views[0]);
   white.lowest = 7;
   std::fill(white.pixels.pixels().begin(), white.pixels.pixels().end(), 3000.f);
   DistortionMap shifted = identity_map(512, 512, {});
   shifted.order = 1;
   shifted.coefficients.resize(3, 2);
   shifted.coefficients << 100, 0, 1, 0, 0, 1;
-  const Image<float> picture = resample(white, shifted);
-  EXPECT_EQ(picture(500, 100), 7);
-  EXPECT_EQ(picture(300, 100), 3000);
+  const Image<float> image = resample(white, shifted);
+  EXPECT_EQ(image(500, 100), 7);
+  EXPECT_EQ(image(300, 100), 3000);
 }
 
 TEST(Resample, IdentityLeavesThePixels) {
-  const Exposure exposure = exposure_of(room().views[0]);
-  const Image<float> picture = resample(exposure, identity_map(512, 512, {}));
-  EXPECT_TRUE(std::equal(picture.pixels().begin(), picture.pixels().end(), exposure.pixels.pixels().begin()));
+  const XrayImage xray_image = exposure_of(simulated_case().views[0]);
+  const Image<float> image = resample(xray_image, identity_map(512, 512, {}));
+  EXPECT_TRUE(std::equal(image.pixels().begin(), image.pixels().end(), xray_image.pixels.pixels().begin()));
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Ve
 }
 
 /// All wires of a grid are of one width. What only seems a crossing (a wire at the edge of the field, a wire
-/// behind a plate's dot) is wider or far less sharp; the factors part the two kinds on simulated pictures.
+/// behind a plate's dot) is wider or far less sharp; the factors part the two kinds on simulated images.
 struct Likeness {
   double radius_px = 0;
   double sigma_px = 0;
@@ -113,8 +113,8 @@ struct Likeness {
 
 /// Where the plate's dots are in the way of some crossings: those found, and those that a wire hides from the
 /// search, between or beyond two others.
-std::vector<Disc> plate_dots(const Exposure& exposure, const Grid& crossings) {
-  std::vector<Dot> found = find_dots(exposure, {});
+std::vector<Disc> plate_dots(const XrayImage& xray_image, const Grid& crossings) {
+  std::vector<Dot> found = find_dots(xray_image, {});
   std::erase_if(found, [&](const Dot& dot) {
     return dot.misfit >= 0.15 || std::any_of(crossings.begin(), crossings.end(), [&](const auto& entry) {
              return (entry.second.centre_px - dot.centre_px).norm() < 0.6 * dot.radius_px;
@@ -138,8 +138,8 @@ std::vector<Disc> plate_dots(const Exposure& exposure, const Grid& crossings) {
 
 }  // namespace
 
-std::vector<Dot> find_grid(const Exposure& exposure) {
-  std::vector<Dot> crosses = find_crosses(exposure, {});
+std::vector<Dot> find_grid(const XrayImage& xray_image) {
+  std::vector<Dot> crosses = find_crosses(xray_image, {});
   const Likeness alike(crosses);
   std::erase_if(crosses, [&](const Dot& cross) { return !alike.holds(cross); });
   const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
@@ -152,7 +152,7 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
     low = low.cwiseMin(d.index);
     high = high.cwiseMax(d.index);
   }
-  const std::vector<Disc> dots = plate_dots(exposure, grid);
+  const std::vector<Disc> dots = plate_dots(xray_image, grid);
   const Dot typical = grid.begin()->second;
   std::vector<Dot> complete;
   for (int j = low.y(); j <= high.y(); ++j)
@@ -184,7 +184,7 @@ std::vector<Dot> find_grid(const Exposure& exposure) {
         return fallback;
       };
       const auto cross =
-          fit_cross(exposure, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
+          fit_cross(xray_image, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
           cross->sigma_px < 0.5 && alike.width_fits(*cross))
         complete.push_back(*cross);
@@ -205,7 +205,7 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
     indices.push_back(d.index);
   }
   grid.crosses = static_cast<int>(indices.size());
-  // The centre is the crossing nearest to the picture's middle that has all eight neighbours.
+  // The centre is the crossing nearest to the image's middle that has all eight neighbours.
   const Vector2d middle(0.5 * (map.width - 1), 0.5 * (map.height - 1));
   std::vector<std::size_t> central;
   double nearest = 1e9;

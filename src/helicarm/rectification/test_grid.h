@@ -8,7 +8,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/detection/dot.h"
 #include "helicarm/rectification/distortion_map.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
@@ -25,14 +25,14 @@ struct TestGrid {
   int crosses = 0;
   std::vector<Eigen::Vector2d> raw_px;  ///< the crossings on the grid
   std::vector<Eigen::Vector2d> rectified_px;
-  std::vector<Eigen::Vector2d> raw_ideal_px;  ///< Eq. 14 in the raw picture
-  std::vector<double> raw_error_px;           ///< Eq. 15, each by its own picture's similarity
+  std::vector<Eigen::Vector2d> raw_ideal_px;  ///< Eq. 14 in the raw image
+  std::vector<double> raw_error_px;           ///< Eq. 15, each by its own image's similarity
   std::vector<double> rectified_error_px;
 };
 
 /// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their
 /// neighbours put them, without the dots' pixels.
-std::vector<Dot> find_grid(const Exposure& exposure);
+std::vector<Dot> find_grid(const XrayImage& xray_image);
 
 /// The crossings that define the ideal grid: the paper's nine, or all of them.
 enum class GridFit { nine, all };

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 #include "helicarm/simulation/simulate_case.h"
 
 namespace helicarm {
@@ -110,11 +110,11 @@ drawn::Shade wires() {
   return shade;
 }
 
-Exposure noisy(const drawn::Shade& shade) {
+XrayImage noisy(const drawn::Shade& shade) {
   RandomStream random(4, 2);
-  Image<float> picture = drawn::grey(shade, 1200);
-  drawn::add_noise(picture, 12, random);
-  return drawn::exposure(std::move(picture));
+  Image<float> image = drawn::grey(shade, 1200);
+  drawn::add_noise(image, 12, random);
+  return drawn::xray_image(std::move(image));
 }
 
 TEST(FindGrid, EveryCrossingOfAGridOfWires) {

@@ -28,32 +28,32 @@ std::vector<float> block_means(const Image<float>& image) {
 
 }  // namespace
 
-double saturated_share(const Exposure& exposure) {
-  const float black = exposure.lowest + 0.002f * (exposure.highest - exposure.lowest);
+double saturated_share(const XrayImage& xray_image) {
+  const float black = xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);
   std::size_t field = 0;
   std::size_t clipped = 0;
-  for (const float grey : exposure.pixels.pixels()) {
+  for (const float grey : xray_image.pixels.pixels()) {
     field += grey > black;
-    clipped += grey >= exposure.highest;
+    clipped += grey >= xray_image.highest;
   }
   return field == 0 ? 0 : double(clipped) / double(field);
 }
 
-Expected<void> check_usable(const Exposure& exposure) {
-  std::vector<float> means = block_means(exposure.pixels);
+Expected<void> check_usable(const XrayImage& xray_image) {
+  std::vector<float> means = block_means(xray_image.pixels);
   if (means.size() < 9)
     return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few to hold a calibrator",
-                                              exposure.pixels.width(), exposure.pixels.height()));
+                                              xray_image.pixels.width(), xray_image.pixels.height()));
   std::sort(means.begin(), means.end());
-  const double share = saturated_share(exposure);
-  if (share > most_saturated && means.back() > exposure.lowest)
+  const double share = saturated_share(xray_image);
+  if (share > most_saturated && means.back() > xray_image.lowest)
     return fail(Reason::saturated,
                 fmt::format("{:.0f} % of the field is clipped at the highest grey value", 100 * share),
                 {{"saturated_share", share}});
   const auto at = [&](double q) {
     return double(means[static_cast<std::size_t>(q * double(means.size() - 1))]);
   };
-  const double range = (at(0.99) - at(0.01)) / double(exposure.highest - exposure.lowest);
+  const double range = (at(0.99) - at(0.01)) / double(xray_image.highest - xray_image.lowest);
   if (range < least_range)
     return fail(Reason::blank_image,
                 fmt::format("the picture is blank: its grey values span {:.2f} % of the scale", 100 * range),

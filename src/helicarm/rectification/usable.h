@@ -2,14 +2,14 @@
 #pragma once
 
 #include "helicarm/core/failure.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
 /// Share of the pixels inside the field (above black) that are clipped at the highest value.
-double saturated_share(const Exposure& exposure);
+double saturated_share(const XrayImage& xray_image);
 
-/// Refuses a picture that shows nothing (blank_image) or is clipped nearly everywhere (saturated).
-Expected<void> check_usable(const Exposure& exposure);
+/// Refuses an image that shows nothing (blank_image) or is clipped nearly everywhere (saturated).
+Expected<void> check_usable(const XrayImage& xray_image);
 
 }  // namespace helicarm

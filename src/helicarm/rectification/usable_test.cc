@@ -3,55 +3,55 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/detection/drawn_picture_test.h"
+#include "helicarm/detection/drawn_image_test.h"
 
 namespace helicarm {
 namespace {
 
-Exposure ramp(int side = 128) {
-  Image<float> picture(side, side);
+XrayImage ramp(int side = 128) {
+  Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
-    for (int u = 0; u < side; ++u) picture(u, v) = 1000 + 10 * float(u);
-  return drawn::exposure(std::move(picture));
+    for (int u = 0; u < side; ++u) image(u, v) = 1000 + 10 * float(u);
+  return drawn::xray_image(std::move(image));
 }
 
-Reason refusal(const Exposure& exposure) { return check_usable(exposure).error().reason; }
+Reason refusal(const XrayImage& xray_image) { return check_usable(xray_image).error().reason; }
 
-TEST(CheckUsable, OrdinaryPicturePasses) { EXPECT_TRUE(check_usable(ramp())); }
+TEST(CheckUsable, OrdinaryImagePasses) { EXPECT_TRUE(check_usable(ramp())); }
 
-TEST(CheckUsable, ConstantPictureIsBlank) {
-  EXPECT_EQ(refusal(drawn::exposure(Image<float>(128, 128, 1800))), Reason::blank_image);
-  EXPECT_EQ(refusal(drawn::exposure(Image<float>(128, 128, 0))), Reason::blank_image);
+TEST(CheckUsable, ConstantImageIsBlank) {
+  EXPECT_EQ(refusal(drawn::xray_image(Image<float>(128, 128, 1800))), Reason::blank_image);
+  EXPECT_EQ(refusal(drawn::xray_image(Image<float>(128, 128, 0))), Reason::blank_image);
 }
 
 TEST(CheckUsable, NoiseAloneIsBlank) {
   RandomStream random(1, 1);
-  Image<float> picture(128, 128, 2000);
-  drawn::add_noise(picture, 60, random);
-  EXPECT_EQ(refusal(drawn::exposure(std::move(picture))), Reason::blank_image);
+  Image<float> image(128, 128, 2000);
+  drawn::add_noise(image, 60, random);
+  EXPECT_EQ(refusal(drawn::xray_image(std::move(image))), Reason::blank_image);
 }
 
-TEST(CheckUsable, WhitePictureIsSaturated) {
-  EXPECT_EQ(refusal(drawn::exposure(Image<float>(128, 128, 4095))), Reason::saturated);
-  Exposure mostly = ramp();
+TEST(CheckUsable, WhiteImageIsSaturated) {
+  EXPECT_EQ(refusal(drawn::xray_image(Image<float>(128, 128, 4095))), Reason::saturated);
+  XrayImage mostly = ramp();
   for (int v = 0; v < 120; ++v) std::fill_n(mostly.pixels.row(v), 128, 4095.f);
   EXPECT_EQ(refusal(mostly), Reason::saturated);
 }
 
-TEST(CheckUsable, HalfSaturatedPicturePasses) {
-  Exposure half = ramp();
+TEST(CheckUsable, HalfSaturatedImagePasses) {
+  XrayImage half = ramp();
   for (int v = 0; v < 64; ++v) std::fill_n(half.pixels.row(v), 128, 4095.f);
   EXPECT_TRUE(check_usable(half));
 }
 
-TEST(CheckUsable, TinyPictureIsRefused) { EXPECT_EQ(refusal(ramp(40)), Reason::bad_size); }
+TEST(CheckUsable, TinyImageIsRefused) { EXPECT_EQ(refusal(ramp(40)), Reason::bad_size); }
 
 TEST(SaturatedShare, CountsTheFieldOnly) {
-  Exposure exposure = ramp();
-  for (int v = 0; v < 64; ++v) std::fill_n(exposure.pixels.row(v), 128, 0.f);
-  for (int v = 64; v < 80; ++v) std::fill_n(exposure.pixels.row(v), 128, 4095.f);
-  EXPECT_DOUBLE_EQ(saturated_share(exposure), 0.25);
-  EXPECT_EQ(saturated_share(drawn::exposure(Image<float>(128, 128, 0))), 0);
+  XrayImage xray_image = ramp();
+  for (int v = 0; v < 64; ++v) std::fill_n(xray_image.pixels.row(v), 128, 0.f);
+  for (int v = 64; v < 80; ++v) std::fill_n(xray_image.pixels.row(v), 128, 4095.f);
+  EXPECT_DOUBLE_EQ(saturated_share(xray_image), 0.25);
+  EXPECT_EQ(saturated_share(drawn::xray_image(Image<float>(128, 128, 0))), 0);
 }
 
 }  // namespace

@@ -15,24 +15,24 @@ namespace helicarm {
 namespace {
 
 namespace fs = std::filesystem;
-using operating_room::CArmFault;
-using operating_room::VirtualRoom;
+using virtual_devices::CArmFault;
+using virtual_devices::VirtualDevices;
 
 /// Longer than the window that an exposure's poses are taken from.
 constexpr std::chrono::milliseconds window{1800};
-constexpr int most_shots = 5;
+constexpr int most_entries = 5;
 
 /// One virtual room for all, and an operation of its own for each test.
 class FaultyOperation : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    operating_room::VirtualRoomOptions options;
-    options.picture_size = 512;
+    virtual_devices::VirtualDevicesOptions options;
+    options.image_size = 512;
     options.tracker_rate_hz = 100;
     options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
-    room_ = VirtualRoom::open(options).value();
+    virtual_or_ = VirtualDevices::open(options).value();
     folder_ = std::make_unique<TemporaryFolder>();
-    plan_ = plan_for(*room_, room_->tracker().port());
+    plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
     devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_->path() / "inbox").value());
     ReceiverOptions receiving;
     receiving.port = 0;
@@ -41,7 +41,7 @@ class FaultyOperation : public testing::Test {
   }
   static void TearDownTestSuite() {
     devices_.reset();
-    room_.reset();
+    virtual_or_.reset();
     folder_.reset();
   }
   void SetUp() override {
@@ -52,59 +52,59 @@ class FaultyOperation : public testing::Test {
 
   Expected<std::unique_ptr<Operation>> begin() {
     return Operation::begin(plan_, session_, devices_->board(), devices_->robot(),
-                            [this](Step, const std::string& what) { told_.push_back(what); });
+                            [this](Step, const std::string& what) { reported_.push_back(what); });
   }
-  DatedArrival shot(const std::string& view, CArmFault fault = CArmFault::none) {
-    EXPECT_TRUE(
-        operating_room::shoot(room_->theatre(), view, {"127.0.0.1", devices_->receiver_port()}, fault));
-    return devices_->next_picture(20).value();
+  DatedArrival acquired_view(const std::string& view, CArmFault fault = CArmFault::none) {
+    EXPECT_TRUE(virtual_devices::shoot(virtual_or_->simulated_scene(), view,
+                                       {"127.0.0.1", devices_->receiver_port()}, fault));
+    return devices_->next_image(20).value();
   }
   Expected<void> take(const std::string& view, CArmFault fault = CArmFault::none) {
-    const DatedArrival picture = shot(view, fault);
-    return operation_->take(view, picture.arrival, picture.time_s);
+    const DatedArrival image = acquired_view(view, fault);
+    return operation_->take(view, image.arrival, image.time_s);
   }
   /// Again where a busy machine made the tracker stutter.
   void expose(const std::string& view, CArmFault fault = CArmFault::none) {
     Expected<void> taken = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_shots && !taken; ++i) taken = take(view, fault);
+    for (int i = 0; i < most_entries && !taken; ++i) taken = take(view, fault);
     ASSERT_TRUE(taken) << taken.error().message;
   }
   static void shift(const char* body, double mm) {
-    room_->theatre().move_bone(body, {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
+    virtual_or_->simulated_scene().move_bone(body, {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
     std::this_thread::sleep_for(window);
   }
   std::string log() const { return read_file(session_ / "session.log", 1 << 24).value(); }
 
-  static std::unique_ptr<VirtualRoom> room_;
+  static std::unique_ptr<VirtualDevices> virtual_or_;
   static std::unique_ptr<Connections> devices_;
   static OperationPlan plan_;
   static std::unique_ptr<TemporaryFolder> folder_;
   fs::path session_;
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
   std::unique_ptr<Operation> operation_;
 };
-std::unique_ptr<VirtualRoom> FaultyOperation::room_;
+std::unique_ptr<VirtualDevices> FaultyOperation::virtual_or_;
 std::unique_ptr<Connections> FaultyOperation::devices_;
 OperationPlan FaultyOperation::plan_;
 std::unique_ptr<TemporaryFolder> FaultyOperation::folder_;
 
-TEST_F(FaultyOperation, SamePictureForBothViewsIsRefusedAndTheNextOneTaken) {
+TEST_F(FaultyOperation, SameImageForBothViewsIsRefusedAndTheNextOneTaken) {
   expose("AP");
-  EXPECT_EQ(take("LAT", CArmFault::same_picture).error().reason, Reason::views_too_close);
+  EXPECT_EQ(take("LAT", CArmFault::same_image).error().reason, Reason::views_too_close);
   EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"LAT"});
   EXPECT_NE(log().find(R"("why":"views_too_close")"), std::string::npos);
   expose("LAT");
   EXPECT_TRUE(operation_->measure());
 }
 
-TEST_F(FaultyOperation, PictureOfAnotherPatientIsRefused) {
+TEST_F(FaultyOperation, ImageOfAnotherPatientIsRefused) {
   expose("AP");
   EXPECT_EQ(take("LAT", CArmFault::other_patient).error().reason, Reason::patient_mismatch);
   EXPECT_EQ(operation_->measure().error().reason, Reason::usage);
 }
 
-TEST_F(FaultyOperation, PicturesInTheOtherOrderAreSortedByTheirAngles) {
-  expose("AP", CArmFault::same_picture);
+TEST_F(FaultyOperation, ImagesInTheOtherOrderAreSortedByTheirAngles) {
+  expose("AP", CArmFault::same_image);
   EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"AP"});
   expose("AP");
   ASSERT_TRUE(operation_->measure());
@@ -112,25 +112,25 @@ TEST_F(FaultyOperation, PicturesInTheOtherOrderAreSortedByTheirAngles) {
     EXPECT_TRUE(tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
 }
 
-TEST_F(FaultyOperation, OtherOrderThatNoFileTellsLeavesItsTunnelsUnmeasured) {
+TEST_F(FaultyOperation, OtherOrderThatNoFileReportsLeavesItsTunnelsUnmeasured) {
   for (const auto& [view, taken_as] : {std::pair{"LAT", "AP"}, std::pair{"AP", "LAT"}}) {
     Expected<void> taken = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_shots && !taken; ++i) {
-      const DatedArrival picture = shot(view, CArmFault::no_tags);
-      taken = operation_->take(taken_as, picture.arrival, picture.time_s);
+    for (int i = 0; i < most_entries && !taken; ++i) {
+      const DatedArrival image = acquired_view(view, CArmFault::no_tags);
+      taken = operation_->take(taken_as, image.arrival, image.time_s);
     }
     ASSERT_TRUE(taken) << taken.error().message;
   }
   ASSERT_TRUE(operation_->measure());
   for (const PlannedTunnel& tunnel : plan_.tunnels)
     EXPECT_EQ(tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
-  const auto warnings = std::ranges::count_if(told_, [](const std::string& what) {
+  const auto warnings = std::ranges::count_if(reported_, [](const std::string& what) {
     return what.find("no time of acquisition") != std::string::npos;
   });
   EXPECT_EQ(warnings, 1);
 }
 
-TEST_F(FaultyOperation, PictureHeldBackWhileTheLegMovedIsRefused) {
+TEST_F(FaultyOperation, ImageHeldBackWhileTheLegMovedIsRefused) {
   expose("AP");
   const auto late = take("LAT", CArmFault::held_back);
   ASSERT_FALSE(late);
@@ -141,7 +141,7 @@ TEST_F(FaultyOperation, PictureHeldBackWhileTheLegMovedIsRefused) {
   EXPECT_TRUE(operation_->measure());
 }
 
-TEST_F(FaultyOperation, FirstPictureHeldBackIsAskedForAgainOnceTheSecondCame) {
+TEST_F(FaultyOperation, FirstImageHeldBackIsAskedForAgainOnceTheSecondCame) {
   expose("AP", CArmFault::held_back);
   std::this_thread::sleep_for(window);
   expose("LAT");
@@ -151,34 +151,33 @@ TEST_F(FaultyOperation, FirstPictureHeldBackIsAskedForAgainOnceTheSecondCame) {
   EXPECT_TRUE(operation_->measure());
 }
 
-TEST_F(FaultyOperation, PictureThatCameBeforeIsRefused) {
-  DatedArrival again = shot("AP");
+TEST_F(FaultyOperation, ImageThatCameBeforeIsRefused) {
+  DatedArrival again = acquired_view("AP");
   again.arrival.repeated = true;
   EXPECT_EQ(operation_->take("AP", again.arrival, again.time_s).error().reason, Reason::stale_pose);
 }
 
-TEST_F(FaultyOperation, PictureOfATimeWithoutPosesIsRefused) {
-  const DatedArrival picture = shot("AP");
+TEST_F(FaultyOperation, ImageOfATimeWithoutPosesIsRefused) {
+  const DatedArrival image = acquired_view("AP");
   for (const double off_s : {3600.0, -3600.0})  // the later one first: it would have been held back
-    EXPECT_EQ(operation_->take("AP", picture.arrival, picture.time_s + off_s).error().reason,
-              Reason::no_pose);
+    EXPECT_EQ(operation_->take("AP", image.arrival, image.time_s + off_s).error().reason, Reason::no_pose);
   EXPECT_EQ(operation_->views_to_come().size(), 2u);
 }
 
 TEST_F(FaultyOperation, TrackerWhoseClockLeapsDuringTheExposureIsRefused) {
-  ASSERT_TRUE(room_->set_fault("time_jump", true));
+  ASSERT_TRUE(virtual_or_->set_fault("time_jump", true));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
-  ASSERT_TRUE(room_->set_fault("time_jump", false));
+  ASSERT_TRUE(virtual_or_->set_fault("time_jump", false));
   std::this_thread::sleep_for(2 * window);
   expose("AP");
 }
 
 TEST_F(FaultyOperation, FrozenTrackerIsRefused) {
-  ASSERT_TRUE(room_->set_fault("frozen", true));
+  ASSERT_TRUE(virtual_or_->set_fault("frozen", true));
   std::this_thread::sleep_for(std::chrono::milliseconds(600));
   EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
-  ASSERT_TRUE(room_->set_fault("frozen", false));
+  ASSERT_TRUE(virtual_or_->set_fault("frozen", false));
   std::this_thread::sleep_for(window);
   expose("AP");
 }
@@ -204,14 +203,14 @@ class CheckedOperation : public FaultyOperation {
     operation_ = Operation::begin(plan, session_, devices_->board(), devices_->robot()).value();
   }
   void TearDown() override {
-    room_->lift_pointer();
+    virtual_or_->lift_pointer();
     FaultyOperation::TearDown();
   }
   Expected<double> touch(const std::string& bone) {
-    room_->touch(bone);
+    virtual_or_->touch(bone);
     std::this_thread::sleep_for(window);  // until the gate believes the pointer's new place
     Expected<double> off = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_shots; ++i) {
+    for (int i = 0; i < most_entries; ++i) {
       off = operation_->touch(bone + " notch");
       if (off || off.error().reason == Reason::residual_too_large) return off;
     }
@@ -226,10 +225,10 @@ TEST_F(CheckedOperation, BumpedMarkerIsFoundAtItsCheckPoint) {
   ASSERT_TRUE(operation_->measure());
   EXPECT_EQ(operation_->plan_tunnel("femur").error().message,
             "femur notch: this check point must be touched again first");
-  room_->theatre().bump_marker("femur", {2.5, 0, 0});
+  virtual_or_->simulated_scene().bump_marker("femur", {2.5, 0, 0});
   std::this_thread::sleep_for(window);
   const auto femur = touch("femur"), tibia = touch("tibia");
-  room_->theatre().bump_marker("femur", {-2.5, 0, 0});
+  virtual_or_->simulated_scene().bump_marker("femur", {-2.5, 0, 0});
   std::this_thread::sleep_for(window);
   ASSERT_FALSE(femur);
   EXPECT_EQ(femur.error().reason, Reason::residual_too_large) << femur.error().message;
@@ -245,41 +244,41 @@ TEST_F(CheckedOperation, BumpedMarkerIsFoundAtItsCheckPoint) {
 }
 
 TEST_F(CheckedOperation, BonesSwappedFromTheStartAreFoundOnceTheKneeBends) {
-  ASSERT_TRUE(room_->set_fault("swapped_bones", true));
+  ASSERT_TRUE(virtual_or_->set_fault("swapped_bones", true));
   std::this_thread::sleep_for(2 * window);
   for (const char* bone : {"femur", "tibia"}) ASSERT_TRUE(touch(bone)) << bone;
   expose("AP");
   expose("LAT");
-  ASSERT_TRUE(operation_->measure());  // nothing of the pictures tells two still bones apart
+  ASSERT_TRUE(operation_->measure());  // nothing of the images tells two still bones apart
   shift("tibia", 8);
   const auto femur = touch("femur"), tibia = touch("tibia");
   shift("tibia", -8);
-  ASSERT_TRUE(room_->set_fault("swapped_bones", false));
+  ASSERT_TRUE(virtual_or_->set_fault("swapped_bones", false));
   std::this_thread::sleep_for(2 * window);
   EXPECT_EQ(femur.error().reason, Reason::residual_too_large);
   EXPECT_EQ(tibia.error().reason, Reason::residual_too_large);
 }
 
-TEST_F(CheckedOperation, CheckPointIsLearntBeforeTheFirstPicture) {
+TEST_F(CheckedOperation, CheckPointIsLearntBeforeTheFirstImage) {
   expose("AP");
   EXPECT_EQ(operation_->touch("femur notch").error().reason, Reason::usage);
   EXPECT_EQ(operation_->touch("patella").error().reason, Reason::bad_value);
 }
 
 TEST_F(FaultyOperation, BoneHiddenDuringTheExposureIsRefused) {
-  ASSERT_TRUE(room_->set_fault("hide:femur", true));
+  ASSERT_TRUE(virtual_or_->set_fault("hide:femur", true));
   std::this_thread::sleep_for(window);
   EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
-  ASSERT_TRUE(room_->set_fault("hide:femur", false));
+  ASSERT_TRUE(virtual_or_->set_fault("hide:femur", false));
   std::this_thread::sleep_for(window);
   expose("AP");
 }
 
 TEST_F(FaultyOperation, BoneHiddenInAPartOfTheExposureIsRefused) {
-  ASSERT_TRUE(room_->set_fault("hide:femur", true));
+  ASSERT_TRUE(virtual_or_->set_fault("hide:femur", true));
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
-  ASSERT_TRUE(room_->set_fault("hide:femur", false));
+  ASSERT_TRUE(virtual_or_->set_fault("hide:femur", false));
   std::this_thread::sleep_for(window);
 }
 
@@ -307,9 +306,9 @@ class FullDisk {
   rlimit before_{};
 };
 
-TEST_F(FaultyOperation, FullDiskAtAnyWriteIsToldAndLeavesTheRecordWhole) {
+TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndLeavesTheRecordWhole) {
   expose("AP");
-  const DatedArrival lateral = shot("LAT");
+  const DatedArrival lateral = acquired_view("LAT");
   {
     const FullDisk full(fs::file_size(session_ / "session.log") + 10);
     const auto taken = operation_->take("LAT", lateral.arrival, lateral.time_s);

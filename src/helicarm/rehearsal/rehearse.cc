@@ -15,46 +15,47 @@
 namespace helicarm {
 namespace {
 
-using operating_room::VirtualRoom;
+using virtual_devices::VirtualDevices;
 
 constexpr std::chrono::seconds patience{20};
-constexpr double picture_patience_s = 20;
-constexpr int most_shots = 3;
+constexpr double image_patience_s = 20;
+constexpr int most_entries = 3;
 /// An exposure's poses are taken from the second and a half before it.
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
 
-/// Of room_tracker: its drift, rms over the axes, and the turn that a second's mean leaves.
+/// Of virtual_tracker: its drift, rms over the axes, and the turn that a second's mean leaves.
 constexpr double kept_sigma_mm = 0.114;
 constexpr double kept_sigma_deg = 0.03;
 
-Json clicks_of(const simulation::SimulatedCase& room) {
+Json clicks_of(const simulation::SimulatedCase& virtual_or) {
   Json picks = Json::array();
-  for (const simulation::SimulatedView& view : room.views)
+  for (const simulation::SimulatedView& view : virtual_or.views)
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
       picks.push_back({{"name", view.clicks[i].point},
-                       {"view", view.shot.name},
+                       {"view", view.true_view.name},
                        {"uv", json_list(view.clicks[i].raw)},
                        {"snap", "ball"},
                        {"diameter_mm", simulation::tunnel_ball_mm},
-                       {"moves_with", room.navigation->points[i].bone}});
+                       {"moves_with", virtual_or.navigation->points[i].bone}});
   return picks;
 }
 
 /// A leg that was not held quite still.
-void stir(operating_room::Theatre& theatre) {
+void stir(virtual_devices::SimulatedScene& simulated_scene) {
   const auto motion = [](double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& shift) {
     return RigidTransform{
         Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix(), shift};
   };
-  theatre.move_bone("femur", motion(1.5, {1, 2, -1}, {2, -1.5, 1}));
-  theatre.move_bone("tibia", motion(-2, {2, -1, 1}, {-1, 2, 1.5}));
+  simulated_scene.move_bone("femur", motion(1.5, {1, 2, -1}, {2, -1.5, 1}));
+  simulated_scene.move_bone("tibia", motion(-2, {2, -1, 1}, {-1, 2, 1.5}));
 }
 
 EndError end_error(const std::string& name, const EndMiss& miss, const std::optional<LineError>& in_xrays,
-                   VirtualRoom& room) {
+                   VirtualDevices& virtual_or) {
   const Eigen::Vector2d across =
-      (room.tracker_from_tip().inverse() * room.theatre().point_in_tracker(name)).head<2>();
+      (virtual_or.tracker_from_tip().inverse() * virtual_or.simulated_scene().point_in_tracker(name))
+          .head<2>();
   const Eigen::Vector2d off = across - miss.across_mm;
   return {name,
           across.norm(),
@@ -65,51 +66,53 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
 }
 
 /// Shoots, and again where the tracker did not see everything at rest: on a busy machine it may stutter.
-Expected<void> expose(const std::string& view, VirtualRoom& room, Connections& devices,
+Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, Connections& devices,
                       Operation& operation) {
   Expected<void> taken = fail(Reason::not_connected, "no picture came");
-  for (int attempt = 0; attempt < most_shots && !taken; ++attempt) {
+  for (int attempt = 0; attempt < most_entries && !taken; ++attempt) {
     std::this_thread::sleep_for(before_exposure);
-    if (auto shot = operating_room::shoot(room.theatre(), view, {"127.0.0.1", devices.receiver_port()});
-        !shot)
-      return shot;
-    const auto picture = devices.next_picture(picture_patience_s);
-    if (picture) taken = operation.take(view, picture->arrival, picture->time_s);
+    if (auto true_view = virtual_devices::shoot(virtual_or.simulated_scene(), view,
+                                                {"127.0.0.1", devices.receiver_port()});
+        !true_view)
+      return true_view;
+    const auto image = devices.next_image(image_patience_s);
+    if (image) taken = operation.take(view, image->arrival, image->time_s);
   }
   return taken;
 }
 
 }  // namespace
 
-OperationPlan plan_for(VirtualRoom& room, std::uint16_t tracker_port) {
+OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   OperationPlan plan;
   plan.tracker.port = tracker_port;
-  for (const operating_room::TrackedFacet& facet : operating_room::calibrator_facets())
+  for (const virtual_devices::TrackedFacet& facet : virtual_devices::calibrator_facets())
     plan.tracker.facets.push_back({facet.name, facet.calibrator_from_facet});
   plan.tracker.sigma_mm = kept_sigma_mm;
   plan.tracker.sigma_deg = kept_sigma_deg;
-  plan.robot.rtde_port = room.robot().rtde_port();
-  plan.robot.dashboard_port = room.robot().dashboard_port();
-  plan.robot.script_port = room.robot().script_port();
-  plan.robot.tool = room.theatre().tool();
+  plan.robot.rtde_port = virtual_or.robot().rtde_port();
+  plan.robot.dashboard_port = virtual_or.robot().dashboard_port();
+  plan.robot.script_port = virtual_or.robot().script_port();
+  plan.robot.tool = virtual_or.simulated_scene().tool();
   plan.robot.approach.corrections.most = 8;
   plan.robot.approach.corrections.tolerance_mm = 0.25;
   plan.robot.approach.corrections.tolerance_deg = 0.25;
   // Both are drilled from without.
   plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end},
                   {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
-  plan.tracker.pointer = Pointer{operating_room::pointer_marker, operating_room::tip_in_pointer};
-  plan.picks = clicks_of(room.theatre().room());
+  plan.tracker.pointer = Pointer{virtual_devices::pointer_marker, virtual_devices::tip_in_pointer};
+  plan.picks = clicks_of(virtual_or.simulated_scene().simulated_case());
   return plan;
 }
 
 Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& folder,
                              const RehearsalOptions& options) {
   return guarded([&] {
-    options.tell("opening the virtual room");
-    operating_room::VirtualRoomOptions ports{seed, options.picture_size, options.tracker_rate_hz, 0, 0, 0, 0};
-    const auto room = value_or_throw(VirtualRoom::open(ports));
-    const OperationPlan plan = plan_for(*room, room->tracker().port());
+    options.notify("opening the virtual room");
+    virtual_devices::VirtualDevicesOptions ports{seed, options.image_size, options.tracker_rate_hz, 0, 0, 0,
+                                                 0};
+    const auto virtual_or = value_or_throw(VirtualDevices::open(ports));
+    const OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
 
     Connections devices(plan, value_or_throw(Inbox::open(folder / "inbox")));
     ReceiverOptions receiving;
@@ -118,10 +121,10 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     RobotLink& robot = devices.robot();
     const auto operation = value_or_throw(
         Operation::begin(plan, folder, devices.board(), robot, [&](Step step, const std::string& what) {
-          options.tell(fmt::format("{}: {}", name_of(step), what));
+          options.notify(fmt::format("{}: {}", name_of(step), what));
         }));
 
-    for (const std::string& view : plan.views) value_or_throw(expose(view, *room, devices, *operation));
+    for (const std::string& view : plan.views) value_or_throw(expose(view, *virtual_or, devices, *operation));
     value_or_throw(operation->measure());
 
     const auto nod = [&](const RobotOrder& order) -> Expected<std::string> { return robot.confirm(order); };
@@ -129,7 +132,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     operation->confirmed_by("the rehearsal");
     value_or_throw(robot.unlock("the rehearsal"));
     value_or_throw(operation->register_robot(nod));
-    if (options.move_bones) stir(room->theatre());
+    if (options.move_bones) stir(virtual_or->simulated_scene());
     std::this_thread::sleep_for(before_exposure);  // until the gate believes the bones again
 
     Rehearsal done{seed, {}, operation->hand_eye().rms_mm, 0};
@@ -142,8 +145,9 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
           [&](const std::optional<LineError> Verification::*end) -> std::optional<LineError> {
         return outcome.verification ? (*outcome.verification).*end : std::nullopt;
       };
-      done.ends.push_back(end_error(tunnel.start, outcome.start, in_xrays(&Verification::start), *room));
-      done.ends.push_back(end_error(tunnel.end, outcome.end, in_xrays(&Verification::end), *room));
+      done.ends.push_back(
+          end_error(tunnel.start, outcome.start, in_xrays(&Verification::start), *virtual_or));
+      done.ends.push_back(end_error(tunnel.end, outcome.end, in_xrays(&Verification::end), *virtual_or));
       done.corrections += static_cast<int>(outcome.loop.size()) - 1;
       value_or_throw(operation->withdraw(order, rest, nod));
     }

@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "helicarm/operating_room/virtual_room.h"
 #include "helicarm/operation/operation.h"
+#include "helicarm/virtual_devices/virtual_devices.h"
 
 namespace helicarm {
 
 struct RehearsalOptions {
-  int picture_size = 1024;
+  int image_size = 1024;
   double tracker_rate_hz = 60;
   bool move_bones = true;  ///< between exposure and navigation, as legs do
-  std::function<void(const std::string&)> tell = [](const std::string&) {};
+  std::function<void(const std::string&)> notify = [](const std::string&) {};
 };
 
 /// A tunnel's end after the tool was brought to its tunnel.
@@ -37,7 +37,7 @@ struct Rehearsal {
 };
 
 /// What an operation in the virtual room needs to know; the picks are a surgeon's clicks near the balls.
-OperationPlan plan_for(operating_room::VirtualRoom& room, std::uint16_t tracker_port);
+OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_t tracker_port);
 
 /// One pair of bones from the first X-ray to the last check, over the real protocols through sockets:
 /// C-STORE, OpenIGTLink, RTDE, dashboard and script. `folder` takes the session. Fails with the first

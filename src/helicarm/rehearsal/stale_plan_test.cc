@@ -12,7 +12,7 @@ namespace helicarm {
 namespace {
 
 using namespace std::chrono_literals;
-using operating_room::VirtualRoom;
+using virtual_devices::VirtualDevices;
 
 constexpr int most_attempts = 25;
 
@@ -27,12 +27,12 @@ bool came_late(const Failure& failure) {
 class StalePlan : public testing::Test {
  protected:
   void SetUp() override {
-    operating_room::VirtualRoomOptions options;
-    options.picture_size = 512;
+    virtual_devices::VirtualDevicesOptions options;
+    options.image_size = 512;
     options.tracker_rate_hz = 60;
     options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
-    room_ = VirtualRoom::open(options).value();
-    plan_ = plan_for(*room_, room_->tracker().port());
+    virtual_or_ = VirtualDevices::open(options).value();
+    plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
     devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_.path() / "inbox").value());
     ReceiverOptions receiving;
     receiving.port = 0;
@@ -51,9 +51,10 @@ class StalePlan : public testing::Test {
     Expected<void> taken = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_attempts && !taken; ++i) {
       std::this_thread::sleep_for(1800ms);  // the window of an exposure's poses
-      ASSERT_TRUE(operating_room::shoot(room_->theatre(), view, {"127.0.0.1", devices_->receiver_port()}));
-      const DatedArrival picture = devices_->next_picture(20).value();
-      taken = operation_->take(view, picture.arrival, picture.time_s);
+      ASSERT_TRUE(virtual_devices::shoot(virtual_or_->simulated_scene(), view,
+                                         {"127.0.0.1", devices_->receiver_port()}));
+      const DatedArrival image = devices_->next_image(20).value();
+      taken = operation_->take(view, image.arrival, image.time_s);
     }
     ASSERT_TRUE(taken) << taken.error().message;
   }
@@ -93,18 +94,18 @@ class StalePlan : public testing::Test {
     if (robot().status().phase != LinkPhase::ready) {
       ASSERT_TRUE(robot().unlock("tester"));
     }
-    const Joints before = room_->robot().truth().state.joints;
+    const Joints before = virtual_or_->robot().truth().state.joints;
     const auto gone = operation_->go(order, robot().confirm(order));
     ASSERT_FALSE(gone);
     EXPECT_EQ(gone.error().reason, Reason::plan_stale) << gone.error().message;
-    EXPECT_EQ(room_->robot().truth().state.joints, before);
+    EXPECT_EQ(virtual_or_->robot().truth().state.joints, before);
   }
   void move_femur(double mm) {
-    room_->theatre().move_bone("femur", {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
+    virtual_or_->simulated_scene().move_bone("femur", {Eigen::Matrix3d::Identity(), {mm, 0, 0}});
   }
 
   TemporaryFolder folder_;
-  std::unique_ptr<VirtualRoom> room_;
+  std::unique_ptr<VirtualDevices> virtual_or_;
   OperationPlan plan_;
   std::unique_ptr<Connections> devices_;
   std::unique_ptr<Operation> operation_;
@@ -129,14 +130,14 @@ TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
   order = plan();
   if (to_json(former) != to_json(order)) expect_nothing_moves(former);
   // The tracker takes the calibrator for the femur.
-  ASSERT_TRUE(room_->set_fault("swapped_calibrator", true));
+  ASSERT_TRUE(virtual_or_->set_fault("swapped_calibrator", true));
   EXPECT_GT(wait_until_stale(order).figures.at("distance_mm"), 10);
-  ASSERT_TRUE(room_->set_fault("swapped_calibrator", false));
+  ASSERT_TRUE(virtual_or_->set_fault("swapped_calibrator", false));
   expect_nothing_moves(order);
   // The robot's table is pushed: seen since planning, and planned anew only where it was registered.
   std::this_thread::sleep_for(1s);
   order = plan();
-  room_->theatre().move_base({3, 0, 0});
+  virtual_or_->simulated_scene().move_base({3, 0, 0});
   EXPECT_THAT(wait_until_stale(order).message, testing::HasSubstr("robot base or tool moved"));
   expect_nothing_moves(order);
   std::this_thread::sleep_for(1s);
@@ -186,7 +187,7 @@ TEST_F(StalePlan, BoneThatCreepsStopsTheToolWhichIsThenWithdrawn) {
     const RobotOrder order = plan();
     const std::string token = robot().confirm(order);
     std::jthread creep([&](const std::stop_token& over) {
-      while (!room_->robot().truth().moving && !over.stop_requested()) std::this_thread::sleep_for(5ms);
+      while (!virtual_or_->robot().truth().moving && !over.stop_requested()) std::this_thread::sleep_for(5ms);
       for (int i = 0; i < 15 && !over.stop_requested(); ++i) {
         move_femur(2);
         std::this_thread::sleep_for(170ms);
@@ -197,7 +198,7 @@ TEST_F(StalePlan, BoneThatCreepsStopsTheToolWhichIsThenWithdrawn) {
     creep.join();
     ASSERT_FALSE(gone);
     EXPECT_EQ(robot().status().phase, LinkPhase::stopped);
-    EXPECT_FALSE(room_->robot().truth().moving);
+    EXPECT_FALSE(virtual_or_->robot().truth().moving);
     const Failure refused = gone.error();
     try_to([&] { return operation_->withdraw(order, rest, nod_); });
     const RobotState back = robot().wait_connected(5s).value();

@@ -56,7 +56,7 @@ class ChartDrawing {
     };
     x_ = axis(chart.x_names, x_low, x_high);
     y_ = axis(chart.y_names, y_low, y_high);
-    if (chart.picture) share_scale();
+    if (chart.image) share_scale();
     if (chart.field) x_.low = x_low, x_.high = x_high, y_.low = y_low, y_.high = y_high;
     if (chart.field) x_.step = y_.step = round_step(x_high - x_low, Axis::about_ticks);
   }
@@ -81,7 +81,7 @@ class ChartDrawing {
   static const char* colour(std::size_t i) { return series_colours[i % series_colours.size()]; }
   double px(double x) const { return x0_ + chart_width * x_.share(x); }
   double py(double y) const {
-    const bool down = chart_.picture || !chart_.y_names.empty();
+    const bool down = chart_.image || !chart_.y_names.empty();
     return top_margin + chart_height * (down ? y_.share(y) : 1 - y_.share(y));
   }
 

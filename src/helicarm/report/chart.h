@@ -52,7 +52,7 @@ struct Chart {
   std::vector<std::string> x_names = {};  ///< of x = 0, 1, ...: instead of numbers
   std::vector<std::string> y_names = {};  ///< of y = 0, 1, ... downwards, likewise
   bool y_from_zero = false;
-  bool picture = false;                               ///< y down, and the same scale both ways
+  bool image = false;                                 ///< y down, and the same scale both ways
   std::optional<double> y_most = {};                  ///< what lies higher is cut off
   std::string note = {};                              ///< a line below the title
   std::optional<std::array<double, 2>> y_range = {};  ///< instead of the curves' own

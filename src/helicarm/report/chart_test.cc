@@ -39,9 +39,9 @@ TEST(Chart, LeavesOutWhatIsNotFinite) {
   EXPECT_THAT(chart_svg(std::array{Chart{"nothing", "x", "y"}}), Not(HasSubstr("inf")));
 }
 
-TEST(Chart, PictureHasYDownAndOneScaleBothWays) {
+TEST(Chart, ImageHasYDownAndOneScaleBothWays) {
   Chart chart{"t", "u, px", "v, px", {{"", {{0, 0}, {100, 0}, {100, 200}}}}};
-  chart.picture = true;
+  chart.image = true;
   // 460 x 360 px of frame hold 200 units of v in 360 px, so 100 units of u take 180 px.
   EXPECT_THAT(chart_svg(std::array{chart}), HasSubstr("M204.0 56.0L384.0 56.0L384.0 416.0"));
 }

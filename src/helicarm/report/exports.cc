@@ -36,7 +36,7 @@ std::string points_csv(const Result& result) {
   std::string rows;
   for (const PointResult& point : result.points) {
     if (!point.place) continue;
-    const GuidedPoint& at = *point.place;
+    const PointInFrames& at = *point.place;
     rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
     if (at.in_femur && at.covariance_in_femur)
       rows += csv_row(point, "femur", *at.in_femur, *at.covariance_in_femur);
@@ -104,7 +104,7 @@ std::string rows_of(const Eigen::MatrixXd& matrix, std::string_view between) {
 std::string maya_cam(const ViewResult& view) {
   const View& of = view.calibrated->view;
   return fmt::format("image size\n{},{}\n\ncamera matrix\n{}\nrotation\n{}\ntranslation\n{}",
-                     view.exposure->pixels.width(), view.exposure->pixels.height(),
+                     view.xray_image->pixels.width(), view.xray_image->pixels.height(),
                      rows_of(of.intrinsics.matrix(), ","), rows_of(of.camera_from_world.rotation, ","),
                      rows_of(of.camera_from_world.translation, ","));
 }
@@ -145,7 +145,7 @@ Files files_of(const Result& result, std::span<const Export> kinds) {
   std::vector<const ViewResult*> calibrated;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     const ViewResult& view = result.views[i];
-    if (!view.calibrated || !view.exposure) continue;
+    if (!view.calibrated || !view.xray_image) continue;
     calibrated.push_back(&view);
     const std::string stem = file_stem(view.name, i);
     if (wanted(Export::mayacam)) add(stem + "_mayacam.txt", maya_cam(view));

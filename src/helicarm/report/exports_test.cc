@@ -32,7 +32,8 @@ class Exports : public testing::Test {
     for (const auto& [view, turn, fx] : {std::tuple{"AP", 0.1, 4000.5}, std::tuple{"LAT", 1.7, -4100.75}}) {
       ViewResult& of = result_.views.emplace_back();
       of.name = view;
-      of.exposure = std::make_shared<const Exposure>(Exposure{view, Image<float>(64, 48), 0, 4095, {}, {}});
+      of.xray_image =
+          std::make_shared<const XrayImage>(XrayImage{view, Image<float>(64, 48), 0, 4095, {}, {}});
       of.calibrated = CalibratedView{};
       of.calibrated->view = view_at(turn, fx);
     }
@@ -40,7 +41,7 @@ class Exports : public testing::Test {
       PointResult& point = result_.points.emplace_back();
       point.name = name_of_point;
       point.source = PointSource::pick;
-      point.place = GuidedPoint{};
+      point.place = PointInFrames{};
       point.place->in_calibrator = {1.0 / 3, 2, -3};
       point.place->covariance_in_calibrator = Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
     }

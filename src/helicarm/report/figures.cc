@@ -9,14 +9,14 @@
 #include "helicarm/image/png.h"
 #include "helicarm/report/marks.h"
 #include "helicarm/report/markup.h"
-#include "helicarm/report/picture.h"
+#include "helicarm/report/rectified_image.h"
 
 namespace helicarm {
 namespace {
 
 using Pixel = Eigen::Vector2d;
 
-/// Collects SVG elements; `unit` is about a thousandth of the picture's width, so that strokes look alike at
+/// Collects SVG elements; `unit` is about a thousandth of the image's width, so that strokes look alike at
 /// any size.
 class Drawing {
  public:
@@ -65,7 +65,7 @@ class Drawing {
   std::string elements_;
 };
 
-double unit_of(const ViewResult& view) { return view.exposure->pixels.width() / 1024.0; }
+double unit_of(const ViewResult& view) { return view.xray_image->pixels.width() / 1024.0; }
 
 /// A bar in the lower left corner that says how long `length` is once magnified.
 void scale_bar(Drawing& drawing, int height, double length, double magnification, std::string_view what) {
@@ -109,17 +109,17 @@ void draw_lines(Drawing& drawing, const ViewMarks& marks) {
 
 std::string view_figure(const Result& result, std::size_t index) {
   const ViewResult& view = result.views[index];
-  if (!view.exposure) return {};
-  const Image<std::uint8_t> picture = rectified_picture(view);
+  if (!view.xray_image) return {};
+  const Image<std::uint8_t> view_image = rectified_image(view);
   Drawing drawing(unit_of(view));
   drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)",
-              picture.width(), picture.height(), base64(encode_png(picture)));
+              view_image.width(), view_image.height(), base64(encode_png(view_image)));
   const ViewMarks marks = marks_of(result, index);
   draw_dots(drawing, marks);
-  draw_balls(drawing, marks, picture.height());
+  draw_balls(drawing, marks, view_image.height());
   draw_points(drawing, marks);
   draw_lines(drawing, marks);
-  return drawing.svg("X-ray " + view.name, picture.width(), picture.height());
+  return drawing.svg("X-ray " + view.name, view_image.width(), view_image.height());
 }
 
 std::string distortion_figure(const ViewResult& view) {

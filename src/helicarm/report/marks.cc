@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "helicarm/verification/picture_line.h"
+#include "helicarm/verification/image_line.h"
 
 namespace helicarm {
 namespace {

@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// A pure scale about the picture's corner: simple enough to be seen through.
+/// A pure scale about the image's corner: simple enough to be seen through.
 DistortionMap doubling_map() {
   DistortionMap map = identity_map(200, 200, {});
   map.order = 1;
@@ -39,9 +39,9 @@ Result one_view() {
   view.calibrated = CalibratedView{};
   view.calibrated->view = {{400, 400, 30, 40, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
   result.views.push_back(std::move(view));
-  const auto seen = [](double u, double v) { return SeenPoint{{2 * u, 2 * v}, {u, v}, 0.1}; };
+  const auto seen = [](double u, double v) { return ImagePoint{{2 * u, 2 * v}, {u, v}, 0.1}; };
   result.points = {
-      {"start", PointSource::pick, {}, {seen(10, 20)}, GuidedPoint{}, 0, {}},
+      {"start", PointSource::pick, {}, {seen(10, 20)}, PointInFrames{}, 0, {}},
       {"end", PointSource::pick, {}, {seen(60, 20)}, {}, 0, Failure{Reason::not_seen, "alone", "", {}}},
       {"T1", PointSource::target, {}, {{}}, {}, 0, {}}};
   result.tunnel_ends = {{0, 1}};
@@ -78,7 +78,7 @@ TEST(RawMarks, LieWhereTheMapPutsThem) {
 
 TEST(MarksOf, AnExposureAloneHasNone) {
   Result result;
-  result.views.push_back({"AP", std::make_shared<const Exposure>(), {}, {}, {}});
+  result.views.push_back({"AP", std::make_shared<const XrayImage>(), {}, {}, {}});
   const ViewMarks marks = marks_of(result, 0);
   EXPECT_TRUE(marks.balls.empty() && marks.plate_dots.empty() && marks.points.empty());
 }

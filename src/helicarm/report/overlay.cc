@@ -10,7 +10,7 @@
 #include "helicarm/image/opencv.h"
 #include "helicarm/image/png.h"
 #include "helicarm/report/marks.h"
-#include "helicarm/report/picture.h"
+#include "helicarm/report/rectified_image.h"
 
 namespace helicarm {
 namespace {
@@ -28,14 +28,14 @@ cv::Point fixed_point(const Eigen::Vector2d& at) {
 class Canvas {
  public:
   explicit Canvas(const Image<std::uint8_t>& grey) : scale_(grey.width() / 1024.0) {
-    cv::cvtColor(as_mat(grey), picture_, cv::COLOR_GRAY2RGB);
+    cv::cvtColor(as_mat(grey), image_, cv::COLOR_GRAY2RGB);
   }
   void circle(const Eigen::Vector2d& at, double radius, const cv::Scalar& colour) {
-    cv::circle(picture_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1,
+    cv::circle(image_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1,
                cv::LINE_AA, shift);
   }
   void line(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const cv::Scalar& colour) {
-    cv::line(picture_, fixed_point(a), fixed_point(b), colour, 2, cv::LINE_AA, shift);
+    cv::line(image_, fixed_point(a), fixed_point(b), colour, 2, cv::LINE_AA, shift);
   }
   void cross(const Eigen::Vector2d& at, double arm, const cv::Scalar& colour) {
     const double reach = arm * scale_;
@@ -46,20 +46,19 @@ class Canvas {
     const Eigen::Vector2d corner = at + scale_ * Eigen::Vector2d(17, -9);
     const cv::Point place(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
     for (const auto& [ink, thickness] : {std::pair{cv::Scalar(0, 0, 0), 3}, {colour, 1}})
-      cv::putText(picture_, words, place, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness,
-                  cv::LINE_AA);
+      cv::putText(image_, words, place, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness, cv::LINE_AA);
   }
-  std::string png() const { return encode_png(picture_); }
+  std::string png() const { return encode_png(image_); }
 
  private:
-  cv::Mat picture_;
+  cv::Mat image_;
   double scale_;
 };
 
 }  // namespace
 
 std::string overlay_png(const Result& result, std::size_t index, std::span<const Eigen::Vector2d> path) {
-  Canvas canvas(rectified_picture(result.views[index]));
+  Canvas canvas(rectified_image(result.views[index]));
   const ViewMarks marks = marks_of(result, index);
   for (const DotMark& dot : marks.plate_dots) canvas.circle(dot.place, 9, blue);
   for (const DotMark& blob : marks.false_blobs) canvas.cross(blob.place, 8, red);

@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// The rectified picture of a view as PNG, with balls and labels, points, planned tunnels and tool lines
+/// The rectified image of a view as PNG, with balls and labels, points, planned tunnels and tool lines
 /// drawn in; `path`: where the tool's tip will go (rectified pixels).
 std::string overlay_png(const Result& result, std::size_t view, std::span<const Eigen::Vector2d> path = {});
 

@@ -31,7 +31,7 @@ std::string report_html(const Result& result) {
 Expected<void> write_report(const Result& result, const std::filesystem::path& folder) {
   if (auto written = write_file(folder / "report.html", report_html(result)); !written) return written;
   for (std::size_t i = 0; i < result.views.size(); ++i)
-    if (result.views[i].exposure)
+    if (result.views[i].xray_image)
       if (auto written = write_file(folder / overlay_name(result.views[i].name, i), overlay_png(result, i));
           !written)
         return written;

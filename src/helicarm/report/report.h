@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// The whole report as one HTML page: pictures inside, nothing loaded from elsewhere, no identity of the
+/// The whole report as one HTML page: images inside, nothing loaded from elsewhere, no identity of the
 /// patient.
 std::string report_html(const Result& result);
 

@@ -19,10 +19,10 @@ Result full_result() {
   for (const char* name : {"AP", nasty}) {
     ViewResult view;
     view.name = name;
-    Exposure exposure{name, Image<float>(64, 48, 7), 0, 4095, {}, {}};
-    exposure.acquisition.patient_key = "CANARY";
-    exposure.pixels(3, 3) = 900;
-    view.exposure = std::make_shared<const Exposure>(std::move(exposure));
+    XrayImage xray_image{name, Image<float>(64, 48, 7), 0, 4095, {}, {}};
+    xray_image.acquisition.patient_key = "CANARY";
+    xray_image.pixels(3, 3) = 900;
+    view.xray_image = std::make_shared<const XrayImage>(std::move(xray_image));
     view.rectification = Rectification{};
     view.rectification->map = identity_map(64, 48, 0.2);
     Fiducial ball{nasty, Eigen::Vector3d::Zero()};
@@ -35,7 +35,7 @@ Result full_result() {
     view.calibrated->view = {{400, 400, 20, 20.1, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
     result.views.push_back(std::move(view));
   }
-  PointResult seen{nasty, PointSource::pick, {}, {SeenPoint{{1, 2}, {3, 4}, 0.1}, {}}, GuidedPoint{}, 0.2,
+  PointResult seen{nasty, PointSource::pick, {}, {ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, PointInFrames{}, 0.2,
                    {}};
   PointResult lost{
       "T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, nasty, "", {}}};
@@ -101,7 +101,7 @@ TEST(OverlayName, OddNamesAreNumbered) {
   EXPECT_EQ(overlay_name("", 0), "view1_overlay.png");
 }
 
-TEST(OverlayPng, IsAPngOfThePicture) {
+TEST(OverlayPng, IsAPngOfTheImage) {
   const std::string png = overlay_png(full_result(), 0);
   ASSERT_GT(png.size(), 33u);
   EXPECT_EQ(png.substr(1, 3), "PNG");

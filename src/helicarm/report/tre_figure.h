@@ -7,7 +7,7 @@
 
 namespace helicarm {
 
-/// The predicted TRE as an SVG picture: the slices through the volume's middle along XOY and XOZ (the paper's
+/// The predicted TRE as an SVG image: the slices through the volume's middle along XOY and XOZ (the paper's
 /// Fig. 7), with isolines at the ticks of the scale. A document of its own.
 std::string tre_figure(const TreVolume& volume);
 

@@ -33,7 +33,7 @@ struct SessionHistory {
 Expected<SessionHistory> read_session(const std::filesystem::path& log);
 
 /// The record of an operation: lines are only ever appended, and each is on disk when `append` returns. Safe
-/// to call from several threads. Patient data do not belong here: pictures are named by their digests.
+/// to call from several threads. Patient data do not belong here: images are named by their digests.
 class SessionLog {
  public:
   /// Goes on with the log that is there (cutting off a torn end) or begins one. Refuses cannot_write, also

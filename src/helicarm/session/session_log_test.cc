@@ -151,7 +151,7 @@ TEST_F(Session, IsOneProgramsAtATime) {
   EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::cannot_write);
 }
 
-TEST_F(Session, FullDiskIsToldAndLeavesTheLogWhole) {
+TEST_F(Session, FullDiskIsReportedAndLeavesTheLogWhole) {
   const auto session = SessionLog::open(log_).value();
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
   rlimit old{};
@@ -169,7 +169,7 @@ TEST_F(Session, FullDiskIsToldAndLeavesTheLogWhole) {
   EXPECT_EQ(history.records[1].content.at("x_mm"), 2);
 }
 
-TEST_F(Session, FolderThatCannotBeMadeIsTold) {
+TEST_F(Session, FolderThatCannotBeMadeIsReported) {
   EXPECT_EQ(SessionLog::open("/dev/null/session.log").error().reason, Reason::cannot_write);
 }
 

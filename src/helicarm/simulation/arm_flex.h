@@ -14,7 +14,7 @@ namespace helicarm::simulation {
 /// A make of C-arm, as its data sheet has it.
 struct CArmModel {
   bool intensifier;    ///< round field, distortion and plate; else a flat panel
-  double receiver_mm;  ///< side of the picture
+  double receiver_mm;  ///< side of the image
   double source_detector_mm;
   double source_isocentre_mm;
 };
@@ -24,11 +24,11 @@ CArmModel model_of(Preset preset);
 /// What one C-arm does at one angle. Camera axes: x right, y down, z from the source to the receiver.
 struct ArmState {
   double f_mm;
-  Eigen::Vector2d principal_mm;  ///< from the picture's middle
+  Eigen::Vector2d principal_mm;  ///< from the image's middle
   Eigen::Vector3d source_mm;     ///< from its place in an unbent arm
-  double roll_deg;               ///< of the picture about its axis
+  double roll_deg;               ///< of the image about its axis
   double s_rotation;             ///< of the intensifier's S, rad
-  Eigen::Vector2d shift_mm;      ///< of the intensifier's picture
+  Eigen::Vector2d shift_mm;      ///< of the intensifier's image
 };
 
 /// One C-arm with its faults: it bends under its own weight, and its intensifier's electrons go astray in the

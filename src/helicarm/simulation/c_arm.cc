@@ -46,43 +46,44 @@ std::vector<ViewAngles> angles_of(const SimulationOptions& options, RandomStream
   return {{"AP", {orbit, random.uniform(-2, 2)}}, {"LAT", {orbit + between, random.uniform(-2, 2)}}};
 }
 
-Shot named_shot(const SimulationOptions& options, const ViewAngles& view, std::uint32_t number) {
-  Shot shot;
-  shot.name = view.name;
-  shot.number = number;
-  shot.mirrored = number == 1 && options.has(Fault::mirrored);
-  shot.true_angles = view.angles;
-  shot.primary_angle_deg = rounded(view.angles.primary_deg, 0.5);
-  shot.secondary_angle_deg = rounded(view.angles.secondary_deg, 0.5);
-  return shot;
+TrueView named_view(const SimulationOptions& options, const ViewAngles& view, std::uint32_t number) {
+  TrueView true_view;
+  true_view.name = view.name;
+  true_view.number = number;
+  true_view.mirrored = number == 1 && options.has(Fault::mirrored);
+  true_view.true_angles = view.angles;
+  true_view.primary_angle_deg = rounded(view.angles.primary_deg, 0.5);
+  true_view.secondary_angle_deg = rounded(view.angles.secondary_deg, 0.5);
+  return true_view;
 }
 
 /// 2.3.3: Eq. 5 at (0, 0, 0) and (90, 0, 0) degrees, T = (0, 0, 800) mm. The world's origin is put to the
-/// middle of the cone, since from its base the top of the spiral falls outside the lateral picture.
-std::vector<Shot> paper_stand(const SimulationOptions& options) {
+/// middle of the cone, since from its base the top of the spiral falls outside the lateral image.
+std::vector<TrueView> paper_stand(const SimulationOptions& options) {
   const CArmModel model = model_of(Preset::paper_sim);
   const ConicalHelix helix;
   const Vector3d middle(0, 0, 0.5 * helix.h * helix.t_end);
   const double pixel_mm = model.receiver_mm / options.size;
   const double f = model.source_detector_mm / pixel_mm;
-  std::vector<Shot> shots;
+  std::vector<TrueView> true_views;
   const std::vector<ViewAngles> printed = {{"AP", {0, 0}}, {"LAT", {90, 0}}};
   for (const ViewAngles& view : options.views.empty() ? printed : options.views) {
-    Shot shot = named_shot(options, view, static_cast<std::uint32_t>(shots.size()));
-    shot.f_mm = shot.nominal_f_mm = model.source_detector_mm;
-    shot.view.intrinsics = {f, f, 0.5 * options.size, 0.5 * options.size};
+    TrueView true_view = named_view(options, view, static_cast<std::uint32_t>(true_views.size()));
+    true_view.f_mm = true_view.nominal_f_mm = model.source_detector_mm;
+    true_view.view.intrinsics = {f, f, 0.5 * options.size, 0.5 * options.size};
     const Matrix3d rotation =
         rotation_from_euler(view.angles.primary_deg * radian, view.angles.secondary_deg * radian, 0);
-    shot.view.camera_from_world = {rotation, Vector3d(0, 0, model.source_isocentre_mm) - rotation * middle};
-    shot.detector = {options.size, options.size, pixel_mm, {}, {}};
-    shot.detector.distortion.centre_px = Vector2d::Constant(0.5 * (options.size - 1));
-    shot.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
-    shots.push_back(shot);
+    true_view.view.camera_from_world = {rotation,
+                                        Vector3d(0, 0, model.source_isocentre_mm) - rotation * middle};
+    true_view.detector = {options.size, options.size, pixel_mm, {}, {}};
+    true_view.detector.distortion.centre_px = Vector2d::Constant(0.5 * (options.size - 1));
+    true_view.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
+    true_views.push_back(true_view);
   }
-  return shots;
+  return true_views;
 }
 
-/// Where an unbent arm points. Seen from the patient (x distal, y lateral, z anterior); pictures from the
+/// Where an unbent arm points. Seen from the patient (x distal, y lateral, z anterior); images from the
 /// side are turned by a quarter, so that the leg lies across as in the operating room.
 Matrix3d pointing(const ArmAngles& angles) {
   const Matrix3d from_below = (Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
@@ -93,7 +94,7 @@ Matrix3d pointing(const ArmAngles& angles) {
 
 }  // namespace
 
-View Shot::stored_view() const {
+View TrueView::stored_view() const {
   View stored = view;
   if (mirrored) {
     stored.intrinsics.fx = -stored.intrinsics.fx;
@@ -102,18 +103,18 @@ View Shot::stored_view() const {
   return stored;
 }
 
-Vector2d Shot::ideal_image(const Vector3d& point_in_calibrator) const {
+Vector2d TrueView::ideal_image(const Vector3d& point_in_calibrator) const {
   return stored_view().project(point_in_calibrator);
 }
 
-Vector2d Shot::raw_image(const Vector3d& point_in_calibrator) const {
+Vector2d TrueView::raw_image(const Vector3d& point_in_calibrator) const {
   Vector2d raw = detector.distortion.raw_from_ideal(view.project(point_in_calibrator));
   if (mirrored) raw.x() = detector.width - 1 - raw.x();
   return raw;
 }
 
-std::vector<Shot> take_stand(const SimulationOptions& options, double plate_height_mm,
-                             const RigidTransform& calibrator_from_patient) {
+std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_height_mm,
+                                 const RigidTransform& calibrator_from_patient) {
   if (options.machine() == Preset::paper_sim) return paper_stand(options);
   const CArmModel model = model_of(options.machine());
   const ArmFlex arm = draw_arm(options.arm_seed.value_or(options.seed), model, options.size);
@@ -122,35 +123,37 @@ std::vector<Shot> take_stand(const SimulationOptions& options, double plate_heig
   const Vector2d middle = Vector2d::Constant(0.5 * (options.size - 1));
   const Vector3d isocentre(random.uniform(-4, 4), random.uniform(-4, 4), random.uniform(34, 40));
 
-  std::vector<Shot> shots;
+  std::vector<TrueView> true_views;
   for (const ViewAngles& view : angles_of(options, random)) {
-    Shot shot = named_shot(options, view, static_cast<std::uint32_t>(shots.size()));
-    RandomStream once(options.seed, stream::shots, shot.number);
-    shot.true_angles.primary_deg += once.uniform(-0.05, 0.05);
-    shot.true_angles.secondary_deg += once.uniform(-0.05, 0.05);
-    const Matrix3d unbent = pointing(shot.true_angles);
+    TrueView true_view = named_view(options, view, static_cast<std::uint32_t>(true_views.size()));
+    RandomStream once(options.seed, stream::true_views, true_view.number);
+    true_view.true_angles.primary_deg += once.uniform(-0.05, 0.05);
+    true_view.true_angles.secondary_deg += once.uniform(-0.05, 0.05);
+    const Matrix3d unbent = pointing(true_view.true_angles);
     const ArmState state = unrepeated(arm.at(unbent), once);
-    shot.f_mm = state.f_mm;
-    shot.nominal_f_mm = model.source_detector_mm;
+    true_view.f_mm = state.f_mm;
+    true_view.nominal_f_mm = model.source_detector_mm;
     const Vector2d centre = middle + state.principal_mm / pixel_mm;
-    shot.view.intrinsics = {shot.f_mm / pixel_mm, shot.f_mm / pixel_mm, centre.x(), centre.y()};
+    true_view.view.intrinsics = {true_view.f_mm / pixel_mm, true_view.f_mm / pixel_mm, centre.x(),
+                                 centre.y()};
     const Matrix3d rotation = turn(state.roll_deg, Vector3d::UnitZ()) * unbent;
     const RigidTransform camera_from_patient{
         rotation, Vector3d(0, 0, model.source_isocentre_mm) - state.source_mm - rotation * isocentre};
-    shot.view.camera_from_world = camera_from_patient * calibrator_from_patient.inverse();
+    true_view.view.camera_from_world = camera_from_patient * calibrator_from_patient.inverse();
 
-    shot.detector = {options.size, options.size, pixel_mm, arm.distortion, {}};
-    shot.detector.distortion.s_rotation = state.s_rotation;
-    shot.detector.distortion.shift_px = state.shift_mm / pixel_mm;
-    if (model.intensifier) shot.detector.field_radius_px = arm.distortion.radius_px;
-    shot.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
+    true_view.detector = {options.size, options.size, pixel_mm, arm.distortion, {}};
+    true_view.detector.distortion.s_rotation = state.s_rotation;
+    true_view.detector.distortion.shift_px = state.shift_mm / pixel_mm;
+    if (model.intensifier) true_view.detector.field_radius_px = arm.distortion.radius_px;
+    true_view.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
     // The plate is laid on by hand, and centred on the receiver, not on the central ray.
-    shot.camera_from_plate = {turn(once.uniform(-0.5, 0.5), Vector3d::UnitZ()),
-                              {once.uniform(-2, 2), once.uniform(-2, 2), shot.f_mm - plate_height_mm}};
-    shot.camera_from_plate.translation.head<2>() += pixel_mm * (middle - centre);
-    shots.push_back(shot);
+    true_view.camera_from_plate = {
+        turn(once.uniform(-0.5, 0.5), Vector3d::UnitZ()),
+        {once.uniform(-2, 2), once.uniform(-2, 2), true_view.f_mm - plate_height_mm}};
+    true_view.camera_from_plate.translation.head<2>() += pixel_mm * (middle - centre);
+    true_views.push_back(true_view);
   }
-  return shots;
+  return true_views;
 }
 
 }  // namespace helicarm::simulation

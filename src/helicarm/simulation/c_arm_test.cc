@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 
 constexpr double plate_mm = 15;
 
-std::vector<Shot> shots_at(const std::vector<ArmAngles>& angles, std::uint64_t seed = 1,
-                           std::optional<std::uint64_t> arm_seed = {}) {
+std::vector<TrueView> true_views_at(const std::vector<ArmAngles>& angles, std::uint64_t seed = 1,
+                                    std::optional<std::uint64_t> arm_seed = {}) {
   SimulationOptions options;
   options.seed = seed;
   options.arm_seed = arm_seed;
@@ -24,11 +24,13 @@ std::vector<Shot> shots_at(const std::vector<ArmAngles>& angles, std::uint64_t s
   return take_stand(options, plate_mm, {});
 }
 
-Vector2d principal_mm(const Shot& shot) {
-  return shot.pixel_mm() * Vector2d(shot.view.intrinsics.u0, shot.view.intrinsics.v0);
+Vector2d principal_mm(const TrueView& true_view) {
+  return true_view.pixel_mm() * Vector2d(true_view.view.intrinsics.u0, true_view.view.intrinsics.v0);
 }
 
-Vector3d beam_direction(const Shot& shot) { return shot.view.camera_from_world.rotation.row(2); }
+Vector3d beam_direction(const TrueView& true_view) {
+  return true_view.view.camera_from_world.rotation.row(2);
+}
 
 /// Greatest and rms difference in raw pixels over the field.
 double greatest_difference_px(const IntensifierDistortion& a, const IntensifierDistortion& b) {
@@ -41,19 +43,20 @@ double greatest_difference_px(const IntensifierDistortion& a, const IntensifierD
 
 TEST(CArm, SameAngleTwiceIsTheSameButForALittle) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const auto shots = shots_at({{0, 0}, {90, 5}, {90, 5}}, seed);
-    EXPECT_LT((principal_mm(shots[1]) - principal_mm(shots[2])).norm(), 0.21);
-    EXPECT_NE(principal_mm(shots[1]), principal_mm(shots[2]));
-    EXPECT_LT(std::abs(shots[1].f_mm - shots[2].f_mm), 0.11);
-    EXPECT_LT(greatest_difference_px(shots[1].detector.distortion, shots[2].detector.distortion), 0.5);
-    EXPECT_GT(beam_direction(shots[1]).dot(beam_direction(shots[2])), std::cos(0.2 * radian));
+    const auto true_views = true_views_at({{0, 0}, {90, 5}, {90, 5}}, seed);
+    EXPECT_LT((principal_mm(true_views[1]) - principal_mm(true_views[2])).norm(), 0.21);
+    EXPECT_NE(principal_mm(true_views[1]), principal_mm(true_views[2]));
+    EXPECT_LT(std::abs(true_views[1].f_mm - true_views[2].f_mm), 0.11);
+    EXPECT_LT(greatest_difference_px(true_views[1].detector.distortion, true_views[2].detector.distortion),
+              0.5);
+    EXPECT_GT(beam_direction(true_views[1]).dot(beam_direction(true_views[2])), std::cos(0.2 * radian));
   }
 }
 
 TEST(CArm, OneArmBendsAlikeInTwoCases) {
-  const auto monday = shots_at({{0, 0}, {90, 0}}, 1, 77);
-  const auto tuesday = shots_at({{0, 0}, {90, 0}}, 2, 77);
-  const auto other = shots_at({{0, 0}, {90, 0}}, 2, 78);
+  const auto monday = true_views_at({{0, 0}, {90, 0}}, 1, 77);
+  const auto tuesday = true_views_at({{0, 0}, {90, 0}}, 2, 77);
+  const auto other = true_views_at({{0, 0}, {90, 0}}, 2, 78);
   for (std::size_t i = 0; i < 2; ++i) {
     EXPECT_LT((principal_mm(monday[i]) - principal_mm(tuesday[i])).norm(), 0.25);
     EXPECT_GT((principal_mm(monday[i]) - principal_mm(other[i])).norm(), 0.25);
@@ -62,7 +65,7 @@ TEST(CArm, OneArmBendsAlikeInTwoCases) {
 }
 
 TEST(CArm, FlexAndDistortionVarySmoothlyWithTheAngle) {
-  // Pictures from the side are turned by a quarter beyond 45 degrees, so stay on one side of that.
+  // Images from the side are turned by a quarter beyond 45 degrees, so stay on one side of that.
   const CArmModel model = model_of(Preset::ii_9in);
   const ArmFlex arm = draw_arm(4, model, 1024);
   const auto at = [&](double primary) {
@@ -81,23 +84,23 @@ TEST(CArm, FlexAndDistortionVarySmoothlyWithTheAngle) {
 
 TEST(CArm, TheSTurnsOverWithTheArm) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const auto shots = shots_at({{0, 0}, {180, 0}, {90, 0}}, seed);
-    const double up = shots[0].detector.distortion.s_rotation;
-    EXPECT_NEAR(shots[1].detector.distortion.s_rotation, -up, 0.03 * radian);
-    EXPECT_LE(std::abs(shots[2].detector.distortion.s_rotation), 1.01 * radian);
+    const auto true_views = true_views_at({{0, 0}, {180, 0}, {90, 0}}, seed);
+    const double up = true_views[0].detector.distortion.s_rotation;
+    EXPECT_NEAR(true_views[1].detector.distortion.s_rotation, -up, 0.03 * radian);
+    EXPECT_LE(std::abs(true_views[2].detector.distortion.s_rotation), 1.01 * radian);
   }
 }
 
 TEST(CArm, LooksWhereTheAnglesSay) {
-  const auto shots = shots_at({{0, 0}, {90, 0}, {45, 0}, {0, 30}});
+  const auto true_views = true_views_at({{0, 0}, {90, 0}, {45, 0}, {0, 30}});
   const double tilt = std::sqrt(0.5);
   const std::vector<Vector3d> expected = {
       {0, 0, 1}, {0, -1, 0}, {0, -tilt, tilt}, {-0.5, 0, std::sqrt(0.75)}};
   for (std::size_t i = 0; i < expected.size(); ++i) {
-    EXPECT_LT((beam_direction(shots[i]) - expected[i]).norm(), 0.002) << i;
-    EXPECT_NEAR(shots[i].view.camera_from_world.rotation.determinant(), 1, 1e-12);
+    EXPECT_LT((beam_direction(true_views[i]) - expected[i]).norm(), 0.002) << i;
+    EXPECT_NEAR(true_views[i].view.camera_from_world.rotation.determinant(), 1, 1e-12);
   }
-  EXPECT_EQ(shots[3].secondary_angle_deg, 30);
+  EXPECT_EQ(true_views[3].secondary_angle_deg, 30);
 }
 
 TEST(CArm, ViewsAreReadStrictly) {

@@ -60,8 +60,8 @@ TEST(CtBody, CaseIsSeenThroughItAndTheTruthNamesIt) {
   bare.ct = std::make_shared<CtOptions>(block(-1000));
   const SimulatedCase without = *simulate_case(bare);
   ASSERT_TRUE(with.calibrator_from_ct.has_value());
-  const Shot& shot = with.views[0].shot;
-  const Eigen::Vector2d centre = shot.raw_image(with.calibrator_from_ct->translation);
+  const TrueView& true_view = with.views[0].true_view;
+  const Eigen::Vector2d centre = true_view.raw_image(with.calibrator_from_ct->translation);
   const Eigen::Vector2i pixel = centre.array().round().cast<int>();
   EXPECT_LT(with.views[0].pixels(pixel.x(), pixel.y()), 0.9 * without.views[0].pixels(pixel.x(), pixel.y()));
   const Json truth = truth_json(with);

@@ -12,8 +12,8 @@ using Eigen::Vector3d;
 constexpr double wire_radius_mm = 1;
 
 /// A K-wire that crosses a ball's shadow in this view, 15 mm nearer the source.
-Body wire_over(const Vector3d& ball, const Shot& shot, RandomStream& random) {
-  const Vector3d towards_source = (shot.view.source_in_world() - ball).normalized();
+Body wire_over(const Vector3d& ball, const TrueView& true_view, RandomStream& random) {
+  const Vector3d towards_source = (true_view.view.source_in_world() - ball).normalized();
   const Vector3d middle = ball + 15 * towards_source;
   const Vector3d across = towards_source.unitOrthogonal();
   const Vector3d axis = Eigen::AngleAxisd(random.uniform(0, EIGEN_PI), towards_source) * across;
@@ -29,7 +29,7 @@ Body screw(const Vector3d& tip, const Vector3d& axis, double length) {
 }  // namespace
 
 Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator,
-                  const std::vector<Shot>& shots, const RigidTransform& calibrator_from_knee) {
+                  const std::vector<TrueView>& true_views, const RigidTransform& calibrator_from_knee) {
   RandomStream random(options.seed, stream::faults);
   Scene scene;
   if (options.has(Fault::decoys))
@@ -38,9 +38,9 @@ Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator
       scene.push_back(steel("decoy", {sphere(place, 2)}));
     }
   if (options.has(Fault::wires))
-    for (const Shot& shot : shots) {
+    for (const TrueView& true_view : true_views) {
       const auto chosen = random.index(static_cast<std::uint32_t>(calibrator.balls.size()));
-      scene.push_back(wire_over(calibrator.balls[chosen].centre_in_calibrator, shot, random));
+      scene.push_back(wire_over(calibrator.balls[chosen].centre_in_calibrator, true_view, random));
     }
   if (options.has(Fault::screws)) {
     scene.push_back(
@@ -51,13 +51,13 @@ Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator
   return scene;
 }
 
-Scene shutter_leaves(const SimulationOptions& options, const Shot& shot) {
+Scene shutter_leaves(const SimulationOptions& options, const TrueView& true_view) {
   if (!options.has(Fault::shutters)) return {};
-  RandomStream random(options.seed, stream::faults, shot.number + 1);
-  const double field_mm = 0.5 * shot.pixel_mm() * shot.detector.width;
+  RandomStream random(options.seed, stream::faults, true_view.number + 1);
+  const double field_mm = 0.5 * true_view.pixel_mm() * true_view.detector.width;
   constexpr double depth_mm = 100;
-  const double scale = depth_mm / shot.f_mm;
-  const RigidTransform world_from_camera = shot.view.camera_from_world.inverse();
+  const double scale = depth_mm / true_view.f_mm;
+  const RigidTransform world_from_camera = true_view.view.camera_from_world.inverse();
   const double reach = field_mm * scale * 2;
   Scene leaves;
   for (int side : {-1, 1}) {

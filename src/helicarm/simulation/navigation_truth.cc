@@ -19,14 +19,14 @@ RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double 
   for (;;) {
     const RigidTransform pose{random_rotation(random),
                               place + random_motion(random, 0, spread_mm).translation};
-    if (pose_covariance(room_tracker(), body, pose)) return pose;
+    if (pose_covariance(virtual_tracker(), body, pose)) return pose;
   }
 }
 
 /// Takes the readings and tells how far they truly scatter.
 void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>& bodies,
                 std::uint64_t seed) {
-  const TrackerModel model = room_tracker();
+  const TrackerModel model = virtual_tracker();
   double turn2 = 0;
   double shift2 = 0;
   std::uint32_t number = 0;
@@ -70,7 +70,7 @@ double distance_to_line(const Vector3d& point, const Vector3d& a, const Vector3d
   return (point - a).cross(b - a).norm() / (b - a).norm();
 }
 
-TrackerModel room_tracker() {
+TrackerModel virtual_tracker() {
   TrackerModel model;
   model.drift_sigma_mm = {0.07, 0.07, 0.17};
   model.lost_sample = 0.02;

@@ -36,7 +36,7 @@ struct ToolLine {
 
 /// The tracker of the operating room. Besides the markers' noise each body keeps an error of its place in the
 /// volume, which no short mean takes away.
-TrackerModel room_tracker();
+TrackerModel virtual_tracker();
 
 /// A reading is the mean of this many samples of bodies at rest, less those that were lost.
 inline constexpr int samples_per_reading = 6;

@@ -19,7 +19,7 @@ void expect_as_one_by_one(const std::vector<Solid>& solids, const RayRow& rays) 
 }
 
 /// From 600 mm away to anywhere about the origin.
-RayRow strewn_rays(RandomStream& random) {
+RayRow uniform_rays(RandomStream& random) {
   RayRow rays({random.uniform(-50, 50), 40, -600}, 333);
   for (std::size_t i = 0; i < rays.x.size(); ++i) {
     const Vector3d aim(random.uniform(-12, 12), random.uniform(-12, 12), random.uniform(-12, 12));
@@ -41,7 +41,7 @@ TEST(RayRow, AgreesWithEachRayAloneForEveryKindAndTheirUnions) {
                                      frustum({0, 0, -3}, {0, 0, 3}, 11, 1),
                                      box({-3, 2, 3}, {4, 5, 6}, turn)};
   for (int trial = 0; trial < 20; ++trial) {
-    const RayRow rays = strewn_rays(random);
+    const RayRow rays = uniform_rays(random);
     for (const Solid& solid : solids) expect_as_one_by_one({solid}, rays);
     expect_as_one_by_one({solids[0], solids[3]}, rays);
     expect_as_one_by_one(solids, rays);

@@ -68,9 +68,9 @@ RayRange lit_range(const std::vector<double>& weight) {
   return lit;
 }
 
-class Tracer {
+class RayTracer {
  public:
-  Tracer(const Scene& scene, const VirtualDetector& detector, const View& view, const CtBody* ct)
+  RayTracer(const Scene& scene, const VirtualDetector& detector, const View& view, const CtBody* ct)
       : scene_(scene), detector_(detector), ct_(ct), source_(view.source_in_world()) {
     direction_from_pixel_ = view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
     for (const Body& body : scene) {
@@ -198,20 +198,20 @@ double field_weight(const VirtualDetector& detector, const Vector2d& raw) {
 
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
                          unsigned threads, const CtBody* ct) {
-  const Tracer tracer(scene, detector, view, ct);
-  Image<float> picture(detector.width, detector.height);
+  const RayTracer tracer(scene, detector, view, ct);
+  Image<float> image(detector.width, detector.height);
   Image<float> metal(detector.width, detector.height);
   const auto rows = static_cast<std::size_t>(detector.height);
   parallel_for(rows, threads, [&](std::size_t row) {
     const int v = static_cast<int>(row);
-    tracer.trace_row(v, picture.row(v), metal.row(v));
+    tracer.trace_row(v, image.row(v), metal.row(v));
   });
   parallel_for(rows, threads, [&](std::size_t row) {
     const int v = static_cast<int>(row);
     for (int u = 0; u < detector.width; ++u)
-      if (at_edge(metal, u, v)) picture(u, v) = tracer.supersampled(u, v);
+      if (at_edge(metal, u, v)) image(u, v) = tracer.supersampled(u, v);
   });
-  return picture;
+  return image;
 }
 
 }  // namespace helicarm::simulation

@@ -22,9 +22,9 @@ struct VirtualDetector {
   std::optional<double> field_radius_px;  ///< of the intensifier's round field, about the distortion's centre
 };
 
-/// The noise-free picture, open beam = 1, black outside the round field. Every raw pixel's own ray is traced
+/// The noise-free image, open beam = 1, black outside the round field. Every raw pixel's own ray is traced
 /// (nothing is resampled); pixels at the edge of metal average 3 x 3 rays. `view`: ideal pixels, world = the
-/// scene's frame, in which the picture is not mirrored. `ct`, if any, is in the beam too; the source must not
+/// scene's frame, in which the image is not mirrored. `ct`, if any, is in the beam too; the source must not
 /// be in it. The same numbers whatever `threads` (0: all cores).
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
                          unsigned threads = 0, const CtBody* ct = nullptr);

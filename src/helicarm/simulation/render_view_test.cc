@@ -39,25 +39,25 @@ Body grey(Solid solid, double per_mm, bool metal = false) {
   return {"grey", {std::move(solid)}, Attenuation::Constant(per_mm), metal};
 }
 
-double path(const Image<float>& picture, int u, int v, double per_mm) {
-  return -std::log(picture(u, v)) / per_mm;
+double path(const Image<float>& image, int u, int v, double per_mm) {
+  return -std::log(image(u, v)) / per_mm;
 }
 
 TEST(RenderView, EmptySceneIsTheOpenBeam) {
   const VirtualDetector detector = small_detector();
-  const Image<float> picture = render_view({}, detector, straight_view(detector), 1);
-  for (float pixel : picture.pixels()) EXPECT_FLOAT_EQ(pixel, 1);
+  const Image<float> image = render_view({}, detector, straight_view(detector), 1);
+  for (float pixel : image.pixels()) EXPECT_FLOAT_EQ(pixel, 1);
 }
 
 TEST(RenderView, BallsChordFollowsTheClosedFormFromCentreToEdge) {
   const VirtualDetector detector = small_detector();
   const View view = straight_view(detector);
-  const Image<float> picture = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
+  const Image<float> image = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
   for (int u = 0; u < detector.width; ++u) {
     const Vector3d ray((u - view.intrinsics.u0) / view.intrinsics.fx,
                        (48 - view.intrinsics.v0) / view.intrinsics.fy, 1);
     const double miss = Vector3d(0, 0, depth_mm).cross(ray).norm() / ray.norm();
-    EXPECT_NEAR(path(picture, u, 48, 0.02), 2 * std::sqrt(std::max(0.0, 25 - miss * miss)), 1e-4);
+    EXPECT_NEAR(path(image, u, 48, 0.02), 2 * std::sqrt(std::max(0.0, 25 - miss * miss)), 1e-4);
   }
 }
 
@@ -65,10 +65,10 @@ TEST(RenderView, AbsorbedMassOfABallIsItsVolume) {
   const VirtualDetector detector = small_detector();
   const View view = straight_view(detector);
   constexpr double radius = 4;
-  const Image<float> picture = render_view({grey(sphere({0, 0, 0}, radius), 0.05, true)}, detector, view, 1);
+  const Image<float> image = render_view({grey(sphere({0, 0, 0}, radius), 0.05, true)}, detector, view, 1);
   double sum = 0;
   for (int v = 0; v < detector.height; ++v)
-    for (int u = 0; u < detector.width; ++u) sum += path(picture, u, v, 0.05);
+    for (int u = 0; u < detector.width; ++u) sum += path(image, u, v, 0.05);
   const double magnification = f_mm / depth_mm;
   const double volume = sum * std::pow(detector.pixel_mm / magnification, 2);
   EXPECT_NEAR(volume / (4.0 / 3.0 * EIGEN_PI * std::pow(radius, 3)), 1, 1e-3);
@@ -80,7 +80,7 @@ TEST(RenderView, SteelBallsCentroidIsTheCentreOfItsProjectedEllipse) {
   view.intrinsics.u0 = -400;  // the ball is seen 5 degrees off the axis
   constexpr double radius = 2;
   const Vector3d centre((63.4 + 400) / view.intrinsics.fx * depth_mm, 0.31, 0);
-  const Image<float> picture = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
+  const Image<float> image = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
   // The shadow's outline is the conic K (c c' - (c.c - r^2) I) K', whose centre follows from its dual's last
   // column.
   const Vector3d c = view.camera_from_world * centre;
@@ -92,7 +92,7 @@ TEST(RenderView, SteelBallsCentroidIsTheCentreOfItsProjectedEllipse) {
   double weight = 0;
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) {
-      const double dark = 1 - picture(u, v);
+      const double dark = 1 - image(u, v);
       sum += dark * Vector2d(u, v);
       weight += dark;
     }
@@ -107,13 +107,13 @@ TEST(RenderView, DistortionMovesTheBallToWhereItsInverseSays) {
   detector.distortion.shift_px = {4, -3};
   const View view = straight_view(detector);
   const Vector3d centre(2.1, -1.3, 0);
-  const Image<float> picture = render_view({grey(sphere(centre, 1), 3, true)}, detector, view, 1);
+  const Image<float> image = render_view({grey(sphere(centre, 1), 3, true)}, detector, view, 1);
   Vector2d sum(0, 0);
   double weight = 0;
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) {
-      sum += (1 - picture(u, v)) * Vector2d(u, v);
-      weight += 1 - picture(u, v);
+      sum += (1 - image(u, v)) * Vector2d(u, v);
+      weight += 1 - image(u, v);
     }
   EXPECT_LT((sum / weight - detector.distortion.raw_from_ideal(view.project(centre))).norm(), 0.1);
 }
@@ -130,17 +130,17 @@ TEST(RenderView, RoundFieldIsBlackOutsideAndWholeInside) {
   VirtualDetector detector = small_detector();
   detector.distortion.centre_px = {64, 48};
   detector.field_radius_px = 40;
-  const Image<float> picture = render_view({}, detector, straight_view(detector), 1);
-  EXPECT_EQ(picture(64 + 42, 48), 0);
-  EXPECT_EQ(picture(0, 0), 0);
-  EXPECT_EQ(picture(64 + 38, 48), 1);
+  const Image<float> image = render_view({}, detector, straight_view(detector), 1);
+  EXPECT_EQ(image(64 + 42, 48), 0);
+  EXPECT_EQ(image(0, 0), 0);
+  EXPECT_EQ(image(64 + 38, 48), 1);
   double area = 0;
-  for (float pixel : picture.pixels()) area += pixel;
+  for (float pixel : image.pixels()) area += pixel;
   EXPECT_NEAR(area, EIGEN_PI * 40 * 40, 10);
 }
 
 /// Every ray through every body, nothing left out.
-Image<float> picture_the_long_way(const Scene& scene, const VirtualDetector& detector, const View& view) {
+Image<float> render_by_an_oracle(const Scene& scene, const VirtualDetector& detector, const View& view) {
   const Vector3d source = view.source_in_world();
   const auto ray = [&](double u, double v) -> Vector3d {
     const Vector2d ideal = detector.distortion.ideal_from_raw({u, v});
@@ -159,7 +159,7 @@ Image<float> picture_the_long_way(const Scene& scene, const VirtualDetector& det
   Image<float> paths(detector.width, detector.height);
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) paths(u, v) = static_cast<float>(metal(u, v));
-  Image<float> picture(detector.width, detector.height);
+  Image<float> image(detector.width, detector.height);
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) {
       bool edge = false;
@@ -169,9 +169,9 @@ Image<float> picture_the_long_way(const Scene& scene, const VirtualDetector& det
       double sum = edge ? 0 : 9 * signal(u, v);
       for (int part = 0; edge && part < 9; ++part)
         sum += signal(u + (part % 3 - 1) / 3.0, v + (part / 3 - 1) / 3.0);
-      picture(u, v) = static_cast<float>(sum / 9);
+      image(u, v) = static_cast<float>(sum / 9);
     }
-  return picture;
+  return image;
 }
 
 TEST(RenderView, WholeSceneIsWhatEveryRayThroughEveryBodyGives) {
@@ -179,18 +179,18 @@ TEST(RenderView, WholeSceneIsWhatEveryRayThroughEveryBodyGives) {
   options.size = 256;
   for (const Preset preset : {Preset::ii_9in, Preset::flat_panel}) {
     options.preset = preset;
-    const Shot shot = take_stand(options, 15, {}).back();
+    const TrueView true_view = take_stand(options, 15, {}).back();
     Calibrator calibrator = udcsc();
     calibrator.targets = check_targets(calibrator);
     Scene scene = calibrator_body(calibrator);
     const RigidTransform aside{Eigen::Matrix3d::Identity(), {12, 5, 20}};
     for (const Body& body : knee_body()) scene.push_back(moved(body, aside));
-    for (const Body& dot : plate_body(plate48(), shot.camera_from_plate, shot.view)) scene.push_back(dot);
-    const Image<float> picture = render_view(scene, shot.detector, shot.view, 2);
-    const Image<float> truth = picture_the_long_way(scene, shot.detector, shot.view);
-    for (int v = 0; v < picture.height(); ++v)
-      for (int u = 0; u < picture.width(); ++u)
-        ASSERT_NEAR(picture(u, v), truth(u, v), 1e-6) << u << ' ' << v;
+    for (const Body& dot : plate_body(plate48(), true_view.camera_from_plate, true_view.view))
+      scene.push_back(dot);
+    const Image<float> image = render_view(scene, true_view.detector, true_view.view, 2);
+    const Image<float> truth = render_by_an_oracle(scene, true_view.detector, true_view.view);
+    for (int v = 0; v < image.height(); ++v)
+      for (int u = 0; u < image.width(); ++u) ASSERT_NEAR(image(u, v), truth(u, v), 1e-6) << u << ' ' << v;
   }
 }
 

@@ -94,7 +94,7 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   return {};
 }
 
-/// Within 3 px of the ball's centre, to a tenth of a pixel as a mouse on a zoomed picture gives it.
+/// Within 3 px of the ball's centre, to a tenth of a pixel as a mouse on a zoomed image gives it.
 Click click(const TruePoint& point, RandomStream& random) {
   const double distance = 3 * std::sqrt(random.uniform());
   const double angle = random.uniform(0, 2 * EIGEN_PI);
@@ -104,44 +104,49 @@ Click click(const TruePoint& point, RandomStream& random) {
 
 void expose(SimulatedView& view, const Scene& scene, const SimulationOptions& options, std::uint32_t number,
             const CtBody* ct = nullptr) {
-  const Shot& shot = view.shot;
-  const Image<float> signal = render_view(scene, shot.detector, shot.view, options.threads, ct);
-  view.pixels = develop(signal, shot.imaging, options.seed, stream::noise + 2 * number, options.threads);
-  if (shot.mirrored) view.pixels = mirrored(view.pixels);
+  const TrueView& true_view = view.true_view;
+  const Image<float> signal = render_view(scene, true_view.detector, true_view.view, options.threads, ct);
+  view.pixels =
+      detector_response(signal, true_view.imaging, options.seed, stream::noise + 2 * number, options.threads);
+  if (true_view.mirrored) view.pixels = mirrored(view.pixels);
 }
 
 void add_plate_dots(SimulatedView& view, const Plate& plate, const Scene& scene) {
-  const Shot& shot = view.shot;
-  const RigidTransform world_from_plate = shot.view.camera_from_world.inverse() * shot.camera_from_plate;
+  const TrueView& true_view = view.true_view;
+  const RigidTransform world_from_plate =
+      true_view.view.camera_from_world.inverse() * true_view.camera_from_plate;
   for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
     const Vector2d& dot = plate.dots_mm[i];
     view.plate_dots.push_back(true_point(plate_dot_name(i),
                                          world_from_plate * Eigen::Vector3d(dot.x(), dot.y(), 0),
-                                         plate.diameter_mm, scene, shot));
+                                         plate.diameter_mm, scene, true_view));
   }
 }
 
-SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const Shot& shot,
+SimulatedView take_view(const SimulatedCase& simulated_case, const Scene& patient, const TrueView& true_view,
                         std::uint32_t number, const CtBody* ct) {
-  const SimulationOptions& options = room.options;
+  const SimulationOptions& options = simulated_case.options;
   Scene scene = patient;
-  if (room.plate)
-    for (const Body& dot : plate_body(*room.plate, shot.camera_from_plate, shot.view)) scene.push_back(dot);
-  for (const Body& leaf : shutter_leaves(options, shot)) scene.push_back(leaf);
+  if (simulated_case.plate)
+    for (const Body& dot : plate_body(*simulated_case.plate, true_view.camera_from_plate, true_view.view))
+      scene.push_back(dot);
+  for (const Body& leaf : shutter_leaves(options, true_view)) scene.push_back(leaf);
 
   SimulatedView view;
-  view.shot = shot;
+  view.true_view = true_view;
   expose(view, scene, options, number, ct);
-  for (const CalibratorBall& ball : room.calibrator.balls)
-    view.balls.push_back(true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, shot));
-  for (const CalibratorTarget& target : room.calibrator.targets)
+  for (const CalibratorBall& ball : simulated_case.calibrator.balls)
+    view.balls.push_back(
+        true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, true_view));
+  for (const CalibratorTarget& target : simulated_case.calibrator.targets)
     view.targets.push_back(
-        true_point(target.name, target.point_in_calibrator, target.diameter_mm, scene, shot));
-  if (room.plate) add_plate_dots(view, *room.plate, scene);
-  if (room.navigation) {
+        true_point(target.name, target.point_in_calibrator, target.diameter_mm, scene, true_view));
+  if (simulated_case.plate) add_plate_dots(view, *simulated_case.plate, scene);
+  if (simulated_case.navigation) {
     RandomStream random(options.seed, stream::clicks, number);
-    for (const TunnelPoint& point : room.navigation->points) {
-      view.tunnel_points.push_back(true_point(point.name, point.in_calibrator, tunnel_ball_mm, scene, shot));
+    for (const TunnelPoint& point : simulated_case.navigation->points) {
+      view.tunnel_points.push_back(
+          true_point(point.name, point.in_calibrator, tunnel_ball_mm, scene, true_view));
       view.clicks.push_back(click(view.tunnel_points.back(), random));
     }
   }
@@ -150,88 +155,89 @@ SimulatedView take_view(const SimulatedCase& room, const Scene& patient, const S
 
 SimulatedCase simulate_grid(SimulationOptions options) {
   options.knee = false;
-  SimulatedCase room;
-  room.options = options;
-  room.plate = plate48();
+  SimulatedCase simulated_case;
+  simulated_case.options = options;
+  simulated_case.plate = plate48();
   const WireGrid grid;
-  for (const Shot& shot : take_grid_stand(options, *room.plate->height_above_receiver_mm)) {
+  for (const TrueView& true_view :
+       take_grid_stand(options, *simulated_case.plate->height_above_receiver_mm)) {
     SimulatedView view;
-    view.shot = shot;
-    Scene scene = plate_body(*room.plate, shot.camera_from_plate, shot.view);
-    if (!room.views.empty())
+    view.true_view = true_view;
+    Scene scene = plate_body(*simulated_case.plate, true_view.camera_from_plate, true_view.view);
+    if (!simulated_case.views.empty())
       for (const Body& wire : wire_grid_body(grid)) scene.push_back(wire);
-    expose(view, scene, options, static_cast<std::uint32_t>(room.views.size()));
-    add_plate_dots(view, *room.plate, scene);
-    if (!room.views.empty()) view.crosses = grid_crosses(grid, scene, shot);
-    room.views.push_back(std::move(view));
+    expose(view, scene, options, static_cast<std::uint32_t>(simulated_case.views.size()));
+    add_plate_dots(view, *simulated_case.plate, scene);
+    if (!simulated_case.views.empty()) view.crosses = grid_crosses(grid, scene, true_view);
+    simulated_case.views.push_back(std::move(view));
   }
-  return room;
+  return simulated_case;
 }
 
 }  // namespace
 
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
-  SimulatedCase room;
-  room.options = options;
-  room.calibrator = udcsc();
-  if (const auto checked = check(options, room.calibrator); !checked)
+  SimulatedCase simulated_case;
+  simulated_case.options = options;
+  simulated_case.calibrator = udcsc();
+  if (const auto checked = check(options, simulated_case.calibrator); !checked)
     return tl::unexpected<Failure>(checked.error());
   if (options.kind == CaseKind::grid) {
     if (const auto checked = check_grid(options); !checked) return tl::unexpected<Failure>(checked.error());
     return simulate_grid(options);
   }
   const bool tunnels = options.kind == CaseKind::tunnels;
-  if (!tunnels) room.calibrator.targets = check_targets(room.calibrator);
-  if (model_of(options.machine()).intensifier) room.plate = plate48();
+  if (!tunnels) simulated_case.calibrator.targets = check_targets(simulated_case.calibrator);
+  if (model_of(options.machine()).intensifier) simulated_case.plate = plate48();
 
   RandomStream random(options.seed, stream::patient);
   const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
   RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
   patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
   const RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
-  if (options.knee) room.calibrator_from_knee = calibrator_from_knee;
+  if (options.knee) simulated_case.calibrator_from_knee = calibrator_from_knee;
 
-  const double plate_height = room.plate ? *room.plate->height_above_receiver_mm : 0;
-  const std::vector<Shot> shots = take_stand(options, plate_height, calibrator_from_patient);
-  Scene patient = calibrator_body(room.calibrator);
+  const double plate_height = simulated_case.plate ? *simulated_case.plate->height_above_receiver_mm : 0;
+  const std::vector<TrueView> true_views = take_stand(options, plate_height, calibrator_from_patient);
+  Scene patient = calibrator_body(simulated_case.calibrator);
   std::erase_if(patient, [&](const Body& body) {
     return std::find(options.lost_balls.begin(), options.lost_balls.end(), body.name) !=
            options.lost_balls.end();
   });
   std::optional<CtBody> ct;
   if (options.ct) {
-    room.calibrator_from_ct = calibrator_from_knee * knee_from_patient(*options.ct);
+    simulated_case.calibrator_from_ct = calibrator_from_knee * knee_from_patient(*options.ct);
     ct.emplace(*options.ct, calibrator_from_knee, options.threads);
-    for (const Shot& shot : shots)
-      if (ct->contains(shot.view.source_in_world()))
+    for (const TrueView& true_view : true_views)
+      if (ct->contains(true_view.view.source_in_world()))
         return fail(Reason::bad_value, fmt::format("{}: the X-ray source of {} lies inside the volume",
-                                                   options.ct->name, shot.name));
+                                                   options.ct->name, true_view.name));
   }
   if (options.knee && !ct)
     for (const Body& body : knee_body()) patient.push_back(moved(body, calibrator_from_knee));
-  for (const Body& body : stray_metal(options, room.calibrator, shots, calibrator_from_knee))
+  for (const Body& body : stray_metal(options, simulated_case.calibrator, true_views, calibrator_from_knee))
     patient.push_back(body);
   if (tunnels) {
-    room.navigation = set_up_navigation(options.seed, calibrator_from_knee);
-    for (const TunnelPoint& point : room.navigation->points)
+    simulated_case.navigation = set_up_navigation(options.seed, calibrator_from_knee);
+    for (const TunnelPoint& point : simulated_case.navigation->points)
       patient.push_back(steel(point.name, {sphere(point.in_calibrator, tunnel_ball_mm / 2)}));
   }
-  for (std::size_t i = 0; i < shots.size(); ++i)
-    room.views.push_back(
-        take_view(room, patient, shots[i], static_cast<std::uint32_t>(i), ct ? &*ct : nullptr));
-  return room;
+  for (std::size_t i = 0; i < true_views.size(); ++i)
+    simulated_case.views.push_back(take_view(simulated_case, patient, true_views[i],
+                                             static_cast<std::uint32_t>(i), ct ? &*ct : nullptr));
+  return simulated_case;
 }
 
-Exposure exposure_of(const SimulatedView& view) {
-  Exposure exposure;
-  exposure.name = view.shot.name;
-  exposure.pixels = Image<float>(view.pixels.width(), view.pixels.height());
-  std::ranges::copy(view.pixels.pixels(), exposure.pixels.pixels().begin());
-  exposure.highest = static_cast<float>((1 << view.shot.imaging.bits) - 1);
-  exposure.acquisition.pixel_mm = Eigen::Vector2d::Constant(view.shot.pixel_mm());
-  exposure.acquisition.source_detector_mm = view.shot.nominal_f_mm;
-  exposure.acquisition.logarithmic = view.shot.imaging.logarithmic;
-  return exposure;
+XrayImage exposure_of(const SimulatedView& view) {
+  XrayImage xray_image;
+  xray_image.name = view.true_view.name;
+  xray_image.pixels = Image<float>(view.pixels.width(), view.pixels.height());
+  std::ranges::copy(view.pixels.pixels(), xray_image.pixels.pixels().begin());
+  xray_image.highest = static_cast<float>((1 << view.true_view.imaging.bits) - 1);
+  xray_image.acquisition.pixel_mm = Eigen::Vector2d::Constant(view.true_view.pixel_mm());
+  xray_image.acquisition.source_detector_mm = view.true_view.nominal_f_mm;
+  xray_image.acquisition.logarithmic = view.true_view.imaging.logarithmic;
+  return xray_image;
 }
 
 }  // namespace helicarm::simulation

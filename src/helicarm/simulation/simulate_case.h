@@ -13,7 +13,7 @@
 #include "helicarm/simulation/navigation_truth.h"
 #include "helicarm/simulation/simulation_options.h"
 #include "helicarm/simulation/truth.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm::simulation {
 
@@ -23,9 +23,9 @@ struct Click {
   Eigen::Vector2d raw;
 };
 
-/// One stored picture and everything that is true of it.
+/// One stored image and everything that is true of it.
 struct SimulatedView {
-  Shot shot;
+  TrueView true_view;
   Image<std::uint16_t> pixels;
   std::vector<TruePoint> balls;
   std::vector<TruePoint> targets;
@@ -49,7 +49,7 @@ struct SimulatedCase {
 /// depth or ball, a preset that does not suit the kind, and a grid that is not before the plate.
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
 
-/// The picture as the reader would hand it over, without the detour through a file.
-Exposure exposure_of(const SimulatedView& view);
+/// The image as the reader would hand it over, without the detour through a file.
+XrayImage exposure_of(const SimulatedView& view);
 
 }  // namespace helicarm::simulation

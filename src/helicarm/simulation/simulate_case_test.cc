@@ -29,16 +29,16 @@ bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
 }
 
 /// Centroid of what is darker than half way between the middle and the rim of a round window.
-Vector2d dark_centroid(const Image<std::uint16_t>& picture, const Vector2d& near, int half) {
+Vector2d dark_centroid(const Image<std::uint16_t>& image, const Vector2d& near, int half) {
   const int u0 = static_cast<int>(std::lround(near.x()));
   const int v0 = static_cast<int>(std::lround(near.y()));
-  const double threshold = 0.5 * (picture(u0, v0) + picture(u0 + half, v0 + half));
+  const double threshold = 0.5 * (image(u0, v0) + image(u0 + half, v0 + half));
   Vector2d sum(0, 0);
   double weight = 0;
   for (int v = v0 - half; v <= v0 + half; ++v)
     for (int u = u0 - half; u <= u0 + half; ++u) {
       if (std::hypot(u - near.x(), v - near.y()) > half) continue;
-      const double dark = std::max(0.0, threshold - picture(u, v));
+      const double dark = std::max(0.0, threshold - image(u, v));
       sum += dark * Vector2d(u, v);
       weight += dark;
     }
@@ -69,7 +69,7 @@ TEST(SimulateCase, ClearBallsAreDarkWhereTheTruthPutsThem) {
         if (ball.visibility != Visibility::clear) continue;
         ++clear;
         EXPECT_LT((dark_centroid(view.pixels, ball.raw, 8) - ball.raw).norm(), 0.3)
-            << view.shot.name << ball.name;
+            << view.true_view.name << ball.name;
       }
       EXPECT_GE(clear, 8);
     }
@@ -81,8 +81,8 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
   options.preset = Preset::paper_sim;
   const SimulatedCase simulated = *simulate_case(options);
   EXPECT_FALSE(simulated.plate);
-  const View& ap = simulated.views[0].shot.view;
-  const View& lateral = simulated.views[1].shot.view;
+  const View& ap = simulated.views[0].true_view.view;
+  const View& lateral = simulated.views[1].true_view.view;
   for (const View& view : {ap, lateral}) {
     EXPECT_NEAR(view.intrinsics.fx, 3000, 1e-9);  // 900 mm over twice 0.15 mm
     EXPECT_EQ(view.intrinsics.u0, 256);
@@ -93,7 +93,7 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
   for (const SimulatedView& view : simulated.views)
     for (const TruePoint& ball : view.balls) {
       EXPECT_LT((ball.raw - ball.ideal).norm(), 1e-9);
-      EXPECT_NE(ball.visibility, Visibility::outside) << view.shot.name << ball.name;
+      EXPECT_NE(ball.visibility, Visibility::outside) << view.true_view.name << ball.name;
     }
 }
 
@@ -116,7 +116,7 @@ TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreSeen) {
   for (const SimulatedView& view : simulated.views) {
     ASSERT_EQ(view.plate_dots.size(), 48u);
     for (const TruePoint& dot : view.plate_dots) {
-      EXPECT_NEAR(view.shot.view.depth(dot.in_calibrator), view.shot.f_mm - 15, 1e-9);
+      EXPECT_NEAR(view.true_view.view.depth(dot.in_calibrator), view.true_view.f_mm - 15, 1e-9);
       if (dot.visibility != Visibility::clear) continue;
       EXPECT_LT((dark_centroid(view.pixels, dot.raw, 4) - dot.raw).norm(), 0.5);
     }
@@ -127,31 +127,31 @@ TEST(SimulateCase, StandKeepsItsPromisesForManySeeds) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     SimulationOptions options;
     options.seed = seed;
-    const std::vector<Shot> shots = take_stand(options, 15, {});
-    const Eigen::Vector3d ap = shots[0].view.camera_from_world.rotation.row(2);
-    const Eigen::Vector3d lateral = shots[1].view.camera_from_world.rotation.row(2);
+    const std::vector<TrueView> true_views = take_stand(options, 15, {});
+    const Eigen::Vector3d ap = true_views[0].view.camera_from_world.rotation.row(2);
+    const Eigen::Vector3d lateral = true_views[1].view.camera_from_world.rotation.row(2);
     EXPECT_NEAR(std::acos(ap.dot(lateral)) * 180 / EIGEN_PI, 90, 5.2);
-    const auto principal = [](const Shot& shot) {
-      return Vector2d(shot.view.intrinsics.u0, shot.view.intrinsics.v0);
+    const auto principal = [](const TrueView& true_view) {
+      return Vector2d(true_view.view.intrinsics.u0, true_view.view.intrinsics.v0);
     };
-    EXPECT_LE((principal(shots[0]) - principal(shots[1])).norm(), 25);
-    EXPECT_LE(std::abs(shots[0].f_mm - shots[1].f_mm), 2);
-    for (const Shot& shot : shots) {
-      EXPECT_NEAR(shot.view.camera_from_world.rotation.determinant(), 1, 1e-12);
-      EXPECT_LE((principal(shot) - Vector2d(511.5, 511.5)).norm() * shot.detector.pixel_mm, 12);
-      EXPECT_LE(std::abs(shot.f_mm - shot.nominal_f_mm), 5);
+    EXPECT_LE((principal(true_views[0]) - principal(true_views[1])).norm(), 25);
+    EXPECT_LE(std::abs(true_views[0].f_mm - true_views[1].f_mm), 2);
+    for (const TrueView& true_view : true_views) {
+      EXPECT_NEAR(true_view.view.camera_from_world.rotation.determinant(), 1, 1e-12);
+      EXPECT_LE((principal(true_view) - Vector2d(511.5, 511.5)).norm() * true_view.detector.pixel_mm, 12);
+      EXPECT_LE(std::abs(true_view.f_mm - true_view.nominal_f_mm), 5);
     }
   }
 }
 
-TEST(SimulateCase, MirroredViewFlipsPictureAndTruthTogether) {
+TEST(SimulateCase, MirroredViewFlipsImageAndTruthTogether) {
   SimulationOptions options = small(CaseKind::accuracy);
   const SimulatedCase plain = *simulate_case(options);
   options.faults = {Fault::mirrored};
   const SimulatedCase flipped = *simulate_case(options);
   EXPECT_TRUE(same(plain.views[0].pixels, flipped.views[0].pixels));
   EXPECT_TRUE(same(mirrored(plain.views[1].pixels), flipped.views[1].pixels));
-  EXPECT_LT(flipped.views[1].shot.stored_view().intrinsics.fx, 0);
+  EXPECT_LT(flipped.views[1].true_view.stored_view().intrinsics.fx, 0);
   for (std::size_t i = 0; i < 12; ++i) {
     const TruePoint& before = plain.views[1].balls[i];
     const TruePoint& after = flipped.views[1].balls[i];
@@ -255,8 +255,8 @@ TEST(SimulateCase, ViewsAreTakenWhereAskedFor) {
   ASSERT_EQ(simulated.views.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
     const SimulatedView& view = simulated.views[i];
-    EXPECT_EQ(view.shot.name, options.views[i].name);
-    EXPECT_EQ(view.shot.primary_angle_deg, options.views[i].angles.primary_deg);
+    EXPECT_EQ(view.true_view.name, options.views[i].name);
+    EXPECT_EQ(view.true_view.primary_angle_deg, options.views[i].angles.primary_deg);
     EXPECT_GE(std::ranges::count(view.balls, Visibility::clear, &TruePoint::visibility), 8);
   }
   options.kind = CaseKind::grid;

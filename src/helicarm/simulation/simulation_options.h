@@ -17,7 +17,7 @@ enum class CaseKind {
   accuracy,  ///< the paper's 3.2: intensifier, plate, five check targets
   tunnels,   ///< an ACL navigation: intensifier, plate, balls at the tunnels' ends, tracker and tool
   flat,      ///< as accuracy, with a flat panel: no plate, no distortion
-  grid       ///< the paper's 3.1: pictures of the plate alone and with the test grid of wires before it
+  grid       ///< the paper's 3.1: images of the plate alone and with the test grid of wires before it
 };
 
 /// A make of C-arm. Pixels are given for 1024 of them a side; with 512 they are twice as large.
@@ -58,7 +58,7 @@ struct ArmAngles {
 };
 
 struct ViewAngles {
-  std::string name;  ///< letters, digits, - and _, at most 32; also the picture's file
+  std::string name;  ///< letters, digits, - and _, at most 32; also the image's file
   ArmAngles angles;
 };
 

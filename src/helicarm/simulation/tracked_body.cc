@@ -21,8 +21,8 @@ TrackedBody calibrator_markers() {
 
 TrackedBody marker_array() {
   // No two sides of the figure are alike, or a tracker could take one disc for another.
-  const std::vector<Vector3d> discs = {{-45, -30, 0}, {40, -38, 0}, {32, 44, 0}, {-27, 24, 0}};
-  return {{{Vector3d::UnitZ(), discs}}};
+  const std::vector<Vector3d> detections = {{-45, -30, 0}, {40, -38, 0}, {32, 44, 0}, {-27, 24, 0}};
+  return {{{Vector3d::UnitZ(), detections}}};
 }
 
 }  // namespace helicarm::simulation

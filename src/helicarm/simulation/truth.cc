@@ -10,9 +10,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-bool in_picture(const Shot& shot, const Vector2d& raw) {
-  return raw.x() >= 0 && raw.y() >= 0 && raw.x() <= shot.detector.width - 1 &&
-         raw.y() <= shot.detector.height - 1 && field_weight(shot.detector, raw) == 1;
+bool in_image(const TrueView& true_view, const Vector2d& raw) {
+  return raw.x() >= 0 && raw.y() >= 0 && raw.x() <= true_view.detector.width - 1 &&
+         raw.y() <= true_view.detector.height - 1 && field_weight(true_view.detector, raw) == 1;
 }
 
 bool crosses(const Body& body, const Vector3d& source, const Vector3d& direction) {
@@ -21,10 +21,10 @@ bool crosses(const Body& body, const Vector3d& source, const Vector3d& direction
 }
 
 Visibility visibility(const std::string& name, const Vector3d& centre, double radius, const Scene& scene,
-                      const Shot& shot) {
+                      const TrueView& true_view) {
   if (std::none_of(scene.begin(), scene.end(), [&](const Body& body) { return body.name == name; }))
     return Visibility::absent;
-  const Vector3d source = shot.view.source_in_world();
+  const Vector3d source = true_view.view.source_in_world();
   const Vector3d along = (centre - source).normalized();
   const Vector3d right = along.unitOrthogonal();
   const Vector3d down = along.cross(right);
@@ -34,7 +34,7 @@ Visibility visibility(const std::string& name, const Vector3d& centre, double ra
       const double angle = spoke * EIGEN_PI / 8;
       const Vector3d place =
           centre + 0.5 * ring * radius * (std::cos(angle) * right + std::sin(angle) * down);
-      if (!in_picture(shot, shot.detector.distortion.raw_from_ideal(shot.view.project(place))))
+      if (!in_image(true_view, true_view.detector.distortion.raw_from_ideal(true_view.view.project(place))))
         return Visibility::outside;
       const Vector3d direction = (place - source).normalized();
       for (const Body& body : scene) {
@@ -50,9 +50,9 @@ Visibility visibility(const std::string& name, const Vector3d& centre, double ra
 }  // namespace
 
 TruePoint true_point(const std::string& name, const Vector3d& in_calibrator, double diameter_mm,
-                     const Scene& scene, const Shot& shot) {
-  return {name, in_calibrator, shot.ideal_image(in_calibrator), shot.raw_image(in_calibrator),
-          visibility(name, in_calibrator, 0.5 * diameter_mm, scene, shot)};
+                     const Scene& scene, const TrueView& true_view) {
+  return {name, in_calibrator, true_view.ideal_image(in_calibrator), true_view.raw_image(in_calibrator),
+          visibility(name, in_calibrator, 0.5 * diameter_mm, scene, true_view)};
 }
 
 }  // namespace helicarm::simulation

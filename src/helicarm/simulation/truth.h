@@ -12,13 +12,13 @@
 namespace helicarm::simulation {
 
 enum class Visibility {
-  clear,    ///< its whole shadow lies in the picture and no other metal touches it
+  clear,    ///< its whole shadow lies in the image and no other metal touches it
   hidden,   ///< other metal covers a part of it
-  outside,  ///< a part of it lies beyond the picture, the field or under a shutter
+  outside,  ///< a part of it lies beyond the image, the field or under a shutter
   absent    ///< it is not there
 };
 
-/// Where the centre of a small thing is truly seen, in the stored picture.
+/// Where the centre of a small thing is truly seen, in the stored image.
 struct TruePoint {
   std::string name;
   Eigen::Vector3d in_calibrator;
@@ -29,6 +29,6 @@ struct TruePoint {
 
 /// `scene` is what was rendered; the thing itself is its body called `name`, absent if there is none.
 TruePoint true_point(const std::string& name, const Eigen::Vector3d& in_calibrator, double diameter_mm,
-                     const Scene& scene, const Shot& shot);
+                     const Scene& scene, const TrueView& true_view);
 
 }  // namespace helicarm::simulation

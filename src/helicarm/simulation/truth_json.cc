@@ -61,33 +61,33 @@ Json imaging_json(const Imaging& imaging) {
 }
 
 Json view_json(const SimulatedView& view, const char* world) {
-  const Shot& shot = view.shot;
-  const View stored = shot.stored_view();
-  Json json = {{"name", shot.name},
-               {"image_size", {shot.detector.width, shot.detector.height}},
-               {"mirrored", shot.mirrored},
+  const TrueView& true_view = view.true_view;
+  const View stored = true_view.stored_view();
+  Json json = {{"name", true_view.name},
+               {"image_size", {true_view.detector.width, true_view.detector.height}},
+               {"mirrored", true_view.mirrored},
                {"camera",
-                {{"f_mm", shot.f_mm},
-                 {"pixel_mm", shot.detector.pixel_mm},
+                {{"f_mm", true_view.f_mm},
+                 {"pixel_mm", true_view.detector.pixel_mm},
                  {"K", matrix_json(stored.intrinsics.matrix())},
                  {std::string("camera_from_") + world, matrix_json(stored.camera_from_world.matrix())},
                  {"projection", matrix_json(stored.projection())}}},
-               {"angles_deg", {shot.true_angles.primary_deg, shot.true_angles.secondary_deg}},
-               {"imaging", imaging_json(shot.imaging)},
+               {"angles_deg", {true_view.true_angles.primary_deg, true_view.true_angles.secondary_deg}},
+               {"imaging", imaging_json(true_view.imaging)},
                {"field_radius_px", nullptr},
-               {"distortion", distortion_json(shot.detector)},
+               {"distortion", distortion_json(true_view.detector)},
                {"balls", points_json(view.balls)},
                {"targets", points_json(view.targets)},
                {"tunnel_points", points_json(view.tunnel_points)},
                {"plate", points_json(view.plate_dots)}};
   if (!view.crosses.empty()) json["crosses"] = points_json(view.crosses);
-  if (shot.detector.field_radius_px) json["field_radius_px"] = *shot.detector.field_radius_px;
+  if (true_view.detector.field_radius_px) json["field_radius_px"] = *true_view.detector.field_radius_px;
   return json;
 }
 
 /// Distances in ideal pixels of the tunnel's true ends from the tool line's image.
-Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const Shot& shot) {
-  const View view = shot.stored_view();
+Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const TrueView& true_view) {
+  const View view = true_view.stored_view();
   const auto flat = [&](const Eigen::Vector3d& point) {
     const Eigen::Vector2d pixel = view.project(point);
     return Eigen::Vector3d(pixel.x(), pixel.y(), 0);
@@ -106,7 +106,7 @@ Json navigation_json(const SimulatedCase& simulated) {
   Json json;
   for (const auto& [frame, pose] : truth.tracker_from)
     json["poses"]["tracker_from_" + frame] = matrix_json(pose.matrix());
-  const TrackerModel tracker = room_tracker();
+  const TrackerModel tracker = virtual_tracker();
   json["tracker"] = {{"marker_sigma_mm", vector_json(tracker.marker_sigma_mm)},
                      {"drift_sigma_mm", vector_json(tracker.drift_sigma_mm)},
                      {"samples_per_reading", samples_per_reading},
@@ -126,7 +126,7 @@ Json navigation_json(const SimulatedCase& simulated) {
                   {"start_error_mm", line.start_error_mm},
                   {"end_error_mm", line.end_error_mm}};
     for (const SimulatedView& view : simulated.views)
-      entry["error_px"][view.shot.name] = line_errors_px(line, truth, view.shot);
+      entry["error_px"][view.true_view.name] = line_errors_px(line, truth, view.true_view);
     json["tool_lines"].push_back(entry);
   }
   return json;

@@ -29,20 +29,20 @@ Scene wire_grid_body(const WireGrid& grid) {
   return wires;
 }
 
-std::vector<TruePoint> grid_crosses(const WireGrid& grid, const Scene& scene, const Shot& shot) {
+std::vector<TruePoint> grid_crosses(const WireGrid& grid, const Scene& scene, const TrueView& true_view) {
   std::vector<TruePoint> crosses;
   const int half = grid.wires / 2;
   for (int j = -half; j <= half; ++j)
     for (int i = -half; i <= half; ++i) {
       const Vector3d place = grid.pitch_mm * Vector3d(i, j, 0);
-      crosses.push_back(true_point(wire_name, place, grid.thickness_mm, scene, shot));
+      crosses.push_back(true_point(wire_name, place, grid.thickness_mm, scene, true_view));
       crosses.back().name = fmt::format("{},{}", i, j);
     }
   return crosses;
 }
 
-std::vector<Shot> take_grid_stand(const SimulationOptions& options, double plate_height_mm) {
-  Shot arm = take_stand(options, plate_height_mm, {}).front();
+std::vector<TrueView> take_grid_stand(const SimulationOptions& options, double plate_height_mm) {
+  TrueView arm = take_stand(options, plate_height_mm, {}).front();
   arm.mirrored = false;
   RandomStream random(options.seed, stream::grid);
   const double turn = random.uniform(-2, 2) * EIGEN_PI / 180;
@@ -56,17 +56,17 @@ std::vector<Shot> take_grid_stand(const SimulationOptions& options, double plate
     return RigidTransform{Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(),
                           place + Vector3d(right, down, 0)};
   };
-  std::vector<Shot> shots;
+  std::vector<TrueView> true_views;
   const auto take = [&](std::string name, double distance_mm) {
-    shots.push_back(arm);
-    shots.back().name = std::move(name);
-    shots.back().view.camera_from_world = camera_from_grid(distance_mm);
+    true_views.push_back(arm);
+    true_views.back().name = std::move(name);
+    true_views.back().view.camera_from_world = camera_from_grid(distance_mm);
   };
   const std::vector<double>& distances = options.grid_distances_mm;
   take("PLATE", distances.front());
   for (const double distance : distances)
     take(distances.size() == 1 ? "GRID" : fmt::format("GRID-{:g}", distance), distance);
-  return shots;
+  return true_views;
 }
 
 }  // namespace helicarm::simulation

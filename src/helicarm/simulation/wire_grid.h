@@ -21,11 +21,12 @@ struct WireGrid {
 Scene wire_grid_body(const WireGrid& grid);
 
 /// Where the crosses are truly seen, called "i,j", row by row; `scene` is what was rendered, world = grid.
-std::vector<TruePoint> grid_crosses(const WireGrid& grid, const Scene& scene, const Shot& shot);
+std::vector<TruePoint> grid_crosses(const WireGrid& grid, const Scene& scene, const TrueView& true_view);
 
 /// The plate alone and then, for each distance from the receiver, with the grid before it: all by the C-arm
 /// as it stands for the seed's AP view. The grid is laid on by hand: turned by up to 2 degrees and shifted by
-/// up to 3 mm from the receiver's middle. World = grid; of the first shot, the grid at the first distance.
-std::vector<Shot> take_grid_stand(const SimulationOptions& options, double plate_height_mm);
+/// up to 3 mm from the receiver's middle. World = grid; of the first acquisition, the grid at the first
+/// distance.
+std::vector<TrueView> take_grid_stand(const SimulationOptions& options, double plate_height_mm);
 
 }  // namespace helicarm::simulation

@@ -22,18 +22,18 @@ SimulationOptions small_grid(std::vector<double> distances_mm) {
 TEST(WireGrid, PlateComesFirstAndStaysWhileTheGridMoves) {
   const SimulatedCase simulated = *simulate_case(small_grid({30, 120}));
   ASSERT_EQ(simulated.views.size(), 3u);
-  EXPECT_EQ(simulated.views[0].shot.name, "PLATE");
-  EXPECT_EQ(simulated.views[1].shot.name, "GRID-30");
-  EXPECT_EQ(simulated.views[2].shot.name, "GRID-120");
+  EXPECT_EQ(simulated.views[0].true_view.name, "PLATE");
+  EXPECT_EQ(simulated.views[1].true_view.name, "GRID-30");
+  EXPECT_EQ(simulated.views[2].true_view.name, "GRID-120");
   EXPECT_TRUE(simulated.views[0].crosses.empty());
   EXPECT_FALSE(simulated.options.knee);
   for (const SimulatedView& view : simulated.views)
     for (std::size_t i = 0; i < view.plate_dots.size(); ++i)
       EXPECT_LT((view.plate_dots[i].raw - simulated.views[0].plate_dots[i].raw).norm(), 1e-6);
   for (std::size_t i = 1; i < 3; ++i) {
-    const Shot& shot = simulated.views[i].shot;
-    const double depth = shot.view.camera_from_world.translation.z();
-    EXPECT_NEAR(shot.f_mm - depth, i == 1 ? 30 : 120, 1e-9);
+    const TrueView& true_view = simulated.views[i].true_view;
+    const double depth = true_view.view.camera_from_world.translation.z();
+    EXPECT_NEAR(true_view.f_mm - depth, i == 1 ? 30 : 120, 1e-9);
     ASSERT_EQ(simulated.views[i].crosses.size(), 81u);
   }
 }
@@ -41,7 +41,7 @@ TEST(WireGrid, PlateComesFirstAndStaysWhileTheGridMoves) {
 TEST(WireGrid, CrossesAreDarkestWhereTheTruthPutsThem) {
   const SimulatedCase simulated = *simulate_case(small_grid({45}));
   const SimulatedView& view = simulated.views[1];
-  EXPECT_EQ(view.shot.name, "GRID");
+  EXPECT_EQ(view.true_view.name, "GRID");
   int clear = 0;
   for (const TruePoint& cross : view.crosses) {
     if (cross.visibility != Visibility::clear || (cross.raw - Eigen::Vector2d(255.5, 255.5)).norm() > 230)

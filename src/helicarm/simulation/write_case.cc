@@ -38,7 +38,7 @@ void add_navigation(Json& json, const SimulatedCase& simulated) {
   for (const SimulatedView& view : simulated.views)
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
       json["picks"].push_back({{"name", view.clicks[i].point},
-                               {"view", view.shot.name},
+                               {"view", view.true_view.name},
                                {"uv", vector_json(view.clicks[i].raw)},
                                {"snap", "ball"},
                                {"diameter_mm", tunnel_ball_mm},
@@ -75,19 +75,19 @@ void remove_leftovers(const std::filesystem::path& folder) {
 
 DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
   const SimulatedView& view = simulated.views[number];
-  const Shot& shot = view.shot;
+  const TrueView& true_view = view.true_view;
   DerivedImage image;
   image.pixels = view.pixels;
   image.bits_stored = simulated.options.bits;
-  image.acquisition.pixel_mm = Eigen::Vector2d::Constant(shot.detector.pixel_mm);
-  image.acquisition.source_detector_mm = shot.nominal_f_mm;
-  image.acquisition.primary_angle_deg = shot.primary_angle_deg;
-  image.acquisition.secondary_angle_deg = shot.secondary_angle_deg;
-  image.acquisition.flip_hint = shot.mirrored;
-  image.acquisition.logarithmic = shot.imaging.logarithmic;
+  image.acquisition.pixel_mm = Eigen::Vector2d::Constant(true_view.detector.pixel_mm);
+  image.acquisition.source_detector_mm = true_view.nominal_f_mm;
+  image.acquisition.primary_angle_deg = true_view.primary_angle_deg;
+  image.acquisition.secondary_angle_deg = true_view.secondary_angle_deg;
+  image.acquisition.flip_hint = true_view.mirrored;
+  image.acquisition.logarithmic = true_view.imaging.logarithmic;
   image.acquisition.modality = "XA";
   image.derived = false;
-  image.series_description = shot.name;
+  image.series_description = true_view.name;
   image.patient_name = "SIMULATED";
   image.patient_id = fmt::format("SIM{}", simulated.options.seed);
   image.study_uid = uid(simulated.options.seed, 0);
@@ -102,7 +102,7 @@ Json case_json(const SimulatedCase& simulated) {
                {"plate", simulated.plate ? Json(plate_file) : Json(nullptr)},
                {"views", Json::array()}};
   for (const SimulatedView& view : simulated.views)
-    json["views"].push_back({{"name", view.shot.name}, {"image", view.shot.name + ".dcm"}});
+    json["views"].push_back({{"name", view.true_view.name}, {"image", view.true_view.name + ".dcm"}});
   if (simulated.navigation) add_navigation(json, simulated);
   return json;
 }
@@ -131,7 +131,8 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
     // The truth goes first: it marks the folder as a simulation should the rest be cut short.
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)
-      value_or_throw(write_dicom(folder / (simulated.views[i].shot.name + ".dcm"), dicom_of(simulated, i)));
+      value_or_throw(
+          write_dicom(folder / (simulated.views[i].true_view.name + ".dcm"), dicom_of(simulated, i)));
     if (simulated.plate) value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
     if (simulated.options.kind == CaseKind::grid) return;
     value_or_throw(write_json(folder / calibrator_file, to_json(simulated.calibrator)));

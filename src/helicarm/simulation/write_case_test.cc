@@ -7,7 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/simulation/truth_json.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::simulation {
 namespace {
@@ -39,24 +39,25 @@ class WriteCase : public testing::Test {
 
 TEST_F(WriteCase, DicomComesBackWithItsPixelsAndTags) {
   for (int bits : {8, 12, 16}) {
-    const SimulatedCase room = simulated(CaseKind::tunnels, bits);
-    ASSERT_TRUE(write_case(folder_, room));
-    for (const SimulatedView& view : room.views) {
-      const auto exposure = read_exposure(folder_ / (view.shot.name + ".dcm"), view.shot.name, {});
-      ASSERT_TRUE(exposure) << exposure.error().message;
+    const SimulatedCase simulated_case = simulated(CaseKind::tunnels, bits);
+    ASSERT_TRUE(write_case(folder_, simulated_case));
+    for (const SimulatedView& view : simulated_case.views) {
+      const auto xray_image =
+          read_xray_image(folder_ / (view.true_view.name + ".dcm"), view.true_view.name, {});
+      ASSERT_TRUE(xray_image) << xray_image.error().message;
       EXPECT_TRUE(std::equal(view.pixels.pixels().begin(), view.pixels.pixels().end(),
-                             exposure->pixels.pixels().begin(), exposure->pixels.pixels().end()));
-      EXPECT_EQ(exposure->highest, (1 << bits) - 1);
-      EXPECT_NEAR(exposure->acquisition.pixel_mm->x(), 235.0 / 512, 1e-9);
-      EXPECT_EQ(exposure->acquisition.source_detector_mm, 997);
-      EXPECT_EQ(exposure->acquisition.flip_hint, view.shot.mirrored);
+                             xray_image->pixels.pixels().begin(), xray_image->pixels.pixels().end()));
+      EXPECT_EQ(xray_image->highest, (1 << bits) - 1);
+      EXPECT_NEAR(xray_image->acquisition.pixel_mm->x(), 235.0 / 512, 1e-9);
+      EXPECT_EQ(xray_image->acquisition.source_detector_mm, 997);
+      EXPECT_EQ(xray_image->acquisition.flip_hint, view.true_view.mirrored);
     }
   }
 }
 
 TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
-  const SimulatedCase room = simulated(CaseKind::accuracy, 12);
-  ASSERT_TRUE(write_case(folder_, room));
+  const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
+  ASSERT_TRUE(write_case(folder_, simulated_case));
   const auto calibrator = read_calibrator(folder_ / "calibrator.json");
   ASSERT_TRUE(calibrator) << calibrator.error().message;
   EXPECT_EQ(calibrator->balls.size(), 12u);
@@ -67,8 +68,8 @@ TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
 }
 
 TEST_F(WriteCase, TruthProjectsTheBallsOntoTheirIdealPixels) {
-  const SimulatedCase room = simulated(CaseKind::accuracy, 12);
-  const Json truth = truth_json(room);
+  const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
+  const Json truth = truth_json(simulated_case);
   EXPECT_EQ(truth["format"], "helicarm-truth/1");
   for (const Json& view : truth["views"])
     for (const Json& ball : view["balls"]) {

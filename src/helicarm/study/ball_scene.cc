@@ -35,7 +35,7 @@ Vector3d point_at(const View& view, const Vector2d& pixel, double depth) {
   return {(pixel.x() - k.u0) / k.fx * depth, (pixel.y() - k.v0) / k.fy * depth, depth};
 }
 
-/// A straight rod across the square, its axis `offset_px` from the ball in the picture.
+/// A straight rod across the square, its axis `offset_px` from the ball in the image.
 simulation::Solid rod(const View& view, const Vector2d& ball, const Vector2d& towards, double offset_px,
                       double depth, double diameter) {
   const Vector2d along(-towards.y(), towards.x());
@@ -104,7 +104,7 @@ double BallScene::radius_px() const { return view.intrinsics.fx * diameter_mm / 
 
 Image<float> BallScene::signal() const {
   // Square by square: a ray then meets a few bodies, not all.
-  Image<float> picture = simulation::render_view({muscle}, detector, view, 1);
+  Image<float> image = simulation::render_view({muscle}, detector, view, 1);
   for (const BallTile& tile : tiles) {
     View shifted = view;
     shifted.intrinsics.u0 -= tile.left;
@@ -115,14 +115,14 @@ Image<float> BallScene::signal() const {
     bodies.push_back(muscle);
     const Image<float> part = simulation::render_view(bodies, square, shifted, 1);
     for (int v = 0; v < side_px; ++v)
-      for (int u = 0; u < side_px; ++u) picture(tile.left + u, tile.top + v) = part(u, v);
+      for (int u = 0; u < side_px; ++u) image(tile.left + u, tile.top + v) = part(u, v);
   }
-  return picture;
+  return image;
 }
 
 BallScene ball_scene(double diameter_mm, Companion companion, int squares, std::uint64_t seed,
-                     std::uint64_t picture) {
-  RandomStream random(seed, places_stream, picture);
+                     std::uint64_t image) {
+  RandomStream random(seed, places_stream, image);
   BallScene scene;
   scene.diameter_mm = diameter_mm;
   scene.detector.pixel_mm = pixel_mm;
@@ -166,11 +166,11 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
   }
   // By the place of a ball on the receiver and by its radius, both in px.
   std::vector<Eigen::ArrayXXd> slopes;
-  const auto picture = [&] {
+  const auto image = [&] {
     const Image<float> signal = signal_of(scene, tile, balls, imaging.focus_sigma_px);
     return Eigen::ArrayXXd(light.quanta * Pixels(signal.pixels().data()).cast<double>());
   };
-  const Eigen::ArrayXXd direct = picture();
+  const Eigen::ArrayXXd direct = image();
   for (Sphere& ball : balls) {
     const Sphere true_ball = ball;
     const double mm_per_px = ball.centre.z() / scene.view.intrinsics.fx;
@@ -178,9 +178,9 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
     const auto differentiate = [&](double& number) {
       const double value = number;
       number = value + step_px * mm_per_px;
-      const Eigen::ArrayXXd more = picture();
+      const Eigen::ArrayXXd more = image();
       number = value - step_px * mm_per_px;
-      slopes.push_back((more - picture()) / (2 * step_px));
+      slopes.push_back((more - image()) / (2 * step_px));
       number = value;
     };
     differentiate(ball.centre.x());

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "helicarm/geometry/view.h"
-#include "helicarm/simulation/develop.h"
+#include "helicarm/simulation/detector_response.h"
 #include "helicarm/simulation/render_view.h"
 #include "helicarm/simulation/scene.h"
 
@@ -20,12 +20,12 @@ enum class Companion { none, ball, plate_dot, wire_in_the_middle, wire_beside, b
 /// One ball in a square of its own. Frame: the camera's, mm.
 struct BallTile {
   Eigen::Vector3d ball;
-  Eigen::Vector2d towards;   ///< in the picture: where the companion lies, else the brighter side
+  Eigen::Vector2d towards;   ///< in the image: where the companion lies, else the brighter side
   simulation::Scene bodies;  ///< the ball first, then what lies across it
   int left, top;             ///< of the square, px
 };
 
-/// A picture's worth of steel balls, 750 mm from the source and 247 mm from the receiver, in an ellipsoid of
+/// An image's worth of steel balls, 750 mm from the source and 247 mm from the receiver, in an ellipsoid of
 /// muscle that grows thinner towards the sides.
 struct BallScene {
   static constexpr int side_px = 96;  ///< of a ball's square
@@ -42,9 +42,9 @@ struct BallScene {
 /// Whether a square's ball stands alone whatever the others' companion: those tell the look.
 inline bool is_alone(std::size_t tile) { return tile % 8 == 0; }
 
-/// `squares` across the picture, a ball in each.
+/// `squares` across the image, a ball in each.
 BallScene ball_scene(double diameter_mm, Companion companion, int squares, std::uint64_t seed,
-                     std::uint64_t picture);
+                     std::uint64_t image);
 
 /// The bound (Cramer and Rao) on the standard deviation per axis of the ball's centre, px, from the pixels
 /// around it up to `window_px` beyond each rim, when places and radii of all balls in the square, a quadratic

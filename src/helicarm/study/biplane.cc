@@ -36,10 +36,10 @@ const std::array<BiplaneRow, cells_of_table> table_1{
 
 /// Errors of one cell over an experiment.
 struct Gathered {
-  Lanes most{}, least = lanes(1e300), sum{}, squares{};
+  Simd most{}, least = simd(1e300), sum{}, squares{};
   double count = 0;
 
-  void add(Lanes error) {
+  void add(Simd error) {
     most = larger(error, most);
     least = error < least ? error : least;
     sum += error;
@@ -81,7 +81,7 @@ class BiplaneTrials {
     std::array<Gathered, cells_of_table> cells;
     for (int test = 0; test < tests_of_experiment; ++test)
       run_test(LaneRandom(options_.seed, biplane_stream + std::uint32_t(test), first), cells);
-    for (int lane = 0; lane < lane_count; ++lane)
+    for (int lane = 0; lane < simd_width; ++lane)
       for (const Gathered& cell : cells) put_record(cell.figures(lane), out);
   }
 
@@ -112,7 +112,7 @@ class BiplaneTrials {
     const double sigma = sigma_px(options_.sigma, options_.fle);
     Seen result;
     for (const Eigen::Vector3d& point : points) {
-      result.points.push_back({lanes(point.x()), lanes(point.y()), lanes(point.z())});
+      result.points.push_back({simd(point.x()), simd(point.y()), simd(point.z())});
       for (std::size_t view = 0; view < 2; ++view) {
         const Eigen::Vector2d pixel = views_[view].project(point);
         const auto [u, v] = random.normals(at++);
@@ -206,7 +206,7 @@ Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, c
   setting.blocks = (options.groups + experiments_of_block - 1) / experiments_of_block;
   setting.values_per_block = experiments_of_block * stride;
   setting.work = [&](std::size_t block, std::span<double> values) {
-    for (std::size_t i = 0; i < experiments_of_block; i += lane_count)
+    for (std::size_t i = 0; i < experiments_of_block; i += simd_width)
       if (const std::size_t first = block * experiments_of_block + i; first < options.groups)
         trials.run(first, values.subspan(i * stride));
   };

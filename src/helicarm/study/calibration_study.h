@@ -12,7 +12,7 @@
 
 namespace helicarm {
 
-/// Table 1's columns of UDCSC and Fig. 14 from pictures: tests of 3.2 in the virtual operating room
+/// Table 1's columns of UDCSC and Fig. 14 from images: tests of 3.2 in the virtual operating room
 /// (intensifier, plate, knee, calibrator with its five check targets), each measured by the printed recipe
 /// and by the best one.
 struct CalibrationStudyOptions {

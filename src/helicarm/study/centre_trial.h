@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// What a situation changes in the picture or in what the fit is told.
+/// What a situation changes in the image or in what the fit is told.
 struct CentreSituation {
   std::string group, name;
   double scatter = 0.3;  ///< over the direct signal
@@ -26,7 +26,7 @@ struct CentreSituation {
   std::optional<double> held_radius = {};  ///< over the true one; empty: fitted
 };
 
-/// What one picture adds: counts and sums, a record.
+/// What one image adds: counts and sums, a record.
 struct CentreSums {
   double balls = 0, refused = 0, covered = 0, bounds = 0;
   double squares = 0, normed = 0, variances = 0, bias = 0, radii = 0, bound_squares = 0;
@@ -34,9 +34,8 @@ struct CentreSums {
   void add(const Eigen::Vector2d& error, double sigma, const Eigen::Vector2d& towards);
 };
 
-/// A picture with `squares` across, a ball in each.
-CentreSums try_picture(const CentreSituation& situation, int squares, std::uint64_t seed,
-                       std::size_t picture);
+/// An image with `squares` across, a ball in each.
+CentreSums try_image(const CentreSituation& situation, int squares, std::uint64_t seed, std::size_t image);
 
 /// A calibrator before a knee on a flat panel, a wire over a ball in each view: the balls that nothing
 /// touches, and those that other metal does.

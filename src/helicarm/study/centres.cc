@@ -16,7 +16,7 @@ namespace {
 
 constexpr double not_computed = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* whole_view = "cone before a knee";
-constexpr double cost_of_case = 2;  // over that of a picture, roughly
+constexpr double cost_of_case = 2;  // over that of an image, roughly
 
 std::vector<CentreSituation> all_situations() {
   std::vector<CentreSituation> all;
@@ -57,9 +57,9 @@ std::vector<CentreSituation> all_situations() {
   return all;
 }
 
-/// The sums over the pictures, `kinds` of them side by side.
-StudySetting summed_over(std::size_t pictures, std::size_t kinds) {
-  StudySetting setting{pictures, kinds * numbers_in<CentreSums>};
+/// The sums over the images, `kinds` of them side by side.
+StudySetting summed_over(std::size_t images, std::size_t kinds) {
+  StudySetting setting{images, kinds * numbers_in<CentreSums>};
   setting.settle = [size = setting.values_per_block](std::span<const double> values) {
     std::vector<double> sums(size);
     for (std::size_t i = 0; i < values.size(); ++i) sums[i % size] += values[i];
@@ -87,7 +87,7 @@ Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, con
                                                const Ranks& ranks) {
   if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
   const auto squares = std::size_t(options.squares * options.squares), measured = squares - (squares + 7) / 8;
-  const std::size_t pictures = (options.groups + measured - 1) / measured;
+  const std::size_t images = (options.groups + measured - 1) / measured;
   const auto wanted = [&](const std::string& group) {
     return options.only.empty() || std::ranges::count(options.only, group) > 0;
   };
@@ -95,13 +95,13 @@ Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, con
   std::erase_if(situations, [&](const CentreSituation& s) { return !wanted(s.group); });
   std::vector<StudySetting> settings;
   for (const CentreSituation& situation : situations) {
-    settings.push_back(summed_over(pictures, 1));
-    settings.back().work = [&](std::size_t picture, std::span<double> out) {
-      put_record(try_picture(situation, options.squares, options.seed, picture), out);
+    settings.push_back(summed_over(images, 1));
+    settings.back().work = [&](std::size_t image, std::span<double> out) {
+      put_record(try_image(situation, options.squares, options.seed, image), out);
     };
   }
   if (wanted(whole_view)) {
-    settings.push_back(summed_over(pictures, 2));
+    settings.push_back(summed_over(images, 2));
     settings.back().cost = cost_of_case;
     settings.back().work = [&](std::size_t number, std::span<double> out) {
       put_record(try_case(options.seed + number), out);

@@ -12,10 +12,10 @@
 namespace helicarm {
 
 struct CentreOptions {
-  std::size_t groups = 1000;  ///< balls of each situation, filled up to whole pictures
+  std::size_t groups = 1000;  ///< balls of each situation, filled up to whole images
   std::uint64_t seed = 1;
   std::vector<std::string> only = {};  ///< groups of situations; empty: all
-  int squares = 10;                    ///< across a picture, a ball in each
+  int squares = 10;                    ///< across an image, a ball in each
 };
 
 /// How far off the centres of balls are in one situation; errors per axis, pixels.

@@ -51,8 +51,8 @@ Eigen::Matrix<double, 2, 3> by_place(const View& view, const Vector3d& point) {
 }
 
 /// Adds what is believed of one combination of each view's numbers, `covariance` being that of all views.
-void believe(Eigen::MatrixXd& information, const std::vector<Numbers>& combination,
-             const Eigen::MatrixXd& covariance) {
+void accept(Eigen::MatrixXd& information, const std::vector<Numbers>& combination,
+            const Eigen::MatrixXd& covariance) {
   if (covariance.size() == 0) return;
   const Eigen::MatrixXd inverse = covariance.inverse();
   for (Eigen::Index i = 0; i < inverse.rows(); ++i)
@@ -95,11 +95,11 @@ Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Ve
   const auto each = [&](double sigma) {
     return sigma > 0 ? Eigen::MatrixXd(sigma * sigma * Eigen::MatrixXd::Identity(n, n)) : Eigen::MatrixXd();
   };
-  believe(information, focal, prior.focal_covariance);
-  believe(information, u0, prior.principal_covariance);
-  believe(information, v0, prior.principal_covariance);
-  believe(information, aspect, each(prior.aspect_sigma));
-  believe(information, skew, each(prior.skew_sigma));
+  accept(information, focal, prior.focal_covariance);
+  accept(information, u0, prior.principal_covariance);
+  accept(information, v0, prior.principal_covariance);
+  accept(information, aspect, each(prior.aspect_sigma));
+  accept(information, skew, each(prior.skew_sigma));
   const Eigen::VectorXd root = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd inverse =
       (root.asDiagonal() * information * root.asDiagonal())

@@ -83,7 +83,7 @@ class Judge {
       : sigma_(sigma_px(options.sigma, options.fle)),
         targets_(targets_in_cone()),
         lane_targets_(targets_, views_) {
-    for (std::uint64_t first = 0; first < draws; first += lane_count) {
+    for (std::uint64_t first = 0; first < draws; first += simd_width) {
       noise_.emplace_back();
       draw_noise(LaneRandom(options.seed, stream, first), draw::calibration, LaneBalls::most, noise_.back());
     }
@@ -94,19 +94,19 @@ class Judge {
     std::vector<LanePoint> balls;
     LanePixels exact, pixels;
     for (const auto& place : places) {
-      balls.push_back({lanes(place.x()), lanes(place.y()), lanes(place.z())});
+      balls.push_back({simd(place.x()), simd(place.y()), simd(place.z())});
       for (std::size_t view = 0; view < 2; ++view)
         exact.of_view[view][balls.size() - 1] = lane_views_.project(view, balls.back());
     }
     const LaneBalls model(balls);
-    Lanes sum{};
+    Simd sum{};
     for (const LanePixels& noise : noise_) {
       add_noise(exact, sigma_, noise, count, pixels);
       const LaneProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
                                             model.calibrate({pixels.of_view[1], count})};
       sum += lane_targets_.mean_square(0, lane_targets_.size(), calibrated);
     }
-    const double mean = (sum[0] + sum[1] + sum[2] + sum[3]) / double(lane_count * noise_.size());
+    const double mean = (sum[0] + sum[1] + sum[2] + sum[3]) / double(simd_width * noise_.size());
     return std::isfinite(mean) ? std::sqrt(mean) : std::numeric_limits<double>::infinity();
   }
 

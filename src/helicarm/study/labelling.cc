@@ -13,8 +13,8 @@
 namespace helicarm {
 namespace {
 
-using simulation::Disc;
-using simulation::DiscView;
+using simulation::SyntheticDetection;
+using simulation::SyntheticView;
 
 constexpr std::uint32_t views_stream = 2000;
 constexpr int many_balls = 8;
@@ -30,34 +30,34 @@ struct Trial {
 };
 
 LabellingPrior nominal_prior() {
-  const simulation::NominalDiscCamera camera;
+  const simulation::NominalCamera camera;
   return {.focal_px = camera.focal_px,
           .principal_px = camera.principal_px,
           .field_radius_px = camera.field_radius_px};
 }
 
-Expected<Labelling> label(const Calibrator& calibrator, const std::vector<Disc>& discs) {
+Expected<Labelling> label(const Calibrator& calibrator, const std::vector<SyntheticDetection>& detections) {
   std::vector<BallCandidate> candidates;
-  for (const Disc& disc : discs)
+  for (const SyntheticDetection& disc : detections)
     candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
   return label_balls(calibrator, candidates, nominal_prior());
 }
 
 /// A false disc may pass for a hidden ball unless a fit to the true ones puts that 4 sigma away.
-Verdict judge(const Labelling& labelling, const DiscView& picture, const Calibrator& calibrator) {
-  if (labelling.mirrored != picture.mirrored()) return Verdict::wrong;
-  std::vector<Sighting> seen;
-  for (const Disc& disc : picture.discs)
+Verdict judge(const Labelling& labelling, const SyntheticView& image, const Calibrator& calibrator) {
+  if (labelling.mirrored != image.mirrored()) return Verdict::wrong;
+  std::vector<WeightedCorrespondence> seen;
+  for (const SyntheticDetection& disc : image.detections)
     if (disc.ball >= 0)
       seen.push_back({calibrator.balls[disc.ball].centre_in_calibrator, disc.uv, disc.sigma_px});
   const LabellingPrior prior = nominal_prior();
   const PoseFit known =
-      fit_pose(picture.view, seen,
+      fit_pose(image.view, seen,
                {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px}, 20);
   Verdict verdict = Verdict::right;
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     if (labelling.candidate_of_ball[k] < 0) continue;
-    const Disc& disc = picture.discs[labelling.candidate_of_ball[k]];
+    const SyntheticDetection& disc = image.detections[labelling.candidate_of_ball[k]];
     if (disc.ball == static_cast<int>(k)) continue;
     const Eigen::Vector3d& centre = calibrator.balls[k].centre_in_calibrator;
     const Eigen::Vector2d off = disc.uv - known.view.project(centre);
@@ -83,21 +83,20 @@ double thread_ms() {
 Trial try_view(const Calibrator& calibrator, const LabellingStudy& study, std::uint64_t number) {
   RandomStream random(study.seed, views_stream, number);
   const int hidden = static_cast<int>(random.index(study.most_hidden + 1));
-  const int false_discs = static_cast<int>(random.index(study.most_false + 1));
-  const auto picture = simulation::random_discs(
+  const int outliers = static_cast<int>(random.index(study.most_false + 1));
+  const auto image = simulation::synthetic_detections(
       calibrator,
-      {.hidden = hidden, .false_discs = false_discs, .kind = study.false_discs, .noise_px = study.noise_px},
-      random);
+      {.hidden = hidden, .outliers = outliers, .kind = study.outliers, .noise_px = study.noise_px}, random);
   Trial trial;
-  trial.visible = picture.visible;
+  trial.visible = image.visible;
   const double start = thread_ms();
-  const auto labelling = label(calibrator, picture.discs);
+  const auto labelling = label(calibrator, image.detections);
   trial.ms = thread_ms() - start;
   if (labelling)
-    trial.verdict = judge(*labelling, picture, calibrator);
+    trial.verdict = judge(*labelling, image, calibrator);
   else
     trial.refused = labelling.error().reason;
-  trial.spread = degrees_off_axis(calibrator, picture.view) >= spread_deg;
+  trial.spread = degrees_off_axis(calibrator, image.view) >= spread_deg;
   return trial;
 }
 

@@ -7,7 +7,7 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/phantom/calibrator.h"
-#include "helicarm/simulation/discs.h"
+#include "helicarm/simulation/synthetic_detections.h"
 
 namespace helicarm {
 
@@ -19,7 +19,7 @@ struct LabellingStudy {
   unsigned threads = 0;  ///< 0: all cores
   int most_hidden = 6;
   int most_false = 10;
-  simulation::FalseDiscs false_discs = simulation::FalseDiscs::strewn;
+  simulation::OutlierKind outliers = simulation::OutlierKind::uniform;
   double noise_px = 0.5;  ///< of centres, per axis
 };
 

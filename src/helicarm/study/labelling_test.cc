@@ -10,7 +10,7 @@
 namespace helicarm {
 namespace {
 
-using simulation::FalseDiscs;
+using simulation::OutlierKind;
 
 void expect_same(const LabellingCount& a, const LabellingCount& b) {
   EXPECT_EQ(a.views, b.views);
@@ -27,9 +27,9 @@ TEST(StudyLabelling, EveryViewOffTheAxisIsNamedAndNoneIsNamedWrong) {
   EXPECT_EQ(tally.spread.solved, tally.spread.views);
 }
 
-TEST(StudyLabelling, DiscsThatImitateBallsAreNeverNamedWrong) {
-  for (const auto kind : {FalseDiscs::imitating, FalseDiscs::lattice}) {
-    const auto tally = study_labelling(udcsc(), {.views = 40, .seed = 2, .false_discs = kind});
+TEST(StudyLabelling, OutliersThatImitateBallsAreNeverLabelledWrong) {
+  for (const auto kind : {OutlierKind::imitating, OutlierKind::lattice}) {
+    const auto tally = study_labelling(udcsc(), {.views = 40, .seed = 2, .outliers = kind});
     EXPECT_EQ(tally.all.wrong, 0);
     EXPECT_GE(tally.spread.solved, tally.spread.views - 1);
   }
@@ -51,12 +51,12 @@ TEST(StudyLabelling, NoViewsNoCounts) {
 
 /// Prints the figures of docs/method.md; run with --gtest_also_run_disabled_tests.
 TEST(StudyLabelling, DISABLED_TenThousandViews) {
-  std::vector<std::pair<std::uint64_t, FalseDiscs>> runs;
+  std::vector<std::pair<std::uint64_t, OutlierKind>> runs;
   for (std::uint64_t seed = 101; seed <= 105; ++seed)
-    for (const auto kind : {FalseDiscs::strewn, FalseDiscs::imitating, FalseDiscs::lattice})
+    for (const auto kind : {OutlierKind::uniform, OutlierKind::imitating, OutlierKind::lattice})
       runs.push_back({seed, kind});
   for (const auto& [seed, kind] : runs) {
-    const auto tally = study_labelling(udcsc(), {.seed = seed, .false_discs = kind});
+    const auto tally = study_labelling(udcsc(), {.seed = seed, .outliers = kind});
     fmt::print("seed {}, false discs of kind {}\n", seed, static_cast<int>(kind));
     const auto print = [](const std::string& what, const LabellingCount& count) {
       if (count.views == 0) return;
@@ -70,7 +70,7 @@ TEST(StudyLabelling, DISABLED_TenThousandViews) {
     print("8 or more, spread", tally.spread);
     print("8 or more, not spread", tally.not_spread);
     fmt::print("ms: median {:.2f}, 99 % {:.2f}\n", tally.median_ms, tally.p99_ms);
-    EXPECT_LE(tally.all.wrong, kind == FalseDiscs::imitating ? 1 : 0);
+    EXPECT_LE(tally.all.wrong, kind == OutlierKind::imitating ? 1 : 0);
   }
 }
 

@@ -8,8 +8,8 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/calibration/calibrate.h"
-#include "helicarm/calibration/machine.h"
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
@@ -32,13 +32,13 @@ constexpr double pinned = 1e-6;                // sigma of what is known
 constexpr double known_mm = 1e-3;              // likewise, of a length
 constexpr double aspect_sigma = 1e-3;
 constexpr std::size_t bound_trials = 200;  // where each trial has a bound of its own
-constexpr int shots_of_machine = 12;
+constexpr int entries_of_history = 12;
 
 const Vector3d centre(0, 0, 40);  // of the places
 
 /// What the experiment's C-arms are like: an unknown one of its make, and one that sags little.
-const MachinePrior make = unknown_machine();
-const MachinePrior stiff{Departure{10, 0.3}, Departure{7, 0.5}};
+const CArmPrior make = unknown_c_arm();
+const CArmPrior stiff{IntrinsicsVariation{10, 0.3}, IntrinsicsVariation{7, 0.5}};
 
 std::vector<Vector3d> balls_on_helix(int n) {
   std::vector<Vector3d> balls;
@@ -48,25 +48,25 @@ std::vector<Vector3d> balls_on_helix(int n) {
 }
 
 /// Departures from nominal of focal length and principal point, mm.
-Vector3d departure(const MachinePrior& machine, double Departure::*part, RandomStream& random) {
-  return {*machine.focal.*part * random.normal(), *machine.principal.*part * random.normal(),
-          *machine.principal.*part * random.normal()};
+Vector3d variation(const CArmPrior& c_arm, double IntrinsicsVariation::*part, RandomStream& random) {
+  return {*c_arm.focal.*part * random.normal(), *c_arm.principal.*part * random.normal(),
+          *c_arm.principal.*part * random.normal()};
 }
 
-View view_with(const Vector3d& departure_mm, double aspect, double angle) {
-  const double f = px_per_mm * (focal_mm + departure_mm.x());
+View view_with(const Vector3d& variation_mm, double aspect, double angle) {
+  const double f = px_per_mm * (focal_mm + variation_mm.x());
   const Eigen::Matrix3d rotation = rotation_from_euler(angle, 0, 0);
-  return {{2 * f * aspect / (1 + aspect), 2 * f / (1 + aspect), middle_px + px_per_mm * departure_mm.y(),
-           middle_px + px_per_mm * departure_mm.z(), 0},
+  return {{2 * f * aspect / (1 + aspect), 2 * f / (1 + aspect), middle_px + px_per_mm * variation_mm.y(),
+           middle_px + px_per_mm * variation_mm.z(), 0},
           {rotation, Vector3d(0, 0, 800) - rotation * centre}};
 }
 
-std::array<View, 2> views_of(const MachinePrior& machine, const Vector3d& common_mm, double aspect_spread,
+std::array<View, 2> views_of(const CArmPrior& c_arm, const Vector3d& common_mm, double aspect_spread,
                              RandomStream& random) {
   std::array<View, 2> views;
   for (std::size_t i = 0; i < 2; ++i) {
     const double aspect = 1 + aspect_spread * random.normal();
-    views[i] = view_with(common_mm + departure(machine, &Departure::of_view, random), aspect,
+    views[i] = view_with(common_mm + variation(c_arm, &IntrinsicsVariation::of_view, random), aspect,
                          double(i) * std::numbers::pi / 2);
   }
   return views;
@@ -86,59 +86,60 @@ ViewFiducials pictured(const char* name, const View& view, const std::vector<Vec
   return seen;
 }
 
-/// A machine and what its earlier shots have told of it.
-struct KnownMachine {
-  Vector3d mean_departure_mm;
-  MachineKnowledge knowledge;
+/// A machine and what its earlier acquisitions have told of it.
+struct KnownCArm {
+  Vector3d mean_variation_mm;
+  LearnedIntrinsics knowledge;
 };
 
-KnownMachine machine_with_history(const LimitSetting& setting, const std::vector<Vector3d>& balls,
-                                  RandomStream random) {
-  KnownMachine known;
-  known.mean_departure_mm = departure(stiff, &Departure::common, random);
-  std::vector<MachineShot> shots;
-  while (int(shots.size()) < shots_of_machine)
-    for (const View& view : views_of(stiff, known.mean_departure_mm, aspect_sigma, random)) {
+KnownCArm c_arm_with_history(const LimitSetting& setting, const std::vector<Vector3d>& balls,
+                             RandomStream random) {
+  KnownCArm known;
+  known.mean_variation_mm = variation(stiff, &IntrinsicsVariation::common, random);
+  std::vector<HistoryEntry> true_views;
+  while (int(true_views.size()) < entries_of_history)
+    for (const View& view : views_of(stiff, known.mean_variation_mm, aspect_sigma, random)) {
       ViewFiducials seen = pictured("", view, balls, setting.sigma_px, random);
-      seen.prior.aspect = Belief{1, aspect_sigma};
-      if (const auto shot = shot_of(seen, "", {make})) shots.push_back(*shot);
+      seen.prior.aspect = NormalPrior{1, aspect_sigma};
+      if (const auto true_view = history_entry_of(seen, "", {make})) true_views.push_back(*true_view);
     }
-  known.knowledge = knowledge_of(shots, {focal_mm, 0, 0}, make);
+  known.knowledge = learn_intrinsics(true_views, {focal_mm, 0, 0}, make);
   return known;
 }
 
 /// What the estimator is told, and what the bound is told.
-struct Told {
-  MachinePrior machine;
-  std::optional<Belief> aspect;
-  std::optional<Belief> skew = Belief{0, pinned};
+struct PriorKnowledge {
+  CArmPrior c_arm;
+  std::optional<NormalPrior> aspect;
+  std::optional<NormalPrior> skew = NormalPrior{0, pinned};
   PriorInformation bound;
 };
 
-Told told_of(LimitModel model) {
-  const auto departures = [](const Departure& d) {
+PriorKnowledge told_of(LimitModel model) {
+  const auto variations = [](const IntrinsicsVariation& d) {
     return Eigen::MatrixXd(px_per_mm * px_per_mm *
                            (Eigen::Matrix2d::Constant(d.common * d.common) +
                             Eigen::Matrix2d(d.of_view * d.of_view * Eigen::Matrix2d::Identity())));
   };
-  const auto with = [&](const MachinePrior& machine, double aspect) {
-    return Told{machine,
-                Belief{1, aspect},
-                Belief{0, pinned},
-                {departures(*machine.focal), departures(*machine.principal), aspect, pinned}};
+  const auto with = [&](const CArmPrior& c_arm, double aspect) {
+    return PriorKnowledge{c_arm,
+                          NormalPrior{1, aspect},
+                          NormalPrior{0, pinned},
+                          {variations(*c_arm.focal), variations(*c_arm.principal), aspect, pinned}};
   };
   switch (model) {
     case LimitModel::free:
       return {{}, {}, {}, {}};
     case LimitModel::square:
-      return {{}, Belief{1, pinned}, Belief{0, pinned}, {{}, {}, pinned, pinned}};
+      return {{}, NormalPrior{1, pinned}, NormalPrior{0, pinned}, {{}, {}, pinned, pinned}};
     case LimitModel::prior:
       return with(make, aspect_sigma);
-    case LimitModel::machine:  // the bound is that of a machine whose mean and sag are known
-      return with({Departure{known_mm, stiff.focal->of_view}, Departure{known_mm, stiff.principal->of_view}},
+    case LimitModel::c_arm:  // the bound is that of a machine whose mean and sag are known
+      return with({IntrinsicsVariation{known_mm, stiff.focal->of_view},
+                   IntrinsicsVariation{known_mm, stiff.principal->of_view}},
                   aspect_sigma);
     case LimitModel::known:
-      return with({Departure{known_mm, known_mm}, Departure{known_mm, known_mm}}, pinned);
+      return with({IntrinsicsVariation{known_mm, known_mm}, IntrinsicsVariation{known_mm, known_mm}}, pinned);
   }
   return {};
 }
@@ -146,34 +147,35 @@ Told told_of(LimitModel model) {
 std::optional<LocatedPoint> located(const std::array<Eigen::Vector2d, 2>& pixels, double sigma,
                                     const Expected<CalibrationResult>& calibration) {
   if (!calibration) return std::nullopt;
-  std::vector<PointPicture> pictures;
+  std::vector<PointObservation> images;
   for (std::size_t i = 0; i < 2; ++i)
-    pictures.push_back({i, pixels[i], sigma * sigma * Eigen::Matrix2d::Identity()});
-  const auto point = locate("", PointSource::target, pictures, *calibration);
+    images.push_back({i, pixels[i], sigma * sigma * Eigen::Matrix2d::Identity()});
+  const auto point = locate("", PointSource::target, images, *calibration);
   return point ? std::optional(*point) : std::nullopt;
 }
 
 LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>& balls,
-                       const KnownMachine* machine, std::uint64_t seed, std::size_t trial) {
+                       const KnownCArm* c_arm, std::uint64_t seed, std::size_t trial) {
   RandomStream random(seed, setting.stream, trial);
-  const Told told = told_of(setting.model);
-  const bool drawn = setting.model == LimitModel::prior || setting.model == LimitModel::machine;
-  const MachinePrior& arm = machine ? stiff : make;
-  const Vector3d common = machine                              ? machine->mean_departure_mm
-                          : setting.model == LimitModel::prior ? departure(arm, &Departure::common, random)
-                                                               : Vector3d::Zero();
+  const PriorKnowledge prior_knowledge = told_of(setting.model);
+  const bool drawn = setting.model == LimitModel::prior || setting.model == LimitModel::c_arm;
+  const CArmPrior& arm = c_arm ? stiff : make;
+  const Vector3d common = c_arm ? c_arm->mean_variation_mm
+                          : setting.model == LimitModel::prior
+                              ? variation(arm, &IntrinsicsVariation::common, random)
+                              : Vector3d::Zero();
   const std::array<View, 2> views = drawn ? views_of(arm, common, aspect_sigma, random)
                                           : std::array{view_with(Vector3d::Zero(), 1, 0),
                                                        view_with(Vector3d::Zero(), 1, std::numbers::pi / 2)};
   std::vector<ViewFiducials> seen;
   for (std::size_t i = 0; i < 2; ++i) {
     seen.push_back(pictured(i == 0 ? "AP" : "LAT", views[i], balls, setting.sigma_px, random));
-    seen[i].prior.aspect = told.aspect;
-    seen[i].prior.skew = told.skew;
-    if (machine) seen[i].prior = known_prior(seen[i].prior, machine->knowledge, false);
+    seen[i].prior.aspect = prior_knowledge.aspect;
+    seen[i].prior.skew = prior_knowledge.skew;
+    if (c_arm) seen[i].prior = learned_prior(seen[i].prior, c_arm->knowledge, false);
   }
   CalibrationOptions options;
-  options.common.machine = machine ? machine->knowledge.prior : told.machine;
+  options.common.c_arm = c_arm ? c_arm->knowledge.prior : prior_knowledge.c_arm;
   const auto calibration = calibrate(seen, options);
   const auto dlt = calibrate_paper(seen, options);
 
@@ -194,7 +196,8 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
     if (const auto point = located(pixels, sigma, dlt))
       outcome.dlt2 = (point->point_in_anchor - truth).squaredNorm();
     if (trial == 0 || (drawn && trial < bound_trials))
-      outcome.bound2 = least_covariance(views, balls, truth, setting.sigma_px, sigma, told.bound).trace();
+      outcome.bound2 =
+          least_covariance(views, balls, truth, setting.sigma_px, sigma, prior_knowledge.bound).trace();
   }
   return outcomes;
 }
@@ -204,12 +207,12 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
 void run_limit_trials(const LimitSetting& setting, const LimitOptions& options, std::size_t block,
                       std::span<double> out) {
   const std::vector<Vector3d> balls = balls_on_helix(setting.balls);
-  std::optional<KnownMachine> machine;
-  if (setting.model == LimitModel::machine)
-    machine = machine_with_history(setting, balls, RandomStream(options.seed, setting.stream + 1000, block));
+  std::optional<KnownCArm> c_arm;
+  if (setting.model == LimitModel::c_arm)
+    c_arm = c_arm_with_history(setting, balls, RandomStream(options.seed, setting.stream + 1000, block));
   const std::size_t end = std::min(options.groups, (block + 1) * limit_trials_of_block);
   for (std::size_t trial = block * limit_trials_of_block; trial < end; ++trial)
-    put_record(try_once(setting, balls, machine ? &*machine : nullptr, options.seed, trial), out);
+    put_record(try_once(setting, balls, c_arm ? &*c_arm : nullptr, options.seed, trial), out);
 }
 
 }  // namespace helicarm

@@ -12,9 +12,9 @@
 namespace helicarm {
 
 /// What is known of the intrinsics.
-enum class LimitModel { free, square, prior, machine, known };
+enum class LimitModel { free, square, prior, c_arm, known };
 inline constexpr std::array limit_models{LimitModel::free, LimitModel::square, LimitModel::prior,
-                                         LimitModel::machine, LimitModel::known};
+                                         LimitModel::c_arm, LimitModel::known};
 
 /// Where the points are, each with noisy and with exact pixels.
 struct LimitPlace {

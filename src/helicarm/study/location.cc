@@ -34,22 +34,22 @@ struct LocationTrials {
     std::vector<LanePoint> balls;
     LanePixels exact, noise, pixels;
     for (const Eigen::Vector3d& ball : map.balls) {
-      balls.push_back({lanes(ball.x()), lanes(ball.y()), lanes(ball.z())});
+      balls.push_back({simd(ball.x()), simd(ball.y()), simd(ball.z())});
       for (std::size_t view = 0; view < 2; ++view)
         exact.of_view[view][balls.size() - 1] = lane_views.project(view, balls.back());
     }
     const LaneBalls model(balls);
     const std::size_t end = std::min(options.groups, (block + 1) * draws_of_block);
-    for (std::size_t first = block * draws_of_block; first < end; first += lane_count) {
+    for (std::size_t first = block * draws_of_block; first < end; first += simd_width) {
       const LaneRandom random(options.seed, location_stream, first);
       draw_noise(random, draw::calibration, count, noise);
       add_noise(exact, sigma, noise, count, pixels);
       const LaneProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
                                             model.calibrate({pixels.of_view[1], count})};
-      const auto drawn = std::min<std::size_t>(lane_count, end - first);
+      const auto drawn = std::min<std::size_t>(simd_width, end - first);
       for (std::size_t i = 0; i < map.points.size(); ++i) {
         const Eigen::Vector3d& place = map.points[i].place;
-        const LanePoint target{lanes(place.x()), lanes(place.y()), lanes(place.z())};
+        const LanePoint target{simd(place.x()), simd(place.y()), simd(place.z())};
         LanePixel bare[2], noisy[2];
         for (std::size_t view = 0; view < 2; ++view) {
           const auto [u, v] =
@@ -57,8 +57,8 @@ struct LocationTrials {
           bare[view] = lane_views.project(view, target);
           noisy[view] = {bare[view].u + sigma * u, bare[view].v + sigma * v};
         }
-        const Lanes fresh = norm(intersect(calibrated[0], noisy[0], calibrated[1], noisy[1]) - target);
-        const Lanes still = norm(intersect(calibrated[0], bare[0], calibrated[1], bare[1]) - target);
+        const Simd fresh = norm(intersect(calibrated[0], noisy[0], calibrated[1], noisy[1]) - target);
+        const Simd still = norm(intersect(calibrated[0], bare[0], calibrated[1], bare[1]) - target);
         double* sums = values.data() + i * sums_of_point;
         for (std::size_t lane = 0; lane < drawn; ++lane) {
           sums[0] += fresh[lane];
@@ -82,7 +82,7 @@ std::vector<Eigen::Vector3d> balls_of(const LocationOptions& options) {
 SeenIn seen_in(const std::array<View, 2>& views, const Eigen::Vector3d& place) {
   const auto holds = [&](const View& view) {
     const Eigen::Array2d pixel = view.project(place);
-    return view.depth(place) > 0 && (pixel >= -0.5).all() && (pixel < picture_px - 0.5).all();
+    return view.depth(place) > 0 && (pixel >= -0.5).all() && (pixel < image_px - 0.5).all();
   };
   return SeenIn((holds(views[0]) ? 1 : 0) + (holds(views[1]) ? 2 : 0));
 }

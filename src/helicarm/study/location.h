@@ -28,8 +28,8 @@ struct LocationOptions {
 
 enum class TargetPlane { xoy, xoz };
 
-/// Which of the two pictures of 1024 x 1024 pixels hold a target: its bits are AP and LAT. One that is not in
-/// both cannot be located in reality; the map shows what rays beyond the picture would give.
+/// Which of the two images of 1024 x 1024 pixels hold a target: its bits are AP and LAT. One that is not in
+/// both cannot be located in reality; the map shows what rays beyond the image would give.
 enum class SeenIn { none, ap, lat, both };
 
 struct LocationPoint {

@@ -30,7 +30,7 @@ double tre_at(const LocationMap& map, double distance_mm, double step_mm, double
   return sum / count;
 }
 
-/// Spearman's correlation of TRE with the distance, of all points or of those in both pictures.
+/// Spearman's correlation of TRE with the distance, of all points or of those in both images.
 double rise_of(const LocationMap& map, bool seen_only) {
   std::vector<double> distance, tre;
   for (const LocationPoint& point : map.points) {
@@ -111,7 +111,7 @@ StudyFiles files_of(const LocationMap& map, const LocationOptions& options) {
       "and could not be located in reality; over the other {} Spearman's correlation is {:.3f}.",
       options.groups, steps, rise, rise > 0.5 ? ", as printed" : ": the print is not confirmed",
       tre_at(map, 0, options.step_mm, &LocationPoint::tre_exact), map.points.size(),
-      map.points.size() - in_both, picture_px, picture_px, in_lat, in_ap, in_none, in_both, rise_seen);
+      map.points.size() - in_both, image_px, image_px, in_lat, in_ap, in_none, in_both, rise_seen);
   Json balls = Json::array();
   for (const Eigen::Vector3d& ball : map.balls) balls.push_back({ball.x(), ball.y(), ball.z()});
   Json seen_in;

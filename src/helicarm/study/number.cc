@@ -100,16 +100,16 @@ class NumberTrials {
   }
 
  private:
-  static double* put(Lanes value, double* out, std::size_t stride) {
-    for (int i = 0; i < lane_count; ++i) out[i] = value[i];
+  static double* put(Simd value, double* out, std::size_t stride) {
+    for (int i = 0; i < simd_width; ++i) out[i] = value[i];
     return out + stride;
   }
 
   static double* put_fre(const std::vector<LanePoint>& balls, const LaneProjection (&views)[2],
                          const LanePixels& pixels, double* out, std::size_t stride) {
-    Lanes sum{}, largest{};
+    Simd sum{}, largest{};
     for (std::size_t i = 0; i < balls.size(); ++i) {
-      const Lanes error =
+      const Simd error =
           norm(intersect(views[0], pixels.of_view[0][i], views[1], pixels.of_view[1][i]) - balls[i]);
       sum += error;
       largest = larger(error, largest);
@@ -152,7 +152,7 @@ StudySetting setting_of(const NumberTrials& trials, std::size_t balls, std::size
   setting.cost = double(balls) + 20;  // what does not grow with them: targets
   setting.work = [&trials, balls, groups](std::size_t block, std::span<double> values) {
     const std::size_t first = block * groups_per_block;
-    for (std::size_t i = 0; i < groups_per_block && first + i < groups; i += lane_count)
+    for (std::size_t i = 0; i < groups_per_block && first + i < groups; i += simd_width)
       trials.run(balls, first + i, values.data() + i, groups_per_block);
   };
   setting.settle = [&trials, groups, threads](std::span<const double> values) {

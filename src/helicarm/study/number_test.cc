@@ -223,7 +223,7 @@ TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
   EXPECT_EQ(study_design(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
-TEST(StudyCalibration, MeasuresSimulatedPicturesByBothRecipes) {
+TEST(StudyCalibration, MeasuresSimulatedImagesByBothRecipes) {
   CalibrationStudyOptions options;
   options.groups = 2;
   options.size_px = 512;

@@ -95,14 +95,14 @@ LanePixel LaneViews::project(std::size_t view, const LanePoint& point) const {
     const double(&p)[4] = p_[view][i];
     return p[0] * point.x + p[1] * point.y + p[2] * point.z + p[3];
   };
-  const Lanes one_over_depth = 1.0 / row(2);
+  const Simd one_over_depth = 1.0 / row(2);
   return {row(0) * one_over_depth, row(1) * one_over_depth};
 }
 
-LanePoint on_spiral(Lanes share) {
+LanePoint on_spiral(Simd share) {
   constexpr ConicalHelix spiral;
   const SineCosine direction = sine_cosine_of_turns(share * (spiral.t_end / (2 * std::numbers::pi)));
-  const Lanes radius = spiral.rr * exponential(share * (-spiral.t_end / spiral.pp));
+  const Simd radius = spiral.rr * exponential(share * (-spiral.t_end / spiral.pp));
   return {radius * direction.cosine, radius * direction.sine, share * (spiral.h * spiral.t_end)};
 }
 
@@ -145,15 +145,15 @@ LaneTargets::LaneTargets(std::span<const Eigen::Vector3d> points, const std::arr
   if (points.size() > LaneBalls::most) throw std::invalid_argument("LaneTargets: more than 64");
   const LaneViews lane_views(views);
   for (const Eigen::Vector3d& point : points) {
-    const LanePoint target{lanes(point.x()), lanes(point.y()), lanes(point.z())};
+    const LanePoint target{simd(point.x()), simd(point.y()), simd(point.z())};
     for (std::size_t i = 0; i < 2; ++i) exact_.of_view[i][points_.size()] = lane_views.project(i, target);
     points_.push_back(target);
   }
 }
 
-Lanes LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2],
-                              double sigma, const LanePixels* noise) const {
-  Lanes sum{};
+Simd LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2],
+                             double sigma, const LanePixels* noise) const {
+  Simd sum{};
   for (std::size_t i = begin; i < end; ++i) {
     LanePixel seen[2];
     for (std::size_t view = 0; view < 2; ++view) {
@@ -167,8 +167,8 @@ Lanes LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProj
   return sum / double(end - begin);
 }
 
-Lanes LaneTargets::mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const {
-  Lanes sum{};
+Simd LaneTargets::mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const {
+  Simd sum{};
   for (std::size_t i = begin; i < end; ++i) {
     const LanePoint off =
         intersect(views[0], exact_.of_view[0][i], views[1], exact_.of_view[1][i]) - points_[i];

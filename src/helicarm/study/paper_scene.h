@@ -10,13 +10,13 @@
 #include <Eigen/Core>
 
 #include "helicarm/geometry/view.h"
-#include "helicarm/study/lane_geometry.h"
-#include "helicarm/study/lane_random.h"
+#include "helicarm/study/simd_geometry.h"
+#include "helicarm/study/simd_random.h"
 
 namespace helicarm {
 
 /// Where the poses of 2.3.3 put the world's origin: on the cone's axis, at its base as printed, or halfway
-/// up, so that both pictures hold the whole cone.
+/// up, so that both images hold the whole cone.
 enum class WorldOrigin { base, centre };
 std::string_view name_of(WorldOrigin origin);
 
@@ -41,7 +41,7 @@ inline constexpr double cone_base_mm = 60;      // radii
 inline constexpr double cone_top_mm = 30;
 inline constexpr double space_radius_mm = 100;  // C of 2.3.3
 inline constexpr double printed_fle = 2.34;
-inline constexpr double picture_px = 1024;  // each way
+inline constexpr double image_px = 1024;  // each way
 
 /// The AP and the lateral view of 2.3.3: f 900 mm, 0.15 mm pixels, 512, 800 mm. World: the calibrator's
 /// frame.
@@ -68,7 +68,7 @@ class LaneViews {
 };
 
 /// The place on the spiral (Eq. 9) at a share of its 3.5 turns, 0 to 1.
-LanePoint on_spiral(Lanes share);
+LanePoint on_spiral(Simd share);
 
 /// Four groups of balls drawn at random on the spiral: uniform in the angle t.
 std::vector<LanePoint> balls_on_spiral(const LaneRandom& random, std::size_t count);
@@ -102,10 +102,10 @@ class LaneTargets {
   std::size_t size() const { return points_.size(); }
   /// Mean distance (Eq. 12) of where calibrated views place the targets begin .. end - 1 from where they are;
   /// their pixels carry noise where it is given.
-  Lanes mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2], double sigma_px,
-                   const LanePixels* noise) const;
+  Simd mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2], double sigma_px,
+                  const LanePixels* noise) const;
   /// Mean squared distance likewise, of exact pixels.
-  Lanes mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const;
+  Simd mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const;
 
  private:
   std::vector<LanePoint> points_;

@@ -19,7 +19,7 @@ constexpr double printed_mean_ratio = 2, printed_max_ratio = 2.5, printed_best_m
 constexpr double printed_raw_max = 13.26, printed_rectified_mean = 2.67;
 
 struct GridCurve {
-  const char* picture;
+  const char* image;
   const char* name;
   double GridErrors::*mean;
   double GridErrors::*max;
@@ -31,9 +31,9 @@ constexpr std::array<GridCurve, 3> curves{
 
 struct GridReading {
   const char* name;
-  GridErrors GridPicture::*errors;
+  GridErrors GridImage::*errors;
 };
-constexpr std::array<GridReading, 2> readings{{{"nine", &GridPicture::nine}, {"all", &GridPicture::all}}};
+constexpr std::array<GridReading, 2> readings{{{"nine", &GridImage::nine}, {"all", &GridImage::all}}};
 
 /// Over the intensifiers; what has no answer is left out.
 struct Spread {
@@ -56,7 +56,7 @@ class Results {
  public:
   explicit Results(const std::vector<Intensifier>& intensifiers) : intensifiers_(intensifiers) {}
 
-  Spread at(std::size_t distance, GridErrors GridPicture::*reading, double GridErrors::*figure) const {
+  Spread at(std::size_t distance, GridErrors GridImage::*reading, double GridErrors::*figure) const {
     return Spread(
         over(reading, [&](std::size_t k, const GridErrors& e) { return k == distance ? e.*figure : gap; }));
   }
@@ -65,21 +65,21 @@ class Results {
                double GridErrors::*rectified_error) const {
     std::vector<double> ratios;
     for (const Intensifier& intensifier : intensifiers_)
-      for (const GridPicture& picture : intensifier.pictures)
-        ratios.push_back(picture.*raw.errors.*raw_error / (picture.*rectified.errors.*rectified_error));
+      for (const GridImage& image : intensifier.images)
+        ratios.push_back(image.*raw.errors.*raw_error / (image.*rectified.errors.*rectified_error));
     return Spread(ratios);
   }
-  Spread everywhere(GridErrors GridPicture::*reading, double GridErrors::*figure) const {
+  Spread everywhere(GridErrors GridImage::*reading, double GridErrors::*figure) const {
     return Spread(over(reading, [&](std::size_t, const GridErrors& e) { return e.*figure; }));
   }
 
  private:
   template <class Figure>
-  std::vector<double> over(GridErrors GridPicture::*reading, Figure figure) const {
+  std::vector<double> over(GridErrors GridImage::*reading, Figure figure) const {
     std::vector<double> values;
     for (const Intensifier& intensifier : intensifiers_)
-      for (std::size_t k = 0; k < intensifier.pictures.size(); ++k)
-        values.push_back(figure(k, intensifier.pictures[k].*reading));
+      for (std::size_t k = 0; k < intensifier.images.size(); ++k)
+        values.push_back(figure(k, intensifier.images[k].*reading));
     return values;
   }
   const std::vector<Intensifier>& intensifiers_;
@@ -89,7 +89,7 @@ class Results {
 Chart figure_9(const Intensifier& first, double distance_mm) {
   Chart chart{fmt::format("Fig. 9: test grid, {:g} mm from the receiver", distance_mm), "u, px", "v, px"};
   chart.note = "the first intensifier's raw picture; ideal places by the nine central crosses (Eq. 14)";
-  chart.picture = true;
+  chart.image = true;
   constexpr std::size_t side = 9;
   ChartSeries raw{"raw", {}, false, true};
   ChartSeries ideal{"ideal"};
@@ -133,7 +133,7 @@ Chart figure_11(const Results& results, const RectificationStudyOptions& options
     ChartSeries series{curves[c].name};
     series.joined = true;
     for (std::size_t k = 0; k < options.distances_mm.size(); ++k) {
-      const Spread spread = results.at(k, &GridPicture::nine, max ? curves[c].max : curves[c].mean);
+      const Spread spread = results.at(k, &GridImage::nine, max ? curves[c].max : curves[c].mean);
       if (!std::isfinite(spread.mean)) continue;
       series.points.push_back({options.distances_mm[k] + aside_mm * (double(c) - 1), spread.mean});
       series.ranges.push_back({spread.least, spread.most});
@@ -150,11 +150,11 @@ std::string csv_of(const std::vector<Intensifier>& intensifiers, const Rectifica
     for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
       for (const GridReading& reading : readings)
         for (const GridCurve& curve : curves) {
-          const GridPicture& picture = intensifiers[i].pictures[k];
-          const GridErrors& errors = picture.*reading.errors;
+          const GridImage& image = intensifiers[i].images[k];
+          const GridErrors& errors = image.*reading.errors;
           csv += fmt::format("{},{},{},{}{},{},{}{}\n", i + 1, intensifiers[i].case_seed,
-                             options.distances_mm[k], picture.crosses,
-                             csv_cells(std::array{picture.finder_rms}), reading.name, curve.picture,
+                             options.distances_mm[k], image.crosses, csv_cells(std::array{image.finder_rms}),
+                             reading.name, curve.image,
                              csv_cells(std::array{errors.*curve.mean, errors.*curve.max}));
         }
   return csv;
@@ -166,14 +166,14 @@ Json rows_of(const Results& results, const RectificationStudyOptions& options) {
     for (const GridReading& reading : readings) {
       Json row = {{"distance_mm", options.distances_mm[k]}, {"similarity", reading.name}};
       for (const GridCurve& curve : curves)
-        row[curve.picture] = {{"mean_px", results.at(k, reading.errors, curve.mean).json()},
-                              {"max_px", results.at(k, reading.errors, curve.max).json()}};
+        row[curve.image] = {{"mean_px", results.at(k, reading.errors, curve.mean).json()},
+                            {"max_px", results.at(k, reading.errors, curve.max).json()}};
       rows.push_back(std::move(row));
     }
   return rows;
 }
 
-/// The third: the ideal grid of the raw picture by the nine, that of the rectified one by all.
+/// The third: the ideal grid of the raw image by the nine, that of the rectified one by all.
 constexpr std::array<std::array<std::size_t, 2>, 3> pairs_of_readings{{{0, 0}, {1, 1}, {0, 1}}};
 
 Json ratios_of(const Results& results) {
@@ -183,7 +183,7 @@ Json ratios_of(const Results& results) {
       ratios.push_back(
           {{"raw_similarity", readings[r].name},
            {"rectified_similarity", readings[q].name},
-           {"picture", curve.picture},
+           {"picture", curve.image},
            {"mean", results.ratio(readings[r], &GridErrors::raw_mean, readings[q], curve.mean).json()},
            {"max", results.ratio(readings[r], &GridErrors::raw_max, readings[q], curve.max).json()}});
   return ratios;
@@ -193,7 +193,7 @@ Json ratios_of(const Results& results) {
 double trend(const Results& results, const RectificationStudyOptions& options, double GridErrors::*figure) {
   std::vector<double> means;
   for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
-    means.push_back(results.at(k, &GridPicture::nine, figure).mean);
+    means.push_back(results.at(k, &GridImage::nine, figure).mean);
   return spearman(options.distances_mm, means);
 }
 
@@ -207,12 +207,11 @@ std::string summary_of(const std::vector<Intensifier>& intensifiers, const Resul
   using E = GridErrors;
   std::size_t refused = 0;
   for (const Intensifier& intensifier : intensifiers)
-    refused += std::size_t(std::ranges::count_if(intensifier.pictures, [](const GridPicture& picture) {
-      return !std::isfinite(picture.nine.raw_mean);
-    }));
+    refused += std::size_t(std::ranges::count_if(
+        intensifier.images, [](const GridImage& image) { return !std::isfinite(image.nine.raw_mean); }));
   const auto& [nine, all, mixed] = pairs_of_readings;
   const auto& [raw, paper, best] = curves;
-  const auto most = [&](double E::*figure) { return results.everywhere(&GridPicture::nine, figure).most; };
+  const auto most = [&](double E::*figure) { return results.everywhere(&GridImage::nine, figure).most; };
   return fmt::format(
       "Figs. 9 to 11: {} simulated intensifiers, the test grid at {} distances; pictures without an answer: "
       "{}. "

@@ -66,21 +66,21 @@ std::optional<std::size_t> true_cross(const simulation::SimulatedView& view, con
 }
 
 /// Where a map or the grid is refused, what hangs on it stays NaN.
-GridPicture measure_picture(const simulation::SimulatedView& view, const std::optional<Maps>& maps,
-                            std::span<GridCross> kept) {
-  GridPicture picture = all_missing<GridPicture>();
-  picture.crosses = 0;
-  if (!maps) return picture;
+GridImage measure_image(const simulation::SimulatedView& view, const std::optional<Maps>& maps,
+                        std::span<GridCross> kept) {
+  GridImage image = all_missing<GridImage>();
+  image.crosses = 0;
+  if (!maps) return image;
   const auto crosses = within_both(find_grid(exposure_of(view)), *maps);
   double squares = 0;
   for (const Dot& cross : crosses)
     if (const auto at = true_cross(view, cross.centre_px))
-      squares += (view.crosses[*at].raw - cross.centre_px).squaredNorm(), ++picture.crosses;
-  if (picture.crosses > 0) picture.finder_rms = std::sqrt(squares / picture.crosses);
-  if (const auto all = measured_by(crosses, *maps, GridFit::all)) picture.all = all->errors();
+      squares += (view.crosses[*at].raw - cross.centre_px).squaredNorm(), ++image.crosses;
+  if (image.crosses > 0) image.finder_rms = std::sqrt(squares / image.crosses);
+  if (const auto all = measured_by(crosses, *maps, GridFit::all)) image.all = all->errors();
   const auto nine = measured_by(crosses, *maps, GridFit::nine);
-  if (!nine) return picture;
-  picture.nine = nine->errors();
+  if (!nine) return image;
+  image.nine = nine->errors();
   const TestGrid& paper = nine->paper;
   for (std::size_t k = 0; k < paper.raw_px.size() && !kept.empty(); ++k)
     if (const auto at = true_cross(view, paper.raw_px[k]))
@@ -91,11 +91,11 @@ GridPicture measure_picture(const simulation::SimulatedView& view, const std::op
                    paper.raw_error_px[k],
                    paper.rectified_error_px[k],
                    nine->best.rectified_error_px[k]};
-  return picture;
+  return image;
 }
 
 std::optional<Maps> maps_of(const simulation::SimulatedCase& given) {
-  const Exposure plate = exposure_of(given.views.front());
+  const XrayImage plate = exposure_of(given.views.front());
   auto paper = rectify(plate, *given.plate, {Method::paper, {}});
   auto best = rectify(plate, *given.plate, {Method::best, {}});
   if (!paper || !best) return {};
@@ -115,9 +115,9 @@ void run_intensifier(const RectificationStudyOptions& options, std::size_t numbe
   crosses.fill(all_missing<GridCross>());
   for (std::size_t i = 0; i < options.distances_mm.size(); ++i) {
     const bool keep = options.distances_mm[i] == options.figure_distance_mm;
-    const auto picture =
-        measure_picture(given.views[i + 1], maps, keep ? std::span(crosses) : std::span<GridCross>());
-    put_record(picture, out);
+    const auto image =
+        measure_image(given.views[i + 1], maps, keep ? std::span(crosses) : std::span<GridCross>());
+    put_record(image, out);
   }
   for (const GridCross& cross : crosses) put_record(cross, out);
 }
@@ -134,7 +134,7 @@ Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyO
   StudySetting setting;
   setting.blocks = options.groups;
   setting.values_per_block =
-      options.distances_mm.size() * numbers_in<GridPicture> + crosses_of_grid * numbers_in<GridCross>;
+      options.distances_mm.size() * numbers_in<GridImage> + crosses_of_grid * numbers_in<GridCross>;
   setting.work = [&](std::size_t block, std::span<double> values) {
     run_intensifier(options, block, values);
   };
@@ -148,7 +148,7 @@ Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyO
     for (std::size_t i = 0; i < options.groups; ++i) {
       Intensifier intensifier{seed_of_intensifier(options, i), {}, {}};
       for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
-        intensifier.pictures.push_back(take_record<GridPicture>(values));
+        intensifier.images.push_back(take_record<GridImage>(values));
       for (GridCross& cross : intensifier.crosses) cross = take_record<GridCross>(values);
       intensifiers.push_back(std::move(intensifier));
     }

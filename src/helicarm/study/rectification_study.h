@@ -11,7 +11,7 @@
 
 namespace helicarm {
 
-/// The paper's 3.1 (Figs. 9 to 11) from pictures: each intensifier takes the plate alone, which gives the
+/// The paper's 3.1 (Figs. 9 to 11) from images: each intensifier takes the plate alone, which gives the
 /// maps, and then the test grid of wires at several distances from the receiver.
 struct RectificationStudyOptions {
   std::size_t groups = 10;  ///< intensifiers
@@ -22,21 +22,21 @@ struct RectificationStudyOptions {
   double figure_distance_mm = 45;  ///< whose crosses are kept (Figs. 9 and 10); one of the above
 };
 
-/// Mean and largest error over the crosses of one picture (Eq. 15), raw pixels' scale; NaN: no answer.
+/// Mean and largest error over the crosses of one image (Eq. 15), raw pixels' scale; NaN: no answer.
 struct GridErrors {
   double raw_mean, raw_max;
   double paper_mean, paper_max;  ///< rectified by the printed recipe: Hough centres, quadratic
   double best_mean, best_max;    ///< rectified by the best one
 };
 
-struct GridPicture {
+struct GridImage {
   double crosses;     ///< found, and within both maps
   double finder_rms;  ///< of the crosses found from their true places, px
   GridErrors nine;    ///< the ideal grid is that of the nine central crosses (Eq. 14)
   GridErrors all;     ///< it is that of all crosses
 };
 
-/// One cross; NaN: not found. Ideal place by the nine of the raw picture.
+/// One cross; NaN: not found. Ideal place by the nine of the raw image.
 struct GridCross {
   double u, v, ideal_u, ideal_v, raw_error, paper_error, best_error;
 };
@@ -45,7 +45,7 @@ constexpr std::size_t crosses_of_grid = 81;
 
 struct Intensifier {
   std::uint32_t case_seed;  ///< `helicarm simulate --kind grid --seed` draws the same one
-  std::vector<GridPicture> pictures;
+  std::vector<GridImage> images;
   std::array<GridCross, crosses_of_grid> crosses;  ///< at figure_distance_mm, row by row
 };
 

@@ -37,14 +37,14 @@ TEST(RectificationStudy, IntensifierIsTheSameAmongOthersAndOnMoreThreadsAndTheBe
   EXPECT_THAT(files.svg, testing::HasSubstr("Fig. 10"));
   EXPECT_THAT(files.summary, testing::HasSubstr("Printed ("));
   for (const Intensifier& intensifier : *two) {
-    const GridPicture& picture = intensifier.pictures.at(0);
-    EXPECT_GT(picture.crosses, 65);
-    EXPECT_LT(picture.finder_rms, 0.15);
-    EXPECT_LT(picture.nine.best_mean, 0.1 * picture.nine.raw_mean);
-    EXPECT_LT(picture.all.raw_mean, picture.nine.raw_mean);
+    const GridImage& image = intensifier.images.at(0);
+    EXPECT_GT(image.crosses, 65);
+    EXPECT_LT(image.finder_rms, 0.15);
+    EXPECT_LT(image.nine.best_mean, 0.1 * image.nine.raw_mean);
+    EXPECT_LT(image.all.raw_mean, image.nine.raw_mean);
     int seen = 0;
     for (const GridCross& cross : intensifier.crosses) seen += std::isfinite(cross.raw_error);
-    EXPECT_EQ(seen, picture.crosses);
+    EXPECT_EQ(seen, image.crosses);
   }
 }
 

@@ -50,7 +50,7 @@ struct UniformityTrials {
     for (std::size_t view = 0; view < 2; ++view)
       for (std::size_t i = 0; i < count; ++i) exact.of_view[view][i] = lane_views.project(view, balls[i]);
     const LaneBalls model(balls);
-    Lanes first[6]{}, sum[6]{};
+    Simd first[6]{}, sum[6]{};
     for (int k = 0; k < options.draws; ++k) {
       const std::uint32_t at = draw::repetition * std::uint32_t(k);
       draw_noise(random, at + draw::calibration, count, noise);
@@ -62,15 +62,15 @@ struct UniformityTrials {
         const LaneTargets& targets = places[place];
         draw_noise(random, at + from, targets.size(), noise);
         from += 2 * LaneBalls::most;
-        const Lanes fresh = targets.mean_error(0, targets.size(), calibrated, sigma, &noise);
-        const Lanes bare = targets.mean_error(0, targets.size(), calibrated, sigma, nullptr);
+        const Simd fresh = targets.mean_error(0, targets.size(), calibrated, sigma, &noise);
+        const Simd bare = targets.mean_error(0, targets.size(), calibrated, sigma, nullptr);
         if (k == 0) first[place] = fresh, first[3 + place] = bare;
         sum[place] += fresh;
         sum[3 + place] += bare;
       }
     }
     const SurgicalSpace space{origin_in_calibrator(options.origin), space_radius_mm};
-    for (int lane = 0; lane < lane_count; ++lane, out += figures_of_group) {
+    for (int lane = 0; lane < simd_width; ++lane, out += figures_of_group) {
       std::vector<Eigen::Vector3d> points;
       for (const LanePoint& ball : balls) points.emplace_back(ball.x[lane], ball.y[lane], ball.z[lane]);
       out[0] = uniformity(points, space);
@@ -103,7 +103,7 @@ Expected<std::vector<UniformityGroup>> study_uniformity(const UniformityOptions&
   setting.blocks = (options.groups + groups_of_turn - 1) / groups_of_turn;
   setting.values_per_block = groups_of_turn * figures_of_group;
   setting.work = [&](std::size_t block, std::span<double> values) {
-    for (std::size_t i = 0; i < groups_of_turn; i += lane_count)
+    for (std::size_t i = 0; i < groups_of_turn; i += simd_width)
       if (const std::size_t group = block * groups_of_turn + i; group < options.groups)
         trials.run(group, values.data() + i * figures_of_group);
   };

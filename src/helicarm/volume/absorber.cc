@@ -81,8 +81,8 @@ Absorber::Block empty_block(const Vector3i& size, int along) {
 /// Up to eight rays along one axis, until they are marched.
 struct Bundle {
   MarchRays rays;
-  std::array<std::size_t, march_lanes> number;
-  std::array<float, march_lanes> length;  ///< mm a slab
+  std::array<std::size_t, march_simd> number;
+  std::array<float, march_simd> length;  ///< mm a slab
   int count = 0;
   int first = std::numeric_limits<int>::max();
   int last = 0;
@@ -171,14 +171,14 @@ void Absorber::integrate(const Vector3d& source, std::span<const Vector3d> direc
     Bundle& bundle = bundles[static_cast<std::size_t>(axis)];
     const int p = axis == 0 ? 1 : 0;
     const int q = 3 - axis - p;
-    for (int lane = bundle.count; lane < march_lanes; ++lane) {
+    for (int lane = bundle.count; lane < march_simd; ++lane) {
       MarchRays& rays = bundle.rays;
       rays.p[lane] = rays.q[lane] = -1;
       rays.dp[lane] = rays.dq[lane] = rays.alike[lane] = 0;
       rays.per_dp[lane] = rays.per_dq[lane] = 1;
     }
     const Block& block = block_for(axis);
-    std::array<float, march_lanes> sums;
+    std::array<float, march_simd> sums;
     march({block.values.data() + block.stride[axis], block.stride[axis], block.stride[q],
            static_cast<float>(size_[p] + 1), static_cast<float>(size_[q] + 1)},
           bundle.rays, bundle.first, bundle.last, sums.data());
@@ -220,7 +220,7 @@ void Absorber::integrate(const Vector3d& source, std::span<const Vector3d> direc
     // One slab more on each side: rounding must not lose any, and the margin adds nothing.
     bundle.first = std::max(0, std::min(bundle.first, static_cast<int>(std::min(a, b)) - 1));
     bundle.last = std::min(size_[d], std::max(bundle.last, static_cast<int>(std::max(a, b)) + 2));
-    if (bundle.count == march_lanes) finish(d);
+    if (bundle.count == march_simd) finish(d);
   }
   for (int axis = 0; axis < 3; ++axis)
     if (bundles[static_cast<std::size_t>(axis)].count > 0) finish(axis);

@@ -10,8 +10,8 @@
 namespace helicarm {
 namespace {
 
-using Floats = float __attribute__((vector_size(4 * march_lanes)));
-using Ints = int __attribute__((vector_size(4 * march_lanes)));
+using Floats = float __attribute__((vector_size(4 * march_simd)));
+using Ints = int __attribute__((vector_size(4 * march_simd)));
 
 #define HELICARM_INLINE [[gnu::always_inline]] inline
 
@@ -22,7 +22,7 @@ HELICARM_INLINE Floats real(const Ints& lanes) { return __builtin_convertvector(
 /// Two voxels side by side along p in each lane, the first in the lower half.
 HELICARM_INLINE Ints gather_pairs(const std::int16_t* values, const Ints& index) {
   Ints pairs;
-  for (int lane = 0; lane < march_lanes; ++lane) {
+  for (int lane = 0; lane < march_simd; ++lane) {
     int pair;
     std::memcpy(&pair, values + index[lane], sizeof pair);
     pairs[lane] = pair;
@@ -90,7 +90,7 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   // Rays from one source keep their order, so one look in mid-way tells which end's index is the least.
   const auto middle = static_cast<float>((first + last) / 2);
   const Floats place = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
-  const Ints least = Ints{} + (place[0] <= place[march_lanes - 1] ? 0 : march_lanes - 1);
+  const Ints least = Ints{} + (place[0] <= place[march_simd - 1] ? 0 : march_simd - 1);
 #pragma GCC unroll 2
   for (int k = first; k < last; ++k) {
     const auto slab = static_cast<float>(k);

@@ -7,21 +7,21 @@
 namespace helicarm {
 
 #ifdef __AVX2__
-inline constexpr int march_lanes = 8;
+inline constexpr int march_simd = 8;
 #else
-inline constexpr int march_lanes = 4;
+inline constexpr int march_simd = 4;
 #endif
 
 /// Rays that run mainly along one axis d of a padded block, in voxels; p is the axis of stride 1, q the
 /// third. Within the slab k of one voxel a ray moves by at most one voxel along p and q.
 struct MarchRays {
-  float p[march_lanes];  ///< lower end of the ray's p within slab 0; the margin's voxel is 0 .. 1
-  float dp[march_lanes];
-  float per_dp[march_lanes];  ///< 1 / |dp|, at most 1e20
-  float q[march_lanes];
-  float dq[march_lanes];
-  float per_dq[march_lanes];
-  float alike[march_lanes];  ///< 1 where p and q rise together, else 0
+  float p[march_simd];  ///< lower end of the ray's p within slab 0; the margin's voxel is 0 .. 1
+  float dp[march_simd];
+  float per_dp[march_simd];  ///< 1 / |dp|, at most 1e20
+  float q[march_simd];
+  float dq[march_simd];
+  float per_dq[march_simd];
+  float alike[march_simd];  ///< 1 where p and q rise together, else 0
 };
 
 struct MarchBlock {

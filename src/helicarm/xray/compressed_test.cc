@@ -39,8 +39,8 @@ class Compressed : public ::testing::Test {
   }
 };
 
-/// A smooth picture of `bits` bits.
-DicomBuilder picture(int bits, int frames = 1) {
+/// A smooth image of `bits` bits.
+DicomBuilder grey_image(int bits, int frames = 1) {
   std::string bytes;
   for (int f = 0; f < frames; ++f)
     for (int v = 0; v < height; ++v)
@@ -79,7 +79,7 @@ std::string compress(const std::string& bytes, E_TransferSyntax syntax,
   return out;
 }
 
-float greatest_difference(const Exposure& a, const Exposure& b) {
+float greatest_difference(const XrayImage& a, const XrayImage& b) {
   float difference = 0;
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u)
@@ -88,7 +88,7 @@ float greatest_difference(const Exposure& a, const Exposure& b) {
 }
 
 void expect_close(int bits, E_TransferSyntax syntax, const DcmRepresentationParameter* how, float tolerance) {
-  const std::string plain = picture(bits).bytes();
+  const std::string plain = grey_image(bits).bytes();
   const auto compressed = read_dicom(compress(plain, syntax, how), "x.dcm", {});
   ASSERT_TRUE(compressed) << bits << ": " << compressed.error().message;
   EXPECT_LE(greatest_difference(*compressed, *read_dicom(plain, "x.dcm", {})), tolerance) << bits;
@@ -112,31 +112,31 @@ TEST_F(Compressed, LossyJpegIsClose) {
   expect_close(12, EXS_JPEGProcess2_4, &quality, 64);
 }
 
-TEST_F(Compressed, OddScanHeaderOfASequentialJpegIsMended) {
+TEST_F(Compressed, OddScanHeaderOfASequentialJpegIsCorrected) {
   const DJ_RPLossy quality(95);
-  const std::string sound = compress(picture(8).bytes(), EXS_JPEGProcess1, &quality);
+  const std::string sound = compress(grey_image(8).bytes(), EXS_JPEGProcess1, &quality);
   std::string odd = sound;
   const std::size_t scan = odd.find("\xFF\xDA");
   ASSERT_NE(scan, std::string::npos);
   odd[scan + 8] = 0;
-  const auto exposure = read_dicom(odd, "x.dcm", {});
-  ASSERT_TRUE(exposure) << exposure.error().message;
-  EXPECT_EQ(greatest_difference(*exposure, *read_dicom(sound, "x.dcm", {})), 0);
-  ASSERT_FALSE(exposure->warnings.empty());
-  EXPECT_EQ(exposure->warnings[0].reason, Reason::lossy_picture);
+  const auto xray_image = read_dicom(odd, "x.dcm", {});
+  ASSERT_TRUE(xray_image) << xray_image.error().message;
+  EXPECT_EQ(greatest_difference(*xray_image, *read_dicom(sound, "x.dcm", {})), 0);
+  ASSERT_FALSE(xray_image->warnings.empty());
+  EXPECT_EQ(xray_image->warnings[0].reason, Reason::lossy_image);
 }
 
 TEST_F(Compressed, FramesAreFoundByCountAndByOffsetTable) {
-  const std::string plain = picture(12, 3).bytes();
+  const std::string plain = grey_image(12, 3).bytes();
   const std::string rle = compress(plain, EXS_RLELossless, nullptr);
   const DJ_RPLossless first_order(1, 0);
   const std::string jpeg = compress(plain, EXS_JPEGProcess14SV1, &first_order);
   for (int frame = 1; frame <= 3; ++frame) {
     const auto expected = read_dicom(plain, "x.dcm", frame);
     for (const std::string* file : {&rle, &jpeg}) {
-      const auto exposure = read_dicom(*file, "x.dcm", frame);
-      ASSERT_TRUE(exposure) << exposure.error().message;
-      EXPECT_EQ(exposure->acquisition.instance_key, expected->acquisition.instance_key);
+      const auto xray_image = read_dicom(*file, "x.dcm", frame);
+      ASSERT_TRUE(xray_image) << xray_image.error().message;
+      EXPECT_EQ(xray_image->acquisition.instance_key, expected->acquisition.instance_key);
     }
   }
 }
@@ -183,9 +183,10 @@ TEST_F(Compressed, DamageIsRefusedQuickly) {
   for (const std::string& stream :
        {std::string("raw pixels"), head, head + frame_header, head + frame_header + "\xFF\xD9",
         head + other_size + "\xFF\xD9", temporary_markers + "\xFF\xD9", head + std::string(1000, '\xFF')}) {
-    const auto exposure = jpeg(stream);
-    ASSERT_FALSE(exposure);
-    EXPECT_TRUE(exposure.error().reason == Reason::bad_value || exposure.error().reason == Reason::truncated);
+    const auto xray_image = jpeg(stream);
+    ASSERT_FALSE(xray_image);
+    EXPECT_TRUE(xray_image.error().reason == Reason::bad_value ||
+                xray_image.error().reason == Reason::truncated);
   }
   const auto rle = [](const std::string& frame) {
     return read_dicom(DicomBuilder().syntax("1.2.840.10008.1.2.5").fragments({frame}).bytes(), "x.dcm", {});
@@ -199,10 +200,10 @@ TEST_F(Compressed, DamageIsRefusedQuickly) {
 TEST_F(Compressed, MutationsNeverCrash) {
   const DJ_RPLossless first_order(1, 0);
   const DJ_RPLossy quality(90);
-  const std::vector<std::string> files = {picture(12).bytes(),
-                                          compress(picture(12).bytes(), EXS_RLELossless, nullptr),
-                                          compress(picture(12).bytes(), EXS_JPEGProcess14SV1, &first_order),
-                                          compress(picture(8).bytes(), EXS_JPEGProcess1, &quality)};
+  const std::vector<std::string> files = {
+      grey_image(12).bytes(), compress(grey_image(12).bytes(), EXS_RLELossless, nullptr),
+      compress(grey_image(12).bytes(), EXS_JPEGProcess14SV1, &first_order),
+      compress(grey_image(8).bytes(), EXS_JPEGProcess1, &quality)};
   RandomStream random(11, 1);
   for (const std::string& file : files)
     for (int trial = 0; trial < 1500; ++trial) {
@@ -211,11 +212,11 @@ TEST_F(Compressed, MutationsNeverCrash) {
       for (std::uint32_t flips = 1 + random.index(3); flips > 0; --flips)
         bytes[132 + random.index(size - 132)] = static_cast<char>(random.bits());
       if (random.index(4) == 0) bytes.resize(random.index(size));
-      const auto exposure = read_dicom(bytes, "x.dcm", {});
-      if (exposure) {
-        EXPECT_FALSE(exposure->pixels.empty());
+      const auto xray_image = read_dicom(bytes, "x.dcm", {});
+      if (xray_image) {
+        EXPECT_FALSE(xray_image->pixels.empty());
       } else {
-        EXPECT_EQ(exit_code(exposure.error().reason), 2);
+        EXPECT_EQ(exit_code(xray_image.error().reason), 2);
       }
     }
 }

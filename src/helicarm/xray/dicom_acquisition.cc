@@ -69,7 +69,7 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
     a.acquired = acquisition_time(elements);
     if (lossy(elements))
       read.warnings.push_back(
-          {Reason::lossy_picture, fmt::format("{}: the picture was compressed with loss", elements.origin)});
+          {Reason::lossy_image, fmt::format("{}: the picture was compressed with loss", elements.origin)});
     a.flip_hint = flipped(elements);
     a.rotation_hint_deg = one(elements, tags::field_rotation, -360, 360).value_or(0);
     const std::string_view relationship = elements.text(tags::intensity_relationship);

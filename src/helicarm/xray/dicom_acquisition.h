@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "helicarm/xray/dicom_check.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
@@ -17,14 +17,14 @@ struct AcquisitionRead {
   std::vector<Warning> warnings;
 };
 
-/// What the tags say of how the picture was taken. An absent or empty value stays absent; a senseless one is
+/// What the tags say of how the image was taken. An absent or empty value stays absent; a senseless one is
 /// bad_value. Pixel Spacing, whose plane is unknown, is never used.
 Expected<AcquisitionRead> read_acquisition(const DicomElements& elements);
 
 /// Which way the tags have the grey values run.
 struct Polarity {
   bool invert;   ///< swap dark and bright, so that less dose (metal) is darker
-  bool certain;  ///< false where the tags are silent or at odds: then the picture may overrule them
+  bool certain;  ///< false where the tags are silent or at odds: then the image may overrule them
 };
 
 /// Pixel Intensity Relationship Sign (PS3.3 C.8.11.3.1.2) says how *stored* values follow the dose: -1, more

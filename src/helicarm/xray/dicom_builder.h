@@ -9,7 +9,7 @@
 
 namespace helicarm {
 
-/// For tests: a DICOM file byte by byte, so that any element can be wrong. Starts as a sound 8 x 6 XA picture
+/// For tests: a DICOM file byte by byte, so that any element can be wrong. Starts as a sound 8 x 6 XA image
 /// of 12 bits with the values 100, 101, ...
 class DicomBuilder {
  public:

@@ -27,13 +27,13 @@ struct DicomOutline {
 /// Whether objects of this SOP class may be an X-ray that is read here: XA, RF, CR, DX or secondary capture.
 bool is_xray_class(std::string_view sop_class);
 
-/// What a file is to be a picture of.
+/// What a file is to be an image of.
 enum class DicomKind { xray, ct };
 
 /// SOP class of a CT slice.
 inline constexpr std::string_view ct_class = "1.2.840.10008.5.1.4.1.1.2";
 
-/// Checks a whole file in memory before anything is decoded: `walk_dicom`, then what it is a picture of and
+/// Checks a whole file in memory before anything is decoded: `walk_dicom`, then what it is an image of and
 /// how the pixels are stored. Refuses: not_an_image, truncated, bad_size (Rows, Columns, more than 64 MiB a
 /// frame), bad_value, unsupported (not a grey X-ray or secondary capture, or not a CT slice).
 Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin,

@@ -144,7 +144,7 @@ TEST(DicomCheck, FrameCounts) {
   EXPECT_EQ(reason(DicomBuilder().text(0x00280008, "IS", "")), "ok");
 }
 
-TEST(DicomCheck, OtherKindsOfPicture) {
+TEST(DicomCheck, OtherKindsOfImage) {
   for (const char* sop_class :
        {"1.2.840.10008.5.1.4.1.1.2", "1.2.840.10008.5.1.4.1.1.4", "1.2.840.10008.5.1.4.1.1.6.1"})
     EXPECT_EQ(reason(DicomBuilder().text(0x00080016, "UI", sop_class)), "unsupported") << sop_class;

@@ -5,13 +5,13 @@
 #include <string>
 
 #include "helicarm/xray/dicom_elements.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
-/// When the picture was shot: by Acquisition DateTime, else Acquisition Date and Time, else Content Date and
-/// Time; with Timezone Offset From UTC where the time names none. What is no whole date and time, to the
-/// second, counts as absent: pictures are measured without it.
+/// When the image was acquisition: by Acquisition DateTime, else Acquisition Date and Time, else Content Date
+/// and Time; with Timezone Offset From UTC where the time names none. What is no whole date and time, to the
+/// second, counts as absent: images are measured without it.
 std::optional<AcquisitionTime> acquisition_time(const DicomElements& elements);
 
 /// As an Acquisition DateTime says it (UTC, microseconds).

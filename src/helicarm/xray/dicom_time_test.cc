@@ -30,7 +30,7 @@ TEST(DicomTime, DateTimeWithItsOffset) {
   EXPECT_DOUBLE_EQ(time->resolution_s, 0.01);
 }
 
-TEST(DicomTime, OffsetOfThePictureServesTimesWithoutOne) {
+TEST(DicomTime, OffsetOfTheImageServesTimesWithoutOne) {
   EXPECT_DOUBLE_EQ(read(dated("20260228225958").text(timezone, "SH", "-0100"))->seconds, late_in_february);
   EXPECT_NE(read(dated("20260228235958"))->source, read(dated("20260228235958+0000"))->source);
 }

@@ -12,7 +12,7 @@
 
 namespace helicarm {
 
-/// 128-bit fingerprint as 32 hexadecimal digits, to tell whether two texts or pictures are the same: not a
+/// 128-bit fingerprint as 32 hexadecimal digits, to tell whether two texts or images are the same: not a
 /// safeguard against forgery. Four multiplicative lanes, so that it runs at the speed of memory.
 inline std::string digest(std::string_view bytes) {
   constexpr std::array<std::uint64_t, 4> primes = {0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9,

@@ -62,7 +62,7 @@ std::size_t find_segment(std::string_view jpeg, std::size_t at, bool (*wanted)(i
 }
 
 /// A sequential scan can only mean coefficients 0 to 63 in full; some writers leave other figures there.
-void mend_scan_header(std::string& jpeg, std::size_t frame) {
+void correct_scan_header(std::string& jpeg, std::size_t frame) {
   const std::size_t scan = find_segment(jpeg, frame, starts_scan);
   if (scan != std::string::npos && word_at(jpeg, scan + 2) == 8)
     jpeg.replace(scan + 7, 3, std::string("\0\x3F\0", 3));
@@ -92,7 +92,7 @@ Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, in
   if (jpeg.find("\xFF\xD9", last - 2) == std::string::npos)
     return fail(Reason::truncated, fmt::format("{}: the JPEG data has no end", origin));
 
-  if (!lossless) mend_scan_header(jpeg, frame);
+  if (!lossless) correct_scan_header(jpeg, frame);
 
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   std::string out(pixels * (precision > 8 ? 2 : 1), '\0');

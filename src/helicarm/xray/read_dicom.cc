@@ -22,44 +22,44 @@ Expected<int> choose_frame(const std::string& origin, int frames, std::optional<
   return frame.value_or(1) - 1;
 }
 
-void invert(Exposure& exposure) {
-  const float sum = exposure.lowest + exposure.highest;
-  for (float& pixel : exposure.pixels.pixels()) pixel = sum - pixel;
+void invert(XrayImage& xray_image) {
+  const float sum = xray_image.lowest + xray_image.highest;
+  for (float& pixel : xray_image.pixels.pixels()) pixel = sum - pixel;
 }
 
-void make_metal_dark(Exposure& exposure, const std::string& origin) {
-  if (!metal_looks_bright(exposure.pixels).value_or(false)) return;
-  invert(exposure);
-  exposure.warnings.push_back(
+void make_metal_dark(XrayImage& xray_image, const std::string& origin) {
+  if (!metal_looks_bright(xray_image.pixels).value_or(false)) return;
+  invert(xray_image);
+  xray_image.warnings.push_back(
       {Reason::tag_disagrees, fmt::format("{}: metal looks bright; the grey values were inverted", origin)});
 }
 
-std::string picture_key(const Image<float>& pixels) {
+std::string image_key(const Image<float>& pixels) {
   const auto values = pixels.pixels();
   return digest(fmt::format("{} {} {}", pixels.width(), pixels.height(),
                             digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()})));
 }
 
-Expected<Exposure> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame) {
+Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame) {
   return guarded([&] {
     const DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
     auto [acquisition, warnings] = value_or_throw(read_acquisition(outline.elements));
     const Polarity polarity = value_or_throw(read_polarity(outline));
     const int index = value_or_throw(choose_frame(origin, outline.frames, frame));
 
-    Exposure exposure;
-    exposure.pixels = value_or_throw(decode_frame(outline, index));
+    XrayImage xray_image;
+    xray_image.pixels = value_or_throw(decode_frame(outline, index));
     const auto levels = static_cast<float>(1 << outline.bits_stored);
-    exposure.lowest = outline.is_signed ? -levels / 2 : 0;
-    exposure.highest = exposure.lowest + levels - 1;
-    exposure.acquisition = std::move(acquisition);
-    exposure.warnings = std::move(warnings);
-    if (polarity.invert) invert(exposure);
-    if (!polarity.certain) make_metal_dark(exposure, origin);
-    exposure.acquisition.instance_key = picture_key(exposure.pixels);
-    exposure.acquisition.uid_key =
+    xray_image.lowest = outline.is_signed ? -levels / 2 : 0;
+    xray_image.highest = xray_image.lowest + levels - 1;
+    xray_image.acquisition = std::move(acquisition);
+    xray_image.warnings = std::move(warnings);
+    if (polarity.invert) invert(xray_image);
+    if (!polarity.certain) make_metal_dark(xray_image, origin);
+    xray_image.acquisition.instance_key = image_key(xray_image.pixels);
+    xray_image.acquisition.uid_key =
         digest(fmt::format("{} {}", outline.elements.text(tags::sop_instance), index));
-    return exposure;
+    return xray_image;
   });
 }
 

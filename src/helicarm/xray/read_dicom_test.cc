@@ -10,47 +10,47 @@
 namespace helicarm {
 namespace {
 
-Expected<Exposure> read(const DicomBuilder& builder, std::optional<int> frame = {}) {
+Expected<XrayImage> read(const DicomBuilder& builder, std::optional<int> frame = {}) {
   return read_dicom(builder.bytes(), "x.dcm", frame);
 }
 
 std::string_view reason(const DicomBuilder& builder, std::optional<int> frame = {}) {
-  const auto exposure = read(builder, frame);
-  return exposure ? "ok" : code(exposure.error().reason);
+  const auto xray_image = read(builder, frame);
+  return xray_image ? "ok" : code(xray_image.error().reason);
 }
 
-bool warned(const Exposure& exposure, Reason reason) {
-  return std::ranges::any_of(exposure.warnings, [&](const Warning& w) { return w.reason == reason; });
+bool warned(const XrayImage& xray_image, Reason reason) {
+  return std::ranges::any_of(xray_image.warnings, [&](const Warning& w) { return w.reason == reason; });
 }
 
 DicomBuilder sign(DicomBuilder builder, int sign) { return builder.word(0x00281041, sign, "SS"); }
 
 TEST(ReadDicom, ValuesAndTags) {
-  const auto exposure = read(DicomBuilder().text(0x00181510, "DS", "-12.5").text(0x00181511, "DS", "+3"));
-  ASSERT_TRUE(exposure) << exposure.error().message;
-  EXPECT_EQ(exposure->pixels(0, 0), 100);
-  EXPECT_EQ(exposure->pixels(3, 2), 100 + 2 * 8 + 3);
-  EXPECT_EQ(exposure->lowest, 0);
-  EXPECT_EQ(exposure->highest, 4095);
-  const Acquisition& a = exposure->acquisition;
+  const auto xray_image = read(DicomBuilder().text(0x00181510, "DS", "-12.5").text(0x00181511, "DS", "+3"));
+  ASSERT_TRUE(xray_image) << xray_image.error().message;
+  EXPECT_EQ(xray_image->pixels(0, 0), 100);
+  EXPECT_EQ(xray_image->pixels(3, 2), 100 + 2 * 8 + 3);
+  EXPECT_EQ(xray_image->lowest, 0);
+  EXPECT_EQ(xray_image->highest, 4095);
+  const Acquisition& a = xray_image->acquisition;
   EXPECT_EQ(*a.pixel_mm, Eigen::Vector2d(0.2, 0.3));
   EXPECT_EQ(a.source_detector_mm, 1000);
   EXPECT_EQ(a.primary_angle_deg, -12.5);
   EXPECT_EQ(a.secondary_angle_deg, 3);
   EXPECT_FALSE(a.flip_hint);
   EXPECT_FALSE(a.logarithmic.has_value());
-  EXPECT_TRUE(exposure->warnings.empty());
+  EXPECT_TRUE(xray_image->warnings.empty());
 }
 
 TEST(ReadDicom, FlipRotationAndRelationshipAreHints) {
-  const auto exposure = read(DicomBuilder()
-                                 .text(0x00187034, "CS", "YES")
-                                 .text(0x00187032, "DS", "90")
-                                 .text(0x00281040, "CS", "LOG"));
-  EXPECT_TRUE(exposure->acquisition.flip_hint);
-  EXPECT_EQ(exposure->acquisition.rotation_hint_deg, 90);
-  EXPECT_EQ(exposure->acquisition.logarithmic, true);
-  EXPECT_EQ(exposure->pixels(0, 0), 100);
+  const auto xray_image = read(DicomBuilder()
+                                   .text(0x00187034, "CS", "YES")
+                                   .text(0x00187032, "DS", "90")
+                                   .text(0x00281040, "CS", "LOG"));
+  EXPECT_TRUE(xray_image->acquisition.flip_hint);
+  EXPECT_EQ(xray_image->acquisition.rotation_hint_deg, 90);
+  EXPECT_EQ(xray_image->acquisition.logarithmic, true);
+  EXPECT_EQ(xray_image->pixels(0, 0), 100);
   EXPECT_EQ(reason(DicomBuilder().text(0x00187034, "CS", "MAYBE")), "bad_value");
 }
 
@@ -66,47 +66,48 @@ TEST(ReadDicom, SignedValuesAndStrayHighBits) {
   values[0] = 0x0FFF;  // -1 in twelve bits
   values[1] = 0x0800;
   values[2] = 0xF005;  // an overlay above the stored bits
-  const auto exposure = read(DicomBuilder().word(0x00280103, 1).pixels(values));
-  ASSERT_TRUE(exposure);
-  EXPECT_EQ(exposure->pixels(0, 0), -1);
-  EXPECT_EQ(exposure->pixels(1, 0), -2048);
-  EXPECT_EQ(exposure->pixels(2, 0), 5);
-  EXPECT_EQ(exposure->lowest, -2048);
-  EXPECT_EQ(exposure->highest, 2047);
+  const auto xray_image = read(DicomBuilder().word(0x00280103, 1).pixels(values));
+  ASSERT_TRUE(xray_image);
+  EXPECT_EQ(xray_image->pixels(0, 0), -1);
+  EXPECT_EQ(xray_image->pixels(1, 0), -2048);
+  EXPECT_EQ(xray_image->pixels(2, 0), 5);
+  EXPECT_EQ(xray_image->lowest, -2048);
+  EXPECT_EQ(xray_image->highest, 2047);
 }
 
 TEST(ReadDicom, SenselessSpacingAndDistanceAreRefused) {
   for (const char* spacing : {"0\\0", "-0.3\\-0.3", "NaN\\NaN", "1e400\\1e400", "0,30\\0,30", "0.3",
                               "0.2\\0.2\\0.2", "inf\\0.3", "0.3\\", "5\\5", "0.3 0.3"}) {
-    const auto exposure = read(DicomBuilder().text(0x00181164, "DS", spacing));
-    ASSERT_FALSE(exposure) << spacing;
-    EXPECT_EQ(exposure.error().reason, Reason::bad_value);
-    EXPECT_NE(exposure.error().message.find("(0018,1164)"), std::string::npos) << exposure.error().message;
+    const auto xray_image = read(DicomBuilder().text(0x00181164, "DS", spacing));
+    ASSERT_FALSE(xray_image) << spacing;
+    EXPECT_EQ(xray_image.error().reason, Reason::bad_value);
+    EXPECT_NE(xray_image.error().message.find("(0018,1164)"), std::string::npos)
+        << xray_image.error().message;
   }
   for (const char* distance : {"0", "1", "1e9", "-1000", "nan"})
     EXPECT_EQ(reason(DicomBuilder().text(0x00181110, "DS", distance)), "bad_value") << distance;
 }
 
 TEST(ReadDicom, AbsentSpacingStaysAbsent) {
-  const auto exposure =
+  const auto xray_image =
       read(DicomBuilder().erase(0x00181164).erase(0x00181110).text(0x00280030, "DS", "0.3\\0.3"));
-  ASSERT_TRUE(exposure);
-  EXPECT_FALSE(exposure->acquisition.pixel_mm);
-  EXPECT_FALSE(exposure->acquisition.source_detector_mm);
-  EXPECT_TRUE(warned(*exposure, Reason::spacing_missing));
+  ASSERT_TRUE(xray_image);
+  EXPECT_FALSE(xray_image->acquisition.pixel_mm);
+  EXPECT_FALSE(xray_image->acquisition.source_detector_mm);
+  EXPECT_TRUE(warned(*xray_image, Reason::spacing_missing));
 }
 
 TEST(ReadDicom, ImagerSpacingWinsOverADifferingPixelSpacing) {
-  const auto exposure = read(DicomBuilder().text(0x00280030, "DS", "0.15\\0.15"));
-  EXPECT_EQ(exposure->acquisition.pixel_mm->y(), 0.3);
-  EXPECT_TRUE(warned(*exposure, Reason::tag_disagrees));
+  const auto xray_image = read(DicomBuilder().text(0x00280030, "DS", "0.15\\0.15"));
+  EXPECT_EQ(xray_image->acquisition.pixel_mm->y(), 0.3);
+  EXPECT_TRUE(warned(*xray_image, Reason::tag_disagrees));
 }
 
-TEST(ReadDicom, LossyCompressionIsToldEvenAfterwards) {
+TEST(ReadDicom, LossyCompressionIsReportedEvenAfterwards) {
   const auto once_lossy = read(DicomBuilder().text(0x00282110, "CS", "01"));
   ASSERT_TRUE(once_lossy);
-  EXPECT_TRUE(warned(*once_lossy, Reason::lossy_picture));
-  EXPECT_FALSE(warned(*read(DicomBuilder().text(0x00282110, "CS", "00")), Reason::lossy_picture));
+  EXPECT_TRUE(warned(*once_lossy, Reason::lossy_image));
+  EXPECT_FALSE(warned(*read(DicomBuilder().text(0x00282110, "CS", "00")), Reason::lossy_image));
 }
 
 TEST(ReadDicom, SeveralFramesNeedAFrame) {
@@ -125,7 +126,7 @@ TEST(ReadDicom, SeveralFramesNeedAFrame) {
   EXPECT_EQ(reason(DicomBuilder(), 1), "ok");
 }
 
-TEST(ReadDicom, OnePictureStoredInManyWays) {
+TEST(ReadDicom, OneImageStoredInManyWays) {
   std::vector<std::uint16_t> dark, inverse;
   for (int i = 0; i < 48; ++i) {
     dark.push_back(static_cast<std::uint16_t>(i * 80));
@@ -164,7 +165,7 @@ DicomBuilder balls(bool bright) {
       .raw(0x7FE00010, "OB", bytes);
 }
 
-TEST(ReadDicom, PictureDecidesWhereTheTagsAreAtOdds) {
+TEST(ReadDicom, ImageDecidesWhereTheTagsDisagree) {
   const std::string expected = read(balls(false))->acquisition.instance_key;
   const auto monochrome1 = [](DicomBuilder b) { return b.text(0x00280004, "CS", "MONOCHROME1"); };
   // Right for a radiograph: metal stored low and shown white.
@@ -190,7 +191,7 @@ TEST(ReadDicom, NoiseAndEdgesDoNotDecidePolarity) {
   EXPECT_FALSE(metal_looks_bright(Image<float>(2, 2)).has_value());
 }
 
-TEST(ReadDicom, KeysTellPatientsStudiesAndPicturesApart) {
+TEST(ReadDicom, KeysTellPatientsStudiesAndImagesApart) {
   const auto one = read(DicomBuilder().text(0x0020000D, "UI", "1.2"))->acquisition;
   const auto other =
       read(DicomBuilder().text(0x00100020, "LO", "2").text(0x0020000D, "UI", "1.3"))->acquisition;
@@ -206,9 +207,9 @@ TEST(ReadDicom, KeysTellPatientsStudiesAndPicturesApart) {
 
 TEST(ReadDicom, HostilePatientNameDoesNoHarm) {
   const std::string name = "<script>%n\x1b[31m\xff\xfe" + std::string(10000, 'A');
-  const auto exposure = read(DicomBuilder().text(0x00100010, "PN", name));
-  ASSERT_TRUE(exposure);
-  EXPECT_EQ(exposure->acquisition.patient_key.size(), 32u);
+  const auto xray_image = read(DicomBuilder().text(0x00100010, "PN", name));
+  ASSERT_TRUE(xray_image);
+  EXPECT_EQ(xray_image->acquisition.patient_key.size(), 32u);
 }
 
 }  // namespace

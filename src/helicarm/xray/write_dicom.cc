@@ -13,7 +13,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/image/grey_picture.h"
+#include "helicarm/image/grey_image.h"
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
 
@@ -109,7 +109,7 @@ void put_pixels(DcmDataset& dataset, const DerivedImage& image) {
 }
 
 void check(const fs::path& path, const DerivedImage& image) {
-  const auto side = static_cast<int>(max_picture_side);
+  const auto side = static_cast<int>(max_image_side);
   if (image.pixels.empty() || image.pixels.width() > side || image.pixels.height() > side)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels, must be 1 to {} a side", path.string(),
                                                  image.pixels.width(), image.pixels.height(), side));

@@ -7,11 +7,11 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/image/image.h"
-#include "helicarm/xray/exposure.h"
+#include "helicarm/xray/xray_image.h"
 
 namespace helicarm {
 
-/// A picture to be written as DICOM. Carries no patient data but what is given here.
+/// An image to be written as DICOM. Carries no patient data but what is given here.
 struct DerivedImage {
   Image<std::uint16_t> pixels;
   int bits_stored = 16;  ///< 8 .. 16; at 8 a byte a pixel is written

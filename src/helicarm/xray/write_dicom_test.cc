@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/uid.h"
 
 namespace helicarm {
@@ -21,7 +21,7 @@ class WriteDicom : public ::testing::Test {
   fs::path folder_;
 };
 
-DerivedImage picture(int bits) {
+DerivedImage grey_image(int bits) {
   DerivedImage image{.pixels = Image<std::uint16_t>(33, 21), .bits_stored = bits, .acquisition = {}};
   unsigned value = 0;
   for (std::uint16_t& pixel : image.pixels.pixels())
@@ -32,7 +32,7 @@ DerivedImage picture(int bits) {
 TEST_F(WriteDicom, WhatIsWrittenIsRead) {
   for (int bits : {8, 12, 16})
     for (bool rle : {false, true}) {
-      DerivedImage image = picture(bits);
+      DerivedImage image = grey_image(bits);
       image.rle = rle;
       image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.3);
       image.acquisition.source_detector_mm = 997.25;
@@ -40,11 +40,11 @@ TEST_F(WriteDicom, WhatIsWrittenIsRead) {
       image.acquisition.flip_hint = true;
       image.acquisition.logarithmic = true;
       ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
-      const auto exposure = read_exposure(folder_ / "a.dcm", "AP", {});
-      ASSERT_TRUE(exposure) << exposure.error().message;
-      EXPECT_TRUE(std::ranges::equal(exposure->pixels.pixels(), image.pixels.pixels()));
-      EXPECT_EQ(exposure->highest, static_cast<float>((1 << bits) - 1));
-      const Acquisition& a = exposure->acquisition;
+      const auto xray_image = read_xray_image(folder_ / "a.dcm", "AP", {});
+      ASSERT_TRUE(xray_image) << xray_image.error().message;
+      EXPECT_TRUE(std::ranges::equal(xray_image->pixels.pixels(), image.pixels.pixels()));
+      EXPECT_EQ(xray_image->highest, static_cast<float>((1 << bits) - 1));
+      const Acquisition& a = xray_image->acquisition;
       EXPECT_EQ(*a.pixel_mm, *image.acquisition.pixel_mm);
       EXPECT_EQ(a.source_detector_mm, 997.25);
       EXPECT_EQ(a.primary_angle_deg, -1.5);
@@ -55,7 +55,7 @@ TEST_F(WriteDicom, WhatIsWrittenIsRead) {
 }
 
 TEST_F(WriteDicom, SameUidsGiveTheSameBytes) {
-  DerivedImage image = picture(12);
+  DerivedImage image = grey_image(12);
   RandomStream random(5, 1);
   for (std::string* uid : {&image.study_uid, &image.series_uid, &image.instance_uid}) *uid = make_uid(random);
   ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
@@ -64,7 +64,7 @@ TEST_F(WriteDicom, SameUidsGiveTheSameBytes) {
 }
 
 TEST_F(WriteDicom, WhatDoesNotFitIsRefused) {
-  DerivedImage image = picture(12);
+  DerivedImage image = grey_image(12);
   image.pixels(3, 3) = 4096;
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", image).error().reason, Reason::bad_value);
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", DerivedImage{}).error().reason, Reason::bad_size);

@@ -9,7 +9,7 @@
 namespace helicarm::dicom {
 namespace {
 
-TEST(Command, OfStoreTellsClassInstanceAndThatDataFollow) {
+TEST(Command, OfStoreReportsClassInstanceAndThatDataFollow) {
   const Command command = read_command(peer::command(1, xa_class, "2.25.17")).value();
   EXPECT_TRUE(command.is(Operation::store));
   EXPECT_EQ(command.message_id, 7);

@@ -34,7 +34,7 @@ void remove_parts(const fs::path& folder) {
 }
 
 /// Proves that every frame's structure is sound and the first one can be decoded.
-void check_picture(std::string_view file, const std::string& origin) {
+void check_image(std::string_view file, const std::string& origin) {
   value_or_throw(read_dicom(file, origin, 1));
 }
 
@@ -78,7 +78,7 @@ void Inbox::check_folder(const std::string& origin) const {
 
 Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin) {
   return guarded([&] {
-    check_picture(file, origin);
+    check_image(file, origin);
     const std::string uid(value_or_throw(walk_dicom(file, origin)).text(tags::sop_instance));
     if (!dicom::is_uid(uid))
       throw BadInput(Reason::bad_value, fmt::format("{}: SOP Instance UID is not valid", origin));

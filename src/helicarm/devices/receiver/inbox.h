@@ -12,7 +12,7 @@
 
 namespace helicarm {
 
-/// A picture that is safely on disk.
+/// An image that is safely on disk.
 struct Arrival {
   std::filesystem::path path;
   std::string digest;     ///< of the file's bytes

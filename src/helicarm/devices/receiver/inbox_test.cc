@@ -21,7 +21,7 @@ class InboxOnDisk : public testing::Test {
   std::unique_ptr<Inbox> inbox_ = Inbox::open(folder_).value();
 };
 
-TEST_F(InboxOnDisk, PictureIsKeptAsItCame) {
+TEST_F(InboxOnDisk, ImageIsKeptAsItCame) {
   const std::string file = DicomBuilder().bytes();
   const Arrival arrival = inbox_->store(file, "test").value();
   EXPECT_EQ(arrival.path, folder_ / "2.25.17.dcm");
@@ -29,7 +29,7 @@ TEST_F(InboxOnDisk, PictureIsKeptAsItCame) {
   EXPECT_FALSE(arrival.repeated);
 }
 
-TEST_F(InboxOnDisk, SamePictureAgainIsTheSameArrival) {
+TEST_F(InboxOnDisk, SameImageAgainIsTheSameArrival) {
   inbox_->store(DicomBuilder().bytes(), "test").value();
   const Arrival again = inbox_->store(DicomBuilder().bytes(), "test").value();
   EXPECT_TRUE(again.repeated);
@@ -48,7 +48,7 @@ TEST_F(InboxOnDisk, OtherBytesUnderOneUidAreBothKeptWithAWarning) {
   EXPECT_EQ(read_file(folder_ / "2.25.17.dcm", 1 << 20).value(), DicomBuilder().bytes());
 }
 
-TEST_F(InboxOnDisk, UnreadablePictureIsRefusedAndLeavesNothing) {
+TEST_F(InboxOnDisk, UnreadableImageIsRefusedAndLeavesNothing) {
   EXPECT_EQ(inbox_->store("hello", "test").error().reason, Reason::not_an_image);
   EXPECT_FALSE(inbox_->store(DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
   EXPECT_FALSE(inbox_->store(DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
@@ -95,7 +95,7 @@ TEST_F(InboxOnDisk, LockDeletedInOperationIsAnError) {
   EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
 }
 
-TEST_F(InboxOnDisk, HalfWrittenPicturesOfAKilledProgramAreClearedAway) {
+TEST_F(InboxOnDisk, HalfWrittenImagesOfAKilledProgramAreClearedAway) {
   inbox_.reset();
   std::ofstream(folder_ / ".2.25.17.dcm.123.0.part") << "half";
   inbox_ = Inbox::open(folder_).value();

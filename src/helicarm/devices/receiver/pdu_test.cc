@@ -11,7 +11,7 @@
 namespace helicarm::dicom {
 namespace {
 
-TEST(AssociationRequest, TellsTitlesContextsAndLargestPdu) {
+TEST(AssociationRequest, ReportsTitlesContextsAndLargestPdu) {
   const auto request = read_association_request(peer::Request().body()).value();
   EXPECT_EQ(request.called, "HELICARM");
   EXPECT_EQ(request.calling, "C_ARM");
@@ -83,7 +83,7 @@ TEST(Fragments, FragmentWithoutItsHeaderIsRefused) {
             Reason::bad_value);
 }
 
-TEST(Fragments, SeveralInOnePduAreTold) {
+TEST(Fragments, SeveralInOnePduAreReported) {
   const std::string body = peer::fragment(1, 1, "abc") + peer::fragment(1, 3, "d");
   const auto fragments = read_fragments(body).value();
   ASSERT_EQ(fragments.size(), 2u);

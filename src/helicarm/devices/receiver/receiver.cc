@@ -17,7 +17,7 @@ namespace {
 
 using asio::ip::tcp;
 
-// Checking and writing a picture takes one of them for some milliseconds.
+// Checking and writing an image takes one of them for some milliseconds.
 constexpr std::size_t crew = 4;
 // Without descriptors, say: trying again at once would take all of a processor.
 constexpr std::chrono::milliseconds breath{100};

@@ -29,7 +29,7 @@ struct ReceiverOptions {
   unsigned most_associations = 32;  ///< at once; more are rejected as transient
   unsigned most_of_address = 16;    ///< of these, from one address
   double spared_s = 2;  ///< an association without an image for so long makes room for another one
-  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< of one picture
+  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< of one image
   std::size_t most_bytes = std::size_t{512} << 20;         ///< of all that are on the way
   double request_limit_s = 10;                             ///< from connection to association
   double idle_limit_s = 30;                                ///< for each PDU
@@ -50,7 +50,7 @@ struct ReceiverCounters {
   std::atomic<std::uint64_t> echoed{0};
   std::atomic<std::uint64_t> stored{0};
   std::atomic<std::uint64_t> repeated{0};
-  std::atomic<std::uint64_t> refused{0};         ///< pictures
+  std::atomic<std::uint64_t> refused{0};         ///< images
   std::atomic<std::size_t> bytes_on_the_way{0};  ///< now, of images that are not whole yet
 };
 
@@ -65,14 +65,14 @@ struct ReceiverHooks {
   std::function<void(const Failure&)> cut = [](const Failure&) {};
 };
 
-/// Service class provider for C-STORE and C-ECHO. A picture is acknowledged once it is safely in the inbox,
+/// Service class provider for C-STORE and C-ECHO. An image is acknowledged once it is safely in the inbox,
 /// else its status says why not. No peer can hold up another.
 class DicomReceiver {
  public:
   /// Listens when it returns. Refuses port_taken, and bad_value for an address or TLS files that are none.
   static Expected<std::unique_ptr<DicomReceiver>> open(const ReceiverOptions& options, Inbox& inbox,
                                                        ReceiverHooks hooks = {});
-  /// Closes all connections; a picture that is being written is finished first.
+  /// Closes all connections; an image that is being written is finished first.
   ~DicomReceiver();
 
   std::uint16_t port() const;

@@ -20,7 +20,7 @@ std::string other_half(const std::string& patient = "CANARY^NAME") {
   return peer::pdu(data, peer::fragment(3, 2, set.substr(set.size() / 2)));
 }
 
-TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsShutNobodyOut) {
+TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsShutNoOneOut) {
   options_.request_limit_s = 3600;
   open();
   std::vector<RawClient> crowd;
@@ -101,7 +101,7 @@ TEST_F(ReceiverCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
   EXPECT_EQ(line_with("cannot be accepted").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverCrowd, EveryImageThatWasCutIsTold) {
+TEST_F(ReceiverCrowd, EveryImageThatWasCutIsReported) {
   const auto cut = [&](auto&& how, const std::string& words) {
     RawClient client = associated();
     client.send(peer::echo() + half_an_image());
@@ -132,7 +132,7 @@ TEST_F(ReceiverCrowd, EveryImageThatWasCutIsTold) {
   EXPECT_EQ(line_with("takes too long").reason, Reason::truncated);
 }
 
-TEST_F(ReceiverCrowd, ImageThatTheReceiversEndCutsIsTold) {
+TEST_F(ReceiverCrowd, ImageThatTheReceiversEndCutsIsReported) {
   RawClient client = associated();
   client.send(half_an_image());
   ASSERT_TRUE(eventually([&] { return receiver_->counters().bytes_on_the_way > 0; }));
@@ -140,7 +140,7 @@ TEST_F(ReceiverCrowd, ImageThatTheReceiversEndCutsIsTold) {
   EXPECT_EQ(line_with("the receiver ends").reason, Reason::truncated);
 }
 
-TEST_F(ReceiverCrowd, ReleasedAssociationsAndWordlessConnectionsAreNotTold) {
+TEST_F(ReceiverCrowd, ReleasedAssociationsAndWordlessConnectionsAreNotReported) {
   client().close();
   RawClient polite = associated();
   polite.send(peer::release());

@@ -29,7 +29,7 @@ TEST_F(Receiver, AnswersEchoAndReleases) {
   EXPECT_EQ(receiver_->counters().echoed, 1u);
 }
 
-TEST_F(Receiver, PictureIsOnDiskWhenItIsAcknowledged) {
+TEST_F(Receiver, ImageIsOnDiskWhenItIsAcknowledged) {
   RawClient client = associated();
   client.send(peer::store(DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0);
@@ -38,7 +38,7 @@ TEST_F(Receiver, PictureIsOnDiskWhenItIsAcknowledged) {
   EXPECT_EQ(receiver_->counters().stored, 1u);
 }
 
-TEST_F(Receiver, PictureInManySmallFragmentsIsTheSame) {
+TEST_F(Receiver, ImageInManySmallFragmentsIsTheSame) {
   RawClient client = associated();
   const std::string command = peer::command(1, xa_class, "2.25.17"), set = peer::data_set(DicomBuilder());
   for (const char c : command.substr(0, command.size() - 1))
@@ -59,7 +59,7 @@ TEST_F(Receiver, RetransmissionIsAcknowledgedAndKeptOnce) {
   EXPECT_EQ(receiver_->counters().repeated, 1u);
 }
 
-TEST_F(Receiver, TellsTheHookOfEachPicture) {
+TEST_F(Receiver, ReportsTheHookOfEachImage) {
   std::vector<Arrival> arrivals;
   std::vector<Failure> failures;
   receiver_ = DicomReceiver::open(options_, *inbox_,
@@ -76,7 +76,7 @@ TEST_F(Receiver, TellsTheHookOfEachPicture) {
   EXPECT_EQ(arrivals[0].path.filename(), "2.25.17.dcm");
 }
 
-TEST_F(Receiver, BadPictureIsRefusedWithAStatusAndTheAssociationGoesOn) {
+TEST_F(Receiver, BadImageIsRefusedWithAStatusAndTheAssociationGoesOn) {
   RawClient client = associated();
   client.send(peer::store(DicomBuilder().word(0x00280010, 65535)));
   EXPECT_EQ(client.receive_status(), 0xC000);
@@ -156,7 +156,7 @@ TEST_F(Receiver, BreachesWithinAnAssociationAbortIt) {
   expect_alive();
 }
 
-TEST_F(Receiver, AbortInMidPictureLeavesNothing) {
+TEST_F(Receiver, AbortInMidImageLeavesNothing) {
   RawClient client = associated();
   client.send(peer::pdu(data, peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17"))));
   client.send(peer::pdu(data, peer::fragment(3, 0, peer::data_set(DicomBuilder()).substr(0, 100))));
@@ -165,7 +165,7 @@ TEST_F(Receiver, AbortInMidPictureLeavesNothing) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
-TEST_F(Receiver, PictureBeyondTheLimitAbortsTheAssociation) {
+TEST_F(Receiver, ImageBeyondTheLimitAbortsTheAssociation) {
   options_.most_object_bytes = 100;
   open();
   RawClient client = associated();
@@ -186,7 +186,7 @@ TEST_F(Receiver, LargestPduOfNoughtIsUnlimitedAndOfOneByteIsRejected) {
   EXPECT_EQ(answer_to(request.bytes()), rejected);
 }
 
-TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
+TEST_F(Receiver, StalledPeersHoldUpNoOneAndAreDropped) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
   RawClient silent = client(), half = client(), idle = associated();
@@ -201,15 +201,15 @@ TEST_F(Receiver, StalledPeersHoldUpNobodyAndAreDropped) {
 TEST_F(Receiver, PeerThatSendsAByteAtATimeIsDropped) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
-  RawClient request = client(), picture = associated();
+  RawClient request = client(), image = associated();
   const auto begun = std::chrono::steady_clock::now();
   for (int i = 0; i < 25; ++i) {
     request.send(peer::Request().bytes().substr(static_cast<std::size_t>(i), 1));
-    picture.send(peer::store(DicomBuilder()).substr(static_cast<std::size_t>(i), 1));
+    image.send(peer::store(DicomBuilder()).substr(static_cast<std::size_t>(i), 1));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   EXPECT_EQ(request.receive_type(), closed);
-  EXPECT_EQ(picture.receive_type(), closed);
+  EXPECT_EQ(image.receive_type(), closed);
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
   expect_alive();
 }
@@ -232,7 +232,7 @@ TEST_F(Receiver, TwoHundredPeersAtOnceAreServedUpToTheLimitAndTheOthersSentAway)
   expect_alive();
 }
 
-TEST_F(Receiver, FloodOfEchoesIsAnsweredAndHoldsUpNobody) {
+TEST_F(Receiver, FloodOfEchoesIsAnsweredAndHoldsUpNoOne) {
   constexpr int flood = 2000;
   RawClient flooding = associated();
   std::string echoes;
@@ -260,7 +260,7 @@ TEST_F(Receiver, TooManyAssociationsAreRejectedForNow) {
   EXPECT_EQ(fourth.receive_type(), accepted);
 }
 
-TEST_F(Receiver, PortThatIsTakenIsToldClearly) {
+TEST_F(Receiver, PortThatIsTakenIsReportedClearly) {
   ReceiverOptions same = options_;
   same.port = receiver_->port();
   const auto second = DicomReceiver::open(same, *inbox_);
@@ -269,7 +269,7 @@ TEST_F(Receiver, PortThatIsTakenIsToldClearly) {
   EXPECT_NE(second.error().message.find(std::to_string(same.port)), std::string::npos);
 }
 
-TEST_F(Receiver, AddressAndTlsFilesThatAreNoneAreToldClearly) {
+TEST_F(Receiver, AddressAndTlsFilesThatAreNoneAreReportedClearly) {
   ReceiverOptions bad = options_;
   bad.address = "knee";
   EXPECT_EQ(DicomReceiver::open(bad, *inbox_).error().reason, Reason::bad_value);

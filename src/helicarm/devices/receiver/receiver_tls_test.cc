@@ -74,19 +74,19 @@ TEST_F(ReceiverTls, PeerWithACertificateOfTheAuthorityIsServed) {
   EXPECT_EQ(answer_over_tls(ours_), accepted);
 }
 
-TEST_F(ReceiverTls, PeerWithoutACertificateIsRefusedAndTold) {
+TEST_F(ReceiverTls, PeerWithoutACertificateIsRefusedAndReported) {
   EXPECT_EQ(answer_over_tls(std::nullopt), closed);
   const Failure line = line_with("TLS handshake");
   EXPECT_EQ(line.reason, Reason::not_connected);
   EXPECT_EQ(line.message.find("127.0.0.1: connection ended: TLS handshake: "), 0u) << line.message;
 }
 
-TEST_F(ReceiverTls, StrangersCertificateIsRefusedAndTold) {
+TEST_F(ReceiverTls, StrangersCertificateIsRefusedAndReported) {
   EXPECT_EQ(answer_over_tls(self_signed(folder_, "stranger")), closed);
   EXPECT_EQ(line_with("TLS handshake: certificate: ").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverTls, PlainTalkIsRefusedAndTold) {
+TEST_F(ReceiverTls, PlainTalkIsRefusedAndReported) {
   RawClient plain = client();
   plain.send(peer::Request().bytes());
   plain.receive_type();

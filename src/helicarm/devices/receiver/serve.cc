@@ -45,7 +45,7 @@ std::function<void()> eviction(const std::shared_ptr<Leash>& leash) {
 }
 
 /// Ends that no image is lost by come in floods: as many are told as a log can bear.
-void tell(ReceiverShared& shared, Failure why) {
+void notify(ReceiverShared& shared, Failure why) {
   const auto left_out = shared.lines.pass();
   if (!left_out) return;
   if (*left_out > 0) why.message += fmt::format(" ({} lines left out)", *left_out);
@@ -111,10 +111,10 @@ class Session {
     }
     if (!breach) co_return;
     break_off({Reason::bad_value, breach->why});
-    asio::error_code nobody_is_there;
+    asio::error_code nobody_listens;
     const std::string abort = dicom::abort(breach->reason);
     co_await asio::async_write(stream_, asio::buffer(abort),
-                               asio::redirect_error(use_awaitable, nobody_is_there));
+                               asio::redirect_error(use_awaitable, nobody_listens));
   }
 
   awaitable<void> shake_hands() {
@@ -205,7 +205,7 @@ class Session {
           {Reason::truncated, fmt::format("{}: image cut after {} bytes: {}", peer, *bytes, why.message)});
     why.message = fmt::format("{}: {} ended: {}", peer,
                               association_.associated() ? "association" : "connection", why.message);
-    tell(shared_, std::move(why));
+    notify(shared_, std::move(why));
   }
 
   Stream stream_;
@@ -239,7 +239,7 @@ void serve(tcp::socket socket, asio::ssl::context* tls, ReceiverShared& shared) 
   const auto id = shared.admission.connect(address, eviction(leash), Clock::now());
   if (!id) {
     ++shared.counters.turned_away;
-    return tell(shared, {Reason::not_connected, address + ": turned away: too many connections"});
+    return notify(shared, {Reason::not_connected, address + ": turned away: too many connections"});
   }
   if (tls)
     asio::co_spawn(

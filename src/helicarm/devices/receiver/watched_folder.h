@@ -34,7 +34,7 @@ class FolderLook {
   std::map<std::filesystem::path, Trace> traces_;
 };
 
-/// Takes every picture that comes into a folder to the inbox, until it is destroyed or has taken `most`. The
+/// Takes every image that comes into a folder to the inbox, until it is destroyed or has taken `most`. The
 /// folder is left as it is. Hooks are called from a thread of its own.
 class WatchedFolder {
  public:

@@ -65,7 +65,7 @@ TEST_F(FolderOnDisk, FolderThatIsAwayAndComesBackIsNoError) {
   EXPECT_EQ(look.at_rest().size(), 1u);
 }
 
-TEST_F(FolderOnDisk, PictureGoesToTheInboxAndTheFileStays) {
+TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
   const auto inbox = Inbox::open(folder_ / "inbox").value();
   fs::create_directory(folder_ / "share");
   std::promise<Arrival> arrived;
@@ -77,7 +77,7 @@ TEST_F(FolderOnDisk, PictureGoesToTheInboxAndTheFileStays) {
   EXPECT_TRUE(fs::exists(folder_ / "share/knee"));
 }
 
-TEST_F(FolderOnDisk, NoMorePicturesAreTakenThanAskedFor) {
+TEST_F(FolderOnDisk, NoMoreImagesAreTakenThanAskedFor) {
   const auto inbox = Inbox::open(folder_ / "inbox").value();
   fs::create_directory(folder_ / "share");
   put("share/one", DicomBuilder().bytes());

@@ -9,7 +9,7 @@
 namespace helicarm {
 
 /// What the tracker sees of the tool and of where it should be, at one moment.
-struct Sighting {
+struct ToolMeasurement {
   RigidTransform tracker_from_tcp;
   RigidTransform tracker_from_target;
   /// Of the target as seen from the tool: shift (mm), then turn (rad).
@@ -23,7 +23,7 @@ struct Miss {
   double sigma_mm = 0;  ///< of the place, root of the covariance's trace
 };
 
-using Measure = std::function<Expected<Sighting>()>;
+using Measure = std::function<Expected<ToolMeasurement>()>;
 /// Moves the tool to a pose given in its present one.
 using MoveTool = std::function<Expected<void>(const RigidTransform& tcp_from_new)>;
 

@@ -20,8 +20,8 @@ struct Scene {
   Expected<std::vector<Miss>> follow(const Corrections& corrections) {
     return follow_target(
         corrections,
-        [&]() -> Expected<Sighting> {
-          Sighting seen{tool, {}};
+        [&]() -> Expected<ToolMeasurement> {
+          ToolMeasurement seen{tool, {}};
           seen.tracker_from_tcp.translation +=
               noise_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
           seen.covariance.topLeftCorner<3, 3>().diagonal().setConstant(sigma_mm * sigma_mm);

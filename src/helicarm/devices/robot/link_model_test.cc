@@ -10,7 +10,7 @@
 namespace helicarm {
 namespace {
 
-using Stops = LinkMachine::Stops;
+using Stops = LinkStateMachine::Stops;
 
 constexpr std::uint64_t sequences = 100000;
 constexpr std::uint64_t enough = 20000;  ///< to find a broken rule
@@ -157,8 +157,8 @@ class World {
     int connection;
   };
   static LinkTimes times() { return {.stale_s = 0.1, .program_silence_s = 0.1, .start_s = 0.3}; }
-  LinkMachine::Time time() const {
-    return LinkMachine::Time{} + std::chrono::hours(1) + std::chrono::milliseconds(step_ms * now_);
+  LinkStateMachine::Time time() const {
+    return LinkStateMachine::Time{} + std::chrono::hours(1) + std::chrono::milliseconds(step_ms * now_);
   }
   int soon(int most) { return now_ + 1 + static_cast<int>(random_.index(static_cast<std::uint32_t>(most))); }
   bool chance(double probability) { return random_.uniform() < probability; }
@@ -224,7 +224,7 @@ class World {
   }
   void restart() {
     lose();
-    machine_ = LinkMachine(times(), session(), rules_.table);
+    machine_ = LinkStateMachine(times(), session(), rules_.table);
     step_ = Step::none;
     unlock_at_.reset();
     tokens_.clear();
@@ -364,7 +364,7 @@ class World {
   RandomStream random_;
   Tally& tally_;
   std::int32_t sessions_ = 0;
-  LinkMachine machine_;
+  LinkStateMachine machine_;
   Reference reference_;
   std::string breach_;
   bool quiet_ = false;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "helicarm/core/random.h"
-#include "helicarm/devices/robot/link_machine.h"
+#include "helicarm/devices/robot/link_state_machine.h"
 
 namespace helicarm {
 

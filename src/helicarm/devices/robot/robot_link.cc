@@ -215,8 +215,8 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
   const Watch watched = watch ? watch : [] { return Expected<void>(); };
   const auto ended = run(order, *since, watched);
   if (!ended) return tl::unexpected<Failure>(ended.error());
-  const auto by_robot = [&]() -> Expected<Sighting> {
-    return Sighting{ended->base_from_tcp, order.waypoints.back().base_from_tcp};
+  const auto by_robot = [&]() -> Expected<ToolMeasurement> {
+    return ToolMeasurement{ended->base_from_tcp, order.waypoints.back().base_from_tcp};
   };
   auto misses = follow_target(
       order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),

@@ -10,7 +10,7 @@
 
 #include "helicarm/devices/robot/check_order.h"
 #include "helicarm/devices/robot/follow_target.h"
-#include "helicarm/devices/robot/link_machine.h"
+#include "helicarm/devices/robot/link_state_machine.h"
 #include "helicarm/devices/robot/rtde_client.h"
 #include "helicarm/devices/robot/timed_socket.h"
 #include "helicarm/devices/robot/tool_track.h"
@@ -43,7 +43,7 @@ struct RobotLinkStatus {
   std::vector<Warning> warnings;
 };
 
-/// A robot over its three ports, and the lock on its motion: sockets and threads around a `LinkMachine`,
+/// A robot over its three ports, and the lock on its motion: sockets and threads around a `LinkStateMachine`,
 /// which decides. Nothing moves but by `execute`; whatever stops the robot, or ends the connection, is
 /// latched and undone by `unlock` alone. All members may be called from any thread.
 class RobotLink {
@@ -79,7 +79,7 @@ class RobotLink {
  private:
   using Clock = std::chrono::steady_clock;
 
-  using Stops = LinkMachine::Stops;
+  using Stops = LinkStateMachine::Stops;
 
   Expected<RobotState> run(const RobotOrder& order, Stops since, const Watch& watch);
   Expected<void> send(const RobotOrder& order, Stops since);
@@ -94,7 +94,7 @@ class RobotLink {
   std::mutex executing_;
   mutable std::mutex guard_;  ///< of all that follows
   mutable std::condition_variable news_;
-  LinkMachine machine_;
+  LinkStateMachine machine_;
   ControllerVersion version_;
   std::optional<TimedSocket> script_socket_;
   RtdeClient client_;  ///< last: its thread uses all the others

@@ -309,7 +309,7 @@ TEST(RobotDrill, SecondProgramCannotCommand) {
   EXPECT_EQ(drill.link.status().phase, LinkPhase::idle);
 }
 
-TEST(RobotLink, RobotThatIsNotThereOrSpeaksOtherwiseIsTold) {
+TEST(RobotLink, RobotThatIsNotThereOrSpeaksOtherwiseIsReported) {
   for (const auto& [fault, reason] : {std::pair{RobotFault::wrong_version, Reason::not_connected},
                                       std::pair{RobotFault::unknown_output, Reason::unsupported},
                                       std::pair{RobotFault::input_in_use, Reason::robot_locked}}) {
@@ -330,7 +330,7 @@ TEST(RobotLink, RobotThatIsNotThereOrSpeaksOtherwiseIsTold) {
   EXPECT_EQ(link.unlock("tester").error().reason, Reason::not_connected);
 }
 
-TEST(RobotLink, LoopOverTheTrackerMendsAnArmThatIsNotAsDrawn) {
+TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotAsDrawn) {
   VirtualUrOptions options = any_ports();
   options.arm.a2 -= 1;
   options.arm.d5 += 1;
@@ -346,8 +346,8 @@ TEST(RobotLink, LoopOverTheTrackerMendsAnArmThatIsNotAsDrawn) {
   // The tracker stands anywhere, and the robot is never told where.
   const RigidTransform tracker_from_base{
       Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {900, -300, 1500}};
-  const auto misses = link.execute(order, link.confirm(order), [&]() -> Expected<Sighting> {
-    return Sighting{tracker_from_base * robot->truth().base_from_tip, tracker_from_base * target};
+  const auto misses = link.execute(order, link.confirm(order), [&]() -> Expected<ToolMeasurement> {
+    return ToolMeasurement{tracker_from_base * robot->truth().base_from_tip, tracker_from_base * target};
   });
   ASSERT_TRUE(misses) << misses.error().message;
   EXPECT_GT(misses->front().distance_mm, 0.5);
@@ -364,8 +364,8 @@ TEST(RobotLink, ToolThatStaysOffTargetIsStopped) {
   ApproachOptions approach;
   approach.corrections.most = 3;
   const RobotOrder order = planned(approach);
-  const auto misses = link.execute(order, link.confirm(order), []() -> Expected<Sighting> {
-    return Sighting{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};  // whatever the arm does
+  const auto misses = link.execute(order, link.confirm(order), []() -> Expected<ToolMeasurement> {
+    return ToolMeasurement{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};  // whatever the arm does
   });
   ASSERT_FALSE(misses);
   EXPECT_EQ(misses.error().reason, Reason::off_target);

@@ -21,8 +21,8 @@ constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<d
 /// As it is written, to the last digit: what a person confirmed must not change by being read.
 RigidTransform pose_of(JsonReader& reader, const char* key) {
   const Eigen::Matrix4d given = matrix_from(reader, key, any);
-  const RigidTransform mended = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
-  if (!((mended.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
+  const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
+  if (!((corrected.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
     reader.refuse(Reason::bad_value, key, "must be a rotation and a shift to nine digits");
   return exact_pose(given);
 }

@@ -181,27 +181,27 @@ TEST(CheckOrder, FactoryCalibrationShowsAsMismatch) {
 }
 
 TEST(Confirmations, TokenServesItsOrderOnceAndForAWhile) {
-  Confirmations desk(std::chrono::seconds(60));
+  Confirmations controller(std::chrono::seconds(60));
   const RobotOrder order = planned();
   const auto now = Confirmations::Clock::now();
-  const std::string token = desk.confirm(order, now);
+  const std::string token = controller.confirm(order, now);
   EXPECT_EQ(token.size(), 32u);
-  EXPECT_TRUE(desk.redeem(token, order, now));
-  EXPECT_EQ(desk.redeem(token, order, now).error().reason, Reason::order_not_confirmed);
+  EXPECT_TRUE(controller.redeem(token, order, now));
+  EXPECT_EQ(controller.redeem(token, order, now).error().reason, Reason::order_not_confirmed);
 
-  const std::string late = desk.confirm(order, now);
-  EXPECT_FALSE(desk.redeem(late, order, now + std::chrono::seconds(61)));
+  const std::string late = controller.confirm(order, now);
+  EXPECT_FALSE(controller.redeem(late, order, now + std::chrono::seconds(61)));
 
-  const std::string other = desk.confirm(order, now);
+  const std::string other = controller.confirm(order, now);
   RobotOrder changed = order;
   changed.waypoints[1].base_from_tcp.translation.x() += 1e-9;
-  EXPECT_FALSE(desk.redeem(other, changed, now));
-  EXPECT_FALSE(desk.redeem(other, order, now));
+  EXPECT_FALSE(controller.redeem(other, changed, now));
+  EXPECT_FALSE(controller.redeem(other, order, now));
 
-  const std::string forgotten = desk.confirm(order, now);
-  desk.forget_all();
-  EXPECT_FALSE(desk.redeem(forgotten, order, now));
-  EXPECT_FALSE(desk.redeem("", order, now));
+  const std::string forgotten = controller.confirm(order, now);
+  controller.forget_all();
+  EXPECT_FALSE(controller.redeem(forgotten, order, now));
+  EXPECT_FALSE(controller.redeem("", order, now));
 }
 
 }  // namespace

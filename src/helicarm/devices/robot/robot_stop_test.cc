@@ -224,12 +224,13 @@ TEST(StoppedOrder, UnlockDoesNotLetItsCorrectionsGoOn) {
   RobotOrder order = order_with(250);
   order.corrections.most = 3;
   Eigen::Vector3d rested;
-  const auto refused = drill.link.execute(order, drill.link.confirm(order), [&]() -> Expected<Sighting> {
-    drill.link.stop();
-    EXPECT_TRUE(drill.link.unlock("tester"));
-    rested = drill.tip();
-    return Sighting{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};
-  });
+  const auto refused =
+      drill.link.execute(order, drill.link.confirm(order), [&]() -> Expected<ToolMeasurement> {
+        drill.link.stop();
+        EXPECT_TRUE(drill.link.unlock("tester"));
+        rested = drill.tip();
+        return ToolMeasurement{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};
+      });
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::robot_stopped);
   EXPECT_EQ((drill.tip() - rested).norm(), 0);

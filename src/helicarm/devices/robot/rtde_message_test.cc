@@ -126,7 +126,7 @@ TEST(RtdeMessage, TextOfTheRobotCannotMoveTheCursor) {
   EXPECT_EQ(read_text({RtdeKind::text, "\x09 abc"s}).error().reason, Reason::truncated);
 }
 
-TEST(RobotState, ModeThatNobodyKnowsHasANameToo) {
+TEST(RobotState, ModeThatNoOneKnowsHasANameToo) {
   for (const std::int32_t mode :
        {std::numeric_limits<std::int32_t>::min(), -2, 99, std::numeric_limits<std::int32_t>::max()}) {
     EXPECT_EQ(name(static_cast<RobotMode>(mode)), "UNKNOWN");
@@ -134,7 +134,7 @@ TEST(RobotState, ModeThatNobodyKnowsHasANameToo) {
   }
 }
 
-TEST(RobotState, EveryStopIsTold) {
+TEST(RobotState, EveryStopIsReported) {
   RobotState state;
   EXPECT_FALSE(why_stopped(state));
   for (int mode = 3; mode <= 20; ++mode) {

@@ -102,7 +102,7 @@ TEST(VirtualUr, FieldsAskedForComeInTheirOrderAndUnknownOnesAreNotFound) {
   EXPECT_EQ(client.ask(to_bytes({RtdeKind::inputs, "wish"})).content, "\2NOT_FOUND,NOT_FOUND,NOT_FOUND");
 }
 
-TEST(VirtualUr, PortThatIsTakenIsTold) {
+TEST(VirtualUr, PortThatIsTakenIsReported) {
   const auto robot = robot_on_any_port();
   VirtualUrOptions options;
   options.rtde_port = robot->rtde_port();

@@ -47,7 +47,7 @@ TEST(ExposurePose, MeanIsNearerTheTruthThanASample) {
   EXPECT_NEAR(pose->spread_mm, 0.1 * std::sqrt(3), 0.04);
 }
 
-TEST(ExposurePose, CovarianceTellsTheError) {
+TEST(ExposurePose, CovarianceReportsTheError) {
   double square_mm = 0, square_rad = 0, said_mm = 0, said_rad = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const auto pose = exposure_pose(at_rest(trial), 10);

@@ -113,7 +113,7 @@ TEST(IgtlMessage, NameThatFillsItsFieldEndsWithTheField) {
   EXPECT_EQ(std::get<IgtlTracking>(back->content).tools[1].name, tool.name);
 }
 
-TEST(IgtlMessage, WrongCheckSumIsToldApart) {
+TEST(IgtlMessage, WrongCheckSumIsDistinguished) {
   std::string bytes = encode(sample_messages()[0]);
   bytes.back() ^= 1;
   const auto message = decode_whole(bytes);
@@ -121,7 +121,7 @@ TEST(IgtlMessage, WrongCheckSumIsToldApart) {
   EXPECT_TRUE(message.error().figures.contains("crc"));
 }
 
-TEST(IgtlMessage, LengthsAreNotBelieved) {
+TEST(IgtlMessage, LengthsAreNotAccepted) {
   EXPECT_EQ(reason_of(framed("TRANSFORM", std::string(47, '\0'))), Reason::truncated);
   EXPECT_EQ(reason_of(framed("TRANSFORM", std::string(49, '\0'))), Reason::bad_size);
   EXPECT_EQ(reason_of(framed("TRANSFORM", "")), Reason::truncated);
@@ -193,7 +193,7 @@ TEST(IgtlMessage, MutatedMessagesAreReadOrRefusedButNeverOverread) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(IgtlMessage, QuaternionIsMendedWithinRounding) {
+TEST(IgtlMessage, QuaternionIsNormalisedWithinRounding) {
   const Eigen::Matrix3d rotation = rotation_from_vector({0.3, -0.2, 1.0});
   const Eigen::Quaterniond q(rotation);
   for (const double scale : {1.0, 1.0009, -1.0})

@@ -75,7 +75,7 @@ struct RawPeer {
     socket.set_option(tcp::no_delay(true));
   }
   void write(std::string_view bytes) { asio::write(socket, asio::buffer(bytes)); }
-  bool is_hung_up_on() {
+  bool is_disconnected() {
     asio::error_code error;
     char byte;
     while (!error) socket.read_some(asio::buffer(&byte, 1), error);
@@ -129,7 +129,7 @@ TEST(IgtlSockets, StatusIsAnswered) {
   EXPECT_EQ(listener.last_device(), "tracker");
 }
 
-TEST(IgtlSockets, PortThatIsTakenIsToldAndFreeAgainAfterStop) {
+TEST(IgtlSockets, PortThatIsTakenIsReportedAndFreeAgainAfterStop) {
   const auto server = a_server();
   IgtlServerOptions same;
   same.port = server->port();
@@ -190,7 +190,7 @@ TEST(IgtlSockets, PausesGrowUntilAMessageComes) {
   EXPECT_EQ(pauses, (std::vector<double>{0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5, 5}));
 }
 
-TEST(IgtlSockets, ServerThatHangsUpIsTriedAgain) {
+TEST(IgtlSockets, ServerThatDisconnectsIsTriedAgain) {
   RawPeer peer;
   Listener listener(peer.port());
   for (int i = 0; i < 4; ++i) {
@@ -208,7 +208,7 @@ TEST(IgtlSockets, SilentServerIsLeft) {
   options.silence_s = 0.05;
   Listener listener(peer.port(), options);
   peer.accept();
-  EXPECT_TRUE(peer.is_hung_up_on());
+  EXPECT_TRUE(peer.is_disconnected());
   peer.accept();
   EXPECT_GE(count_of(listener.client->status().counters, "silences"), 1u);
 }
@@ -241,7 +241,7 @@ TEST(IgtlSockets, NonsenseEndsTheConnectionAndNotTheClient) {
         std::string("HTTP/1.1 400 Bad Request\r\nContent-Type: text/html; charset=utf-8\r\n")}) {
     peer.accept();
     peer.write(nonsense);
-    EXPECT_TRUE(peer.is_hung_up_on());
+    EXPECT_TRUE(peer.is_disconnected());
   }
   peer.accept();
   peer.write(encode({"sound", 0, IgtlTransform{}}));
@@ -309,11 +309,11 @@ TEST(IgtlSockets, ClientsOverTheLimitAreTurnedAway) {
   second.dial(server->port());
   ASSERT_TRUE(all_connected(*server, 2));
   third.dial(server->port());
-  EXPECT_TRUE(third.is_hung_up_on());
+  EXPECT_TRUE(third.is_disconnected());
   EXPECT_EQ(count_of(server->status().counters, "refused"), 1u);
 }
 
-TEST(IgtlSockets, ClientThatDoesNotReadHoldsUpNobody) {
+TEST(IgtlSockets, ClientThatDoesNotReadHoldsUpNoOne) {
   IgtlServerOptions options;
   options.queue_messages = 4;
   const auto server = a_server(options);
@@ -388,7 +388,7 @@ TEST(IgtlSockets, MessageOverTheServersLimitEndsTheConnection) {
   std::string header = encode({"x", 0, IgtlImage{}}).substr(0, IgtlHeader::size);
   header[45] = 16;  // a body of over 1 MiB
   peer.write(header);
-  EXPECT_TRUE(peer.is_hung_up_on());
+  EXPECT_TRUE(peer.is_disconnected());
   EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "cut") == 1; }));
 }
 
@@ -422,7 +422,7 @@ TEST(IgtlSockets, ClientIdleForLongestMakesRoomOnAFullServer) {
   ASSERT_TRUE(all_connected(*server, 2));
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   Listener listener(server->port());
-  EXPECT_TRUE(oldest.is_hung_up_on());
+  EXPECT_TRUE(oldest.is_disconnected());
   ASSERT_TRUE(eventually([&] {
     server->send({"still here", 0, IgtlTransform{}});
     return listener.last_device() == "still here";

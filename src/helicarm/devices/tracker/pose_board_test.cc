@@ -56,7 +56,7 @@ TEST(PoseBoard, ToolLostWhileDrillingIsStaleWithinATenthOfASecond) {
   }
 }
 
-TEST(PoseBoard, NameGivenTwiceIsBelievedForNeither) {
+TEST(PoseBoard, NameGivenTwiceIsAcceptedForNeither) {
   PoseBoard board;
   board.take(stamped(IgtlTracking{{{"a", 1, pose_at(1)}, {"b", 1, pose_at(2)}, {"a", 1, pose_at(3)}}}, 1), 1);
   EXPECT_FALSE(board.latest("a", 1));
@@ -105,7 +105,7 @@ TEST(PoseBoard, MessageOfAsManyToolsAsItHoldsIsBounded) {
   EXPECT_EQ(board.names_refused(), 20 * (most - 64u));
 }
 
-TEST(PoseBoard, RestartedDeviceWithAnEarlierClockIsBelievedAtOnce) {
+TEST(PoseBoard, RestartedDeviceWithAnEarlierClockIsAcceptedAtOnce) {
   PoseBoard board;
   board.take(stamped(IgtlTransform{pose_at(1)}, 5000, "tool"), 10);
   board.forget_time();

@@ -30,8 +30,8 @@ struct RawPose {
   bool visible = true;
 };
 
-/// Judges one tool's poses as they come. Rounding (|R'R - I| <= 1e-3) is mended; the identity, which drivers
-/// send for a hidden marker, is never a pose.
+/// Judges one tool's poses as they come. Rounding (|R'R - I| <= 1e-3) is corrected; the identity, which
+/// drivers send for a hidden marker, is never a pose.
 class PoseGate {
  public:
   explicit PoseGate(const PoseGateOptions& options = {}) : options_(options), clock_(options.clock) {}

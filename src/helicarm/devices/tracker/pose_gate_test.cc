@@ -53,7 +53,7 @@ TEST(PoseGate, PosesOfAMarkerAtRestPass) {
   EXPECT_TRUE(scene.gate.rejected().empty());
 }
 
-TEST(PoseGate, RoundingIsMended) {
+TEST(PoseGate, RoundingIsCorrected) {
   Eigen::Matrix4d rounded = Scene().jittered();
   rounded.topLeftCorner<3, 3>() = (rounded.topLeftCorner<3, 3>() * 1e4).array().round() / 1e4;
   const auto pose = rigid_pose(rounded, 3000);
@@ -105,7 +105,7 @@ TEST(PoseGate, SinglePoseFarOffIsRejected) {
   EXPECT_EQ(scene.rejected_of(100), 0);
 }
 
-TEST(PoseGate, NewPlaceIsBelievedWhenItLasts) {
+TEST(PoseGate, NewPlaceIsAcceptedWhenItLasts) {
   for (const double distance : {30.0, 200.0}) {
     Scene scene;
     scene.rejected_of(10);
@@ -116,7 +116,7 @@ TEST(PoseGate, NewPlaceIsBelievedWhenItLasts) {
   }
 }
 
-TEST(PoseGate, ThirdPoseAtANewPlaceTellsOfItBeforeItIsBelieved) {
+TEST(PoseGate, ThirdPoseAtANewPlaceReportsOfItBeforeItIsAccepted) {
   Scene scene;
   scene.rejected_of(10);
   scene.place.x() += 40;

@@ -24,7 +24,7 @@ struct SequenceFrame {
 };
 
 /// Reads the poses of a MetaImage sequence file (.mha, .mhd): Seq_FrameNNNN_NAMETransform, ...Status and
-/// Timestamp; pictures in it are passed over. Fails with `missing_file`, `bad_size` (over 512 MiB),
+/// Timestamp; images in it are passed over. Fails with `missing_file`, `bad_size` (over 512 MiB),
 /// `truncated` (no ElementDataFile), `bad_value`.
 Expected<std::vector<SequenceFrame>> read_sequence(const std::filesystem::path& path);
 

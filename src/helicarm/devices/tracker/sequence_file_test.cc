@@ -87,7 +87,7 @@ TEST_F(SequenceFile, HeaderThatEndsInALongerKeyThanElementDataFileIsTruncated) {
 
 TEST_F(SequenceFile, ElementDataFileNeedsNoNewline) { EXPECT_TRUE(read("ElementDataFile=LOCAL")); }
 
-TEST_F(SequenceFile, TimeThatNobodyCanWaitForIsRefused) {
+TEST_F(SequenceFile, TimeThatNoOneCanWaitForIsRefused) {
   for (const char* time : {"nan", "inf", "-inf", "1e300", "-5e9"})
     EXPECT_EQ(read(std::string("Seq_Frame0000_Timestamp = ") + time + "\n" + end_line).error().reason,
               Reason::bad_value)

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/application_state.h"
+
+#include <algorithm>
+
+namespace helicarm::gui {
+
+const Pick* pick_of(const ApplicationState& state, const std::string& point, const std::string& view) {
+  const auto pick = std::ranges::find_if(
+      state.picks, [&](const Pick& other) { return other.name == point && other.view == view; });
+  return pick == state.picks.end() ? nullptr : &*pick;
+}
+
+std::optional<WantedPick> next_pick(const ApplicationState& state) {
+  for (const PlannedTunnel& tunnel : state.tunnels)
+    for (const std::string& point : {tunnel.start, tunnel.end})
+      for (const std::string& view : state.views)
+        if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, tunnel.bone};
+  return std::nullopt;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,358 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/controller.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "gui/controller/equipment.h"
+#include "gui/controller/steps.h"
+#include "gui/replay/pdf_report.h"
+#include "helicarm/core/files.h"
+#include "helicarm/operation/plan_fields.h"
+#include "helicarm/pipeline/run_case.h"
+#include "helicarm/rehearsal/rehearse.h"
+#include "helicarm/report/exports.h"
+#include "helicarm/report/report.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int look_for_images_ms = 100;
+constexpr double bone_step_mm = 5;
+
+std::shared_ptr<const Result> only(Images images) {
+  auto result = std::make_shared<Result>();
+  result->views = std::move(images);
+  return result;
+}
+
+std::string first_missing(const ApplicationState& state) {
+  for (const ViewResult& view : state.result->views)
+    if (!view.xray_image) return view.name;
+  return state.views.empty() ? "" : state.views.front();
+}
+
+void forget_measurement(ApplicationState& state) {
+  state.measured = false;
+  state.order.reset();
+  state.path = {};
+  state.outcomes.clear();
+  state.refusals.clear();
+}
+
+/// Names and bones of a case's tunnels; without any, the two of an ACL operation.
+std::vector<PlannedTunnel> tunnels_of(const Case& given) {
+  std::vector<PlannedTunnel> tunnels;
+  for (const TunnelPlan& tunnel : given.tunnels) {
+    const auto pick = std::ranges::find(given.picks, tunnel.start, &Pick::name);
+    const Bone bone = pick == given.picks.end() ? Bone::femur : pick->moves_with.value_or(Bone::femur);
+    tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
+  }
+  if (given.picks.empty() && tunnels.empty())
+    tunnels = {{"femur", Bone::femur, "FS", "FE"}, {"tibia", Bone::tibia, "TS", "TE"}};
+  return tunnels;
+}
+
+}  // namespace
+
+Controller::Controller(QObject* parent) : QObject(parent) {
+  connect(&images_, &QTimer::timeout, this, &Controller::take_waiting_image);
+  images_.start(look_for_images_ms);
+}
+
+Controller::~Controller() {
+  stop();
+  if (equipment_ && equipment_->operation) equipment_->operation->interrupt();
+}
+
+void Controller::begin(Phase phase, std::string doing, std::function<Change()> work) {
+  if (state_.busy) return;
+  state_.busy = phase;
+  state_.doing = std::move(doing);
+  state_.refusals.erase(phase);
+  if (equipment_) equipment_->stopped = false;
+  emit changed();
+  worker_.post([this, phase, work = std::move(work)] {
+    const auto done = guarded([&]() -> Change {
+      try {
+        return work();
+      } catch (const BadInput&) {
+        throw;
+      } catch (const std::exception& problem) {
+        throw BadInput(Reason::unsupported, fmt::format("unexpected: {}", problem.what()));
+      }
+    });
+    QMetaObject::invokeMethod(
+        this,
+        [this, phase, done] {
+          state_.busy.reset();
+          state_.doing.clear();
+          if (done)
+            (*done)(state_);
+          else
+            state_.refusals.insert_or_assign(phase, done.error());
+          emit changed();
+          if (!done) emit refused(phase, sentence_of(done.error()));
+          if (std::exchange(picks_came_, false)) measure();
+        },
+        Qt::QueuedConnection);
+  });
+}
+
+void Controller::meanwhile(Change change) {
+  QMetaObject::invokeMethod(
+      this,
+      [this, change = std::move(change)] {
+        change(state_);
+        emit changed();
+      },
+      Qt::QueuedConnection);
+}
+
+void Controller::open(Source source, const fs::path& folder, std::string doing,
+                      std::function<Change(Equipment&)> work) {
+  if (state_.busy) return;
+  auto old = std::exchange(equipment_, nullptr);
+  live_tool_.reset();
+  state_ = ApplicationState{};
+  begin(Phase::acquire, std::move(doing),
+        [this, source, folder, work = std::move(work), old = std::move(old),
+         options = options_]() mutable -> Change {
+          old.reset();
+          auto equipment = std::make_shared<Equipment>();
+          equipment->options = options;
+          Change change = work(*equipment);
+          return [this, source, folder, equipment, change](ApplicationState& state) {
+            equipment_ = equipment;
+            state.source = source;
+            state.folder = folder;
+            change(state);
+          };
+        });
+}
+
+void Controller::start_operation(Equipment& equipment, OperationPlan plan, const fs::path& folder) {
+  equipment.tracker = plan.tracker;
+  equipment.operation =
+      value_or_throw(Operation::begin(std::move(plan), folder, equipment.devices->board(),
+                                      equipment.devices->robot(), [this](Step, const std::string& what) {
+                                        meanwhile([what](ApplicationState& state) { state.doing = what; });
+                                      }));
+  equipment.operation->confirmed_by("the person at the screen");
+}
+
+void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
+                                 const OperationPlan& wished, const fs::path& folder) {
+  const auto work = [=, this, freshness = freshness_](Equipment& equipment) -> Change {
+    equipment.virtual_or = value_or_throw(virtual_devices::VirtualDevices::open(options));
+    OperationPlan plan = plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
+    for (const auto& field : plan_fields)
+      if (field.get(wished) != field.get(OperationPlan())) field.set(plan, field.get(wished));
+    const Json offered = std::exchange(plan.picks, Json::array());
+    equipment.devices =
+        std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")), freshness);
+    ReceiverOptions receiver;
+    receiver.port = 0;
+    value_or_throw(equipment.devices->listen(receiver));
+    start_operation(equipment, plan, folder);
+    const auto bones = std::make_shared<const simulation::BoneMeshes>(simulation::moved(
+        simulation::bone_meshes(bone_step_mm),
+        equipment.virtual_or->simulated_scene().simulated_case().calibrator_from_knee.value()));
+    return [change = with_plan(plan, offered), bones](ApplicationState& state) {
+      change(state);
+      state.bones = bones;
+    };
+  };
+  open(Source::virtual_or, folder, "opening the virtual operating room", work);
+}
+
+void Controller::open_devices(const fs::path& file, const ReceiverOptions& receiver, const fs::path& folder) {
+  open(Source::devices, folder, "connecting", [=, this](Equipment& equipment) -> Change {
+    OperationPlan plan = value_or_throw(plan_from(value_or_throw(read_json(file)), file.string()));
+    const Json offered = std::exchange(plan.picks, Json::array());
+    equipment.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
+    value_or_throw(equipment.devices->listen(receiver));
+    start_operation(equipment, plan, folder);
+    return with_plan(plan, offered);
+  });
+}
+
+Controller::Change Controller::with_plan(const OperationPlan& plan, const Json& offered) {
+  std::vector<CaseView> views(plan.views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
+  const Calibrator calibrator = value_or_throw(calibrator_named(plan.calibrator, "."));
+  const std::vector<Pick> picks = value_or_throw(picks_from(offered, "plan", views));
+  return [=](ApplicationState& state) {
+    state.views = plan.views;
+    state.calibrator = calibrator;
+    state.tunnels = plan.tunnels;
+    for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
+    state.offered_picks = picks;
+    Images none(plan.views.size());
+    for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
+    state.result = only(std::move(none));
+    state.next_view = first_missing(state);
+  };
+}
+
+void Controller::open_case(const fs::path& folder) {
+  open(Source::files, folder, "reading " + folder.filename().string(),
+       [=, this](Equipment& equipment) { return with_case(value_or_throw(read_case(folder)), equipment); });
+}
+
+void Controller::open_images(const std::vector<fs::path>& images) {
+  const fs::path folder = images.empty() ? fs::path() : images.front().parent_path();
+  open(Source::files, folder, "reading the pictures", [=, this](Equipment& equipment) {
+    return with_case(value_or_throw(case_of_images(images)), equipment);
+  });
+}
+
+Controller::Change Controller::with_case(Case given, Equipment& equipment) {
+  equipment.given = given;
+  const Change found = measured(equipment, given.picks);
+  return [given = std::move(given), found](ApplicationState& state) {
+    for (const CaseView& view : given.views) state.views.push_back(view.name);
+    state.calibrator = given.calibrator;
+    state.tunnels = tunnels_of(given);
+    state.picks = given.picks;
+    found(state);
+  };
+}
+
+void Controller::set_options(const RunOptions& options) { options_ = options; }
+
+void Controller::expect(const std::string& view) {
+  state_.next_view = view;
+  emit changed();
+}
+
+void Controller::shoot(const std::string& view) {
+  if (!equipment_ || !equipment_->virtual_or) return;
+  begin(Phase::acquire, "shooting " + view, [this, view, equipment = equipment_]() -> Change {
+    return came(value_or_throw(shoot_and_take(*equipment, view)));
+  });
+}
+
+void Controller::take_waiting_image() {
+  if (state_.busy || !equipment_ || !equipment_->operation) return;
+  const auto view_image = equipment_->devices->next_image(0);
+  if (!view_image) return;
+  begin(Phase::acquire, "a picture came",
+        [this, view = state_.next_view, equipment = equipment_, view_image]() -> Change {
+          return came(value_or_throw(take(*equipment, view, *view_image)));
+        });
+}
+
+Controller::Change Controller::came(Images images) {
+  return [this, images = std::move(images)](ApplicationState& state) {
+    forget_measurement(state);
+    live_tool_.reset();  // its lines belong to the former images
+    state.result = only(images);
+    state.next_view = first_missing(state);
+    if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.xray_image != nullptr; }))
+      QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
+  };
+}
+
+Controller::Change Controller::measured(Equipment& equipment, const std::vector<Pick>& picks) {
+  auto result = std::make_shared<const Result>(value_or_throw(gui::measure(equipment, picks)));
+  std::optional<LiveTool> live;
+  if (equipment.operation && !result->failure)
+    if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
+  return [this, result, live](ApplicationState& state) {
+    forget_measurement(state);
+    state.result = result;
+    ++state.measurements;
+    state.measured = !result->failure;
+    if (result->failure) state.refusals.insert_or_assign(phase_of(*result->failure), *result->failure);
+    live_tool_ = live;
+  };
+}
+
+void Controller::measure() {
+  if (!equipment_) return;
+  picks_came_ = state_.busy == Phase::calibrate;
+  begin(Phase::calibrate, "measuring",
+        [this, equipment = equipment_, picks = state_.picks, options = options_] {
+          equipment->options = options;
+          return measured(*equipment, picks);
+        });
+}
+
+void Controller::picks_changed(bool measurable) {
+  state_.order.reset();
+  state_.path = {};
+  emit changed();
+  if (measurable) measure();
+}
+
+bool Controller::is_whole(const std::string& point) const {
+  return std::ranges::all_of(state_.views,
+                             [&](const std::string& view) { return pick_of(state_, point, view); });
+}
+
+bool Controller::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
+
+void Controller::pick(Pick pick) {
+  if (!takes_picks()) return;
+  std::erase_if(state_.picks,
+                [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
+  const std::string point = pick.name;
+  state_.picks.push_back(std::move(pick));
+  picks_changed(is_whole(point));  // its place and how far its rays miss show at once
+}
+
+void Controller::take_offered_picks() {
+  if (state_.busy) return;
+  state_.picks = state_.offered_picks;
+  picks_changed(!next_pick(state_));
+}
+
+void Controller::clear_picks() {
+  if (state_.busy) return;
+  state_.picks.clear();
+  picks_changed(!next_pick(state_));
+}
+
+void Controller::cancel() {
+  if (!state_.busy || !equipment_) return;
+  if (equipment_->devices) return stop();
+  equipment_->stopped = true;
+}
+
+void Controller::export_to(const fs::path& folder) {
+  if (!state_.measured) {
+    emit refused(Phase::verify, tr("Nothing is measured yet: there is nothing to export."));
+    return;
+  }
+  Result result = *state_.result;
+  for (const auto& [tunnel, outcome] : state_.outcomes)
+    if (outcome.verification) result.verifications.push_back(*outcome.verification);
+  begin(Phase::verify, "writing the report", [this, result = std::move(result), folder]() -> Change {
+    value_or_throw(write_report(result, folder));
+    value_or_throw(write_pdf_report(result, folder / "report.pdf"));
+    value_or_throw(write_exports(result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(result)) + "\n"));
+    return [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
+  });
+}
+
+void Controller::set_fault(const std::string& name, bool on) {
+  if (!equipment_ || !equipment_->virtual_or) return;
+  if (const auto of_c_arm = virtual_devices::c_arm_fault(name)) {
+    equipment_->c_arm_fault = on ? *of_c_arm : virtual_devices::CArmFault::none;
+    return;
+  }
+  errands_.start(
+      [equipment = equipment_, name, on] { static_cast<void>(equipment->virtual_or->set_fault(name, on)); });
+}
+
+void Controller::move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm) {
+  if (equipment_ && equipment_->virtual_or)
+    equipment_->virtual_or->simulated_scene().move_bone(bone, {Eigen::Matrix3d::Identity(), shift_mm});
+}
+
+}  // namespace helicarm::gui

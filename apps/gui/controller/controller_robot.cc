@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the desk does with robot and pointer, and what is live.
+#include <algorithm>
+#include <utility>
+
+#include "gui/controller/controller.h"
+#include "gui/controller/equipment.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr std::chrono::seconds robot_patience{5};
+/// Nearer than this to where it was, the tool needs no way back.
+constexpr double at_rest_mm = 1;
+
+bool has_left(const RobotLinkStatus& status, const RobotState& rest) {
+  return !status.state ||
+         (status.state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() > at_rest_mm;
+}
+
+QString words_of(const std::vector<RobotOrder>& tour) {
+  if (tour.empty()) return {};
+  double farthest_mm = 0, speed_mm_s = 0;
+  const Eigen::Vector3d from = tour.back().waypoints.back().base_from_tcp.translation;
+  for (const RobotOrder& order : tour)
+    for (const Waypoint& waypoint : order.waypoints) {
+      farthest_mm = std::max(farthest_mm, (waypoint.base_from_tcp.translation - from).norm());
+      speed_mm_s = std::max(speed_mm_s, waypoint.speed_mm_s);
+    }
+  return Controller::tr("%1 moves; the tip stays within %2 mm of where it is, at %3 mm/s at most")
+      .arg(tour.size())
+      .arg(farthest_mm, 0, 'f', 0)
+      .arg(speed_mm_s, 0, 'f', 0);
+}
+
+}  // namespace
+
+void Controller::touch(const std::string& check_point) {
+  if (!equipment_ || !equipment_->operation) return;
+  begin(Phase::acquire, "touching " + check_point, [equipment = equipment_, check_point]() -> Change {
+    const double off_mm = value_or_throw(equipment->operation->touch(check_point));
+    return [check_point, off_mm](ApplicationState& state) {
+      state.touched_mm.insert_or_assign(check_point, off_mm);
+    };
+  });
+}
+
+void Controller::unlock(const std::string& who) {
+  if (!equipment_ || !equipment_->devices) return;
+  begin(Phase::navigate, "unlocking the robot", [equipment = equipment_, who]() -> Change {
+    value_or_throw(equipment->devices->robot().wait_connected(robot_patience));
+    value_or_throw(equipment->devices->robot().unlock(who));
+    const auto tour = equipment->operation->preview_tour();
+    return [words = tour ? words_of(*tour) : QString()](ApplicationState& state) { state.tour = words; };
+  });
+}
+
+void Controller::register_robot() {
+  if (!equipment_ || !equipment_->operation) return;
+  begin(Phase::navigate, "registering the robot", [this, equipment = equipment_]() -> Change {
+    RobotLink& robot = equipment->devices->robot();
+    value_or_throw(
+        equipment->operation->register_robot([&](const RobotOrder& order) -> Expected<std::string> {
+          if (equipment->stopped) return fail(Reason::interrupted, "stopped by a person");
+          return robot.confirm(order);
+        }));
+    auto live = value_or_throw(equipment->operation->live_tool());
+    return [this, live, rms = equipment->operation->hand_eye().rms_mm](ApplicationState& state) {
+      live_tool_ = live;
+      state.hand_eye_rms_mm = rms;
+    };
+  });
+}
+
+void Controller::plan_tunnel(const std::string& tunnel) {
+  if (!equipment_ || !equipment_->operation) return;
+  follow(tunnel);
+  begin(Phase::navigate, "planning the way to " + tunnel, [this, equipment = equipment_, tunnel]() -> Change {
+    const RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
+    const PathPreview path = value_or_throw(equipment->operation->preview(order));
+    const PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
+    return [this, order, path, watch](ApplicationState& state) {
+      state.order = order;
+      state.path = path;
+      plan_watch_ = watch;
+    };
+  });
+}
+
+void Controller::drop_plan(const Failure& why) {
+  if (state_.busy || !state_.order) return;
+  const RobotOrder order = *std::exchange(state_.order, std::nullopt);
+  state_.path = {};
+  begin(Phase::navigate, "taking the path away", [equipment = equipment_, order, why]() -> Change {
+    static_cast<void>(equipment->operation->check_plan(order));
+    throw BadInput(why);
+  });
+}
+
+void Controller::go() {
+  if (!equipment_ || !equipment_->operation || !state_.order) return;
+  const RobotOrder order = *state_.order;
+  begin(Phase::navigate, "going to " + order.name, [this, equipment = equipment_, order]() -> Change {
+    RobotLink& robot = equipment->devices->robot();
+    const std::string token = robot.confirm(order);
+    equipment->rest = value_or_throw(robot.wait_connected(robot_patience));
+    equipment->last_order = order;
+    const auto outcome = equipment->operation->go(order, token);
+    const Change gone = [out =
+                             outcome || has_left(robot.status(), equipment->rest)](ApplicationState& state) {
+      state.order.reset();
+      state.path = {};
+      state.tool_is_out = out;
+    };
+    if (!outcome) meanwhile(gone);
+    return [gone, outcome = value_or_throw(outcome)](ApplicationState& state) {
+      state.outcomes.insert_or_assign(outcome.tunnel, outcome);
+      gone(state);
+    };
+  });
+}
+
+void Controller::withdraw() {
+  if (!equipment_ || !equipment_->operation || !equipment_->last_order) return;
+  begin(Phase::navigate, "withdrawing", [equipment = equipment_]() -> Change {
+    RobotLink& robot = equipment->devices->robot();
+    value_or_throw(equipment->operation->withdraw(
+        *equipment->last_order, equipment->rest,
+        [&](const RobotOrder& order) { return Expected<std::string>(robot.confirm(order)); }));
+    return [](ApplicationState& state) { state.tool_is_out = false; };
+  });
+}
+
+void Controller::stop() {
+  if (!equipment_ || !equipment_->devices) return;
+  equipment_->stopped = true;
+  errands_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
+}
+
+LiveState Controller::live() const {
+  LiveState now;
+  now.at_s = monotonic_seconds();
+  if (!equipment_ || !equipment_->operation) return now;
+  const PoseBoard& board = equipment_->devices->board();
+  now.lamps = tracker_lamps(equipment_->tracker, board.tools(now.at_s));
+  now.robot = equipment_->devices->robot().status();
+  now.lamps.push_back(robot_lamp(now.robot));
+  now.lamps.push_back(c_arm_lamp(equipment_->devices->c_arm(), now.at_s));
+  if (state_.order && !state_.busy && plan_watch_) {
+    const auto holds = plan_watch_->holds(board, equipment_->devices->robot().track(), now.at_s);
+    if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
+  }
+  if (!live_tool_) return now;
+  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
+  if (tunnel != state_.tunnels.end()) now.bone = tunnel->bone;
+  now.tool = live_tool_->overlay(board, now.bone);
+  if (tunnel == state_.tunnels.end()) return now;
+  now.tunnel = QString::fromStdString(followed_);
+  now.aim = live_tool_->aim(board, followed_);
+  return now;
+}
+
+}  // namespace helicarm::gui

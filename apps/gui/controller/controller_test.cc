@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/controller.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gui/controller/steps.h"
+
+namespace helicarm::gui {
+namespace {
+
+using testing::HasSubstr;
+
+ApplicationState state_with(std::vector<ViewResult> views) {
+  ApplicationState state;
+  state.source = Source::files;
+  state.views = {"AP", "LAT"};
+  state.next_view = "LAT";
+  state.tunnels = {{"femur", Bone::femur, "FS", "FE"}};
+  auto result = std::make_shared<Result>();
+  result->views = std::move(views);
+  state.result = std::move(result);
+  return state;
+}
+
+ViewResult exposed(const std::string& name) {
+  ViewResult view;
+  view.name = name;
+  view.xray_image = std::make_shared<const XrayImage>();
+  return view;
+}
+
+Pick pick(const std::string& name, const std::string& view) {
+  Pick made;
+  made.name = name;
+  made.view = view;
+  return made;
+}
+
+const StepCard& card_of(const std::array<StepCard, phases.size()>& cards, Phase phase) {
+  return cards[std::size_t(phase)];
+}
+
+TEST(Steps, WithoutASourceAllWait) {
+  for (const StepCard& card : steps_of({})) EXPECT_EQ(card.mood, StepMood::waiting);
+}
+
+TEST(Steps, NameTheImageThatIsToCome) {
+  ViewResult missing;
+  missing.name = "LAT";
+  const auto cards = steps_of(state_with({exposed("AP"), missing}));
+  EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 of 2 X-rays");
+  EXPECT_EQ(card_of(cards, Phase::acquire).why, "LAT is to come");
+  EXPECT_EQ(card_of(cards, Phase::acquire).mood, StepMood::waiting);
+}
+
+TEST(Steps, RefusalNamesItsReasonAndDoesNotPassForGood) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.refusals[Phase::rectify] = {Reason::plate_not_found, "no plate", "LAT"};
+  const StepCard card = card_of(steps_of(state), Phase::rectify);
+  EXPECT_EQ(card.mood, StepMood::refused);
+  EXPECT_EQ(card.why, "LAT: no plate (plate_not_found)");
+}
+
+TEST(Steps, WhatIsBeingDoneIsSaid) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.busy = Phase::calibrate;
+  state.doing = "measuring";
+  EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).mood, StepMood::running);
+  EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).why, "measuring");
+}
+
+TEST(Steps, PlanIsGoodOnlyWithAllEndsPlacedAndSaysTheWorst) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.measured = true;
+  EXPECT_EQ(card_of(steps_of(state), Phase::plan).why, "click FS in AP");
+  for (const char* end : {"FS", "FE"})
+    for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
+  EXPECT_EQ(card_of(steps_of(state), Phase::plan).mood, StepMood::waiting);  // not measured with them yet
+  auto result = std::make_shared<Result>(*state.result);
+  for (const double sigma_mm : {0.1, 0.2}) {
+    PointResult point{"FS", PointSource::pick, {}, {}, PointInFrames{}, 0, {}};
+    point.place->covariance_in_calibrator.diagonal().setConstant(sigma_mm * sigma_mm);
+    result->points.push_back(point);
+  }
+  state.result = result;
+  const StepCard card = card_of(steps_of(state), Phase::plan);
+  EXPECT_EQ(card.mood, StepMood::good);
+  EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
+}
+
+TEST(Steps, PointThatCannotBePlacedRefusesThePlan) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.measured = true;
+  for (const char* end : {"FS", "FE"})
+    for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
+  auto result = std::make_shared<Result>(*state.result);
+  result->points.push_back(
+      {"FE", PointSource::pick, {}, {}, {}, 0, Failure{Reason::parallel_rays, "rays are parallel"}});
+  state.result = result;
+  EXPECT_EQ(card_of(steps_of(state), Phase::plan).mood, StepMood::refused);
+  EXPECT_THAT(card_of(steps_of(state), Phase::plan).why.toStdString(), HasSubstr("parallel_rays"));
+}
+
+TEST(Picks, NextOneGoesThroughViewsThenEnds) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSAP");
+  state.picks.push_back(pick("FS", "AP"));
+  EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSLAT");
+}
+
+TEST(Lamps, OldPoseIsNoGreenLight) {
+  TrackerPlan plan;
+  const auto lamps = tracker_lamps(plan, {{.name = "femur", .rejected = {}, .age_s = 0.02},
+                                          {.name = "tibia", .rejected = {}, .age_s = 0.4},
+                                          {.name = "tool", .rejected = {}, .age_s = 7.0}});
+  EXPECT_EQ(lamps[0].light, Light::off);
+  EXPECT_EQ(lamps[1].light, Light::green);
+  EXPECT_EQ(lamps[1].text, "20 ms");
+  EXPECT_EQ(lamps[2].light, Light::amber);
+  EXPECT_EQ(lamps[3].light, Light::red);
+  EXPECT_EQ(lamps[3].text, "7.0 s");
+}
+
+TEST(Lamps, CalibratorIsSeenByOneFacet) {
+  TrackerPlan plan;
+  plan.facets = {{"calibrator/1", {}}, {"calibrator/2", {}}};
+  const auto lamps = tracker_lamps(plan, {{.name = "calibrator/1", .rejected = {}, .age_s = 30.0},
+                                          {.name = "calibrator/2", .rejected = {}, .age_s = 0.03}});
+  EXPECT_EQ(lamps[0].light, Light::green);
+}
+
+TEST(Lamps, StoppedRobotIsRedAndSaysWhy) {
+  RobotLinkStatus status;
+  status.phase = LinkPhase::stopped;
+  status.why = Failure{Reason::robot_stopped, "emergency stop"};
+  const Lamp lamp = robot_lamp(status);
+  EXPECT_EQ(lamp.light, Light::red);
+  EXPECT_THAT(lamp.why.toStdString(), HasSubstr("emergency stop"));
+}
+
+TEST(Lamps, CArmIsGreenByItsLastImageAndRedByWhatWentWrongSince) {
+  EXPECT_EQ(c_arm_lamp({}, 100).light, Light::off);
+  const Lamp well = c_arm_lamp({.last_image_s = 93, .refused = {}}, 100);
+  EXPECT_EQ(well.light, Light::green);
+  EXPECT_EQ(well.text, "7.0 s ago");
+  EXPECT_EQ(c_arm_lamp({.last_image_s = 93, .refused = {}, .broke_off = true}, 100).light, Light::red);
+  const Lamp refused = c_arm_lamp({.last_image_s = 93, .refused = Failure{Reason::bad_value, "cut"}}, 100);
+  EXPECT_EQ(refused.light, Light::red);
+  EXPECT_THAT(refused.why.toStdString(), HasSubstr("cut"));
+}
+
+TEST(Worker, DoesItsJobsInOrderAndEndsWithThoseThatRan) {
+  std::vector<int> done;
+  {
+    Worker worker;
+    std::mutex all;
+    std::condition_variable last;
+    bool over = false;
+    for (int i = 0; i < 100; ++i) worker.post([&, i] { done.push_back(i); });
+    worker.post([&] {
+      const std::lock_guard lock(all);
+      over = true;
+      last.notify_one();
+    });
+    std::unique_lock lock(all);
+    last.wait(lock, [&] { return over; });
+  }
+  ASSERT_EQ(done.size(), 100U);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(done[std::size_t(i)], i);
+}
+
+}  // namespace
+}  // namespace helicarm::gui

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/equipment.h"
+
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "helicarm/phantom/plate.h"
+#include "helicarm/xray/read_xray_image.h"
+
+namespace helicarm::gui {
+namespace {
+
+constexpr int most_entries = 3;
+constexpr double image_patience_s = 20, image_glance_s = 0.1;
+/// An exposure's poses are taken from the second and a half before it.
+constexpr std::chrono::milliseconds before_exposure{1800};
+
+}  // namespace
+
+Expected<Images> take(Equipment& equipment, const std::string& view, const DatedArrival& view_image) {
+  return guarded([&] {
+    value_or_throw(equipment.operation->take(view, view_image.arrival, view_image.time_s));
+    const auto taken = equipment.operation->images();
+    Images images;
+    for (const std::string& name : equipment.operation->plan().views) {
+      ViewResult shown;
+      shown.name = name;
+      if (const auto file = taken.find(name); file != taken.end())
+        shown.xray_image =
+            std::make_shared<const XrayImage>(value_or_throw(read_xray_image(file->second, name, 1)));
+      images.push_back(std::move(shown));
+    }
+    return images;
+  });
+}
+
+namespace {
+
+std::optional<DatedArrival> wait_for_image(Equipment& equipment) {
+  for (int glance = 0; glance * image_glance_s < image_patience_s && !equipment.stopped; ++glance)
+    if (auto view_image = equipment.devices->next_image(image_glance_s)) return view_image;
+  return std::nullopt;
+}
+
+}  // namespace
+
+Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view) {
+  const virtual_devices::ImageReceiver receiver{"127.0.0.1", equipment.devices->receiver_port()};
+  Expected<Images> taken = fail(Reason::not_connected, "no picture came");
+  for (int acquired_view = 0; acquired_view < most_entries && !taken && !equipment.stopped; ++acquired_view) {
+    std::this_thread::sleep_for(before_exposure);
+    const auto sent = virtual_devices::shoot(equipment.virtual_or->simulated_scene(), view, receiver,
+                                             equipment.c_arm_fault);
+    if (!sent) return tl::unexpected<Failure>(sent.error());
+    if (const auto view_image = wait_for_image(equipment)) taken = take(equipment, view, *view_image);
+  }
+  if (!taken && equipment.stopped) return fail(Reason::interrupted, "cancelled");
+  return taken;
+}
+
+Expected<Result> measure(Equipment& equipment, const std::vector<Pick>& picks) {
+  if (equipment.given) {
+    equipment.given->picks = picks;
+    if (!equipment.calibration || equipment.calibrated_by != equipment.options.method) {
+      auto calibration = calibrate_case(*equipment.given, equipment.options);
+      if (!calibration)
+        return result_of_refusal(*equipment.given, std::move(calibration).error(), equipment.options);
+      equipment.calibration = *std::move(calibration);
+      equipment.calibrated_by = equipment.options.method;
+    }
+    return locate_case(*equipment.given, *equipment.calibration, equipment.options);
+  }
+  Json json = Json::array();
+  for (const Pick& pick : picks) json.push_back(helicarm::to_json(pick));
+  equipment.operation->pick(std::move(json));
+  const auto done = equipment.operation->measure();
+  if (const auto& result = equipment.operation->newest_result()) return *result;
+  return tl::unexpected<Failure>(done.error());
+}
+
+Expected<Case> case_of_images(const std::vector<std::filesystem::path>& images) {
+  Case given;
+  given.calibrator = udcsc();
+  given.plate = plate48();
+  for (const std::filesystem::path& view_image : images) {
+    if (!std::filesystem::exists(view_image))
+      return fail(Reason::missing_file, fmt::format("{}: no such file or folder", view_image.string()));
+    CaseView view;
+    view.name = view_image.stem().string();
+    view.image = std::filesystem::absolute(view_image);
+    for (const CaseView& other : given.views)
+      if (other.name == view.name)
+        return fail(Reason::name_clash, fmt::format("{}: two pictures of this name", view.name));
+    given.views.push_back(std::move(view));
+  }
+  if (given.views.size() < 2)
+    return fail(Reason::usage, "one X-ray alone places nothing: drop two or more at once, or a case folder");
+  return given;
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "gui/controller/steps.h"
+
+#include <QCoreApplication>
+#include <algorithm>
+
+#include "helicarm/pipeline/accuracy.h"
+
+namespace helicarm::gui {
+namespace {
+
+QString tr(const char* text) { return QCoreApplication::translate("Steps", text); }
+
+QString text(const std::string& words) { return QString::fromStdString(words); }
+
+/// What the answer gives to doubt, of this view and phase or of all.
+QString doubts(const std::vector<Warning>& warnings) {
+  if (warnings.empty()) return {};
+  const QString first = sentence_of(warnings.front());
+  return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
+}
+
+/// A point's doubt concerns the plan, not the calibration.
+bool is_of_a_point(const Warning& warning) { return warning.figures.contains("ray_gap_mm"); }
+
+std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points) {
+  std::vector<Warning> of_them;
+  for (const Warning& warning : warnings)
+    if (is_of_a_point(warning) == of_points) of_them.push_back(warning);
+  return of_them;
+}
+
+void settle(StepCard& card, const QString& doubt) {
+  card.mood = doubt.isEmpty() ? StepMood::good : StepMood::warning;
+  card.why = doubt;
+}
+
+void acquire(StepCard& card, const ApplicationState& state) {
+  const auto& views = state.result->views;
+  const auto come =
+      std::ranges::count_if(views, [](const ViewResult& view) { return view.xray_image != nullptr; });
+  card.figure = tr("%1 of %2 X-rays").arg(come).arg(state.views.size());
+  if (come == std::ssize(state.views)) return settle(card, {});
+  card.why = tr("%1 is to come").arg(text(state.next_view));
+}
+
+void rectify(StepCard& card, const ApplicationState& state) {
+  double worst = 0;
+  bool bent = false;
+  std::vector<Warning> warnings;
+  for (const ViewResult& view : state.result->views) {
+    if (!view.rectification) return;
+    const Rectification& done = *view.rectification;
+    bent = bent || !done.map.is_identity();
+    worst = std::max(worst, done.map.residual_rms_px);
+    warnings.insert(warnings.end(), done.warnings.begin(), done.warnings.end());
+  }
+  card.figure = bent ? tr("%1 px rms left").arg(worst, 0, 'f', 3) : tr("flat panel");
+  settle(card, doubts(warnings));
+}
+
+void calibrate(StepCard& card, const ApplicationState& state) {
+  int used = 0;
+  std::size_t balls = 0;
+  for (const ViewResult& view : state.result->views) {
+    if (!view.calibrated || !view.found) return;
+    used +=
+        static_cast<int>(std::ranges::count(view.found->fiducials, FiducialStatus::used, &Fiducial::status));
+    balls += view.found->fiducials.size();
+  }
+  card.figure =
+      tr("FRE %1 mm, %2/%3").arg(state.result->accuracy.fre_mm.mean, 0, 'f', 3).arg(used).arg(balls);
+  settle(card, doubts(chosen(state.result->warnings, false)));
+}
+
+void plan(StepCard& card, const ApplicationState& state) {
+  if (const auto wanted = next_pick(state)) {
+    card.why = tr("click %1 in %2").arg(text(wanted->point), text(wanted->view));
+    return;
+  }
+  double worst = 0;
+  int located = 0;
+  for (const PointResult& point : state.result->points) {
+    if (point.source != PointSource::pick) continue;
+    if (point.reason) {
+      card.mood = StepMood::refused;
+      card.why = text(point.name + ": ") + sentence_of(*point.reason);
+      return;
+    }
+    if (!point.place) continue;
+    ++located;
+    worst = std::max(worst, length_at_95(point.place->covariance_in_calibrator));
+  }
+  if (located == 0) return;
+  card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
+  settle(card, doubts(chosen(state.result->warnings, true)));
+}
+
+void navigate(StepCard& card, const ApplicationState& state) {
+  if (!state.hand_eye_rms_mm) return;
+  card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
+  if (state.order) card.why = tr("%1: look at the path, then confirm").arg(text(state.order->name));
+  if (state.outcomes.empty()) return;
+  double worst = 0;
+  for (const auto& [name, outcome] : state.outcomes)
+    if (!outcome.loop.empty()) worst = std::max(worst, outcome.loop.back().distance_mm);
+  card.figure = tr("%1 of %2 tunnels, %3 mm")
+                    .arg(state.outcomes.size())
+                    .arg(state.tunnels.size())
+                    .arg(worst, 0, 'f', 2);
+  if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
+}
+
+void verify(StepCard& card, const ApplicationState& state) {
+  if (state.outcomes.empty()) return;
+  double worst = 0, expected = 0;
+  for (const auto& [name, outcome] : state.outcomes)
+    for (const EndMiss& end : {outcome.start, outcome.end})
+      if (end.distance_mm() >= worst) worst = end.distance_mm(), expected = end.predicted_mm();
+  card.figure = tr("%1 mm (expect %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
+  if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
+}
+
+}  // namespace
+
+Phase phase_of(const Failure& failure) {
+  switch (failure.reason) {
+    case Reason::blank_image:
+    case Reason::saturated:
+    case Reason::plate_not_found:
+    case Reason::plate_mismatch:
+      return Phase::rectify;
+    case Reason::patient_mismatch:
+      return Phase::acquire;
+    case Reason::bad_tunnel:
+    case Reason::not_seen:
+    case Reason::target_not_found:
+    case Reason::parallel_rays:
+    case Reason::uncertain:
+      return Phase::plan;
+    default:
+      return Phase::calibrate;
+  }
+}
+
+QString sentence_of(const Failure& failure) {
+  QString view = text(failure.view);
+  if (!view.isEmpty()) view += ": ";
+  const auto code_of = code(failure.reason);
+  return QString("%1%2 (%3)")
+      .arg(view, text(failure.message),
+           QString::fromUtf8(code_of.data(), static_cast<qsizetype>(code_of.size())));
+}
+
+std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
+  std::array<StepCard, phases.size()> cards;
+  const std::array names{tr("Acquire"), tr("Rectify"),  tr("Calibrate"),
+                         tr("Plan"),    tr("Navigate"), tr("Verify")};
+  using Judge = void (*)(StepCard&, const ApplicationState&);
+  constexpr std::array<Judge, phases.size()> judges{acquire, rectify, calibrate, plan, navigate, verify};
+  for (std::size_t i = 0; i < cards.size(); ++i) {
+    StepCard& card = cards[i];
+    card.phase = phases[i];
+    card.name = names[i];
+    const bool possible = i < 3 || state.measured;
+    if (state.result && possible) judges[i](card, state);
+    if (const auto refusal = state.refusals.find(card.phase); refusal != state.refusals.end()) {
+      card.mood = StepMood::refused;
+      card.why = sentence_of(refusal->second);
+    }
+    if (state.busy == card.phase) {
+      card.mood = StepMood::running;
+      card.why = text(state.doing);
+    }
+  }
+  return cards;
+}
+
+}  // namespace helicarm::gui

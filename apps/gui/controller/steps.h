@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QString>
+
+#include "gui/controller/application_state.h"
+
+namespace helicarm::gui {
+
+enum class StepMood { waiting, running, good, warning, refused };
+
+/// A step as the strip shows it: its mood, the figure that decided it, and why or what to do next.
+struct StepCard {
+  Phase phase = Phase::acquire;
+  QString name;
+  StepMood mood = StepMood::waiting;
+  QString figure;
+  QString why;
+};
+
+std::array<StepCard, phases.size()> steps_of(const ApplicationState& state);
+
+/// The step that a refused measurement concerns.
+Phase phase_of(const Failure& failure);
+
+/// In words, with its code.
+QString sentence_of(const Failure& failure);
+
+}  // namespace helicarm::gui

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <QColor>
+#include <QFont>
+#include <QPainter>
+#include <QPdfWriter>
+#include <QStringList>
+#include <vector>
+
+namespace helicarm::gui {
+
+/// A figure as SVG text, with what stands below it.
+struct LayoutFigure {
+  QByteArray svg;
+  QString caption;
+};
+
+/// A number to be seen first: value, unit and what it is.
+struct LayoutCard {
+  QString value, unit, what;
+};
+
+/// Fills A4 pages from top to bottom; what does not fit goes to the next one. Lengths are mm.
+class PdfLayout {
+ public:
+  /// `footer` stands below each page.
+  PdfLayout(QPdfWriter& writer, QString footer);
+
+  void title(const QString& text);
+  void heading(const QString& text);
+  enum class Tone { plain, soft, bad, good };
+  void paragraph(const QString& text, Tone tone = Tone::plain);
+  void cards(const std::vector<LayoutCard>& cards);
+  /// A column is of numbers where its heading begins with '#'. The headings come again on each page.
+  void table(const QStringList& headings, const std::vector<QStringList>& rows);
+  /// Two side by side.
+  void figures(const std::vector<LayoutFigure>& figures);
+
+ private:
+  double mm(double length) const { return length * dots_per_mm_; }
+  void begin_page();
+  void next_page();
+  /// Goes to the next page where less than this is left.
+  void need(double height);
+  double write(const QString& text, const QFont& font, const QColor& ink);
+  double row_height(const QStringList& cells, const std::vector<double>& widths, const QFont& font) const;
+  void row(const QStringList& cells, const QStringList& headings, const std::vector<double>& widths,
+           const QFont& font, const QColor& ink);
+
+  QPdfWriter& writer_;
+  QString footer_;
+  QPainter painter_;
+  double dots_per_mm_, width_, height_;
+  double y_ = 0;
+  int page_ = 1;
+};
+
+}  // namespace helicarm::gui

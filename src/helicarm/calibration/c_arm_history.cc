@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/c_arm_history.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace helicarm {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double prior_weight = 4;
+constexpr int rounds = 50;
+constexpr double least_information = 1e-9;  // 1 / mm^2
+constexpr std::size_t most_entries = 10000;
+
+Vector3d squares(double focal, double principal) {
+  return {focal * focal, principal * principal, principal * principal};
+}
+
+double variance(double first, double observed, double n) {
+  return (prior_weight * first * first + observed) / (prior_weight + n);
+}
+
+Json row(const Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
+
+HistoryEntry shot_from(JsonReader& reader) {
+  const auto estimate = reader.numbers("estimate_mm", 3, {-1e4, 1e4});
+  const auto information = reader.matrix("information_per_mm2", 3, 3, {-1e12, 1e12});
+  HistoryEntry entry{reader.text("picture"), reader.text("view"), Vector3d(estimate.data()),
+                     Matrix3d(information.data())};
+  reader.finish();
+  const double lowest = Eigen::SelfAdjointEigenSolver<Matrix3d>(entry.information).eigenvalues().minCoeff();
+  if (!(lowest > 0) || !entry.information.isApprox(entry.information.transpose(), 1e-9))
+    reader.refuse(Reason::bad_value, "information_per_mm2", "is not symmetric and positive");
+  return entry;
+}
+
+}  // namespace
+
+LearnedIntrinsics learn_intrinsics(std::span<const HistoryEntry> entries, const Vector3d& nominal_mm,
+                                   const CArmPrior& unknown) {
+  LearnedIntrinsics known{nominal_mm, unknown};
+  if (entries.empty()) return known;
+  const double n = double(entries.size());
+  const Matrix3d assumed =
+      squares(unknown.focal->common, unknown.principal->common).cwiseInverse().asDiagonal();
+  for (int round = 0; round < rounds; ++round) {
+    const Vector3d sag = squares(known.prior.focal->of_view, known.prior.principal->of_view);
+    Matrix3d information = assumed;
+    Vector3d pull = assumed * nominal_mm;
+    for (const HistoryEntry& entry : entries) {
+      const Matrix3d of_mean = (entry.information.inverse() + Matrix3d(sag.asDiagonal())).inverse();
+      information += of_mean;
+      pull += of_mean * entry.estimate_mm;
+    }
+    const Matrix3d covariance = information.inverse();
+    known.mean_mm = covariance * pull;
+    Vector3d observed = Vector3d::Zero();
+    for (const HistoryEntry& entry : entries) {
+      const Matrix3d posterior = (entry.information + Matrix3d(sag.cwiseInverse().asDiagonal())).inverse();
+      const Matrix3d gain = posterior * entry.information;
+      const Vector3d variation = gain * (entry.estimate_mm - known.mean_mm);
+      observed += (posterior + gain * covariance * gain.transpose()).diagonal() + variation.cwiseAbs2();
+    }
+    known.prior.focal = {std::sqrt(covariance(0, 0)),
+                         std::sqrt(variance(unknown.focal->of_view, observed(0), n))};
+    known.prior.principal = {
+        std::sqrt((covariance(1, 1) + covariance(2, 2)) / 2),
+        std::sqrt(variance(unknown.principal->of_view, (observed(1) + observed(2)) / 2, n))};
+  }
+  return known;
+}
+
+std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const std::string& image,
+                                             const CommonPrior& unknown) {
+  if (!view.prior.focal_px || !view.prior.principal_px) return std::nullopt;
+  CalibrationOptions options;
+  options.common = unknown;
+  options.rejection_probability = 0;  // the false balls are out already
+  const auto alone = calibrate({view}, options);
+  if (!alone) return std::nullopt;
+  const CalibratedView& calibrated = alone->views[0];
+  const Intrinsics& k = calibrated.view.intrinsics;
+  const double hand = k.fx < 0 ? -1 : 1;
+  Eigen::Matrix<double, 3, 4> in_mm;
+  in_mm << 0.5 * hand, 0.5, 0, 0, 0, 0, hand, 0, 0, 0, 0, 1;
+  in_mm /= view.prior.unit_px;
+  const Vector3d nominal(*view.prior.focal_px / view.prior.unit_px, 0, 0);
+  const Vector3d posterior = in_mm * Eigen::Vector4d(k.fx, k.fy, k.u0 - view.prior.principal_px->x(),
+                                                     k.v0 - view.prior.principal_px->y());
+  const Matrix3d information =
+      (in_mm * calibrated.covariance.topLeftCorner<4, 4>() * in_mm.transpose()).inverse();
+  const auto variance_of = [](const IntrinsicsVariation& d) { return std::hypot(d.common, d.of_view); };
+  const Matrix3d assumed = squares(variance_of(*unknown.c_arm.focal), variance_of(*unknown.c_arm.principal))
+                               .cwiseInverse()
+                               .asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> told(information - assumed);
+  const Matrix3d own = told.eigenvectors() * told.eigenvalues().cwiseMax(least_information).asDiagonal() *
+                       told.eigenvectors().transpose();
+  // posterior = own^-1-weighted mean of the estimate and the nominal values.
+  const Vector3d estimate = posterior + own.ldlt().solve(assumed * (posterior - nominal));
+  return HistoryEntry{image, view.name, estimate, own};
+}
+
+IntrinsicsPrior learned_prior(IntrinsicsPrior prior, const LearnedIntrinsics& knowledge, bool mirrored) {
+  prior.focal_px = knowledge.mean_mm.x() * prior.unit_px;
+  *prior.principal_px +=
+      prior.unit_px * Eigen::Vector2d((mirrored ? -1 : 1) * knowledge.mean_mm.y(), knowledge.mean_mm.z());
+  return prior;
+}
+
+Expected<CArmHistory> read_history(const std::filesystem::path& path) {
+  return read_json(path).and_then(
+      [&](const Json& json) { return history_from_json(json, path.filename().string()); });
+}
+
+Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin) {
+  return guarded([&] {
+    JsonReader reader(json, origin);
+    reader.choice("format", {"helicarm-machine/1"});
+    CArmHistory history;
+    for (JsonReader& entry : reader.objects("shots", true, most_entries))
+      history.entries.push_back(shot_from(entry));
+    reader.finish();
+    return history;
+  });
+}
+
+Json to_json(const CArmHistory& history) {
+  Json json{{"format", "helicarm-machine/1"}, {"shots", Json::array()}};
+  for (const HistoryEntry& entry : history.entries)
+    json["shots"].push_back(
+        {{"picture", entry.image},
+         {"view", entry.view},
+         {"estimate_mm", row(entry.estimate_mm)},
+         {"information_per_mm2", Json::array({row(entry.information.col(0)), row(entry.information.col(1)),
+                                              row(entry.information.col(2))})}});
+  return json;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "helicarm/guidance/poses.h"
+
+namespace helicarm {
+
+enum class Marker { calibrator, femur, tibia, tool };
+
+/// One reading of one marker: two points that went through the same reading share its error.
+using Reading = std::pair<Marker, int>;
+
+/// A point on its way through the frames, with the first-order effect of every tracker reading on it. A
+/// measured pose is the true one times a small motion (shift tau, turn omega) about the marker's own origin.
+struct PropagatedPoint {
+  Eigen::Vector3d point;
+  Eigen::Matrix3d covariance;                                 ///< from the X-rays
+  std::map<Reading, Eigen::Matrix<double, 3, 6>> by_reading;  ///< d point / d (tau, omega)
+  Eigen::Matrix3Xd by_calibration = {};                       ///< d point / d the views' parameters
+
+  Eigen::Matrix3d total_covariance(const TrackerNoise& noise) const;
+};
+
+/// Covariance of the way from one point to another in the same frame, mm^2: what both owe to the same
+/// calibration (its covariance given) and to the same readings falls out.
+Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const PropagatedPoint& to,
+                                   const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
+
+/// From a marker's frame to the tracker's.
+PropagatedPoint enter_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+                              Reading reading);
+
+/// From the tracker's frame to a marker's.
+PropagatedPoint leave_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+                              Reading reading);
+
+}  // namespace helicarm

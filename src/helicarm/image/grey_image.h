@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "helicarm/image/image.h"
+
+namespace helicarm {
+
+/// Limits for every image file.
+inline constexpr std::uint32_t max_image_side = 16384;
+inline constexpr std::size_t max_image_bytes = std::size_t{64} << 20;
+
+/// A decoded grey image: values as stored, 0 .. 2^bits - 1.
+struct GreyImage {
+  Image<std::uint16_t> pixels;
+  int bits = 8;  ///< 8 or 16
+};
+
+}  // namespace helicarm

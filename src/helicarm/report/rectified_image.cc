@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/report/rectified_image.h"
+
+#include <cmath>
+
+#include "helicarm/image/grey_window.h"
+
+namespace helicarm {
+
+Image<std::uint8_t> rectified_image(const ViewResult& view) {
+  const bool as_stored = !view.rectification || view.rectification->map.is_identity();
+  const Image<float> image =
+      as_stored ? view.xray_image->pixels : resample(*view.xray_image, view.rectification->map);
+  return eight_bit(image, usual_window(image, view.xray_image->lowest));
+}
+
+double round_below(double limit) {
+  const double decade = std::pow(10, std::floor(std::log10(limit)));
+  for (double factor : {5.0, 2.0})
+    if (factor * decade <= limit) return factor * decade;
+  return decade;
+}
+
+}  // namespace helicarm

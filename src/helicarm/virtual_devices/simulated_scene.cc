@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/virtual_devices/simulated_scene.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace helicarm::virtual_devices {
+namespace {
+
+using Eigen::Vector3d;
+using simulation::MarkerFacet;
+using simulation::TrackedBody;
+
+/// The base beside the knee at the height of the table's edge, x towards the patient, z up (the knee's
+/// anterior side): both tunnels' axes lie within the arm's reach.
+const RigidTransform calibrator_from_base{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(),
+                                          {60, 520, -160}};
+
+/// Turns z into the direction.
+Eigen::Matrix3d facing(const Vector3d& direction) {
+  return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<SimulatedScene>> SimulatedScene::set_up(std::uint64_t seed, int image_size) {
+  simulation::SimulationOptions options;
+  options.seed = seed;
+  options.kind = simulation::CaseKind::tunnels;
+  options.size = image_size;
+  auto simulated_case = simulation::simulate_case(options);
+  if (!simulated_case) return tl::unexpected<Failure>(simulated_case.error());
+  return std::unique_ptr<SimulatedScene>(new SimulatedScene(*std::move(simulated_case)));
+}
+
+SimulatedScene::SimulatedScene(simulation::SimulatedCase simulated_case)
+    : simulated_case_(std::move(simulated_case)), tracker_from_(simulated_case_.navigation->tracker_from) {
+  tracker_from_base_ = tracker_from_.at("calibrator") * calibrator_from_base;
+}
+
+RigidTransform SimulatedScene::tracker_from(const std::string& body) const {
+  const std::lock_guard lock(mutex_);
+  return tracker_from_.at(body);
+}
+
+RigidTransform SimulatedScene::tracker_from_marker(const std::string& bone) const {
+  const std::lock_guard lock(mutex_);
+  RigidTransform pose = tracker_from_.at(bone);
+  if (const auto bumped = marker_in_bone_.find(bone); bumped != marker_in_bone_.end())
+    pose.translation = pose * bumped->second;
+  return pose;
+}
+
+void SimulatedScene::bump_marker(const std::string& bone, const Vector3d& shift_mm) {
+  const std::lock_guard lock(mutex_);
+  marker_in_bone_.try_emplace(bone, Vector3d::Zero()).first->second += shift_mm;
+}
+
+RigidTransform SimulatedScene::tracker_from_pointer() const {
+  const std::string bone = [&] {
+    const std::lock_guard lock(mutex_);
+    return touched_;
+  }();
+  const Eigen::Matrix3d turn = tracker_from(bone).rotation;  // which the tracker sees
+  return {turn, point_in_tracker(bone == "femur" ? "FE" : "TS") - turn * tip_in_pointer};
+}
+
+void SimulatedScene::touch(const std::string& bone) {
+  const std::lock_guard lock(mutex_);
+  touched_ = bone;
+}
+
+void SimulatedScene::move_bone(const std::string& bone, const RigidTransform& motion_in_tracker) {
+  const std::lock_guard lock(mutex_);
+  RigidTransform& pose = tracker_from_.at(bone);
+  pose = {motion_in_tracker.rotation * pose.rotation, pose.translation + motion_in_tracker.translation};
+}
+
+void SimulatedScene::turn_bone(const std::string& bone, const Vector3d& about, const Eigen::Matrix3d& turn) {
+  const std::lock_guard lock(mutex_);
+  RigidTransform& pose = tracker_from_.at(bone);
+  pose = {turn * pose.rotation, about + turn * (pose.translation - about)};
+}
+
+RigidTransform SimulatedScene::tracker_from_base() const {
+  const std::lock_guard lock(mutex_);
+  return tracker_from_base_;
+}
+
+void SimulatedScene::move_base(const Vector3d& shift_mm) {
+  const std::lock_guard lock(mutex_);
+  tracker_from_base_.translation += shift_mm;
+}
+
+Vector3d SimulatedScene::point_in_tracker(const std::string& name) const {
+  const auto point =
+      std::ranges::find(simulated_case_.navigation->points, name, &simulation::TunnelPoint::name);
+  if (point == simulated_case_.navigation->points.end()) throw std::invalid_argument("no point " + name);
+  return tracker_from(point->bone) * point->in_bone;
+}
+
+RobotTool SimulatedScene::tool() const { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
+
+RigidTransform SimulatedScene::flange_from_marker() const {
+  // Clamped to the drill's side, by hand.
+  return {Eigen::AngleAxisd(0.35, Vector3d(0.2, 0.9, -0.4).normalized()).toRotationMatrix(), {12, 70, 40}};
+}
+
+TrackedBody tool_markers() {
+  TrackedBody body;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1.0, 1.0}) {
+      const Vector3d normal = side * Vector3d::Unit(axis);
+      MarkerFacet facet{normal, {}};
+      for (const auto& [x, y] : {std::pair{-30.0, -24.0}, {28.0, -30.0}, {22.0, 30.0}, {-18.0, 16.0}})
+        facet.markers_in_body.push_back(facing(normal) * Vector3d(x, y, 30));
+      body.facets.push_back(facet);
+    }
+  return body;
+}
+
+std::vector<TrackedFacet> calibrator_facets() {
+  std::vector<TrackedFacet> facets;
+  for (const MarkerFacet& facet : simulation::calibrator_markers().facets) {
+    Vector3d middle = Vector3d::Zero();
+    for (const Vector3d& marker : facet.markers_in_body)
+      middle += marker / double(facet.markers_in_body.size());
+    const RigidTransform calibrator_from_facet{facing(facet.normal_in_body), middle};
+    MarkerFacet own{Vector3d::UnitZ(), {}};
+    for (const Vector3d& marker : facet.markers_in_body)
+      own.markers_in_body.push_back(calibrator_from_facet.inverse() * marker);
+    facets.push_back({fmt::format("calibrator/{}", facets.size() + 1), calibrator_from_facet, {{own}}});
+  }
+  return facets;
+}
+
+}  // namespace helicarm::virtual_devices

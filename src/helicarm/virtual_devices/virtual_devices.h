@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "helicarm/devices/robot/virtual_ur.h"
+#include "helicarm/virtual_devices/virtual_c_arm.h"
+#include "helicarm/virtual_devices/virtual_tracker.h"
+
+namespace helicarm::virtual_devices {
+
+struct VirtualDevicesOptions {
+  std::uint64_t seed = 1;
+  int image_size = 1024;
+  double tracker_rate_hz = 30;
+  std::uint16_t tracker_port = 18944;  ///< each 0: any that is free
+  std::uint16_t rtde_port = 30004;
+  std::uint16_t dashboard_port = 29999;
+  std::uint16_t script_port = 30002;
+  /// A line for a log on each client of tracker or robot that was cut off; from their threads.
+  std::function<void(const std::string&)> on_notice = [](const std::string&) {};
+};
+
+/// A theatre with tracker and robot switched on; the C-arm shoots by `shoot`. Everything listens on this
+/// machine alone.
+class VirtualDevices {
+ public:
+  /// Refuses as `SimulatedScene::set_up`, VirtualTracker and VirtualUr.
+  static Expected<std::unique_ptr<VirtualDevices>> open(const VirtualDevicesOptions& options);
+
+  SimulatedScene& simulated_scene() { return *simulated_scene_; }
+  VirtualTracker& tracker() { return *tracker_; }
+  VirtualUr& robot() { return *robot_; }
+
+  /// Where the tip of the tool truly is, and its axis (z).
+  RigidTransform tracker_from_tip();
+
+  /// Switches a fault on or off by its name, one of `virtual_fault_names`. An unknown one is bad_value.
+  Expected<void> set_fault(const std::string& name, bool on);
+
+  /// Holds the pointer's tip to a bone ("femur" or "tibia"), still; before and after, it is not seen.
+  void touch(const std::string& bone);
+  void lift_pointer();
+
+  /// As somebody at the robot does after an emergency stop: power on, brakes open. The robot's answers.
+  std::string power_on();
+
+ private:
+  VirtualDevices() = default;
+
+  std::unique_ptr<SimulatedScene> simulated_scene_;
+  std::unique_ptr<VirtualUr> robot_;
+  std::unique_ptr<VirtualTracker> tracker_;
+};
+
+/// hide:BODY, and all faults of tracker and robot, for a person.
+std::string virtual_fault_names();
+
+/// Names of the tools that the tracker follows: the bones, the tool and the calibrator's facets.
+inline constexpr const char* tool_marker = "tool";
+inline constexpr const char* pointer_marker = "pointer";
+
+}  // namespace helicarm::virtual_devices

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/virtual_devices/virtual_devices.h"
+
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/tracker/igtl_client.h"
+#include "helicarm/devices/tracker/pose_board.h"
+
+namespace helicarm::virtual_devices {
+namespace {
+
+constexpr int small = 512;
+
+VirtualDevicesOptions any_ports() {
+  VirtualDevicesOptions options;
+  options.image_size = small;
+  options.tracker_rate_hz = 200;
+  options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
+  return options;
+}
+
+class VirtualDevicesTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { virtual_or_ = VirtualDevices::open(any_ports()).value(); }
+  static void TearDownTestSuite() { virtual_or_.reset(); }
+
+  static std::unique_ptr<VirtualDevices> virtual_or_;
+};
+std::unique_ptr<VirtualDevices> VirtualDevicesTest::virtual_or_;
+
+/// Follows the room's tracker until the tool's poses number so many.
+class Follower {
+ public:
+  explicit Follower(VirtualDevices& virtual_or) {
+    IgtlClientOptions options;
+    options.port = virtual_or.tracker().port();
+    options.ask_for_tracking = true;
+    client_ = IgtlClient::start(options, [this](const IgtlMessage& message, double arrival_s) {
+                board_.take(message, arrival_s);
+              }).value();
+  }
+  std::optional<RigidTransform> wait_for(const std::string& tool, std::uint64_t poses) {
+    for (int i = 0; i < 1000; ++i) {
+      for (const ToolState& state : board_.tools(monotonic_seconds()))
+        if (state.name == tool && state.accepted >= poses) return state.tracker_from_tool;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return std::nullopt;
+  }
+
+  bool knows(const std::string& tool) const {
+    for (const ToolState& state : board_.tools(monotonic_seconds()))
+      if (state.name == tool) return true;
+    return false;
+  }
+
+ private:
+  PoseBoard board_;
+  std::unique_ptr<IgtlClient> client_;
+};
+
+TEST_F(VirtualDevicesTest, TrackerReportsWhereBonesAreWithinItsNoise) {
+  Follower follower(*virtual_or_);
+  for (const char* bone : {"femur", "tibia"}) {
+    const auto seen = follower.wait_for(bone, 5);
+    ASSERT_TRUE(seen) << bone;
+    EXPECT_LT((seen->translation - virtual_or_->simulated_scene().tracker_from(bone).translation).norm(), 1.5)
+        << bone;
+  }
+}
+
+TEST_F(VirtualDevicesTest, TrackerSeesTheToolWhereTheRobotTrulyHoldsIt) {
+  Follower follower(*virtual_or_);
+  const auto seen = follower.wait_for(tool_marker, 5);
+  ASSERT_TRUE(seen);
+  const RigidTransform tip = *seen * virtual_or_->simulated_scene().flange_from_marker().inverse() *
+                             virtual_or_->simulated_scene().tool().flange_from_tcp;
+  EXPECT_LT((tip.translation - virtual_or_->tracker_from_tip().translation).norm(), 3);
+}
+
+TEST_F(VirtualDevicesTest, SomeFacetOfTheCalibratorIsSeenAndReportsItsPose) {
+  Follower follower(*virtual_or_);
+  ASSERT_TRUE(follower.wait_for("femur", 20));
+  int seen = 0;
+  for (const TrackedFacet& facet : calibrator_facets()) {
+    if (!follower.knows(facet.name)) continue;
+    ++seen;
+    const RigidTransform calibrator =
+        *follower.wait_for(facet.name, 1) * facet.calibrator_from_facet.inverse();
+    EXPECT_LT((calibrator.translation - virtual_or_->simulated_scene().tracker_from("calibrator").translation)
+                  .norm(),
+              4);
+  }
+  EXPECT_GE(seen, 1);
+}
+
+TEST_F(VirtualDevicesTest, HiddenMarkerIsLeftOut) {
+  ASSERT_TRUE(virtual_or_->set_fault("hide:tibia", true));
+  Follower follower(*virtual_or_);
+  ASSERT_TRUE(follower.wait_for("femur", 20));
+  EXPECT_FALSE(follower.knows("tibia"));
+  ASSERT_TRUE(virtual_or_->set_fault("hide:tibia", false));
+  EXPECT_TRUE(follower.wait_for("tibia", 1));
+}
+
+TEST_F(VirtualDevicesTest, BoneThatMovesTakesItsBallsAlong) {
+  const Eigen::Vector3d before = virtual_or_->simulated_scene().point_in_tracker("FS");
+  virtual_or_->simulated_scene().move_bone("femur", {Eigen::Matrix3d::Identity(), {1, 2, 3}});
+  EXPECT_NEAR(
+      (virtual_or_->simulated_scene().point_in_tracker("FS") - before - Eigen::Vector3d(1, 2, 3)).norm(), 0,
+      1e-9);
+  virtual_or_->simulated_scene().move_bone("femur", {Eigen::Matrix3d::Identity(), {-1, -2, -3}});
+}
+
+TEST_F(VirtualDevicesTest, UnknownFaultAndViewAreRefused) {
+  EXPECT_EQ(virtual_or_->set_fault("gremlins", true).error().reason, Reason::bad_value);
+  EXPECT_EQ(shoot(virtual_or_->simulated_scene(), "PA", {}).error().reason, Reason::bad_value);
+}
+
+class Acquisitions : public VirtualDevicesTest {
+ protected:
+  void SetUp() override {
+    inbox_ = Inbox::open(folder_).value();
+    ReceiverOptions options;
+    options.port = 0;
+    receiver_ = DicomReceiver::open(options, *inbox_).value();
+  }
+  void TearDown() override {
+    receiver_.reset();
+    inbox_.reset();
+  }
+  Expected<void> acquired_view(const char* view, CArmFault fault = CArmFault::none) {
+    return shoot(virtual_or_->simulated_scene(), view, {"127.0.0.1", receiver_->port()}, fault);
+  }
+
+  TemporaryFolder temporary_;
+  std::filesystem::path folder_ = temporary_.path();
+  std::unique_ptr<Inbox> inbox_;
+  std::unique_ptr<DicomReceiver> receiver_;
+};
+
+TEST_F(Acquisitions, ImageOfAnotherProgramsSenderArrives) {
+  ASSERT_TRUE(acquired_view("AP"));
+  ASSERT_TRUE(acquired_view("LAT"));
+  EXPECT_EQ(receiver_->counters().stored, 2u);
+}
+
+TEST_F(Acquisitions, WrongTitleIsRejected) {
+  EXPECT_FALSE(acquired_view("AP", CArmFault::wrong_title));
+  EXPECT_EQ(receiver_->counters().rejected, 1u);
+}
+
+TEST_F(Acquisitions, AssociationThatBreaksOffLeavesNothing) {
+  EXPECT_FALSE(acquired_view("AP", CArmFault::breaks_off));
+  ASSERT_TRUE(acquired_view("AP"));
+  EXPECT_EQ(receiver_->counters().stored, 1u);
+}
+
+}  // namespace
+}  // namespace helicarm::virtual_devices

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/virtual_devices/virtual_tracker.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <limits>
+
+namespace helicarm::virtual_devices {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::uint32_t samples_stream = 2000;  // and the next: two per body
+constexpr double hour_s = 3600;
+
+std::uint64_t stamp_now(double offset_s) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return stamp_from_seconds(std::chrono::duration<double>(now).count() + offset_s);
+}
+
+std::string other_bone(const std::string& name) {
+  return name == "femur" ? "tibia" : name == "tibia" ? "femur" : name;
+}
+
+void swap_with_calibrator(std::vector<IgtlTool>& tools) {
+  const auto femur = std::ranges::find(tools, "femur", &IgtlTool::name);
+  const auto facet =
+      std::ranges::find_if(tools, [](const IgtlTool& tool) { return tool.name.starts_with("calibrator/"); });
+  if (femur != tools.end() && facet != tools.end()) std::swap(femur->name, facet->name);
+}
+
+}  // namespace
+
+Expected<std::unique_ptr<VirtualTracker>> VirtualTracker::start(const VirtualTrackerOptions& options,
+                                                                std::vector<FollowedBody> bodies) {
+  auto server = IgtlServer::start(options.server);
+  if (!server) return tl::unexpected<Failure>(server.error());
+  return std::unique_ptr<VirtualTracker>(new VirtualTracker(options, std::move(bodies), *std::move(server)));
+}
+
+VirtualTracker::VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
+                               std::unique_ptr<IgtlServer> server)
+    : options_(options),
+      bodies_(std::move(bodies)),
+      server_(std::move(server)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+std::vector<std::string> VirtualTracker::bodies() const {
+  std::vector<std::string> names;
+  for (const FollowedBody& followed : bodies_) names.push_back(followed.name);
+  return names;
+}
+
+bool VirtualTracker::hide(const std::string& body, bool hidden) {
+  if (std::ranges::find(bodies_, body, &FollowedBody::name) == bodies_.end()) return false;
+  const std::lock_guard lock(mutex_);
+  if (hidden)
+    hidden_.insert(body);
+  else
+    hidden_.erase(body);
+  return true;
+}
+
+void VirtualTracker::set(TrackerFault fault, bool on) {
+  const std::lock_guard lock(mutex_);
+  if (on)
+    faults_.insert(fault);
+  else
+    faults_.erase(fault);
+}
+
+void VirtualTracker::run(const std::stop_token& stop) {
+  const auto period =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1 / options_.rate_hz));
+  std::mutex mutex;
+  std::condition_variable_any pause;
+  std::unique_lock lock(mutex);
+  auto next = Clock::now();
+  for (std::uint64_t number = 0; !stop.stop_requested(); ++number) {
+    notify(number);
+    next = std::max(next + period, Clock::now() - period);  // samples that were missed are not made up for
+    pause.wait_until(lock, stop, next, [] { return false; });
+  }
+}
+
+void VirtualTracker::notify(std::uint64_t number) {
+  // Not held while it computes: a machine too slow for the rate would never let others have it.
+  std::unique_lock lock(mutex_);
+  const auto faults = faults_;
+  const auto hidden = hidden_;
+  lock.unlock();
+  const auto has = [&](TrackerFault fault) { return faults.contains(fault); };
+  if (has(TrackerFault::silent)) return;
+  if (!has(TrackerFault::frozen)) {
+    IgtlTracking tracking;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+      const FollowedBody& followed = bodies_[i];
+      const RigidTransform truth = followed.tracker_from_body();
+      const simulation::TrackerSample sample = simulation::track_sample(
+          options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
+          options_.seed, samples_stream + 2 * std::uint32_t(i), number);
+      if (sample.valid() && !hidden.contains(followed.name))
+        tracking.tools.push_back({has(TrackerFault::swapped) ? other_bone(followed.name) : followed.name, 2,
+                                  sample.tracker_from_body->matrix()});
+      else if (has(TrackerFault::identity))
+        tracking.tools.push_back({followed.name, 2, Eigen::Matrix4d::Identity()});
+    }
+    if (has(TrackerFault::not_finite))
+      for (IgtlTool& tool : tracking.tools) tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
+    if (has(TrackerFault::swapped_calibrator)) swap_with_calibrator(tracking.tools);
+    last_.device = "virtual";
+    last_.content = std::move(tracking);
+  }
+  last_.stamp = stamp_now(has(TrackerFault::time_jump) ? -hour_s : 0);
+  server_->send(last_);
+}
+
+}  // namespace helicarm::virtual_devices

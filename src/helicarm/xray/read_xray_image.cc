@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/xray/read_xray_image.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/image/png.h"
+#include "helicarm/image/tiff.h"
+#include "helicarm/xray/dicom_acquisition.h"
+#include "helicarm/xray/read_dicom.h"
+
+namespace helicarm {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::uintmax_t max_file_bytes = 256u << 20;
+
+fs::path sidecar_of(const fs::path& grey_image) {
+  fs::path full = grey_image;
+  full += ".json";
+  if (fs::exists(full)) return full;
+  fs::path plain = grey_image;
+  plain.replace_extension(".json");
+  if (!fs::exists(plain))
+    throw BadInput(
+        Reason::missing_file,
+        fmt::format("{}: no such file: the sidecar of {}, holding \"pixel_mm\" and \"source_detector_mm\"",
+                    plain.string(), grey_image.filename().string()));
+  return plain;
+}
+
+Acquisition read_sidecar(const fs::path& path) {
+  const Json json = value_or_throw(read_json(path));
+  JsonReader reader(json, path.filename().string());
+  Acquisition acquisition;
+  if (const auto pixel_mm = reader.optional_number("pixel_mm", {min_pixel_mm, max_pixel_mm}))
+    acquisition.pixel_mm = Eigen::Vector2d::Constant(*pixel_mm);
+  acquisition.source_detector_mm =
+      reader.optional_number("source_detector_mm", {min_source_detector_mm, max_source_detector_mm});
+  reader.finish();
+  return acquisition;
+}
+
+XrayImage xray_image_of_png(const GreyImage& grey_image, const fs::path& path) {
+  XrayImage xray_image;
+  xray_image.acquisition = read_sidecar(sidecar_of(path));
+  xray_image.highest = grey_image.bits == 8 ? 255 : 65535;
+  xray_image.pixels = Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
+  std::ranges::copy(grey_image.pixels.pixels(), xray_image.pixels.pixels().begin());
+  const std::string origin = path.filename().string();
+  if (!xray_image.acquisition.pixel_mm)
+    xray_image.warnings.push_back(
+        {Reason::spacing_missing, fmt::format("{}: its sidecar gives no \"pixel_mm\"", origin)});
+  make_metal_dark(xray_image, origin);
+  xray_image.acquisition.instance_key = image_key(xray_image.pixels);
+  return xray_image;
+}
+
+XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
+  const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
+  const std::string origin = path.filename().string();
+  if (bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0)
+    return value_or_throw(read_dicom(bytes, origin, frame));
+  if (is_png(bytes)) {
+    value_or_throw(choose_frame(origin, 1, frame));
+    return xray_image_of_png(value_or_throw(decode_png(bytes, origin)), path);
+  }
+  if (is_tiff(bytes)) {
+    const int pages = value_or_throw(count_tiff_pages(bytes, origin));
+    const int page = value_or_throw(choose_frame(origin, pages, frame));
+    return xray_image_of_png(value_or_throw(decode_tiff(bytes, page, origin)), path);
+  }
+  throw BadInput(Reason::not_an_image,
+                 fmt::format("{}: {}, neither DICOM with a preamble nor PNG nor TIFF", origin,
+                             bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size())));
+}
+
+}  // namespace
+
+Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& view_name,
+                                    std::optional<int> frame) {
+  auto xray_image = guarded([&] { return read_by_content(path, frame); });
+  if (!xray_image) {
+    Failure failure = std::move(xray_image).error();
+    failure.view = view_name;
+    return tl::unexpected<Failure>(std::move(failure));
+  }
+  xray_image->name = view_name;
+  for (Warning& warning : xray_image->warnings) warning.view = view_name;
+  return xray_image;
+}
+
+}  // namespace helicarm

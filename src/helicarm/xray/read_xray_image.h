@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "helicarm/xray/xray_image.h"
+
+namespace helicarm {
+
+/// Reads a DICOM, PNG or TIFF X-ray, told apart by content. `frame` is 1-based and needed only if the file
+/// has several. PNG and TIFF have a sidecar NAME.json (or NAME.png.json) beside them with `pixel_mm` and
+/// `source_detector_mm`, either of which may be null. Pixels stay as stored, neither flipped nor turned.
+/// Failures name file and view; codes: missing_file, not_an_image, truncated, bad_size, bad_value,
+/// unsupported, and those of the sidecar's JSON. Safe to call from several threads.
+Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
+                                    std::optional<int> frame);
+
+}  // namespace helicarm
