@@ -69,7 +69,26 @@ void MainWindow::build() {
   auto* column = new QVBoxLayout(middle);
   column->setContentsMargins(6, 6, 6, 6);
   column->setSpacing(6);
+  column->addLayout(build_top());
+  auto* sides = new QSplitter(Qt::Horizontal);
+  for (std::size_t i = 0; i < xrays_.size(); ++i) {
+    xrays_[i] = new XrayView;
+    xrays_[i]->setObjectName(QString("xray%1").arg(i));
+    sides->addWidget(xrays_[i]);
+    sides->setStretchFactor(int(i), 3);
+    connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
+  }
+  sides->addWidget(build_right());
+  sides->setStretchFactor(2, 3);
+  column->addWidget(sides, 1);
+  live_bar_ = new LiveBar;
+  column->addWidget(live_bar_);
+  setCentralWidget(middle);
+  build_status();
+  build_replay();
+}
 
+QLayout* MainWindow::build_top() {
   auto* top = new QHBoxLayout;
   strip_ = new StepStrip;
   top->addWidget(strip_, 1);
@@ -80,24 +99,27 @@ void MainWindow::build() {
   stop->setFocusPolicy(Qt::NoFocus);
   connect(stop, &QPushButton::pressed, &controller_, &Controller::stop);
   top->addWidget(stop);
-  column->addLayout(top);
   connect(strip_, &StepStrip::chosen, this, [this](Phase phase) {
     moved_on_ = true;
     show_phase(phase);
   });
+  return top;
+}
 
-  auto* sides = new QSplitter(Qt::Horizontal);
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    xrays_[i] = new XrayView;
-    xrays_[i]->setObjectName(QString("xray%1").arg(i));
-    sides->addWidget(xrays_[i]);
-    sides->setStretchFactor(int(i), 3);
-    connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
-  }
+QWidget* MainWindow::build_right() {
   auto* right = new QSplitter(Qt::Vertical);
   scene_ = new SceneView;
   scene_->setObjectName("scene");
   right->addWidget(scene_);
+  build_pages();
+  right->addWidget(pages_);
+  right->setSizes({280, 380});
+  constexpr int widest_button = 416;
+  right->setMinimumWidth(widest_button);
+  return right;
+}
+
+void MainWindow::build_pages() {
   pages_ = new QStackedWidget;
   auto* acquire = new AcquirePage(controller_, this);
   auto* rectify = new RectifyPage(controller_, this);
@@ -115,18 +137,6 @@ void MainWindow::build() {
     pages_->addWidget(scrolled);
     all_pages_.push_back(page);
   }
-  right->addWidget(pages_);
-  right->setSizes({280, 380});
-  constexpr int widest_button = 416;
-  right->setMinimumWidth(widest_button);
-  sides->addWidget(right);
-  sides->setStretchFactor(2, 3);
-  column->addWidget(sides, 1);
-  live_bar_ = new LiveBar;
-  column->addWidget(live_bar_);
-  setCentralWidget(middle);
-  build_status();
-
   connect(acquire, &AcquirePage::rehearsal_wanted, this, &MainWindow::open_rehearsal);
   connect(acquire, &AcquirePage::folder_wanted, this, &MainWindow::ask_folder);
   connect(rectify, &RectifyPage::layer_wanted, this, [this](Layer layer) {
@@ -138,7 +148,9 @@ void MainWindow::build() {
     show_tre();
   });
   connect(verify, &VerifyPage::report_wanted, this, &MainWindow::ask_and_export);
+}
 
+void MainWindow::build_replay() {
   replay_dock_ = new QDockWidget(tr("Replay"), this);
   replay_ = new ReplayPanel;
   replay_dock_->setWidget(replay_);

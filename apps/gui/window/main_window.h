@@ -56,7 +56,11 @@ class MainWindow : public QMainWindow {
   void build();
   void build_menus();
   void build_rehearsal_menu();
+  QLayout* build_top();
+  QWidget* build_right();
+  void build_pages();
   void build_status();
+  void build_replay();
   void build_recent();
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;

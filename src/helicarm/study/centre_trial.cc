@@ -66,13 +66,91 @@ const Dot* nearest(const std::vector<Dot>& dots, const Vector2d& place, double r
   return best;
 }
 
-XrayImage exposure_of(const Image<std::uint16_t>& grey, const simulation::Imaging& imaging) {
+XrayImage xray_image_of(const Image<std::uint16_t>& grey, const simulation::Imaging& imaging) {
   XrayImage xray_image;
   xray_image.pixels = Image<float>(grey.width(), grey.height());
   std::ranges::copy(grey.pixels(), xray_image.pixels.pixels().begin());
   xray_image.highest = float((1 << imaging.bits) - 1);
   xray_image.acquisition.logarithmic = imaging.logarithmic;
   return xray_image;
+}
+
+std::vector<Dot> dots_alone(const BallScene& scene, const std::vector<Dot>& found) {
+  std::vector<Dot> alone;
+  for (std::size_t i = 0; i < scene.tiles.size(); ++i)
+    if (is_alone(i))
+      if (const Dot* dot = nearest(found, scene.view.project(scene.tiles[i].ball), scene.radius_px()))
+        alone.push_back(*dot);
+  return alone;
+}
+
+/// Fits the ball of a tile as the pipeline would: from a detection or from a predicted place, by the image of
+/// the balls that stand alone.
+class TileFit {
+ public:
+  TileFit(const CentreSituation& situation, const BallScene& scene, const XrayImage& xray_image)
+      : situation_(situation),
+        scene_(scene),
+        xray_image_(xray_image),
+        found_(find_dots(xray_image, {})),
+        alone_(dots_alone(scene, found_)),
+        look_(estimate_look(xray_image, noise_correlation(xray_image), alone_)) {
+    look_.profile = BallProfile(situation.blur_factor * look_.profile.blur(), look_.profile.absorbance());
+    look_.options.free_radius = !situation.held_radius;
+    for (const Dot& dot : alone_) contrasts_.push_back(dot.contrast);
+    std::ranges::sort(contrasts_);
+  }
+
+  double window_px() const {
+    return look_.options.margin_share * scene_.radius_px() + look_.options.margin_px;
+  }
+
+  std::optional<Dot> operator()(const BallTile& tile, RandomStream random) const {
+    const double radius = scene_.radius_px();
+    std::vector<Dot> neighbours = found_;
+    if (situation_.places_known) {
+      neighbours.clear();
+      for (const simulation::Body& body : tile.bodies) neighbours.push_back(predicted(body, random));
+    }
+    const Dot expected = predicted(tile.bodies.front(), random);
+    const Dot* seen =
+        situation_.places_known ? nullptr : nearest(found_, scene_.view.project(tile.ball), radius);
+    Dot start = seen ? *seen : expected;
+    if (situation_.held_radius) start.radius_px = *situation_.held_radius * radius;
+    const std::vector<Dot> fitted = refit_dots(xray_image_, {start}, look_, neighbours);
+    if (fitted.empty()) return std::nullopt;
+    const bool plausible = seen || (!contrasts_.empty() && is_plausible(fitted.front(), expected,
+                                                                        contrasts_[contrasts_.size() / 2]));
+    return plausible ? std::optional(fitted.front()) : std::nullopt;
+  }
+
+ private:
+  Dot predicted(const simulation::Body& body, RandomStream& random) const {
+    Dot dot;
+    dot.centre_px = scene_.view.project(body.solids.front().world_from_unit.translation()) +
+                    pose_px * Vector2d(random.normal(), random.normal());
+    dot.radius_px = scene_.radius_px();
+    return dot;
+  }
+
+  const CentreSituation& situation_;
+  const BallScene& scene_;
+  const XrayImage& xray_image_;
+  std::vector<Dot> found_;
+  std::vector<Dot> alone_;
+  DotLook look_;
+  std::vector<double> contrasts_;
+};
+
+void add_bounds(CentreSums& sums, const BallScene& scene, const simulation::Light& light,
+                const simulation::Imaging& imaging, double window_px, std::size_t image) {
+  for (int k = 0; k < bounds_per_image; ++k) {
+    std::size_t tile = (1 + 9 * image + 26 * std::size_t(k)) % scene.tiles.size();
+    if (is_alone(tile)) tile = tile > 0 ? tile - 1 : 1;
+    const double bound = centre_bound_px(scene, scene.tiles[tile], light, imaging, window_px);
+    sums.bound_squares += bound * bound;
+    ++sums.bounds;
+  }
 }
 
 }  // namespace
@@ -93,47 +171,9 @@ CentreSums try_image(const CentreSituation& s, int squares, std::uint64_t seed, 
   const simulation::Imaging imaging = imaging_of(s, signal);
   const Image<std::uint16_t> grey =
       simulation::detector_response(signal, imaging, seed, noise_stream + 2 * std::uint32_t(image), 1);
-  XrayImage xray_image = exposure_of(grey, imaging);
+  XrayImage xray_image = xray_image_of(grey, imaging);
   if (s.clipped > 0) clip(xray_image, scene, s.clipped);
-
-  const double radius = scene.radius_px();
-  const std::vector<Dot> found = find_dots(xray_image, {});
-  std::vector<Dot> alone;
-  for (std::size_t i = 0; i < scene.tiles.size(); ++i)
-    if (is_alone(i))
-      if (const Dot* dot = nearest(found, scene.view.project(scene.tiles[i].ball), radius))
-        alone.push_back(*dot);
-  DotLook look = estimate_look(xray_image, noise_correlation(xray_image), alone);
-  look.profile = BallProfile(s.blur_factor * look.profile.blur(), look.profile.absorbance());
-  look.options.free_radius = !s.held_radius;
-
-  std::vector<double> contrasts;
-  for (const Dot& dot : alone) contrasts.push_back(dot.contrast);
-  std::ranges::sort(contrasts);
-  const auto fit_ball = [&](const BallTile& tile, RandomStream random) {
-    const auto predicted = [&](const simulation::Body& body) {
-      Dot dot;
-      dot.centre_px = scene.view.project(body.solids.front().world_from_unit.translation()) +
-                      pose_px * Vector2d(random.normal(), random.normal());
-      dot.radius_px = radius;
-      return dot;
-    };
-    std::vector<Dot> neighbours = found;
-    if (s.places_known) {
-      neighbours.clear();
-      for (const simulation::Body& body : tile.bodies) neighbours.push_back(predicted(body));
-    }
-    Dot start = predicted(tile.bodies.front());
-    const Dot* seen = s.places_known ? nullptr : nearest(found, scene.view.project(tile.ball), radius);
-    const Dot expected = start;
-    if (seen) start = *seen;
-    if (s.held_radius) start.radius_px = *s.held_radius * radius;
-    const std::vector<Dot> fitted = refit_dots(xray_image, {start}, look, neighbours);
-    const bool assumed = !fitted.empty() &&
-                         (seen || (!contrasts.empty() &&
-                                   is_plausible(fitted.front(), expected, contrasts[contrasts.size() / 2])));
-    return assumed ? std::optional(fitted.front()) : std::nullopt;
-  };
+  const TileFit tile_fit(s, scene, xray_image);
 
   const DistortionMap no_distortion = identity_map(grey.width(), grey.height(), scene.detector.pixel_mm);
   CentreSums sums;
@@ -142,7 +182,7 @@ CentreSums try_image(const CentreSituation& s, int squares, std::uint64_t seed, 
     const BallTile& tile = scene.tiles[i];
     const Vector2d truth = scene.view.project(tile.ball);
     ++sums.balls;
-    const std::optional<Dot> fitted = fit_ball(tile, RandomStream(seed, pose_stream, 100 * image + i));
+    const std::optional<Dot> fitted = tile_fit(tile, RandomStream(seed, pose_stream, 100 * image + i));
     if (!fitted) {
       ++sums.refused;
       continue;
@@ -151,22 +191,13 @@ CentreSums try_image(const CentreSituation& s, int squares, std::uint64_t seed, 
     sums.add(
         dot.centre_px - blob_offset(no_distortion, scene.view, truth, tile.ball.z(), s.diameter_mm) - truth,
         dot.error_px(), tile.towards);
-    sums.radii += dot.radius_px / radius - 1;
+    sums.radii += dot.radius_px / scene.radius_px() - 1;
   }
   const bool has_bound =
       s.clipped == 0 && (s.companion == Companion::none || s.companion == Companion::ball ||
                          s.companion == Companion::plate_dot);
-  if (has_bound && image < images_with_bounds) {
-    const simulation::Light light = simulation::illuminate(signal, imaging);
-    const double window = look.options.margin_share * radius + look.options.margin_px;
-    for (int k = 0; k < bounds_per_image; ++k) {
-      std::size_t tile = (1 + 9 * image + 26 * std::size_t(k)) % scene.tiles.size();
-      if (is_alone(tile)) tile = tile > 0 ? tile - 1 : 1;
-      const double bound = centre_bound_px(scene, scene.tiles[tile], light, imaging, window);
-      sums.bound_squares += bound * bound;
-      ++sums.bounds;
-    }
-  }
+  if (has_bound && image < images_with_bounds)
+    add_bounds(sums, scene, simulation::illuminate(signal, imaging), imaging, tile_fit.window_px(), image);
   return sums;
 }
 
@@ -179,7 +210,7 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
   const simulation::SimulatedCase simulated_case = value_or_throw(simulation::simulate_case(options));
   std::array<CentreSums, 2> sums;
   for (const simulation::SimulatedView& view : simulated_case.views) {
-    XrayImage xray_image = exposure_of(view.pixels, view.true_view.imaging);
+    XrayImage xray_image = xray_image_of(view.pixels, view.true_view.imaging);
     xray_image.acquisition.pixel_mm = Vector2d::Constant(view.true_view.pixel_mm());
     xray_image.acquisition.source_detector_mm = view.true_view.nominal_f_mm;
     const Rectification plain = value_or_throw(with_map(xray_image, flat_panel_map(xray_image), {}));

@@ -211,91 +211,114 @@ std::string name_of(std::string_view text) {
 
 }  // namespace
 
-Expected<UrScript> UrScript::parse(std::string_view text) {
-  if (text.size() > longest_script) return fail(Reason::bad_size, "script is too long");
-  int number = 0;
-  auto parsed = guarded([&] {
-    struct Block {
-      std::string word, code;
-      std::size_t start;
-    };
-    UrScript script;
-    std::vector<Block> open;
-    bool ended = false;
-    const auto add = [&](Kind kind, std::string name, std::string expression) -> Command& {
-      return script.codes_[open.back().code].emplace_back(
-          Command{kind, std::move(name), std::move(expression), 0, number});
-    };
-    const auto close = [&] {
-      const Block block = open.back();
-      Code& code = script.codes_[block.code];
-      if (block.word == "while") {
-        code.push_back({Kind::jump, {}, {}, block.start, number});
-        code[block.start].target = code.size();
-      } else if (block.word == "if" || block.word == "else") {
-        code[block.start].target = code.size();
-      }
-      open.pop_back();
-      ended = open.empty();
-    };
+/// Translates a script line by line.
+class UrScript::Reader {
+ public:
+  int line() const { return line_; }
+
+  UrScript read(std::string_view text) {
     while (!text.empty()) {
       const std::size_t size = std::min(text.find('\n'), text.size());
-      std::string_view line = trimmed(text.substr(0, size));
+      const std::string_view line = trimmed(text.substr(0, size));
       text.remove_prefix(std::min(size + 1, text.size()));
-      ++number;
-      if (line.empty()) continue;
-      if (ended) throw BadInput(Reason::bad_value, "text after the program's end");
-      std::string_view after = line;
-      const std::string word = take_word(after);
-      if (open.empty()) {
-        if (word != "def") throw BadInput(Reason::bad_value, "a program starts with def");
-        name_of(head_of(line, word));
-        open.push_back({word, "", 0});
-        script.codes_[""];
-      } else if (word == "end" && after.empty()) {
-        close();
-      } else if (word == "thread") {
-        if (open.size() != 1) throw BadInput(Reason::unsupported, "a thread within a block");
-        const std::string name = name_of(head_of(line, word));
-        open.push_back({word, name, 0});
-        script.codes_[name];
-      } else if (word == "while" || word == "if") {
-        add(Kind::branch_unless, {}, head_of(line, word));
-        open.push_back({word, open.back().code, script.codes_[open.back().code].size() - 1});
-      } else if (word == "else") {
-        if (open.back().word != "if" || after != ":") throw BadInput(Reason::bad_value, "else without if");
-        Code& code = script.codes_[open.back().code];
-        add(Kind::jump, {}, {});
-        code[open.back().start].target = code.size();
-        open.back() = {word, open.back().code, code.size() - 1};
-      } else if (word == "halt" && after.empty()) {
-        add(Kind::halt, {}, {});
-      } else if (word == "kill") {
-        add(Kind::kill, take_word(after), {});
-      } else {
-        const bool global = word == "global";
-        std::string_view value = global ? after : line;
-        const std::string name = take_word(value);
-        if (value.starts_with("=") && !value.starts_with("==")) {
-          value = trimmed(value.substr(1));
-          std::string_view running = value;
-          if (take_word(running) == "run" && !running.starts_with("("))
-            add(Kind::run, name, name_of(running));
-          else
-            add(Kind::assign, name, std::string(value));
-        } else if (!global && value.starts_with("(")) {
-          add(Kind::call, name, std::string(line));
-        } else {
-          throw BadInput(Reason::unsupported, "statement is not understood");
-        }
-      }
+      ++line_;
+      if (!line.empty()) read_line(line);
     }
-    if (!ended) throw BadInput(Reason::truncated, "the program's end is missing");
-    script.threads_.push_back(std::make_unique<Thread>());
-    return script;
-  });
+    if (!ended_) throw BadInput(Reason::truncated, "the program's end is missing");
+    script_.threads_.push_back(std::make_unique<Thread>());
+    return std::move(script_);
+  }
+
+ private:
+  struct Block {
+    std::string word, code;
+    std::size_t start;
+  };
+
+  Code& code() { return script_.codes_[open_.back().code]; }
+  void add(Kind kind, std::string name, std::string expression) {
+    code().push_back({kind, std::move(name), std::move(expression), 0, line_});
+  }
+
+  void read_line(std::string_view line) {
+    if (ended_) throw BadInput(Reason::bad_value, "text after the program's end");
+    std::string_view after = line;
+    const std::string word = take_word(after);
+    if (open_.empty()) {
+      if (word != "def") throw BadInput(Reason::bad_value, "a program starts with def");
+      name_of(head_of(line, word));
+      open_.push_back({word, "", 0});
+      script_.codes_[""];
+    } else if (word == "end" && after.empty()) {
+      close();
+    } else if (word == "thread") {
+      if (open_.size() != 1) throw BadInput(Reason::unsupported, "a thread within a block");
+      const std::string name = name_of(head_of(line, word));
+      open_.push_back({word, name, 0});
+      script_.codes_[name];
+    } else if (word == "while" || word == "if") {
+      add(Kind::branch_unless, {}, head_of(line, word));
+      open_.push_back({word, open_.back().code, code().size() - 1});
+    } else if (word == "else") {
+      otherwise(after);
+    } else if (word == "halt" && after.empty()) {
+      add(Kind::halt, {}, {});
+    } else if (word == "kill") {
+      add(Kind::kill, take_word(after), {});
+    } else {
+      statement(line, word == "global" ? after : line, word == "global");
+    }
+  }
+
+  void close() {
+    const Block block = open_.back();
+    Code& commands = code();
+    if (block.word == "while") {
+      commands.push_back({Kind::jump, {}, {}, block.start, line_});
+      commands[block.start].target = commands.size();
+    } else if (block.word == "if" || block.word == "else") {
+      commands[block.start].target = commands.size();
+    }
+    open_.pop_back();
+    ended_ = open_.empty();
+  }
+
+  void otherwise(std::string_view after) {
+    if (open_.back().word != "if" || after != ":") throw BadInput(Reason::bad_value, "else without if");
+    add(Kind::jump, {}, {});
+    code()[open_.back().start].target = code().size();
+    open_.back() = {"else", open_.back().code, code().size() - 1};
+  }
+
+  void statement(std::string_view line, std::string_view value, bool global) {
+    const std::string name = take_word(value);
+    if (value.starts_with("=") && !value.starts_with("==")) {
+      value = trimmed(value.substr(1));
+      std::string_view running = value;
+      if (take_word(running) == "run" && !running.starts_with("("))
+        add(Kind::run, name, name_of(running));
+      else
+        add(Kind::assign, name, std::string(value));
+    } else if (!global && value.starts_with("(")) {
+      add(Kind::call, name, std::string(line));
+    } else {
+      throw BadInput(Reason::unsupported, "statement is not understood");
+    }
+  }
+
+  UrScript script_;
+  std::vector<Block> open_;
+  bool ended_ = false;
+  int line_ = 0;
+};
+
+Expected<UrScript> UrScript::parse(std::string_view text) {
+  if (text.size() > longest_script) return fail(Reason::bad_size, "script is too long");
+  Reader reader;
+  auto parsed = guarded([&] { return reader.read(text); });
   if (parsed) return parsed;
-  return fail(parsed.error().reason, fmt::format("script: line {}: {}", number, parsed.error().message));
+  return fail(parsed.error().reason,
+              fmt::format("script: line {}: {}", reader.line(), parsed.error().message));
 }
 
 void UrScript::kill(const std::string& handle) {

@@ -39,6 +39,7 @@ class UrScript {
   Expected<bool> step(UrScriptHost& host);
 
  private:
+  class Reader;
   enum class Kind { assign, run, kill, halt, call, branch_unless, jump };
   struct Command {
     Kind kind;
