@@ -20,7 +20,7 @@ using virtual_devices::VirtualDevices;
 
 /// Longer than the window that an exposure's poses are taken from.
 constexpr std::chrono::milliseconds window{1800};
-constexpr int most_entries = 5;
+constexpr int most_takes = 5;
 
 /// One virtual room for all, and an operation of its own for each test.
 class FaultyOperation : public testing::Test {
@@ -66,7 +66,7 @@ class FaultyOperation : public testing::Test {
   /// Again where a busy machine made the tracker stutter.
   void expose(const std::string& view, CArmFault fault = CArmFault::none) {
     Expected<void> taken = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_entries && !taken; ++i) taken = take(view, fault);
+    for (int i = 0; i < most_takes && !taken; ++i) taken = take(view, fault);
     ASSERT_TRUE(taken) << taken.error().message;
   }
   static void shift(const char* body, double mm) {
@@ -115,7 +115,7 @@ TEST_F(FaultyOperation, ImagesInTheOtherOrderAreSortedByTheirAngles) {
 TEST_F(FaultyOperation, OtherOrderThatNoFileReportsLeavesItsTunnelsUnmeasured) {
   for (const auto& [view, taken_as] : {std::pair{"LAT", "AP"}, std::pair{"AP", "LAT"}}) {
     Expected<void> taken = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_entries && !taken; ++i) {
+    for (int i = 0; i < most_takes && !taken; ++i) {
       const DatedArrival image = acquired_view(view, CArmFault::no_tags);
       taken = operation_->take(taken_as, image.arrival, image.time_s);
     }
@@ -210,7 +210,7 @@ class CheckedOperation : public FaultyOperation {
     virtual_or_->touch(bone);
     std::this_thread::sleep_for(window);  // until the gate believes the pointer's new place
     Expected<double> off = fail(Reason::usage, "not tried");
-    for (int i = 0; i < most_entries; ++i) {
+    for (int i = 0; i < most_takes; ++i) {
       off = operation_->touch(bone + " notch");
       if (off || off.error().reason == Reason::residual_too_large) return off;
     }

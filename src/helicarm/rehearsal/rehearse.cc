@@ -19,7 +19,7 @@ using virtual_devices::VirtualDevices;
 
 constexpr std::chrono::seconds patience{20};
 constexpr double image_patience_s = 20;
-constexpr int most_entries = 3;
+constexpr int most_attempts = 3;
 /// An exposure's poses are taken from the second and a half before it.
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
@@ -69,7 +69,7 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
 Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, Connections& devices,
                       Operation& operation) {
   Expected<void> taken = fail(Reason::not_connected, "no picture came");
-  for (int attempt = 0; attempt < most_entries && !taken; ++attempt) {
+  for (int attempt = 0; attempt < most_attempts && !taken; ++attempt) {
     std::this_thread::sleep_for(before_exposure);
     if (auto true_view = virtual_devices::shoot(virtual_or.simulated_scene(), view,
                                                 {"127.0.0.1", devices.receiver_port()});
