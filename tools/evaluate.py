@@ -129,8 +129,9 @@ def evaluate_grids(helicarm, grids):
     for grid in grids:
         with tempfile.TemporaryDirectory() as out:
             done = call(grid / "PLATE.dcm", "--plate", grid / "plate.json", "--out", out, "--quiet")
-            for view in json.loads((grid / "truth.json").read_text())["views"][1:]:
-                name = view["name"]
+            truth = json.loads((grid / "truth.json").read_text())
+            images = [view["name"] for view in truth["views"]] if "views" in truth else list(truth)
+            for name in (name for name in images if name != "PLATE"):
                 if done.returncode == 0:
                     told = call(grid / f"{name}.dcm", "--map", Path(out) / "map.json", "--test-grid", "20", "--json")
                 if done.returncode or told.returncode:

@@ -55,6 +55,10 @@ int run(int argc, char** argv) {
       throw CLI::ParseError(fmt::format("\"{}\" is no command; helicarm --help lists them",
                                         without_control_characters(argv[1])),
                             CLI::ExitCodes::ExtrasError);
+    if (argc == 1) {
+      console.progress << app.help();
+      return exit_code(Reason::usage);
+    }
     app.parse(argc, argv);
   } catch (const CLI::Success& wish) {
     return app.exit(wish, console.out, console.progress);

@@ -67,14 +67,21 @@ class StructureCheck : public nlohmann::json_sax<Json> {
     const std::size_t at = std::min(position, text_.size());
     for (std::size_t start = at > 10 ? at - 10 : 0; start < at; ++start)
       if (names_non_finite(text_.substr(start)))
-        return refuse(Reason::not_finite, fmt::format("a number is not finite (byte {})", start + 1));
-    return refuse(Reason::bad_json, fmt::format("not valid JSON at byte {}", position));
+        return refuse(Reason::not_finite, fmt::format("a number is not finite at {}", place(start + 1)));
+    return refuse(Reason::bad_json, fmt::format("not valid JSON at {}", place(position)));
   }
 
  private:
   bool refuse(Reason reason, const std::string& problem) {
     failure_ = {reason, fmt::format("{}: {}", origin_, problem), {}, {}};
     return false;
+  }
+  /// Line and column of a byte, counted from 1.
+  std::string place(std::size_t byte) const {
+    const std::string_view before = text_.substr(0, std::min(byte > 0 ? byte - 1 : 0, text_.size()));
+    const std::size_t line_start = before.rfind('\n') + 1;  // 0 on the first line
+    return fmt::format("line {}, column {}", std::ranges::count(before, '\n') + 1,
+                       before.size() - line_start + 1);
   }
   bool deeper() {
     if (keys_.size() == max_depth)

@@ -114,5 +114,11 @@ TEST(ToText, BytesThatAreNoUtf8AreReplaced) {
   EXPECT_EQ(to_text(Json{{"file", "\xff.dcm"}}), "{\n  \"file\": \"\xEF\xBF\xBD.dcm\"\n}");
 }
 
+TEST(ParseJson, SyntaxErrorIsGivenByLineAndColumn) {
+  const auto failure = parse_json("{\n  \"a\": 1,\n  \"b\" 2\n}", "case.json").error();
+  EXPECT_EQ(failure.reason, Reason::bad_json);
+  EXPECT_EQ(failure.message, "case.json: not valid JSON at line 3, column 7");
+}
+
 }  // namespace
 }  // namespace helicarm

@@ -174,7 +174,11 @@ Expected<Calibrator> read_calibrator(const std::filesystem::path& path) {
 
 Expected<Calibrator> calibrator_named(const std::string& name_or_path, const std::filesystem::path& folder) {
   if (Calibrator built_in = udcsc(); name_or_path == built_in.name) return built_in;
-  return path_inside(folder, name_or_path).and_then(read_calibrator);
+  return path_inside(folder, name_or_path).and_then(read_calibrator).map_error([](Failure failure) {
+    if (failure.reason == Reason::missing_file)
+      failure.message += fmt::format("; the built-in calibrator is \"{}\"", udcsc().name);
+    return failure;
+  });
 }
 
 Json to_json(const Calibrator& calibrator) {

@@ -75,7 +75,11 @@ Expected<Plate> read_plate(const std::filesystem::path& path) {
 
 Expected<Plate> plate_named(const std::string& name_or_path, const std::filesystem::path& folder) {
   if (Plate built_in = plate48(); name_or_path == built_in.name) return built_in;
-  return path_inside(folder, name_or_path).and_then(read_plate);
+  return path_inside(folder, name_or_path).and_then(read_plate).map_error([](Failure failure) {
+    if (failure.reason == Reason::missing_file)
+      failure.message += fmt::format("; the built-in plate is \"{}\"", plate48().name);
+    return failure;
+  });
 }
 
 Json to_json(const Plate& plate) {

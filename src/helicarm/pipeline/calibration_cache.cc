@@ -4,6 +4,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/stopwatch.h"
 #include "helicarm/xray/digest.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm {
 namespace {
@@ -12,16 +13,6 @@ constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
 
 Expected<std::string> digest_of(const std::filesystem::path& file) {
   return read_file(file, most_file_bytes).map([](const std::string& bytes) { return digest(bytes); });
-}
-
-/// The file beside a PNG or TIFF that states its pixel size and source distance, where there is one.
-std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image) {
-  std::filesystem::path full = image, plain = image;
-  full += ".json";
-  plain.replace_extension(".json");
-  for (const std::filesystem::path& sidecar : {full, plain})
-    if (std::filesystem::exists(sidecar)) return sidecar;
-  return std::nullopt;
 }
 
 /// All that the calibration of a case depends on, by content.

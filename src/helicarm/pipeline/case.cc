@@ -192,9 +192,12 @@ void warn_of_borrowed_name(Case& read) {
          {}});
 }
 
-Case case_from(const fs::path& folder) {
-  const Json json = value_or_throw(read_json(folder / "case.json"));
-  JsonReader reader(json, "case.json");
+Case case_from(const fs::path& path) {
+  const bool is_file = fs::is_regular_file(path);
+  const fs::path folder = is_file ? fs::absolute(path).parent_path() : path;
+  const fs::path file = is_file ? path : folder / "case.json";
+  const Json json = value_or_throw(read_json(file));
+  JsonReader reader(json, file.filename().string());
   reader.choice("format", {"helicarm-case/1"});
   reader.optional_text("notes", most_note_characters);
   Case read;
@@ -232,8 +235,8 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
   });
 }
 
-Expected<Case> read_case(const fs::path& folder) {
-  return guarded([&] { return case_from(folder); });
+Expected<Case> read_case(const fs::path& path) {
+  return guarded([&] { return case_from(path); });
 }
 
 }  // namespace helicarm

@@ -68,8 +68,9 @@ struct Case {
   std::vector<Warning> warnings;
 };
 
-/// Reads `folder`/case.json strictly, and the calibrator and the plate it names. Images are not opened. Fails
-/// with missing_file, bad_json, not_finite, unknown_key, path_outside, name_clash or bad_value.
-Expected<Case> read_case(const std::filesystem::path& folder);
+/// Reads a case strictly, given by its folder or by its case.json, and the calibrator and the plate it names.
+/// Images are not opened. Fails with missing_file, bad_json, not_finite, unknown_key, path_outside,
+/// name_clash or bad_value.
+Expected<Case> read_case(const std::filesystem::path& path);
 
 }  // namespace helicarm

@@ -79,6 +79,21 @@ TEST_F(CaseFile, GivesWhatItHolds) {
   EXPECT_EQ(read_back->tool_lines[0].tunnel, "femur");
 }
 
+TEST_F(CaseFile, MayBeGivenByItsFile) {
+  ASSERT_TRUE(read());
+  const auto by_file = read_case(folder_ / "case.json");
+  ASSERT_TRUE(by_file) << by_file.error().message;
+  EXPECT_TRUE(std::filesystem::equivalent(by_file->folder, folder_));
+}
+
+TEST_F(CaseFile, UnknownCalibratorNamesTheBuiltInOne) {
+  json_["calibrator"] = "udcs";
+  EXPECT_NE(read().error().message.find("udcsc"), std::string::npos);
+  json_["calibrator"] = "udcsc";
+  json_["plate"] = "plate84";
+  EXPECT_NE(read().error().message.find("plate48"), std::string::npos);
+}
+
 TEST_F(CaseFile, NeedsOnlyFormatCalibratorAndViews) {
   for (const char* key : {"plate", "picks", "tunnels", "tool_lines"}) json_.erase(key);
   const auto read_back = read();

@@ -34,6 +34,15 @@ void make_metal_dark(XrayImage& xray_image, const std::string& origin) {
       {Reason::tag_disagrees, fmt::format("{}: metal looks bright; the grey values were inverted", origin)});
 }
 
+float highest_grey(const Image<float>& pixels) {
+  std::uint32_t used = 0;
+  for (const float grey : pixels.pixels()) used |= static_cast<std::uint32_t>(grey);
+  if (used == 0) return 65535;
+  const int highest_bit = std::max(8, static_cast<int>(std::bit_width(used)));
+  const int lowest_bit = highest_bit == 16 ? std::countr_zero(used) : 0;
+  return static_cast<float>((1u << highest_bit) - (1u << lowest_bit));
+}
+
 std::string image_key(const Image<float>& pixels) {
   const auto values = pixels.pixels();
   return digest(fmt::format("{} {} {}", pixels.width(), pixels.height(),
@@ -51,7 +60,8 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
     xray_image.pixels = value_or_throw(decode_frame(outline, index));
     const auto levels = static_cast<float>(1 << outline.bits_stored);
     xray_image.lowest = outline.is_signed ? -levels / 2 : 0;
-    xray_image.highest = xray_image.lowest + levels - 1;
+    xray_image.highest = outline.bits_stored == 16 && !outline.is_signed ? highest_grey(xray_image.pixels)
+                                                                         : xray_image.lowest + levels - 1;
     xray_image.acquisition = std::move(acquisition);
     xray_image.warnings = std::move(warnings);
     if (polarity.invert) invert(xray_image);

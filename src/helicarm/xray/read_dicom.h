@@ -24,6 +24,10 @@ void invert(XrayImage& xray_image);
 /// Inverts an image that plainly shows bright metal, with the warning tag_disagrees.
 void make_metal_dark(XrayImage& xray_image, const std::string& origin);
 
+/// Highest grey value that the source of a 16-bit image could have stored: a source of fewer bits fills
+/// either the low bits of each value or the high ones (then the low ones are zero everywhere). At least 255.
+float highest_grey(const Image<float>& pixels);
+
 /// Digest of an image's size and values.
 std::string image_key(const Image<float>& pixels);
 

@@ -17,20 +17,6 @@ namespace {
 
 constexpr std::uintmax_t max_file_bytes = 256u << 20;
 
-fs::path sidecar_of(const fs::path& grey_image) {
-  fs::path full = grey_image;
-  full += ".json";
-  if (fs::exists(full)) return full;
-  fs::path plain = grey_image;
-  plain.replace_extension(".json");
-  if (!fs::exists(plain))
-    throw BadInput(
-        Reason::missing_file,
-        fmt::format("{}: no such file: the sidecar of {}, holding \"pixel_mm\" and \"source_detector_mm\"",
-                    plain.string(), grey_image.filename().string()));
-  return plain;
-}
-
 Acquisition read_sidecar(const fs::path& path) {
   const Json json = value_or_throw(read_json(path));
   JsonReader reader(json, path.filename().string());
@@ -45,14 +31,18 @@ Acquisition read_sidecar(const fs::path& path) {
 
 XrayImage xray_image_of_png(const GreyImage& grey_image, const fs::path& path) {
   XrayImage xray_image;
-  xray_image.acquisition = read_sidecar(sidecar_of(path));
-  xray_image.highest = grey_image.bits == 8 ? 255 : 65535;
+  const auto sidecar = sidecar_of(path);
+  if (sidecar) xray_image.acquisition = read_sidecar(*sidecar);
   xray_image.pixels = Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
   std::ranges::copy(grey_image.pixels.pixels(), xray_image.pixels.pixels().begin());
+  xray_image.highest = grey_image.bits == 8 ? 255 : highest_grey(xray_image.pixels);
   const std::string origin = path.filename().string();
   if (!xray_image.acquisition.pixel_mm)
     xray_image.warnings.push_back(
-        {Reason::spacing_missing, fmt::format("{}: its sidecar gives no \"pixel_mm\"", origin)});
+        {Reason::spacing_missing,
+         sidecar ? fmt::format("{}: \"pixel_mm\" is not given", sidecar->filename().string())
+                 : fmt::format("{}: no sidecar {}.json with \"pixel_mm\" and \"source_detector_mm\"", origin,
+                               path.stem().string())});
   make_metal_dark(xray_image, origin);
   xray_image.acquisition.instance_key = image_key(xray_image.pixels);
   return xray_image;
@@ -78,6 +68,16 @@ XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
 }
 
 }  // namespace
+
+std::optional<fs::path> sidecar_of(const fs::path& image) {
+  fs::path full = image;
+  full += ".json";
+  fs::path plain = image;
+  plain.replace_extension(".json");
+  for (const fs::path& sidecar : {full, plain})
+    if (fs::exists(sidecar)) return sidecar;
+  return std::nullopt;
+}
 
 Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& view_name,
                                     std::optional<int> frame) {

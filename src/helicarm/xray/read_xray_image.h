@@ -10,11 +10,15 @@
 namespace helicarm {
 
 /// Reads a DICOM, PNG or TIFF X-ray, told apart by content. `frame` is 1-based and needed only if the file
-/// has several. PNG and TIFF have a sidecar NAME.json (or NAME.png.json) beside them with `pixel_mm` and
-/// `source_detector_mm`, either of which may be null. Pixels stay as stored, neither flipped nor turned.
+/// has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) beside them with `pixel_mm` and
+/// `source_detector_mm`, either of which may be null; without `pixel_mm` the image has the warning
+/// spacing_missing. Pixels stay as stored, neither flipped nor turned.
 /// Failures name file and view; codes: missing_file, not_an_image, truncated, bad_size, bad_value,
 /// unsupported, and those of the sidecar's JSON. Safe to call from several threads.
 Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
                                     std::optional<int> frame);
+
+/// The sidecar beside a PNG or TIFF, where there is one.
+std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image);
 
 }  // namespace helicarm

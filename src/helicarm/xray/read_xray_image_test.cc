@@ -66,12 +66,33 @@ TEST_F(ReadXrayImage, NoImageAtAll) {
   EXPECT_EQ(read("text.dcm").error().view, "AP");
 }
 
-TEST_F(ReadXrayImage, SidecarMustBeThereAndSound) {
+TEST_F(ReadXrayImage, WithoutASidecarNothingIsKnownOfTheAcquisition) {
   write("a.png", encode_png(ramp()));
-  const auto missing = read("a.png");
-  ASSERT_FALSE(missing);
-  EXPECT_EQ(missing.error().reason, Reason::missing_file);
-  EXPECT_NE(missing.error().message.find("a.json"), std::string::npos);
+  const auto bare = read("a.png");
+  ASSERT_TRUE(bare) << bare.error().message;
+  EXPECT_FALSE(bare->acquisition.pixel_mm);
+  EXPECT_FALSE(bare->acquisition.source_detector_mm);
+  ASSERT_EQ(bare->warnings.size(), 1u);
+  EXPECT_EQ(bare->warnings[0].reason, Reason::spacing_missing);
+  EXPECT_NE(bare->warnings[0].message.find("a.json"), std::string::npos);
+}
+
+TEST_F(ReadXrayImage, GreyRangeIsTheSourcesNotTheContainers) {
+  const auto highest = [&](int first, int factor) {
+    Image<std::uint16_t> image(64, 64);
+    int value = first;
+    for (std::uint16_t& pixel : image.pixels()) pixel = static_cast<std::uint16_t>(factor * value--);
+    write("a.png", encode_png(image));
+    return read("a.png")->highest;
+  };
+  EXPECT_EQ(highest(4095, 1), 4095);
+  EXPECT_EQ(highest(4095, 16), 65520);  // 12 bits in the high ones
+  EXPECT_EQ(highest(4096, 1), 8191);
+  EXPECT_EQ(highest(65535, 1), 65535);
+}
+
+TEST_F(ReadXrayImage, SidecarMustBeSound) {
+  write("a.png", encode_png(ramp()));
   write("a.json", R"({"pixel_mm": -1, "source_detector_mm": null})");
   EXPECT_EQ(reason("a.png"), "bad_value");
   write("a.json", R"({"pixel_mm": NaN})");
