@@ -6,6 +6,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/simulation/streams.h"
 #include "helicarm/simulation/truth_json.h"
+#include "helicarm/xray/digest.h"
 #include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_dicom.h"
 
@@ -17,9 +18,11 @@ constexpr const char* plate_file = "plate.json";
 constexpr const char* calibrator_file = "calibrator.json";
 constexpr const char* case_file = "case.json";
 
-/// The seed alone decides, so that a case is written alike each time.
-std::string uid(std::uint64_t seed, std::uint64_t item) {
-  RandomStream random(seed, stream::uids, item);
+/// From an image's pixels, so that a case is written alike each time and different images differ.
+std::string uid(const Image<std::uint16_t>& pixels, std::uint64_t item) {
+  const auto values = pixels.pixels();
+  const std::string content = digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
+  RandomStream random(std::stoull(content.substr(0, 16), nullptr, 16), stream::uids, item);
   return make_uid(random);
 }
 
@@ -90,9 +93,9 @@ DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
   image.series_description = true_view.name;
   image.patient_name = "SIMULATED";
   image.patient_id = fmt::format("SIM{}", simulated.options.seed);
-  image.study_uid = uid(simulated.options.seed, 0);
-  image.series_uid = uid(simulated.options.seed, 1 + 2 * number);
-  image.instance_uid = uid(simulated.options.seed, 2 + 2 * number);
+  image.study_uid = uid(simulated.views.front().pixels, 0);
+  image.series_uid = uid(view.pixels, 1);
+  image.instance_uid = uid(view.pixels, 2);
   return image;
 }
 

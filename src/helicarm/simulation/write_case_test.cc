@@ -55,6 +55,17 @@ TEST_F(WriteCase, DicomComesBackWithItsPixelsAndTags) {
   }
 }
 
+TEST_F(WriteCase, DifferentImagesHaveDifferentUidsWhateverTheSeed) {
+  const DerivedImage one = dicom_of(simulated(CaseKind::accuracy, 12), 0);
+  const DerivedImage same = dicom_of(simulated(CaseKind::accuracy, 12), 0);
+  const DerivedImage other = dicom_of(simulated(CaseKind::tunnels, 12), 0);
+  EXPECT_EQ(one.instance_uid, same.instance_uid);
+  EXPECT_EQ(one.study_uid, same.study_uid);
+  EXPECT_NE(one.instance_uid, other.instance_uid);
+  EXPECT_NE(one.series_uid, other.series_uid);
+  EXPECT_NE(one.study_uid, other.study_uid);
+}
+
 TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
   const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
   ASSERT_TRUE(write_case(folder_, simulated_case));
