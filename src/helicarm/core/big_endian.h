@@ -17,8 +17,8 @@ namespace helicarm {
 template <class T>
 concept WireNumber = std::integral<T> || std::same_as<T, float> || std::same_as<T, double>;
 
-/// Takes numbers, most significant byte first, and text off the front of a message. What is not there is
-/// never read: it throws BadInput (truncated), to be caught with `guarded`.
+/// Reads big-endian numbers and text from the front of a message. Reading past the end throws BadInput
+/// (truncated); catch it with `guarded`.
 class BigEndianReader {
  public:
   explicit BigEndianReader(std::string_view bytes) : rest_(bytes) {}
@@ -28,7 +28,7 @@ class BigEndianReader {
   std::string_view take(std::size_t count) {
     if (count > rest_.size())
       throw BadInput(Reason::truncated,
-                     "message ends " + std::to_string(count - rest_.size()) + " bytes before its content");
+                     "message is " + std::to_string(count - rest_.size()) + " bytes too short");
     const std::string_view taken = rest_.substr(0, count);
     rest_.remove_prefix(count);
     return taken;
@@ -42,7 +42,7 @@ class BigEndianReader {
     return std::bit_cast<T>(bytes);
   }
 
-  /// A field of fixed width, up to its first NUL.
+  /// Fixed-width field up to its first NUL.
   std::string_view take_name(std::size_t width) {
     const std::string_view field = take(width);
     return field.substr(0, field.find('\0'));
@@ -52,7 +52,7 @@ class BigEndianReader {
   std::string_view rest_;
 };
 
-/// Puts numbers, most significant byte first, and text together.
+/// Writes big-endian numbers and text.
 class BigEndianWriter {
  public:
   template <WireNumber T>
@@ -66,7 +66,7 @@ class BigEndianWriter {
     bytes_ += text;
     return *this;
   }
-  /// Cut off or filled up to the width.
+  /// Truncated or padded to `width`.
   BigEndianWriter& put_name(std::string_view name, std::size_t width, char filling = '\0') {
     bytes_ += name.substr(0, width);
     bytes_.append(width - std::min(width, name.size()), filling);

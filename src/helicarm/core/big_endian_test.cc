@@ -6,13 +6,13 @@
 namespace helicarm {
 namespace {
 
-TEST(BigEndian, NumbersAreWrittenMostSignificantByteFirst) {
+TEST(BigEndian, WritesMostSignificantByteFirst) {
   EXPECT_EQ(BigEndianWriter().put<std::uint16_t>(5).put<std::uint8_t>(86).put<std::uint16_t>(2).bytes(),
             std::string("\0\5\x56\0\2", 5));
   EXPECT_EQ(BigEndianWriter().put(1.0f).bytes(), std::string("\x3f\x80\0\0", 4));
 }
 
-TEST(BigEndian, WhatIsWrittenIsRead) {
+TEST(BigEndian, RoundTripKeepsNumbersAndText) {
   const std::string bytes =
       BigEndianWriter().put(-2.5).put<std::int32_t>(-7).put_name("tool", 6).put("x").bytes();
   BigEndianReader reader(bytes);
@@ -28,7 +28,7 @@ TEST(BigEndian, NameThatFillsItsFieldHasNoNul) {
   EXPECT_EQ(BigEndianWriter().put_name("abcdef", 4).bytes(), "abcd");
 }
 
-TEST(BigEndian, NumberThatIsNotAllThereIsTruncated) {
+TEST(BigEndian, IncompleteNumberIsTruncated) {
   const auto number = guarded([] { return BigEndianReader("abc").take<std::uint32_t>(); });
   ASSERT_FALSE(number);
   EXPECT_EQ(number.error().reason, Reason::truncated);

@@ -78,7 +78,7 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
     auto fields = split(line);
     if (std::ranges::any_of(fields, holds_control_character))
       return fail(Reason::bad_value,
-                  fmt::format("{}: row {}: holds a control character", table.origin_, table.rows() + 1));
+                  fmt::format("{}: row {}: contains a control character", table.origin_, table.rows() + 1));
     if (table.columns_.empty()) {
       table.columns_ = std::move(fields);
       continue;
@@ -99,7 +99,7 @@ Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_
   for (const std::string& column : table.columns_)
     if (!known(column))
       return fail(Reason::unknown_key,
-                  fmt::format("{}: the column \"{}\" is not known", table.origin_, column));
+                  fmt::format("{}: the column \"{}\" is unknown; remove it", table.origin_, column));
   return table;
 }
 

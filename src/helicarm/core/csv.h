@@ -11,15 +11,15 @@
 
 namespace helicarm {
 
-/// A table read from a CSV file with a header line. Fields are kept as text until asked for.
+/// Table from a CSV file with a header line. Fields are kept as text and converted on access.
 class CsvTable {
  public:
   std::size_t rows() const { return cells_.size(); }
   bool has(const std::string& column) const;
   const std::string& text(std::size_t row, const std::string& column) const;
-  /// Throws BadInput (bad_value, not_finite) naming file, line and column. Locale independent.
+  /// Throws BadInput (bad_value, not_finite) that names file, row and column. Independent of the locale.
   double number(std::size_t row, const std::string& column) const;
-  /// Nothing where the column is absent or the field empty.
+  /// Empty if the column is absent or the field is empty.
   std::optional<double> optional_number(std::size_t row, const std::string& column) const;
 
  private:
@@ -30,8 +30,8 @@ class CsvTable {
   std::vector<std::vector<std::string>> cells_;
 };
 
-/// Reads a comma-separated file. Every `required` column must be there; a column in neither list is
-/// unknown_key, a control character bad_value.
+/// Reads a comma-separated file. Every `required` column must exist; a column in neither list is
+/// `unknown_key`, a control character `bad_value`.
 Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_list<const char*> required,
                             std::initializer_list<const char*> optional);
 

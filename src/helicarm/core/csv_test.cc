@@ -20,7 +20,7 @@ Expected<CsvTable> table_of(const std::string& text) {
   return table;
 }
 
-TEST(ReadCsv, ColumnsMayStandInAnyOrder) {
+TEST(ReadCsv, ColumnsMayBeInAnyOrder) {
   const auto table = table_of("v_px, u_px\r\n2.5,1\n\n3,-4e2\n");
   ASSERT_TRUE(table.has_value());
   EXPECT_EQ(table->rows(), 2u);
@@ -29,7 +29,7 @@ TEST(ReadCsv, ColumnsMayStandInAnyOrder) {
   EXPECT_FALSE(table->optional_number(0, "sigma_px").has_value());
 }
 
-TEST(ReadCsv, ByteOrderMarkOfASpreadsheetIsPassedOver) {
+TEST(ReadCsv, ByteOrderMarkIsSkipped) {
   const auto table = table_of("\xEF\xBB\xBFu_px,v_px\n1,2\n");
   ASSERT_TRUE(table.has_value());
   EXPECT_EQ(table->number(0, "u_px"), 1);
@@ -40,7 +40,7 @@ TEST(ReadCsv, MissingAndUnknownColumnsAreNamed) {
   EXPECT_EQ(table_of("u_px,v_px,w\n1,2,3\n").error().reason, Reason::unknown_key);
 }
 
-TEST(ReadCsv, RowOfOtherLengthIsRefused) { EXPECT_FALSE(table_of("u_px,v_px\n1,2,3\n").has_value()); }
+TEST(ReadCsv, RowOfDifferentLengthIsRefused) { EXPECT_FALSE(table_of("u_px,v_px\n1,2,3\n").has_value()); }
 
 TEST(ReadCsv, ControlCharactersAreRefused) {
   for (const char* text : {"u_px,v_px\n1,\x1b[31m2\n", "u_px,v_px\n1,2\t3\n", "u_px,v\x7f\n1,2\n"}) {
@@ -51,7 +51,7 @@ TEST(ReadCsv, ControlCharactersAreRefused) {
   }
 }
 
-TEST(ReadCsv, NumbersHaveAPointWhateverTheLocale) {
+TEST(ReadCsv, DecimalPointIsIndependentOfTheLocale) {
   struct Comma : std::numpunct<char> {
     char do_decimal_point() const override { return ','; }
   };
@@ -62,7 +62,7 @@ TEST(ReadCsv, NumbersHaveAPointWhateverTheLocale) {
   EXPECT_EQ(table->number(0, "u_px"), 1.5);
 }
 
-TEST(ReadCsv, FieldsThatAreNoFiniteNumberAreRefused) {
+TEST(ReadCsv, FieldsThatAreNotFiniteNumbersAreRefused) {
   const auto table = table_of("u_px,v_px\nnan,1e999\nx,\n");
   EXPECT_THROW(table->number(0, "u_px"), BadInput);
   EXPECT_THROW(table->number(0, "v_px"), BadInput);

@@ -12,7 +12,8 @@
 
 namespace helicarm {
 
-/// Why an answer is missing or doubtful: the closed list of codes a caller may meet (docs/reasons.md).
+/// Why a result is missing or uncertain: the closed list of codes that a caller can receive
+/// (docs/reasons.md).
 enum class Reason {
   // Unreadable input or wrong usage: exit code 2.
   usage,
@@ -29,7 +30,7 @@ enum class Reason {
   name_clash,
   cannot_write,
   port_taken,
-  // Refused, the data does not allow a trustworthy answer: exit code 3.
+  // Refused because the data do not support a reliable result: exit code 3.
   blank_image,
   saturated,
   plate_not_found,
@@ -65,7 +66,7 @@ enum class Reason {
   not_connected,
   replay_differs,
   interrupted,
-  // Only ever warnings.
+  // Warnings only.
   name_differs,
   bone_taken_as_fixed,
   tag_disagrees,
@@ -76,13 +77,13 @@ enum class Reason {
   rules_broken,
 };
 
-/// C-arm history-readable code of a reason, e.g. "too_few_fiducials".
+/// Machine-readable code of a reason, e.g. "too_few_fiducials".
 std::string_view code(Reason reason);
 
 /// 2 for unreadable input or wrong usage, 3 for a refusal.
 int exit_code(Reason reason);
 
-/// A reason, a sentence for a person, the view it concerns (may be empty) and the figures that led to it.
+/// A reason, a message for the user, the view concerned (may be empty) and the figures behind the decision.
 struct Failure {
   Reason reason;
   std::string message;
@@ -100,7 +101,7 @@ inline tl::unexpected<Failure> fail(Reason reason, std::string message,
   return tl::unexpected<Failure>(Failure{reason, std::move(message), {}, std::move(figures)});
 }
 
-/// Carries a Failure out of a deep parser; never crosses a public function (see `guarded`).
+/// Carries a Failure out of nested parser calls; never leaves a public function (see `guarded`).
 class BadInput : public std::exception {
  public:
   explicit BadInput(Failure failure) : failure_(std::move(failure)) {}
@@ -112,7 +113,7 @@ class BadInput : public std::exception {
   Failure failure_;
 };
 
-/// Runs a parser that throws BadInput and hands its Failure back as a value.
+/// Calls a parser that throws BadInput and returns its Failure as a value.
 template <class F>
 auto guarded(F&& parse) -> Expected<std::invoke_result_t<F>> {
   try {
@@ -127,7 +128,7 @@ auto guarded(F&& parse) -> Expected<std::invoke_result_t<F>> {
   }
 }
 
-/// The value, or the failure thrown as BadInput: for use inside `guarded`.
+/// The value, or its failure thrown as BadInput; for use inside `guarded`.
 template <class T>
 T value_or_throw(Expected<T> result) {
   if (!result) throw BadInput(std::move(result).error());

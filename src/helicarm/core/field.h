@@ -19,19 +19,19 @@
 
 namespace helicarm {
 
-/// A number of some options that a person may set: by a flag of the command line, a box of a dialog, a key of
-/// a file. What it is called, how far it goes and what it means are said once, here.
+/// A numeric option set by a CLI flag, a dialog field or a file key: its single definition of name, range and
+/// help.
 template <class Options>
 struct Field {
-  std::string_view name;        ///< as in files: "max_error_mm"
-  std::string_view label = {};  ///< for a person; empty: the name without its unit
-  std::string_view flag = {};   ///< of the command line: "--max-error"; empty: none of its own
-  std::string_view unit = {};   ///< "mm"; empty: a plain number
+  std::string_view name;        ///< key in files: "max_error_mm"
+  std::string_view label = {};  ///< shown to the user; empty: the name without its unit
+  std::string_view flag = {};   ///< CLI option: "--max-error"; empty: no option of its own
+  std::string_view unit = {};   ///< "mm"; empty: dimensionless
   Range range;
-  double step = 0;  ///< only `range.low` and whole steps above it; 0: anything between
+  double step = 0;  ///< allowed values are range.low + n * step; 0: continuous
   std::string_view help;
-  std::span<const std::string_view> words = {};  ///< of a choice: the number is an index
-  bool optional = false;                         ///< may be left unset
+  std::span<const std::string_view> words = {};  ///< for a choice: the value is an index into these
+  bool optional = false;                         ///< may be unset
   std::optional<double> (*get)(const Options&) = nullptr;
   void (*set)(Options&, std::optional<double>) = nullptr;
 };
@@ -57,7 +57,7 @@ constexpr auto& member_of(auto& options) {
 
 }  // namespace detail
 
-/// Binds a field to a member, or to a member of a member: bound<&Plan::tracker, &Tracker::rate>({...}).
+/// Binds a field to a member or nested member: bound<&Plan::tracker, &Tracker::rate>({...}).
 template <auto first, auto... rest>
 constexpr auto bound(Field<typename detail::OptionsOf<decltype(first)>::type> field) {
   using Options = typename detail::OptionsOf<decltype(first)>::type;
@@ -80,7 +80,7 @@ constexpr auto bound(Field<typename detail::OptionsOf<decltype(first)>::type> fi
   return field;
 }
 
-/// The field of this name; a name that is none does not compile where it is asked for in a constant.
+/// The field of this name; an unknown name is a compile error in a constant expression.
 template <class Options>
 constexpr const Field<Options>& field_named(std::span<const Field<Options>> fields, std::string_view name) {
   for (const Field<Options>& field : fields)
@@ -97,7 +97,7 @@ std::string limits_of(const Field<Options>& field) {
                      field.unit.empty() ? "" : " ", field.unit, step);
 }
 
-/// Refuses (bad_value) a number that the field does not take; names field, value and limits.
+/// Refuses (bad_value) a number outside the field's limits; the message names field, value and limits.
 template <class Options>
 Expected<void> check_number(const Field<Options>& field, std::optional<double> number,
                             const std::string& origin) {
@@ -111,7 +111,7 @@ Expected<void> check_number(const Field<Options>& field, std::optional<double> n
                           number ? fmt::format("{:.12g}", *number) : "nothing", limits_of(field)));
 }
 
-/// The same for all fields of some options.
+/// Checks all fields of `options`.
 template <class Options>
 Expected<void> check_fields(std::span<const Field<std::type_identity_t<Options>>> fields,
                             const Options& options, const std::string& origin) {
@@ -120,7 +120,7 @@ Expected<void> check_fields(std::span<const Field<std::type_identity_t<Options>>
   return {};
 }
 
-/// What stands before a box: the label, or "Max error" of "max_error_mm".
+/// Label of the input field: `label`, or "Max error" for "max_error_mm".
 template <class Options>
 std::string label_of(const Field<Options>& field) {
   if (!field.label.empty()) return std::string(field.label);

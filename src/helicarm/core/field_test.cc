@@ -49,18 +49,18 @@ TEST(Field, ReadsAndWritesItsMember) {
   for (const auto& field : fields) EXPECT_TRUE(field.get(options));
   fields[1].set(options, {});
   EXPECT_FALSE(fields[1].get(options));
-  fields[2].set(options, {});  // what cannot be unset stays
+  fields[2].set(options, {});  // a required field keeps its value
   EXPECT_EQ(options.inner.size, 1024);
 }
 
-TEST(Field, KnowsWhatMayBeLeftUnset) {
+TEST(Field, OnlyOptionalFieldsMayBeUnset) {
   EXPECT_TRUE(fields[1].optional);
   EXPECT_FALSE(fields[2].optional);
   EXPECT_EQ(complaint(fields[1], {}), "");
   EXPECT_EQ(complaint(fields[2], {}), "test: size: nothing is not 512 to 1024 px in steps of 512");
 }
 
-TEST(Field, ComplaintNamesFieldValueAndLimits) {
+TEST(Field, MessageNamesFieldValueAndLimits) {
   EXPECT_EQ(complaint(fields[1], 10), "");
   EXPECT_EQ(complaint(fields[1], 10.5), "test: limit_mm: 10.5 is not 0.5 to 10 mm");
   EXPECT_EQ(complaint(fields[2], 700), "test: size: 700 is not 512 to 1024 px in steps of 512");
@@ -68,7 +68,7 @@ TEST(Field, ComplaintNamesFieldValueAndLimits) {
   EXPECT_NE(complaint(fields[1], std::numeric_limits<double>::quiet_NaN()), "");
 }
 
-TEST(Field, AllAreChecked) {
+TEST(Field, AllFieldsAreChecked) {
   Options options;
   EXPECT_TRUE(check_fields(fields, options, "options"));
   options.inner.size = 5;

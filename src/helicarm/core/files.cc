@@ -42,7 +42,7 @@ Expected<void> write_bytes(const fs::path& aside, const fs::path& path, std::str
   return {};
 }
 
-/// Written aside, synced, renamed, the folder synced.
+/// Atomic replacement: temporary file, fsync, rename, fsync of the folder.
 Expected<void> replace_file(const fs::path& path, const Write& write) {
   std::error_code ec;
   const fs::path aside = name_aside(path);
@@ -89,17 +89,18 @@ Expected<void> write_file_with(const fs::path& path, const Write& write) {
   const fs::path folder = folder_of(path);
   fs::create_directories(folder, ec);
   if (!fs::is_directory(folder, ec))
-    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be made", folder.string()));
+    return fail(Reason::cannot_write,
+                fmt::format("{}: is not a folder and cannot be created", folder.string()));
   return replace_file(path, write);
 }
 
 Expected<fs::path> path_inside(const fs::path& folder, const std::string& relative) {
   const auto outside = [&] {
     return fail(Reason::path_outside,
-                fmt::format("\"{}\": leads out of the folder {}", relative, folder.string()));
+                fmt::format("\"{}\": is outside the folder {}", relative, folder.string()));
   };
   if (relative.empty() || relative.find('\0') != std::string::npos)
-    return fail(Reason::bad_value, "a file name is empty or holds a NUL");
+    return fail(Reason::bad_value, "a file name is empty or contains a NUL");
   const fs::path name(relative);
   if (name.is_absolute()) return outside();
   std::error_code ec;

@@ -10,22 +10,21 @@
 
 namespace helicarm {
 
-/// Whole content of a regular file of at most `max_bytes`.
+/// Whole content of a regular file of at most `max_bytes` bytes.
 Expected<std::string> read_file(const std::filesystem::path& path, std::uintmax_t max_bytes);
 
-/// Replaces `path` as a whole or not at all: written aside, fsynced, renamed, folder fsynced.
+/// Replaces `path` atomically: temporary file, fsync, rename, fsync of the folder.
 Expected<void> write_file(const std::filesystem::path& path, std::string_view bytes);
 
-/// As `write_file`, but the folder must be there: it is not made.
+/// Like `write_file`, but the folder must exist.
 Expected<void> write_file_in_folder(const std::filesystem::path& path, std::string_view bytes);
 
-/// As `write_file`, for a library that insists on writing the file itself: `write` fills the name it is
-/// given.
+/// Like `write_file`, for a library that writes the file itself: `write` receives the temporary file's name.
 Expected<void> write_file_with(
     const std::filesystem::path& path,
     const std::function<Expected<void>(const std::filesystem::path& aside)>& write);
 
-/// `relative` below `folder`; a name that is absolute, or that leaves the folder by ".." or by a link, is
+/// `relative` below `folder`. An absolute name, or one that leaves the folder through ".." or a link, is
 /// refused (path_outside).
 Expected<std::filesystem::path> path_inside(const std::filesystem::path& folder, const std::string& relative);
 

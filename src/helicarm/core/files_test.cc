@@ -19,23 +19,23 @@ class Files : public ::testing::Test {
   fs::path folder_;
 };
 
-TEST_F(Files, WhatIsWrittenIsRead) {
+TEST_F(Files, RoundTripKeepsContent) {
   ASSERT_TRUE(write_file(folder_ / "a" / "b.txt", "hello"));
   EXPECT_EQ(*read_file(folder_ / "a" / "b.txt", 10), "hello");
 }
 
-TEST_F(Files, FailedWriteLeavesTheOldFileAndNothingElse) {
+TEST_F(Files, FailedWriteKeepsTheOldFileAndLeavesNoOther) {
   ASSERT_TRUE(write_file(folder_ / "b.txt", "old"));
   const auto result = write_file_with(folder_ / "b.txt", [](const fs::path& aside) -> Expected<void> {
     std::ofstream(aside) << "half";
-    return fail(Reason::cannot_write, "broken on purpose");
+    return fail(Reason::cannot_write, "simulated failure");
   });
   EXPECT_FALSE(result.has_value());
   EXPECT_EQ(*read_file(folder_ / "b.txt", 10), "old");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
 }
 
-TEST_F(Files, FolderThatIsNotThereIsNotMadeWhereItMustBe) {
+TEST_F(Files, WriteFileInFolderDoesNotCreateTheFolder) {
   EXPECT_EQ(write_file_in_folder(folder_ / "a" / "b.txt", "hello").error().reason, Reason::cannot_write);
   EXPECT_FALSE(fs::exists(folder_ / "a"));
   ASSERT_TRUE(write_file_in_folder(folder_ / "b.txt", "hello"));

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uintmax_t max_json_bytes = 64u << 20;
 constexpr std::size_t max_depth = 64;
-/// The library looks a key up by going through all keys of its object: their number must be bounded.
+/// nlohmann::ordered_map searches keys linearly: their number must be bounded.
 constexpr std::size_t max_keys = 1000;
 
 bool names_non_finite(std::string_view rest) {
@@ -32,7 +32,7 @@ std::string shorten(const Json& value) {
   return text;
 }
 
-/// Reads a text without building its values: so nesting and keys are bounded before anything grows with them.
+/// SAX pass without building values: bounds nesting and keys before memory grows with them.
 class StructureCheck : public nlohmann::json_sax<Json> {
  public:
   StructureCheck(std::string_view text, const std::string& origin) : text_(text), origin_(origin) {}
@@ -55,7 +55,7 @@ class StructureCheck : public nlohmann::json_sax<Json> {
     if (!keys_.back().insert(name).second)
       return refuse(Reason::bad_json, fmt::format("key {} is given twice", shorten(name)));
     if (keys_.back().size() > max_keys)
-      return refuse(Reason::bad_json, fmt::format("an object of more than {} keys", max_keys));
+      return refuse(Reason::bad_json, fmt::format("an object has more than {} keys", max_keys));
     return true;
   }
 
@@ -96,7 +96,7 @@ class StructureCheck : public nlohmann::json_sax<Json> {
 
   std::string_view text_;
   const std::string& origin_;
-  std::vector<std::set<std::string>> keys_;  ///< of each object around the place; an array has none
+  std::vector<std::set<std::string>> keys_;  ///< one set per enclosing object; an array's is empty
   Failure failure_{Reason::bad_json, origin_, {}, {}};
 };
 
@@ -174,7 +174,7 @@ std::string JsonReader::text(const char* key, std::size_t max_length) {
   if (text.size() > max_length)
     refuse(Reason::bad_value, key, fmt::format("{} characters, limit {}", text.size(), max_length));
   if (holds_control_character(text))
-    refuse(Reason::bad_value, key, fmt::format("{} holds a control character", shorten(value)));
+    refuse(Reason::bad_value, key, fmt::format("{} contains a control character", shorten(value)));
   return text;
 }
 

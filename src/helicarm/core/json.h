@@ -14,23 +14,23 @@
 
 namespace helicarm {
 
-/// Keys keep the order in which they were written.
+/// Keys keep their order.
 using Json = nlohmann::ordered_json;
 
 }  // namespace helicarm
 
-/// Compiled once, in json.cc.
+/// Instantiated once, in json.cc.
 extern template class nlohmann::basic_json<nlohmann::ordered_map>;
 
 namespace helicarm {
 
-/// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a key given twice, nesting
-/// deeper than 64, an object of more than 1000 keys and every other fault are `bad_json`. `origin` (a file
-/// name) begins each message. All JSON that comes from outside is read by this function.
+/// Parses JSON text. NaN, Infinity and numbers beyond a double are `not_finite`; a duplicate key, nesting
+/// deeper than 64, an object of more than 1000 keys and any other syntax error are `bad_json`. `origin` (a
+/// file name) begins each message. All external JSON is read by this function.
 Expected<Json> parse_json(std::string_view text, const std::string& origin);
 Expected<Json> read_json(const std::filesystem::path& path);
 
-/// Indented text for a person or a file. What is no UTF-8 (the name of a file may be so) is replaced.
+/// Indented text. Invalid UTF-8 (possible in file names) is replaced.
 std::string to_text(const Json& json);
 
 struct Range {
@@ -38,8 +38,8 @@ struct Range {
   double high;
 };
 
-/// Reads one JSON object strictly: every field is checked for type and range, and a key nobody asked for is
-/// an error. All members throw BadInput, with a message that names file, field, value and limit.
+/// Reads one JSON object strictly: type and range of every field are checked, and a key that is not read is
+/// an error. All members throw BadInput; the message names file, field, value and limit.
 class JsonReader {
  public:
   JsonReader(const Json& value, std::string where);
@@ -48,7 +48,7 @@ class JsonReader {
   double number(const char* key, Range range);
   std::optional<double> optional_number(const char* key, Range range);
   int integer(const char* key, int low, int high);
-  /// Without control characters: it may end up on a terminal or in a file's name.
+  /// Control characters are refused: the text may be printed on a terminal or become part of a file name.
   std::string text(const char* key, std::size_t max_length = 200);
   std::optional<std::string> optional_text(const char* key, std::size_t max_length = 200);
   bool boolean(const char* key, bool fallback);
@@ -59,12 +59,12 @@ class JsonReader {
   JsonReader object(const char* key);
   /// Elements of an array of objects; an absent array is empty unless `required`.
   std::vector<JsonReader> objects(const char* key, bool required, std::size_t max_count = 10000);
-  /// Raw value for a field whose shape the caller checks itself; null when absent.
+  /// Raw value for a field whose structure the caller checks; null if absent.
   const Json& raw(const char* key);
-  /// Index in `names` of a text field's value.
+  /// Index in `names` of the field's value.
   std::size_t choice(const char* key, std::initializer_list<std::string_view> names);
 
-  /// To be called last: throws `unknown_key` for a key that was never asked for.
+  /// Call last: throws `unknown_key` for a key that was not read.
   void finish() const;
 
   const std::string& where() const { return where_; }

@@ -9,14 +9,14 @@
 
 namespace helicarm {
 
-/// Bounds a log that strangers can write into: so many lines a second pass, the others are counted. From any
-/// thread.
+/// Limits the rate of log lines that remote peers can cause: `lines_a_second` pass, the others are counted.
+/// Thread-safe.
 class LineLimit {
  public:
   using Clock = std::chrono::steady_clock;
   explicit LineLimit(unsigned lines_a_second) : most_(lines_a_second) {}
 
-  /// How many lines were left out before this one, or nothing where this one is left out too.
+  /// Number of lines dropped before this one, or nothing if this one is dropped.
   std::optional<std::uint64_t> pass(Clock::time_point now = Clock::now()) {
     const std::lock_guard lock(mutex_);
     if (now - second_ >= std::chrono::seconds(1)) {

@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-TEST(LineLimit, LinesBeyondThoseOfASecondAreCounted) {
+TEST(LineLimit, LinesAboveTheRateAreCounted) {
   LineLimit limit(2);
   const LineLimit::Clock::time_point begin{std::chrono::hours(1)};
   EXPECT_EQ(limit.pass(begin), 0u);

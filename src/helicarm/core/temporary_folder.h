@@ -11,14 +11,14 @@
 
 namespace helicarm {
 
-/// A folder of its own among the system's temporary ones, which goes again with all that is in it.
+/// A new folder in the system's temporary folder, removed with its content on destruction.
 class TemporaryFolder {
  public:
   /// Throws BadInput (cannot_write).
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "helicarm_XXXXXX").string();
     if (!::mkdtemp(name.data()))
-      throw BadInput(Reason::cannot_write, name + ": cannot be made: " + std::strerror(errno));
+      throw BadInput(Reason::cannot_write, name + ": cannot be created: " + std::strerror(errno));
     path_ = name;
   }
   ~TemporaryFolder() {
