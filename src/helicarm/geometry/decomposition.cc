@@ -16,7 +16,7 @@ struct Split {
   Eigen::Vector3d across;
 };
 
-/// A row's part along a unit axis and what is left; the second pass removes the rounding of the first.
+/// Component along a unit axis and remainder; the second pass removes the rounding error of the first.
 Split split(const Eigen::Vector3d& row, const Eigen::Vector3d& axis) {
   const double first = row.dot(axis);
   const Eigen::Vector3d rest = row - first * axis;
@@ -25,13 +25,13 @@ Split split(const Eigen::Vector3d& row, const Eigen::Vector3d& axis) {
 }
 
 tl::unexpected<Failure> source_at_infinity() {
-  return fail(Reason::point_at_infinity, "the projection matrix has no source at a finite place");
+  return fail(Reason::point_at_infinity, "the projection matrix has no finite X-ray source");
 }
 
-/// `sign` times the matrix is positive before the source.
+/// `sign` times the matrix is positive in front of the source.
 Expected<View> decompose_signed(const Projection& projection, double sign) {
   if (!projection.allFinite())
-    return fail(Reason::not_finite, "the projection matrix holds a number that is not finite");
+    return fail(Reason::not_finite, "the projection matrix contains a number that is not finite");
   const double scale = sign * projection.row(2).head<3>().norm();
   if (scale == 0) return source_at_infinity();
   const Projection p = projection / scale;

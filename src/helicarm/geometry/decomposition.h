@@ -6,11 +6,10 @@
 
 namespace helicarm {
 
-/// The view whose projection equals a 3x4 matrix up to scale and sign: fy > 0, a proper rotation, and fx < 0
-/// for a mirrored image. The sign of the matrix is chosen so that the given point lies before the source;
-/// without one, so that the image is not mirrored (det of the left 3x3 > 0). Refuses `not_finite` numbers
-/// and a source at infinity
-/// (`point_at_infinity`).
+/// The view whose projection equals a 3x4 matrix up to scale and sign: fy > 0, a proper rotation, fx < 0 for
+/// a mirrored image. The sign of the matrix is chosen so that the given point lies in front of the source;
+/// without a point, so that the image is not mirrored (det of the left 3x3 > 0). Refuses numbers that are not
+/// finite (`not_finite`) and a source at infinity (`point_at_infinity`).
 Expected<View> decompose(const Projection& projection);
 Expected<View> decompose(const Projection& projection, const Eigen::Vector3d& point_in_front);
 

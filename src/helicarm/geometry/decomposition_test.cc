@@ -28,7 +28,7 @@ double distance_up_to_scale(const Projection& a, const Projection& b) {
   return (a - scale * b).norm() / a.norm();
 }
 
-TEST(Decompose, AnyScaleAndSignGivesTheViewBack) {
+TEST(Decompose, RecoversTheViewForAnyScaleAndSign) {
   RandomStream random(1, 0);
   for (int i = 0; i < 300; ++i) {
     const View truth = random_view(random, i % 2 == 1);
@@ -52,7 +52,7 @@ TEST(Decompose, MirroredImageHasNegativeFxAndPositiveDepth) {
   EXPECT_GT(view->camera_from_world.rotation.determinant(), 0);
 }
 
-TEST(Decompose, WithoutAPointTheImageIsTakenAsNotMirrored) {
+TEST(Decompose, WithoutAPointTheImageIsNotMirrored) {
   RandomStream random(3, 0);
   for (double sign : {1.0, -1.0}) {
     const auto view = decompose(sign * random_view(random, false).projection());
@@ -62,7 +62,7 @@ TEST(Decompose, WithoutAPointTheImageIsTakenAsNotMirrored) {
   }
 }
 
-TEST(Decompose, OriginInTheSourcePlaneIsNoObstacle) {
+TEST(Decompose, OriginInTheSourcePlaneIsAccepted) {
   RandomStream random(4, 0);
   View truth = random_view(random, false);
   truth.camera_from_world.translation.z() = 0;

@@ -13,14 +13,14 @@
 namespace helicarm {
 namespace {
 
-constexpr double largest_condition = 1e3;  // balls 0.4 % as thick as wide; the udcsc has 5
+constexpr double largest_condition = 1e3;  // thickness 0.4 % of the width; the udcsc has 5
 constexpr double least_pivot = 1e-11;
-constexpr double least_tz = 1e-8;  // over the norm of the projection's third row
+constexpr double least_tz = 1e-8;  // relative to the norm of the projection's third row
 
 using Design = Eigen::Matrix<double, Eigen::Dynamic, 12>;
 using Square = Eigen::Matrix<double, 12, 12>;
 
-/// Centre and scale that bring points to zero mean and unit rms coordinate (Hartley 1997).
+/// Centroid and scale for zero mean and unit rms coordinate (Hartley 1997).
 template <int N>
 struct Normalisation {
   Eigen::Matrix<double, N, 1> centre = Eigen::Matrix<double, N, 1>::Zero();
@@ -53,7 +53,7 @@ struct NormalisedSystem {
   double condition;
 };
 
-/// The twelfth singular value is the misfit, so the eleventh tells whether the view is determined.
+/// The twelfth singular value is the residual, so the eleventh decides whether the view is determined.
 NormalisedSystem normalised_system(std::span<const PointPair> points) {
   NormalisedSystem system{normalisation_of<3>(points, &PointPair::point_in_world),
                           normalisation_of<2>(points, &PointPair::pixel),
@@ -85,12 +85,11 @@ Expected<NormalisedSystem> checked_system(std::span<const PointPair> points) {
                 {{"n", double(points.size())}});
   NormalisedSystem system = normalised_system(points);
   if (!(system.condition < largest_condition))
-    return fail(
-        Reason::coplanar_fiducials,
-        fmt::format("the points lie in or near a plane, a line or another place that leaves the view open "
-                    "(condition {:.3g}, limit {:g})",
-                    system.condition, largest_condition),
-        {{"condition", system.condition}, {"n", double(points.size())}});
+    return fail(Reason::coplanar_fiducials,
+                fmt::format("the points are close to a plane, a line or another critical set that does not "
+                            "constrain the view (condition {:.3g}, limit {:g})",
+                            system.condition, largest_condition),
+                {{"condition", system.condition}, {"n", double(points.size())}});
   return system;
 }
 
@@ -100,8 +99,8 @@ struct ScaledSystem {
   DltFactors solution;
 };
 
-/// Eq. 7 in pixels about their mean and with columns of unit length: the same residuals, hence the same
-/// minimiser, but far better conditioned than E'E.
+/// Eq. 7 with centred pixels and columns of unit length: same residuals and minimiser, better conditioned
+/// than E'E.
 ScaledSystem solve_scaled(std::span<const PointPair> points) {
   const auto n = Eigen::Index(points.size());
   const Eigen::Vector2d centre = normalisation_of<2>(points, &PointPair::pixel).centre;
@@ -132,7 +131,7 @@ Expected<DltResult> result_of(const Projection& projection, const NormalisedSyst
   if (!view) return tl::unexpected<Failure>(view.error());
   for (const PointPair& p : points)
     if (!(view->depth(p.point_in_world) > 0))
-      return fail(Reason::behind_source, "no X-ray source can see all the points where they are pictured",
+      return fail(Reason::behind_source, "no X-ray source position has all points in front of it",
                   {{"depth_mm", view->depth(p.point_in_world)}});
   return DltResult{*view, factors_from_projection(projection), system.condition};
 }
@@ -167,7 +166,7 @@ Expected<DltResult> dlt_least_squares(std::span<const PointPair> points) {
   if (!(pivot > least_pivot))
     return fail(Reason::point_at_infinity,
                 "Eq. 7 is singular: the world's origin lies in the plane of the X-ray source (t_z = 0); "
-                "the homogeneous form has no such limit",
+                "use the homogeneous form",
                 {{"pivot", pivot}, {"condition", system->condition}});
   return result_of(projection_from_factors(scaled.solution), *system, points);
 }

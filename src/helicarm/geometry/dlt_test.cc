@@ -39,7 +39,7 @@ std::vector<PointPair> pictured(const View& view, const std::vector<Eigen::Vecto
   return pairs;
 }
 
-/// The dumb way: the normal equations as printed, in a wider type.
+/// Reference: the normal equations as printed, in extended precision.
 DltFactors normal_equations(const std::vector<PointPair>& pairs) {
   using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::Index n = Eigen::Index(pairs.size());
@@ -55,7 +55,7 @@ DltFactors normal_equations(const std::vector<PointPair>& pairs) {
   return solution.col(0).cast<double>();
 }
 
-TEST(Dlt, ExactImagesGiveTheViewBack) {
+TEST(Dlt, RecoversTheViewFromExactImages) {
   for (const View& truth : {paper_view(0), paper_view(std::numbers::pi / 2)})
     for (int n : {6, 12, 20}) {
       const auto pairs = pictured(truth, helix(n));
@@ -77,7 +77,7 @@ TEST(Dlt, LeastSquaresAgreesWithTheNormalEquations) {
   }
 }
 
-TEST(Dlt, FactorsAndProjectionAreTheSameThing) {
+TEST(Dlt, FactorsAndProjectionAreEquivalent) {
   const Projection p = paper_view(0.4).projection();
   const auto factors = factors_from_projection(-3 * p);
   ASSERT_TRUE(factors.has_value());
@@ -93,7 +93,7 @@ TEST(Dlt, MirroredImageHasNegativeFx) {
   EXPECT_GT(result->view.depth({0, 0, 40}), 0);
 }
 
-TEST(Dlt, OriginInTheSourcePlaneIsSingularOnlyAsPrinted) {
+TEST(Dlt, OriginInTheSourcePlaneIsSingularOnlyInThePrintedForm) {
   View truth = paper_view(0);
   auto points = helix(12);
   for (auto& p : points) p.z() += 800;
@@ -106,7 +106,7 @@ TEST(Dlt, OriginInTheSourcePlaneIsSingularOnlyAsPrinted) {
   EXPECT_LT((result->view.projection() - truth.projection()).norm() / truth.projection().norm(), 1e-8);
 }
 
-TEST(Dlt, CoplanarAndCollinearPointsAreRefusedHoweverNoisyTheImage) {
+TEST(Dlt, CoplanarAndCollinearPointsAreRefusedAtAnyNoise) {
   for (double sigma : {0.0, 1.0}) {
     auto flat = helix(12), line = helix(12);
     for (auto& p : flat) p.z() = 0.3 * p.x() - 0.2 * p.y();
@@ -121,7 +121,7 @@ TEST(Dlt, CoplanarAndCollinearPointsAreRefusedHoweverNoisyTheImage) {
   }
 }
 
-TEST(Dlt, ConditionGrowsAsThePointsNearAPlane) {
+TEST(Dlt, ConditionGrowsAsThePointsApproachAPlane) {
   double before = 0;
   for (double height : {1.0, 0.1, 0.01}) {
     auto points = helix(12);

@@ -7,7 +7,7 @@ namespace helicarm {
 
 std::vector<Eigen::Vector2d> epipolar_line(const View& from, const Eigen::Vector2d& uv, const View& onto,
                                            double near_mm, double far_mm) {
-  constexpr int points = 17;  // both ends and the depths between, evenly
+  constexpr int points = 17;  // evenly spaced in depth, both ends included
   constexpr double nearest_mm = 1;
   const Ray ray = ray_through(from, uv);
   const Eigen::Vector3d central_ray = from.camera_from_world.rotation.row(2);

@@ -27,7 +27,7 @@ Matrix3d fundamental(const View& from, const View& onto) {
          from.intrinsics.matrix().inverse();
 }
 
-TEST(EpipolarLine, LiesWhereTheFundamentalMatrixPutsIt) {
+TEST(EpipolarLine, AgreesWithTheFundamentalMatrix) {
   for (const Vector2d& uv : {Vector2d(300, 700), Vector2d(0, 0), Vector2d(900, 50)}) {
     const Vector3d line = fundamental(ap, mirrored_lateral) * uv.homogeneous();
     const auto points = epipolar_line(ap, uv, mirrored_lateral, 600, 1000);
@@ -47,16 +47,16 @@ TEST(EpipolarLine, EndsAtPointsOfKnownDepth) {
   EXPECT_LT((points.back() - mirrored_lateral.project(farther)).norm(), 1e-9);
 }
 
-TEST(EpipolarLine, LeavesOutWhatLiesBehindTheOtherSource) {
+TEST(EpipolarLine, OmitsPointsBehindTheOtherSource) {
   View behind = ap;
-  behind.camera_from_world.translation.z() = 100;  // a source between the object and the first one
+  behind.camera_from_world.translation.z() = 100;  // a source between the object and the first source
   const auto all = epipolar_line(ap, {500, 500}, ap, 600, 1000);
   const auto some = epipolar_line(ap, {500, 500}, behind, 600, 1000);
   EXPECT_LT(some.size(), all.size());
   EXPECT_GT(some.size(), 0u);
 }
 
-TEST(EpipolarLine, OntoItselfIsThePixel) {
+TEST(EpipolarLine, IntoTheSameViewIsThePixel) {
   for (const Vector2d& point : epipolar_line(ap, {123, 456}, ap, 500, 900))
     EXPECT_LT((point - Vector2d(123, 456)).norm(), 1e-8);
 }

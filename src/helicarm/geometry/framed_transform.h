@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// A pose at a file's or a device's edge, which carries the names of its frames: to_from_from.
+/// A pose read from a file or a device, with the names of its frames: to_from_from.
 struct FramedTransform {
   std::string to;
   std::string from;
@@ -17,7 +17,7 @@ struct FramedTransform {
   FramedTransform inverse() const { return {from, to, transform.inverse()}; }
 };
 
-/// Throws std::invalid_argument where the inner frames differ.
+/// Throws std::invalid_argument if the inner frames differ.
 inline FramedTransform operator*(const FramedTransform& left, const FramedTransform& right) {
   if (left.from != right.to)
     throw std::invalid_argument(left.to + "_from_" + left.from + " does not fit " + right.to + "_from_" +

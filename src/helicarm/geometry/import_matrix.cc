@@ -19,7 +19,7 @@
 namespace helicarm {
 namespace {
 
-constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD carries its pixels along
+constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
 constexpr double largest_number = 1e12;
 constexpr int largest_side_px = 16384;
 constexpr std::string_view separators = " \t\r,;[]";
@@ -69,7 +69,7 @@ std::string trimmed(const std::string& line) {
   return first == std::string::npos ? "" : line.substr(first, line.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// The numbers below a section's title, up to the next title.
+/// Numbers after a section's title, up to the next title.
 std::vector<double> section(const std::string& text, const std::string& title, std::size_t count,
                             const std::string& origin) {
   std::istringstream lines(text);

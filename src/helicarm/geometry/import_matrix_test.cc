@@ -30,7 +30,7 @@ const std::string maya_cam =
     "image size\n1760,1700\n\ncamera matrix\n8000.5,0,794.25\n0,8100.25,866.5\n0,0,1\n\n"
     "rotation\n0,0,1\n-0.6,-0.8,0\n0.8,-0.6,0\n\ntranslation\n-68.5\n125.25\n136.75\n";
 
-TEST(ImportMatrix, MayaCamIsKeptAsPrinted) {
+TEST(ImportMatrix, MayaCamValuesAreKept) {
   const auto result = import_text(maya_cam, 10);
   ASSERT_TRUE(result.has_value()) << result.error().message;
   EXPECT_EQ(result->view.intrinsics.fx, 8000.5);
@@ -47,7 +47,7 @@ TEST(ImportMatrix, BrokenMayaCamIsNamed) {
     std::string text = maya_cam;
     return text.replace(text.find(what), what.size(), by);
   };
-  EXPECT_EQ(reason_of(replaced("-0.6,-0.8,0", "0.6,0.8,0")), Reason::bad_value);  // a mirror
+  EXPECT_EQ(reason_of(replaced("-0.6,-0.8,0", "0.6,0.8,0")), Reason::bad_value);  // a reflection
   EXPECT_EQ(reason_of(replaced("-0.6,-0.8", "-0.6,-0.7")), Reason::bad_value);
   EXPECT_EQ(reason_of(replaced("0,0,1\n\n", "0,1,1\n\n")), Reason::bad_value);
   EXPECT_EQ(reason_of(replaced("125.25", "nan")), Reason::not_finite);
@@ -82,7 +82,7 @@ TEST(ImportMatrix, SameMatrixAsTextJsonAndNrrd) {
   EXPECT_EQ(*nrrd->image_size, Eigen::Vector2i(1024, 760));
 }
 
-TEST(ImportMatrix, NegativeScaleIsUndoneAndAMirrorKept) {
+TEST(ImportMatrix, NegativeScaleIsRemovedAndAMirroredImageKept) {
   const auto result = import_text("600 0 512 409600\n0 -600 512 409600\n0 0 1 800\n");
   ASSERT_TRUE(result.has_value());
   EXPECT_LT(result->view.intrinsics.fx, 0);

@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// The X-ray that made a pixel: from the source, in a unit direction towards the detector (world frame, mm).
+/// X-ray of a pixel: from the source, in a unit direction towards the detector (world frame, mm).
 struct Ray {
   Eigen::Vector3d origin;
   Eigen::Vector3d direction;
@@ -24,12 +24,12 @@ inline Ray ray_through(const View& view, const Eigen::Vector2d& pixel) {
   return {view.source_in_world(), view.camera_from_world.rotation.transpose() * direction_in_camera};
 }
 
-/// Angle between two rays as lines, 0 to pi/2.
+/// Angle between two rays taken as lines, 0 to pi/2.
 inline double angle_between(const Ray& a, const Ray& b) {
   return std::atan2(a.direction.cross(b.direction).norm(), std::abs(a.direction.dot(b.direction)));
 }
 
-/// Shortest distance between two rays as lines, mm.
+/// Shortest distance between two rays taken as lines, mm.
 inline double gap_between(const Ray& a, const Ray& b) {
   const Eigen::Vector3d across = a.direction.cross(b.direction);
   const Eigen::Vector3d apart = b.origin - a.origin;

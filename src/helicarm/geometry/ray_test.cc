@@ -8,7 +8,7 @@
 namespace helicarm {
 namespace {
 
-TEST(RayThrough, PassesThePointThatMadeThePixel) {
+TEST(RayThrough, PassesThroughTheProjectedPoint) {
   const View view{{-6000, 6100, 500, 520, 3}, {rotation_from_euler(0.2, 0.7, -1), {20, -30, 800}}};
   const Eigen::Vector3d point(40, -10, 60);
   const Ray ray = ray_through(view, view.project(point));

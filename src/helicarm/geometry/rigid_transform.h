@@ -6,8 +6,7 @@
 
 namespace helicarm {
 
-/// A proper rigid motion. A variable is named `a_from_b` and maps points of b into a: p_a = a_from_b * p_b
-/// (mm).
+/// A proper rigid motion. `a_from_b` maps points of frame b to frame a: p_a = a_from_b * p_b (mm).
 struct RigidTransform {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();

@@ -79,7 +79,7 @@ Expected<RigidTransform> rigid_transform_from(const Eigen::Matrix4d& matrix, con
         fmt::format("{}: not a rigid motion, |R'R - I| is {:.3g}, limit {:g}", what, off, rigid_tolerance),
         {{"off_orthogonal", off}});
   if (rotation.determinant() < 0)
-    return fail(Reason::bad_value, fmt::format("{}: a mirror image (determinant -1), not a rotation", what));
+    return fail(Reason::bad_value, fmt::format("{}: a reflection (determinant -1), not a rotation", what));
   return RigidTransform{nearest_rotation(rotation), matrix.topRightCorner<3, 1>()};
 }
 

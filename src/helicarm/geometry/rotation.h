@@ -10,8 +10,8 @@
 
 namespace helicarm {
 
-/// Angles of Eq. 5, radians. Where beta is +-90 degrees only one sum of alpha and gamma is fixed: gamma is
-/// then 0 and the angles are marked as locked.
+/// Angles of Eq. 5, rad. At beta = +-90 degrees only the sum or difference of alpha and gamma is determined:
+/// gamma is set to 0 and the angles are marked as locked.
 struct EulerAngles {
   double alpha = 0;
   double beta = 0;
@@ -19,7 +19,7 @@ struct EulerAngles {
   bool gimbal_locked = false;
 };
 
-/// Eq. 5 with r13 = -CaSbCg + SaSg; as printed (SbSg) it is no rotation.
+/// Eq. 5 with r13 = -CaSbCg + SaSg; as printed (SbSg) the matrix is not a rotation.
 Eigen::Matrix3d rotation_from_euler(double alpha, double beta, double gamma);
 
 /// Inverse of `rotation_from_euler`, beta in [-90, 90] degrees.
@@ -28,15 +28,16 @@ EulerAngles euler_from_rotation(const Eigen::Matrix3d& rotation);
 /// v x p = cross_matrix(v) * p.
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& vector);
 
-/// Rotation about `vector` by its length (rad), and back; the length returned is at most pi.
+/// Rotation vector (rad) to matrix and back; the returned length is at most pi.
 Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector);
 Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation);
 
-/// The proper rotation nearest to a matrix (least squares).
+/// Nearest proper rotation (least squares).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 
-/// A 4x4 from a file or a stream as a rigid motion: rounding (|R'R - I| <= 1e-3) is corrected, anything else
-/// is `bad_value` (scale, shear, mirror, last row) or `not_finite`. `what` begins the message.
+/// A 4x4 matrix from a file or a stream as a rigid motion: rounding (|R'R - I| <= 1e-3) is corrected; scale,
+/// shear, reflection or a wrong last row is `bad_value`, a non-finite number `not_finite`. `what` begins the
+/// message.
 Expected<RigidTransform> rigid_transform_from(const Eigen::Matrix4d& matrix, const std::string& what);
 
 }  // namespace helicarm

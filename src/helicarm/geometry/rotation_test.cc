@@ -30,7 +30,7 @@ TEST(Euler, CorrectedEquationFiveIsARotationForAllAngles) {
         rotation_from_euler(random.uniform(-pi, pi), random.uniform(-pi, pi), random.uniform(-pi, pi)));
 }
 
-TEST(Euler, AnglesComeBack) {
+TEST(Euler, EulerAnglesRoundTrip) {
   RandomStream random(2, 0);
   for (int i = 0; i < 200; ++i) {
     const double alpha = random.uniform(-pi, pi), beta = random.uniform(-1.5, 1.5),
@@ -43,7 +43,7 @@ TEST(Euler, AnglesComeBack) {
   }
 }
 
-TEST(Euler, GimbalLockIsFlaggedAndStillGivesTheRotation) {
+TEST(Euler, GimbalLockIsFlaggedAndKeepsTheRotation) {
   for (double beta : {pi / 2, -pi / 2}) {
     const Eigen::Matrix3d rotation = rotation_from_euler(0.4, beta, 1.1);
     const EulerAngles angles = euler_from_rotation(rotation);
@@ -53,7 +53,7 @@ TEST(Euler, GimbalLockIsFlaggedAndStillGivesTheRotation) {
   }
 }
 
-TEST(RotationVector, ComesBackUpToHalfATurn) {
+TEST(RotationVector, RoundTripsUpToHalfATurn) {
   RandomStream random(3, 0);
   for (double angle : {0.0, 1e-12, 1e-7, 0.3, 2.0, pi - 1e-9}) {
     const Eigen::Vector3d vector = random_vector(random, angle);
@@ -88,7 +88,7 @@ TEST(RigidTransformFrom, RoundingIsCorrected) {
   EXPECT_EQ(pose->translation, Eigen::Vector3d(10, -20, 800));
 }
 
-TEST(RigidTransformFrom, ScaleMirrorLastRowZeroAndNanAreRefused) {
+TEST(RigidTransformFrom, ScaleReflectionLastRowZeroAndNanAreRefused) {
   Eigen::Matrix4d scaled = some_pose(), mirrored = some_pose(), affine = some_pose(), broken = some_pose();
   scaled.topLeftCorner<3, 3>() *= 1.01;
   mirrored.row(0) *= -1;

@@ -15,8 +15,8 @@ namespace helicarm {
 namespace {
 
 constexpr double least_angle_deg = 1;
-constexpr double farthest_mm = 1e5;      // of a point from a source: beyond any room
-constexpr double least_sigma_px = 1e-6;  // an "exact" pixel still has to have a weight
+constexpr double farthest_mm = 1e5;      // from a source: beyond any room
+constexpr double least_sigma_px = 1e-6;  // an exact pixel still needs a finite weight
 constexpr int most_iterations = 20;
 
 constexpr double degrees(double radians) { return radians * 180 / std::numbers::pi; }
@@ -36,11 +36,12 @@ Expected<void> check_place(std::span<const RayObservation> ray_observations, con
     const View& view = ray_observations[i].view;
     const double distance = (point - view.source_in_world()).norm();
     if (!(distance < farthest_mm))
-      return fail(Reason::point_at_infinity,
-                  fmt::format("the rays meet {:.3g} mm from the source, limit {:g}", distance, farthest_mm),
-                  {{"distance_mm", distance}});
+      return fail(
+          Reason::point_at_infinity,
+          fmt::format("the rays intersect {:.3g} mm from the source, limit {:g} mm", distance, farthest_mm),
+          {{"distance_mm", distance}});
     if (!(view.depth(point) > 0))
-      return fail(Reason::behind_source, "the rays meet behind a source",
+      return fail(Reason::behind_source, "the rays intersect behind a source",
                   {{"depth_mm", view.depth(point)}, {"view_index", double(i)}});
   }
   return {};
@@ -60,7 +61,7 @@ Expected<Eigen::Vector3d> intersect_linear(std::span<const Projection> projectio
     }
   const Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> qr(left);
   if (projections.size() < 2 || qr.rank() < 3)
-    return fail(Reason::parallel_rays, "the rays do not fix a point", {{"rank", double(qr.rank())}});
+    return fail(Reason::parallel_rays, "the rays do not determine a point", {{"rank", double(qr.rank())}});
   return qr.solve(right).eval();
 }
 
@@ -87,7 +88,7 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
                                  const Eigen::MatrixXd& covariance_px2) {
   const auto n = Eigen::Index(ray_observations.size());
   if (n < 2)
-    return fail(Reason::not_seen, "the point is seen in fewer than two views", {{"views", double(n)}});
+    return fail(Reason::not_seen, "the point is marked in fewer than two views", {{"views", double(n)}});
   const double angle_deg = degrees(widest_angle(ray_observations));
   if (!(angle_deg >= least_angle_deg))
     return fail(Reason::parallel_rays,
@@ -107,7 +108,7 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   const Eigen::MatrixXd floor = least_sigma_px * least_sigma_px * Eigen::MatrixXd::Identity(2 * n, 2 * n);
   const Eigen::LLT<Eigen::MatrixXd> root(covariance_px2 + floor);
   if (root.info() != Eigen::Success)
-    return fail(Reason::bad_value, "the covariance of the pixels is not positive");
+    return fail(Reason::bad_value, "the covariance of the pixels is not positive definite");
   Intersection result{*start, {}, largest_gap(ray_observations), 0};
   for (int i = 0; i < most_iterations; ++i) {
     Eigen::MatrixX3d jacobian(2 * n, 3);

@@ -42,7 +42,7 @@ TEST(Intersect, ExactPixelsGiveThePointFromTwoOrMoreViews) {
   }
 }
 
-TEST(IntersectLinear, CorrectedEquationEightTakesFactorsOrProjections) {
+TEST(IntersectLinear, CorrectedEquationEightAcceptsFactorsOrProjections) {
   const Eigen::Vector3d point(20, -35, 48);
   const auto ray_observations = observations_of(point, {0, 1.57});
   std::vector<Projection> as_printed;
@@ -71,7 +71,7 @@ TEST(Intersect, NoisyPixelsScatterAsPredicted) {
   const Eigen::Vector3d point(20, -35, 48);
   const auto truth = observations_of(point, {0, 1.2});
   Eigen::MatrixXd covariance = white(truth, 1);
-  covariance(0, 0) = 9;  // one coordinate is worse
+  covariance(0, 0) = 9;  // one coordinate is noisier
   const Eigen::MatrixXd root = covariance.llt().matrixL();
   RandomStream random(5, 0);
   double error2 = 0, chi2 = 0, predicted = 0;
@@ -93,7 +93,7 @@ TEST(Intersect, NoisyPixelsScatterAsPredicted) {
   EXPECT_NEAR(chi2, 1, 0.07);  // 4 equations, 3 unknowns
 }
 
-TEST(Intersect, BadPlacesAreNamedWithFigures) {
+TEST(Intersect, DegenerateConfigurationsAreRefusedWithFigures) {
   const Eigen::Vector3d point(20, -35, 48);
   const auto one = observations_of(point, {0});
   EXPECT_EQ(intersect(one, white(one, 1)).error().reason, Reason::not_seen);
@@ -102,7 +102,7 @@ TEST(Intersect, BadPlacesAreNamedWithFigures) {
   const auto close = observations_of(point, {0, 0.01});
   EXPECT_LT(intersect(close, white(close, 1)).error().figures.at("angle_deg"), 1);
 
-  // Two sources side by side, rays spread apart: the lines meet behind.
+  // Two parallel sources with diverging rays: the lines intersect behind them.
   std::vector<RayObservation> apart{
       {{{6000, 6000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {50, 0, 800}}}, {-500, 512}},
       {{{6000, 6000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {-50, 0, 800}}}, {1500, 512}}};

@@ -23,13 +23,13 @@ struct Intrinsics {
   }
 };
 
-/// One calibrated X-ray: K and the pose of the world in the camera (origin at the source, z towards the
+/// One calibrated X-ray image: K and the pose of the world in the camera (origin at the source, z towards the
 /// detector). The projection matrix is derived, never stored.
 struct View {
   Intrinsics intrinsics;
   RigidTransform camera_from_world;
 
-  /// The third row's first part has unit norm and is positive before the source.
+  /// The left part of the third row has unit norm; positive depth is in front of the source.
   Projection projection() const {
     Projection pose;
     pose << camera_from_world.rotation, camera_from_world.translation;

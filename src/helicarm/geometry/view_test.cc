@@ -8,9 +8,8 @@
 namespace helicarm {
 namespace {
 
-/// Points (mm), pose and intrinsics, and the pixels that OpenCV 4.6.0 gives for them:
-/// cv2.projectPoints(points, (0.4, -1.1, 0.3), (12, -34.5, 803.25), [[fx, 0, 498.25], [0, 4298.75, 531.5],
-/// [0, 0, 1]], None).
+/// Points (mm), pose and intrinsics, and the pixels computed by OpenCV 4.6.0: cv2.projectPoints(points, (0.4,
+/// -1.1, 0.3), (12, -34.5, 803.25), [[fx, 0, 498.25], [0, 4298.75, 531.5], [0, 0, 1]], None).
 struct Projected {
   Eigen::Vector3d point;
   Eigen::Vector2d upright, mirrored;  ///< fx = 4321.5, -4321.5
@@ -27,14 +26,14 @@ View view_with(double fx) {
   return {{fx, 4298.75, 498.25, 531.5, 0}, {rotation_from_vector({0.4, -1.1, 0.3}), {12, -34.5, 803.25}}};
 }
 
-TEST(View, ProjectsAsOpenCvDoes) {
+TEST(View, ProjectionAgreesWithOpenCv) {
   for (const Projected& expected : by_opencv) {
     EXPECT_LT((view_with(4321.5).project(expected.point) - expected.upright).norm(), 1e-10);
     EXPECT_LT((view_with(-4321.5).project(expected.point) - expected.mirrored).norm(), 1e-10);
   }
 }
 
-TEST(View, MatrixProjectsAsOpenCvDoes) {
+TEST(View, MatrixProjectionAgreesWithOpenCv) {
   const Projection projection = view_with(4321.5).projection();
   for (const Projected& expected : by_opencv) {
     const Eigen::Vector3d p = projection * expected.point.homogeneous();
@@ -43,7 +42,7 @@ TEST(View, MatrixProjectsAsOpenCvDoes) {
 }
 
 /// cv2.Rodrigues((0.4, -1.1, 0.3)), OpenCV 4.6.0.
-TEST(RotationFromVector, IsThatOfOpenCv) {
+TEST(RotationFromVector, AgreesWithOpenCv) {
   Eigen::Matrix3d expected;
   expected << 0.42533334289299746, -0.4266500216635599, -0.7981612032903829,  //
       0.03764489992958889, 0.8894871813255765, -0.455406868379005,            //
