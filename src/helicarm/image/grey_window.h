@@ -7,17 +7,17 @@
 
 namespace helicarm {
 
-/// The grey values that are shown between black and white.
+/// Grey values displayed as black and white.
 struct GreyWindow {
   float low = 0;
   float high = 1;
 };
 
-/// The window that clips the darkest and brightest half percent of what is above `lowest`: the bare rim of an
-/// intensifier's field must not claim its ends.
+/// Window that clips the darkest and brightest 0.5 % of the values above `lowest`, so that the rim outside
+/// the intensifier's field does not set the ends.
 GreyWindow usual_window(const Image<float>& grey_image, float lowest);
 
-/// The image for the eye: black at the window's low end, white at its high one.
+/// 8-bit image for display: black at the window's low end, white at its high end.
 Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window);
 
 }  // namespace helicarm

@@ -14,7 +14,7 @@ TEST(UsualWindow, ClipsHalfAPercentOfTheFieldAndIgnoresItsRim) {
   EXPECT_NEAR(window.high, 1094, 1);
 }
 
-TEST(UsualWindow, OfABareImageShowsItBlack) {
+TEST(UsualWindow, EmptyImageIsShownBlack) {
   const Image<float> bare(8, 8, 3);
   const Image<std::uint8_t> grey = eight_bit(bare, usual_window(bare, 3));
   for (const std::uint8_t value : grey.pixels()) EXPECT_EQ(value, 0);
@@ -31,7 +31,7 @@ TEST(EightBit, RunsFromBlackToWhiteAndClips) {
   EXPECT_EQ(grey(4, 0), 255);
 }
 
-TEST(EightBit, AWindowWithoutWidthIsAThreshold) {
+TEST(EightBit, WindowOfZeroWidthIsAThreshold) {
   Image<float> grey_image(2, 1);
   grey_image(1, 0) = 2;
   const Image<std::uint8_t> grey = eight_bit(grey_image, {1, 1});

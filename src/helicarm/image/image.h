@@ -8,8 +8,8 @@
 
 namespace helicarm {
 
-/// A matrix of pixels, row major, without padding. Pixel (0, 0) is the centre of the top-left pixel; u
-/// (column) runs right, v (row) down. A value: it copies deeply and moves cheaply.
+/// Pixel matrix, row major, without padding. Pixel (0, 0) is the centre of the top-left pixel; u (column) to
+/// the right, v (row) down. A value type: deep copy, cheap move.
 template <class T>
 class Image {
  public:

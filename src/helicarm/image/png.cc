@@ -26,7 +26,7 @@ std::string encode(std::uint32_t format, int width, int height, const void* pixe
   return bytes;
 }
 
-/// What libpng's callbacks work on. Nothing here is destroyed while libpng may jump.
+/// State of libpng's callbacks. Nothing here is destroyed while libpng may longjmp.
 struct Reading {
   std::string_view rest;
   bool truncated = false;
@@ -119,12 +119,13 @@ Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin
     const bool rgb = reading.colour == PNG_COLOR_TYPE_RGB;
     if (!rgb && reading.colour != PNG_COLOR_TYPE_GRAY)
       throw BadInput(Reason::unsupported,
-                     fmt::format("{}: a PNG with a palette or alpha; must be grey", origin));
+                     fmt::format("{}: a PNG with a palette or alpha; convert it to grey", origin));
     if (reading.bits < 8)
       throw BadInput(Reason::unsupported,
                      fmt::format("{}: {} bits a pixel; must be 8 or 16", origin, reading.bits));
     if (png_get_interlace_type(reading.png, reading.info) != PNG_INTERLACE_NONE)
-      throw BadInput(Reason::unsupported, fmt::format("{}: an interlaced PNG", origin));
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: an interlaced PNG; save it without interlacing", origin));
     const std::size_t channels = rgb ? 3 : 1, word = reading.bits == 16 ? 2 : 1;
     if (std::size_t{reading.width} * reading.height * word > max_image_bytes)
       throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels are more than {} bytes", origin,
@@ -138,7 +139,7 @@ Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin
       for (int u = 0; u < grey_image.pixels.width(); ++u) {
         const png_byte* at = reading.row.data() + static_cast<std::size_t>(u) * channels * word;
         if (rgb && (std::memcmp(at, at + word, word) != 0 || std::memcmp(at, at + 2 * word, word) != 0))
-          throw BadInput(Reason::unsupported, fmt::format("{}: a colour picture; must be grey", origin));
+          throw BadInput(Reason::unsupported, fmt::format("{}: a colour image; convert it to grey", origin));
         std::uint16_t value = *at;
         if (word == 2) std::memcpy(&value, at, 2);
         grey_image.pixels(u, v) = value;

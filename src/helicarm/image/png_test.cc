@@ -39,7 +39,7 @@ std::string encoded(std::uint32_t format, int channels) {
   return bytes;
 }
 
-TEST(Png, GreyComesBackExactly) {
+TEST(Png, GreyRoundTripIsExact) {
   const auto wide = noise<std::uint16_t>(37, 21);
   const auto narrow = noise<std::uint8_t>(37, 21);
   const auto wide_back = decode_png(encode_png(wide), "x.png");

@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-/// The file in memory, as libtiff reads it.
+/// The file in memory, as libtiff's I/O callbacks read it.
 struct Source {
   std::string_view bytes;
   toff_t at = 0;
@@ -59,7 +59,7 @@ File open(Source& from, const std::string& origin) {
   });
   File file(TIFFClientOpen(origin.c_str(), "r", &from, take, no_write, seek, close, size, map, unmap),
             &TIFFClose);
-  if (!file) throw BadInput(Reason::bad_value, fmt::format("{}: TIFF: damaged or cut off", origin));
+  if (!file) throw BadInput(Reason::bad_value, fmt::format("{}: TIFF: damaged or truncated", origin));
   return file;
 }
 
@@ -119,8 +119,8 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
   return guarded([&] {
     Source from{bytes};
     const int pages = static_cast<int>(TIFFNumberOfDirectories(open(from, origin).get()));
-    // libtiff opens a file whose first directory is cut off, and counts none.
-    if (pages < 1) throw BadInput(Reason::bad_value, fmt::format("{}: TIFF: damaged or cut off", origin));
+    // libtiff opens a file with a truncated first directory and counts no pages.
+    if (pages < 1) throw BadInput(Reason::bad_value, fmt::format("{}: TIFF: damaged or truncated", origin));
     return pages;
   });
 }
@@ -146,7 +146,7 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
         const unsigned char* at = row.data() + u * layout.channels * word;
         if (layout.channels == 3 &&
             (std::memcmp(at, at + word, word) != 0 || std::memcmp(at, at + 2 * word, word) != 0))
-          throw BadInput(Reason::unsupported, fmt::format("{}: a colour picture; must be grey", origin));
+          throw BadInput(Reason::unsupported, fmt::format("{}: a colour image; convert it to grey", origin));
         std::uint16_t value = *at;
         if (word == 2) std::memcpy(&value, at, 2);
         grey_image.pixels(static_cast<int>(u), static_cast<int>(v)) =

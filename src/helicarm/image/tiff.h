@@ -11,12 +11,12 @@ namespace helicarm {
 
 bool is_tiff(std::string_view bytes);
 
-/// At least 1. Refuses bad_value (damaged or cut off).
+/// At least 1. Refuses bad_value (damaged or truncated).
 Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin);
 
-/// One page (0-based) of an unsigned 8 or 16-bit grey TIFF in strips, or RGB whose three channels are equal;
+/// One page (0-based) of an unsigned 8 or 16-bit grey TIFF in strips, or RGB with three equal channels;
 /// uncompressed, PackBits, LZW or deflate. WhiteIsZero is inverted. Refuses: bad_size, bad_value (damaged or
-/// cut off), unsupported (palette, alpha, tiles, other sample types and compressions, true colour).
+/// truncated), unsupported (palette, alpha, tiles, other sample types and compressions, colour).
 Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin);
 
 }  // namespace helicarm

@@ -58,7 +58,7 @@ std::string_view reason(const Kind& kind) {
   return grey_image ? "ok" : code(grey_image.error().reason);
 }
 
-TEST(Tiff, GreyComesBackExactly) {
+TEST(Tiff, GreyRoundTripIsExact) {
   for (int bits : {8, 16})
     for (int compression :
          {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE})
@@ -78,7 +78,7 @@ TEST(Tiff, WhiteIsZeroIsInverted) {
             255 - 42);
 }
 
-TEST(Tiff, OtherKindsAreRefused) {
+TEST(Tiff, UnsupportedKindsAreRefused) {
   EXPECT_EQ(reason({.photometric = PHOTOMETRIC_PALETTE}), "unsupported");
   EXPECT_EQ(reason({.channels = 4, .photometric = PHOTOMETRIC_RGB}), "unsupported");
   EXPECT_EQ(reason({.bits = 32, .format = SAMPLEFORMAT_IEEEFP}), "unsupported");
@@ -102,7 +102,7 @@ TEST(Tiff, MutationsAndTruncationsNeverCrash) {
   }
 }
 
-TEST(Tiff, FileCutWithinItsDirectoryHasNoPages) {
+TEST(Tiff, FileTruncatedInItsDirectoryHasNoPages) {
   const std::string whole = encoded({});
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const auto pages = count_tiff_pages(whole.substr(0, size), "x.tif");
