@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// A 32-bit number, little endian; the caller has checked that its four bytes are there.
+/// Little-endian 32-bit number; the caller has checked that its four bytes exist.
 inline std::uint32_t number_at(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
   std::memcpy(&value, bytes.data() + at, 4);

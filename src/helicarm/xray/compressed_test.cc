@@ -28,7 +28,7 @@ class Compressed : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-    // Without DCMTK's habit of stretching the grey values before lossy compression.
+    // DCMTK rescales the grey values before lossy compression by default: switched off.
     DJEncoderRegistration::registerCodecs(ECC_lossyYCbCr, EUC_default, OFFalse, 0, 0, 0, OFTrue, ESS_444,
                                           OFFalse, OFFalse, 0, 0, 0, 0, 0, 0, 0, 0, OFFalse);
     DcmRLEEncoderRegistration::registerCodecs();
@@ -39,7 +39,7 @@ class Compressed : public ::testing::Test {
   }
 };
 
-/// A smooth image of `bits` bits.
+/// Smooth image of `bits` bits.
 DicomBuilder grey_image(int bits, int frames = 1) {
   std::string bytes;
   for (int f = 0; f < frames; ++f)
@@ -112,7 +112,7 @@ TEST_F(Compressed, LossyJpegIsClose) {
   expect_close(12, EXS_JPEGProcess2_4, &quality, 64);
 }
 
-TEST_F(Compressed, OddScanHeaderOfASequentialJpegIsCorrected) {
+TEST_F(Compressed, InvalidScanHeaderOfASequentialJpegIsCorrected) {
   const DJ_RPLossy quality(95);
   const std::string sound = compress(grey_image(8).bytes(), EXS_JPEGProcess1, &quality);
   std::string odd = sound;

@@ -48,7 +48,7 @@ bool flipped(const DicomElements& elements) {
   return flip == "YES";
 }
 
-/// By JPEG's processes 1, 2 and 4, now or earlier.
+/// JPEG processes 1, 2 and 4, in this file or an earlier one.
 bool lossy(const DicomElements& elements) {
   return elements.text(tags::lossy_compression) == "01" ||
          elements.transfer_syntax == "1.2.840.10008.1.2.4.50" ||
@@ -69,7 +69,7 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
     a.acquired = acquisition_time(elements);
     if (lossy(elements))
       read.warnings.push_back(
-          {Reason::lossy_image, fmt::format("{}: the picture was compressed with loss", elements.origin)});
+          {Reason::lossy_image, fmt::format("{}: the image was compressed with loss", elements.origin)});
     a.flip_hint = flipped(elements);
     a.rotation_hint_deg = one(elements, tags::field_rotation, -360, 360).value_or(0);
     const std::string_view relationship = elements.text(tags::intensity_relationship);

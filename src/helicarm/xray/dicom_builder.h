@@ -9,8 +9,8 @@
 
 namespace helicarm {
 
-/// For tests: a DICOM file byte by byte, so that any element can be wrong. Starts as a sound 8 x 6 XA image
-/// of 12 bits with the values 100, 101, ...
+/// For tests: builds a DICOM file byte by byte so that any element can be invalid. Starts as a valid 8 x 6 XA
+/// image of 12 bits with the values 100, 101, ...
 class DicomBuilder {
  public:
   DicomBuilder() {
@@ -58,7 +58,7 @@ class DicomBuilder {
             number(0, 4);
     return *this;
   }
-  /// Bytes to follow the last element as they are.
+  /// Appends bytes after the last element.
   DicomBuilder& tail(std::string bytes) {
     tail_ = std::move(bytes);
     return *this;

@@ -21,18 +21,17 @@ constexpr std::array<std::string_view, 8> xray_classes = {
     "1.2.840.10008.5.1.4.1.1.1.1",  "1.2.840.10008.5.1.4.1.1.1.1.1", "1.2.840.10008.5.1.4.1.1.7",
     "1.2.840.10008.5.1.4.1.1.7.2",  "1.2.840.10008.5.1.4.1.1.7.3"};
 
-/// A secondary capture may be of anything; these modalities may be an X-ray.
+/// A secondary capture may have any content; these modalities can be X-ray images.
 constexpr std::array<std::string_view, 9> xray_modalities = {"XA", "RF", "CR", "DX", "DR",
                                                              "RG", "OT", "SC", ""};
 
 void check_xray(const DicomElements& elements) {
   const std::string_view sop_class = elements.text(tags::sop_class);
   if (sop_class.empty() && !elements.find(tags::pixel_data))
-    elements.refuse(Reason::not_an_image, tags::pixel_data, "is missing: the file holds no picture");
+    elements.refuse(Reason::not_an_image, tags::pixel_data, "is missing: the file contains no image");
   if (!is_xray_class(sop_class))
-    elements.refuse(
-        Reason::unsupported, tags::sop_class,
-        fmt::format("is {}: not an XA, RF, CR, DX or secondary capture picture", quote(sop_class)));
+    elements.refuse(Reason::unsupported, tags::sop_class,
+                    fmt::format("is {}: not an XA, RF, CR, DX or secondary capture image", quote(sop_class)));
   const std::string_view modality = elements.text(tags::modality);
   if (std::ranges::find(xray_modalities, modality) == xray_modalities.end())
     elements.refuse(Reason::unsupported, tags::modality, fmt::format("is {}: not an X-ray", quote(modality)));

@@ -18,7 +18,7 @@ std::string_view reason(const std::string& bytes) {
 
 std::string_view reason(const DicomBuilder& builder) { return reason(builder.bytes()); }
 
-TEST(DicomCheck, SoundFileIsOutlined) {
+TEST(DicomCheck, ValidFileIsOutlined) {
   const std::string bytes = DicomBuilder().bytes();
   const auto outline = check_dicom(bytes, "x.dcm");
   ASSERT_TRUE(outline) << outline.error().message;
@@ -29,7 +29,7 @@ TEST(DicomCheck, SoundFileIsOutlined) {
   EXPECT_EQ(outline->pixel_data.size(), 96u);
 }
 
-TEST(DicomCheck, NoDicomAtAll) {
+TEST(DicomCheck, FileThatIsNotDicomIsRefused) {
   EXPECT_EQ(reason(""s), "not_an_image");
   EXPECT_EQ(reason(std::string(128, '\0') + "DICM"), "not_an_image");
   EXPECT_EQ(reason("\x89PNG\r\n\x1a\n" + std::string(500, 'x')), "not_an_image");
@@ -48,7 +48,7 @@ TEST(DicomCheck, EveryTruncationIsRefused) {
   EXPECT_EQ(reason(whole.substr(0, whole.size() - 1)), "truncated");
 }
 
-TEST(DicomCheck, SenselessLengths) {
+TEST(DicomCheck, InvalidLengthsAreRefused) {
   const auto pixels_of_length = [](int length) {
     return DicomBuilder()
         .erase(0x7FE00010)
@@ -180,7 +180,7 @@ TEST(DicomCheck, InvalidUids) {
   EXPECT_EQ(reason(DicomBuilder().text(0x0020000D, "UI", "../1")), "bad_value");
 }
 
-TEST(DicomCheck, MessagesEscapeWhatTheFileSays) {
+TEST(DicomCheck, MessagesEscapeFileContent) {
   const std::string bytes =
       DicomBuilder().text(0x00280004, "CS", "<b>\n\x1b[31m" + std::string(500, '%')).bytes();
   const std::string message = check_dicom(bytes, "x.dcm").error().message;

@@ -20,11 +20,11 @@ struct DicomTag {
 struct DicomElement {
   std::uint32_t tag;
   std::array<char, 2> vr;  ///< two blanks in the implicit syntax
-  std::string_view value;  ///< lies in the bytes that were walked
+  std::string_view value;  ///< points into the walked bytes
 };
 
-/// The elements of a DICOM file's outermost level, in ascending order, after those of the meta group. Values
-/// are views of the file's bytes, which must outlive this.
+/// Top-level elements of a DICOM file in ascending order, meta group first. Values are views of the file's
+/// bytes, which must outlive this object.
 struct DicomElements {
   std::string origin;
   std::string transfer_syntax;
@@ -32,25 +32,25 @@ struct DicomElements {
   std::vector<std::string_view> fragments;  ///< of encapsulated Pixel Data; the first is the offset table
 
   const DicomElement* find(DicomTag tag) const;
-  /// Without the padding at both ends; empty when absent.
+  /// Without padding at either end; empty if absent.
   std::string_view text(DicomTag tag) const;
-  /// Decimal text, parts separated by backslashes; nothing when absent or empty. Throws BadInput (bad_value)
-  /// unless there are `count` finite numbers from `low` to `high`.
+  /// Decimal text separated by backslashes; nothing if absent or empty. Throws BadInput (bad_value) unless
+  /// there are `count` finite numbers from `low` to `high`.
   std::optional<std::vector<double>> numbers(DicomTag tag, std::size_t count, double low, double high) const;
-  /// A 16-bit number of VR `vr` ("US" or "SS"), unsigned; nothing when absent. Throws BadInput on any other
-  /// shape.
+  /// 16-bit number of VR `vr` ("US" or "SS"), unsigned; nothing if absent. Throws BadInput for any other
+  /// form.
   std::optional<std::uint16_t> word(DicomTag tag, std::string_view vr) const;
 
   [[noreturn]] void refuse(Reason reason, DicomTag tag, std::string_view problem) const;
 };
 
-/// At most 40 printable characters of a value from a file, for a message.
+/// At most 40 printable characters of a file's value, for a message.
 std::string quote(std::string_view value);
 
-/// Walks the structure of a whole DICOM file in memory without trusting any length in it. Little endian only,
-/// at most 64 levels of nesting. Refuses: not_an_image (no preamble), truncated, bad_value (odd or senseless
-/// length, unknown VR, element twice or out of order, invalid UID), unsupported (big endian, deflated,
-/// unknown transfer syntax). `origin` begins each message.
+/// Walks the structure of a whole DICOM file in memory and checks every length. Little endian only, at most
+/// 64 levels of nesting. Refuses: not_an_image (no preamble), truncated, bad_value (odd or invalid length,
+/// unknown VR, duplicate or unordered element, invalid UID), unsupported (big endian, deflated, unknown
+/// transfer syntax). `origin` begins each message.
 Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin);
 
 }  // namespace helicarm

@@ -17,8 +17,8 @@ std::string joined(const std::vector<std::string_view>& fragments, std::size_t f
   return bytes;
 }
 
-/// The compressed bytes of one frame: by count where each frame is one fragment, else by the offset table
-/// (PS3.5 A.4).
+/// Compressed bytes of one frame: by index if each frame is one fragment, else by the offset table (PS3.5
+/// A.4).
 std::string frame_bytes(const DicomOutline& outline, std::size_t frame) {
   const auto& fragments = outline.elements.fragments;
   const auto frames = static_cast<std::size_t>(outline.frames);

@@ -6,8 +6,9 @@
 
 namespace helicarm {
 
-/// Stored values of one frame (0-based, less than `outline.frames`); bits above Bits Stored are dropped. The
-/// matrix is as stored, neither flipped nor turned. Refuses: truncated, bad_value (damaged compressed data).
+/// Stored values of one frame (0-based, less than `outline.frames`); bits above Bits Stored are dropped.
+/// Pixels are as stored, neither flipped nor rotated. Refuses: truncated, bad_value (damaged compressed
+/// data).
 Expected<Image<float>> decode_frame(const DicomOutline& outline, int frame);
 
 }  // namespace helicarm

@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-/// So many digits from there on; nothing where one of them is none.
+/// `count` digits at `from`; nothing if one is not a digit.
 std::optional<int> digits(std::string_view text, std::size_t from, std::size_t count) {
   int value = 0;
   for (std::size_t i = from; i < from + count; ++i) {
@@ -39,7 +39,7 @@ struct TimeOfDay {
   std::string_view rest;
 };
 
-/// HHMMSS[.F to .FFFFFF]. A fraction of noughts is none.
+/// HHMMSS[.F to .FFFFFF]. A fraction of zeros only is ignored.
 std::optional<TimeOfDay> time_of_day(std::string_view text) {
   const auto hours = digits(text, 0, 2), minutes = digits(text, 2, 2), seconds = digits(text, 4, 2);
   constexpr int leap_second = 60;

@@ -9,12 +9,12 @@
 
 namespace helicarm {
 
-/// When the image was acquisition: by Acquisition DateTime, else Acquisition Date and Time, else Content Date
-/// and Time; with Timezone Offset From UTC where the time names none. What is no whole date and time, to the
-/// second, counts as absent: images are measured without it.
+/// Acquisition time: Acquisition DateTime, else Acquisition Date and Time, else Content Date and Time;
+/// Timezone Offset From UTC applies where the time has no offset. A value without a complete date and time to
+/// the second counts as absent: images are processed without it.
 std::optional<AcquisitionTime> acquisition_time(const DicomElements& elements);
 
-/// As an Acquisition DateTime says it (UTC, microseconds).
+/// In the format of Acquisition DateTime (UTC, microseconds).
 std::string dicom_date_time(double seconds_since_1970);
 
 }  // namespace helicarm

@@ -30,12 +30,12 @@ TEST(DicomTime, DateTimeWithItsOffset) {
   EXPECT_DOUBLE_EQ(time->resolution_s, 0.01);
 }
 
-TEST(DicomTime, OffsetOfTheImageServesTimesWithoutOne) {
+TEST(DicomTime, OffsetOfTheImageAppliesToTimesWithoutOne) {
   EXPECT_DOUBLE_EQ(read(dated("20260228225958").text(timezone, "SH", "-0100"))->seconds, late_in_february);
   EXPECT_NE(read(dated("20260228235958"))->source, read(dated("20260228235958+0000"))->source);
 }
 
-TEST(DicomTime, DateAndTimeElseThoseOfTheContent) {
+TEST(DicomTime, DateAndTimeElseContentDateAndTime) {
   DicomBuilder content =
       DicomBuilder().text(content_date, "DA", "20260228").text(content_time, "TM", "235958");
   EXPECT_DOUBLE_EQ(read(content)->seconds, late_in_february);
@@ -45,12 +45,12 @@ TEST(DicomTime, DateAndTimeElseThoseOfTheContent) {
   EXPECT_EQ(read(content)->source, "Acquisition Date and Time");
 }
 
-TEST(DicomTime, WholeSecondsAreCoarse) {
+TEST(DicomTime, WholeSecondsHaveOneSecondResolution) {
   EXPECT_EQ(read(dated("20260228235958"))->resolution_s, 1);
   EXPECT_EQ(read(dated("20260228235958.000"))->resolution_s, 1);
 }
 
-TEST(DicomTime, WhatIsNoTimeIsAbsent) {
+TEST(DicomTime, InvalidTimesAreAbsent) {
   EXPECT_FALSE(read(DicomBuilder()));
   for (const char* time : {"20260228", "202602282359", "20260229000000", "20261301000000", "20260228240000",
                            "20260228236000", "20260228235958.", "20260228235958.1234567", "2026022823595x",
@@ -58,7 +58,7 @@ TEST(DicomTime, WhatIsNoTimeIsAbsent) {
     EXPECT_FALSE(read(dated(time))) << time;
 }
 
-TEST(DicomTime, WrittenTimeComesBack) {
+TEST(DicomTime, WrittenTimeRoundTrips) {
   for (const double seconds : {0.25, late_in_february + 0.123456, 4e9})
     EXPECT_NEAR(read(dated(dicom_date_time(seconds)))->seconds, seconds, 1e-6);
 }

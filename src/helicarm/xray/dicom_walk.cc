@@ -162,7 +162,7 @@ class Walker {
         fmt::format("is {}; read are little endian, RLE and JPEG (processes 1, 2, 4 and 14)", syntax));
   }
 
-  /// Elements up to `end` or, where `delimited`, up to the item's delimiter before it.
+  /// Elements up to `end` or, if `delimited`, up to the item's delimiter.
   void elements(std::size_t end, bool delimited, bool explicit_vr, int depth) {
     while (at_ < end) {
       const Header next = header(explicit_vr, end);

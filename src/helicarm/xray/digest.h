@@ -12,8 +12,8 @@
 
 namespace helicarm {
 
-/// 128-bit fingerprint as 32 hexadecimal digits, to tell whether two texts or images are the same: not a
-/// safeguard against forgery. Four multiplicative lanes, so that it runs at the speed of memory.
+/// 128-bit fingerprint as 32 hexadecimal digits, to compare texts or images; not cryptographic. Four
+/// multiplicative lanes for memory-speed throughput.
 inline std::string digest(std::string_view bytes) {
   constexpr std::array<std::uint64_t, 4> primes = {0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9,
                                                    0xD6E8FEB86659FD93};

@@ -11,7 +11,7 @@
 namespace helicarm {
 namespace {
 
-/// DCMTK's decoder without its log; it tells damage only by warnings.
+/// DCMTK's decoder with its log suppressed; DCMTK reports damage only as warnings.
 template <class Decoder>
 class QuietDecoder final : public Decoder {
  public:
@@ -43,8 +43,7 @@ bool starts_frame(int marker) {
 }
 bool starts_scan(int marker) { return marker == 0xDA; }
 
-/// Walks the marker segments from `at` to the first wanted one, of at least ten bytes; npos when there is
-/// none.
+/// Walks the marker segments from `at` to the first wanted one of at least ten bytes; npos if there is none.
 std::size_t find_segment(std::string_view jpeg, std::size_t at, bool (*wanted)(int)) {
   while (jpeg.size() - at >= 10 && byte_at(jpeg, at) == 0xFF) {
     const int marker = byte_at(jpeg, at + 1);
@@ -61,7 +60,7 @@ std::size_t find_segment(std::string_view jpeg, std::size_t at, bool (*wanted)(i
   return std::string_view::npos;
 }
 
-/// A sequential scan can only mean coefficients 0 to 63 in full; some writers leave other figures there.
+/// A sequential scan always covers coefficients 0 to 63; some writers store other numbers.
 void correct_scan_header(std::string& jpeg, std::size_t frame) {
   const std::size_t scan = find_segment(jpeg, frame, starts_scan);
   if (scan != std::string::npos && word_at(jpeg, scan + 2) == 8)
@@ -75,7 +74,7 @@ Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, in
   const auto damaged = [&](std::string_view why) {
     return fail(Reason::bad_value, fmt::format("{}: JPEG data: {}", origin, why));
   };
-  if (!jpeg.starts_with("\xFF\xD8")) return damaged("no start of an image");
+  if (!jpeg.starts_with("\xFF\xD8")) return damaged("no start of image marker");
   const std::size_t frame = find_segment(jpeg, 2, starts_frame);
   if (frame == std::string::npos) return damaged("no frame header");
   const int process = byte_at(jpeg, frame + 1) & 15, precision = byte_at(jpeg, frame + 4);
@@ -90,7 +89,7 @@ Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, in
     return damaged(fmt::format("{} bits a pixel, {} allocated", precision, 8 * word_bytes));
   const auto last = jpeg.find_last_not_of(std::string_view("\0", 1));
   if (jpeg.find("\xFF\xD9", last - 2) == std::string::npos)
-    return fail(Reason::truncated, fmt::format("{}: the JPEG data has no end", origin));
+    return fail(Reason::truncated, fmt::format("{}: the JPEG data have no end of image marker", origin));
 
   if (!lossless) correct_scan_header(jpeg, frame);
 

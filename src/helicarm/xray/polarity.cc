@@ -10,8 +10,8 @@ namespace helicarm {
 namespace {
 
 constexpr int samples_across = 256;
-constexpr std::size_t enough = 20;   // samples that must stand out
-constexpr std::size_t majority = 4;  // times as many as stand out the other way
+constexpr std::size_t enough = 20;   // least number of extreme samples
+constexpr std::size_t majority = 4;  // least ratio to the number of samples of the other polarity
 
 }  // namespace
 

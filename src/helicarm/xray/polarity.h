@@ -7,8 +7,8 @@
 
 namespace helicarm {
 
-/// Whether small round things (balls, dots) are brighter than all that surrounds them, or darker; nothing
-/// when the image does not say clearly. Edges, shutters and smooth anatomy do not count.
+/// Whether small round objects (balls, dots) are brighter or darker than their surroundings; nothing if the
+/// image is inconclusive. Edges, shutters and smooth anatomy do not count.
 std::optional<bool> metal_looks_bright(const Image<float>& image);
 
 }  // namespace helicarm

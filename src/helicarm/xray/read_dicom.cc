@@ -14,7 +14,7 @@ namespace helicarm {
 Expected<int> choose_frame(const std::string& origin, int frames, std::optional<int> frame) {
   if (!frame && frames > 1)
     return fail(Reason::bad_value,
-                fmt::format("{}: \"frame\" is missing: the file has {} frames, say which (1 to {})", origin,
+                fmt::format("{}: \"frame\" is missing: the file has {} frames, set it to 1 to {}", origin,
                             frames, frames));
   if (frame && (*frame < 1 || *frame > frames))
     return fail(Reason::bad_value,
@@ -31,7 +31,7 @@ void make_metal_dark(XrayImage& xray_image, const std::string& origin) {
   if (!metal_looks_bright(xray_image.pixels).value_or(false)) return;
   invert(xray_image);
   xray_image.warnings.push_back(
-      {Reason::tag_disagrees, fmt::format("{}: metal looks bright; the grey values were inverted", origin)});
+      {Reason::tag_disagrees, fmt::format("{}: metal is bright; the grey values were inverted", origin)});
 }
 
 float highest_grey(const Image<float>& pixels) {

@@ -9,19 +9,18 @@
 
 namespace helicarm {
 
-/// One frame (1-based; may be left out when there is only one) of a DICOM X-ray in memory. Checked as a whole
-/// before anything is decoded; see `check_dicom`, `read_acquisition` and `read_polarity` for what is refused
-/// and why.
+/// One frame (1-based; optional if the file has one) of a DICOM X-ray in memory. The whole file is checked
+/// before decoding; refusals: see `check_dicom`, `read_acquisition` and `read_polarity`.
 Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame);
 
-/// The 0-based frame asked for; bad_value when it does not exist, or when there are several and none was
-/// named.
+/// 0-based index of the requested frame; bad_value if it does not exist, or if the file has several and none
+/// is requested.
 Expected<int> choose_frame(const std::string& origin, int frames, std::optional<int> frame);
 
 /// Swaps dark and bright within [lowest, highest].
 void invert(XrayImage& xray_image);
 
-/// Inverts an image that plainly shows bright metal, with the warning tag_disagrees.
+/// Inverts an image in which metal is clearly bright, with the warning tag_disagrees.
 void make_metal_dark(XrayImage& xray_image, const std::string& origin);
 
 /// Highest grey value that the source of a 16-bit image could have stored: a source of fewer bits fills

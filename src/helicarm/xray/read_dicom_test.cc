@@ -75,7 +75,7 @@ TEST(ReadDicom, SignedValuesAndStrayHighBits) {
   EXPECT_EQ(xray_image->highest, 2047);
 }
 
-TEST(ReadDicom, SenselessSpacingAndDistanceAreRefused) {
+TEST(ReadDicom, ImplausibleSpacingAndDistanceAreRefused) {
   for (const char* spacing : {"0\\0", "-0.3\\-0.3", "NaN\\NaN", "1e400\\1e400", "0,30\\0,30", "0.3",
                               "0.2\\0.2\\0.2", "inf\\0.3", "0.3\\", "5\\5", "0.3 0.3"}) {
     const auto xray_image = read(DicomBuilder().text(0x00181164, "DS", spacing));
@@ -97,13 +97,13 @@ TEST(ReadDicom, AbsentSpacingStaysAbsent) {
   EXPECT_TRUE(warned(*xray_image, Reason::spacing_missing));
 }
 
-TEST(ReadDicom, ImagerSpacingWinsOverADifferingPixelSpacing) {
+TEST(ReadDicom, ImagerSpacingTakesPrecedenceOverADifferingPixelSpacing) {
   const auto xray_image = read(DicomBuilder().text(0x00280030, "DS", "0.15\\0.15"));
   EXPECT_EQ(xray_image->acquisition.pixel_mm->y(), 0.3);
   EXPECT_TRUE(warned(*xray_image, Reason::tag_disagrees));
 }
 
-TEST(ReadDicom, LossyCompressionIsReportedEvenAfterwards) {
+TEST(ReadDicom, LossyCompressionInTheHistoryIsReported) {
   const auto once_lossy = read(DicomBuilder().text(0x00282110, "CS", "01"));
   ASSERT_TRUE(once_lossy);
   EXPECT_TRUE(warned(*once_lossy, Reason::lossy_image));
@@ -126,7 +126,7 @@ TEST(ReadDicom, SeveralFramesNeedAFrame) {
   EXPECT_EQ(reason(DicomBuilder(), 1), "ok");
 }
 
-TEST(ReadDicom, OneImageStoredInManyWays) {
+TEST(ReadDicom, StorageVariantsGiveTheSameImage) {
   std::vector<std::uint16_t> dark, inverse;
   for (int i = 0; i < 48; ++i) {
     dark.push_back(static_cast<std::uint16_t>(i * 80));
@@ -145,7 +145,7 @@ TEST(ReadDicom, OneImageStoredInManyWays) {
   EXPECT_EQ(reason(sign(plain, 2)), "bad_value");
 }
 
-/// Balls of value 20 on a noisy ground of 200, or the other way round.
+/// Balls of value 20 on a noisy background of 200, or inverted.
 DicomBuilder balls(bool bright) {
   constexpr int side = 200;
   RandomStream random(7, 1);
@@ -168,14 +168,14 @@ DicomBuilder balls(bool bright) {
 TEST(ReadDicom, ImageDecidesWhereTheTagsDisagree) {
   const std::string expected = read(balls(false))->acquisition.instance_key;
   const auto monochrome1 = [](DicomBuilder b) { return b.text(0x00280004, "CS", "MONOCHROME1"); };
-  // Right for a radiograph: metal stored low and shown white.
+  // Correct for a radiograph: metal stored low and displayed white.
   EXPECT_EQ(read(sign(monochrome1(balls(false)), 1))->acquisition.instance_key, expected);
-  // A careless writer's: values turned and MONOCHROME1 set, the sign forgotten.
+  // Writer error: inverted values and MONOCHROME1, without the sign.
   const auto careless = read(sign(monochrome1(balls(true)), 1));
   EXPECT_EQ(careless->acquisition.instance_key, expected);
   EXPECT_TRUE(warned(*careless, Reason::tag_disagrees));
   EXPECT_EQ(read(balls(true))->acquisition.instance_key, expected);
-  // A sign that nothing contradicts is believed.
+  // A consistent sign is applied.
   EXPECT_NE(read(sign(balls(true), 1))->acquisition.instance_key, expected);
 }
 
@@ -191,7 +191,7 @@ TEST(ReadDicom, NoiseAndEdgesDoNotDecidePolarity) {
   EXPECT_FALSE(metal_looks_bright(Image<float>(2, 2)).has_value());
 }
 
-TEST(ReadDicom, KeysTellPatientsStudiesAndImagesApart) {
+TEST(ReadDicom, KeysDistinguishPatientsStudiesAndImages) {
   const auto one = read(DicomBuilder().text(0x0020000D, "UI", "1.2"))->acquisition;
   const auto other =
       read(DicomBuilder().text(0x00100020, "LO", "2").text(0x0020000D, "UI", "1.3"))->acquisition;
@@ -205,7 +205,7 @@ TEST(ReadDicom, KeysTellPatientsStudiesAndImagesApart) {
   EXPECT_TRUE(read(DicomBuilder().erase(0x00100010).erase(0x00100020))->acquisition.patient_key.empty());
 }
 
-TEST(ReadDicom, HostilePatientNameDoesNoHarm) {
+TEST(ReadDicom, ControlCharactersInThePatientNameAreHarmless) {
   const std::string name = "<script>%n\x1b[31m\xff\xfe" + std::string(10000, 'A');
   const auto xray_image = read(DicomBuilder().text(0x00100010, "PN", name));
   ASSERT_TRUE(xray_image);

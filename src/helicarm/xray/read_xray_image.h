@@ -9,12 +9,12 @@
 
 namespace helicarm {
 
-/// Reads a DICOM, PNG or TIFF X-ray, told apart by content. `frame` is 1-based and needed only if the file
-/// has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) beside them with `pixel_mm` and
-/// `source_detector_mm`, either of which may be null; without `pixel_mm` the image has the warning
-/// spacing_missing. Pixels stay as stored, neither flipped nor turned.
+/// Reads a DICOM, PNG or TIFF X-ray image; the format is detected by content. `frame` is 1-based and needed
+/// only if the file has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) with `pixel_mm`
+/// and `source_detector_mm`, either of which may be null; without `pixel_mm` the image has the warning
+/// spacing_missing. Pixels stay as stored, neither flipped nor rotated.
 /// Failures name file and view; codes: missing_file, not_an_image, truncated, bad_size, bad_value,
-/// unsupported, and those of the sidecar's JSON. Safe to call from several threads.
+/// unsupported, and those of the sidecar's JSON. Thread-safe.
 Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
                                     std::optional<int> frame);
 

@@ -42,7 +42,7 @@ Image<std::uint16_t> ramp() {
   return image;
 }
 
-TEST_F(ReadXrayImage, ContentDecidesNotTheName) {
+TEST_F(ReadXrayImage, FormatIsDetectedByContentNotName) {
   write("a.png", DicomBuilder().bytes());
   write("b.dcm", encode_png(ramp()));
   write("b.json", R"({"pixel_mm": 0.25, "source_detector_mm": null})");
@@ -57,7 +57,7 @@ TEST_F(ReadXrayImage, ContentDecidesNotTheName) {
   EXPECT_FALSE(grey_image->acquisition.logarithmic.has_value());
 }
 
-TEST_F(ReadXrayImage, NoImageAtAll) {
+TEST_F(ReadXrayImage, FileThatIsNotAnImageIsRefused) {
   write("empty.dcm", "");
   write("text.dcm", "The quick brown fox");
   EXPECT_EQ(reason("empty.dcm"), "not_an_image");
@@ -66,7 +66,7 @@ TEST_F(ReadXrayImage, NoImageAtAll) {
   EXPECT_EQ(read("text.dcm").error().view, "AP");
 }
 
-TEST_F(ReadXrayImage, WithoutASidecarNothingIsKnownOfTheAcquisition) {
+TEST_F(ReadXrayImage, WithoutASidecarAcquisitionParametersAreAbsent) {
   write("a.png", encode_png(ramp()));
   const auto bare = read("a.png");
   ASSERT_TRUE(bare) << bare.error().message;
@@ -77,7 +77,7 @@ TEST_F(ReadXrayImage, WithoutASidecarNothingIsKnownOfTheAcquisition) {
   EXPECT_NE(bare->warnings[0].message.find("a.json"), std::string::npos);
 }
 
-TEST_F(ReadXrayImage, GreyRangeIsTheSourcesNotTheContainers) {
+TEST_F(ReadXrayImage, GreyRangeIsThatOfTheSourceNotTheContainer) {
   const auto highest = [&](int first, int factor) {
     Image<std::uint16_t> image(64, 64);
     int value = first;
@@ -91,7 +91,7 @@ TEST_F(ReadXrayImage, GreyRangeIsTheSourcesNotTheContainers) {
   EXPECT_EQ(highest(65535, 1), 65535);
 }
 
-TEST_F(ReadXrayImage, SidecarMustBeSound) {
+TEST_F(ReadXrayImage, SidecarMustBeValid) {
   write("a.png", encode_png(ramp()));
   write("a.json", R"({"pixel_mm": -1, "source_detector_mm": null})");
   EXPECT_EQ(reason("a.png"), "bad_value");

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t header_bytes = 64;
 
-/// PackBits into every `step`-th byte of `out`; true when it yields just `pixels` bytes.
+/// PackBits into every `step`-th byte of `out`; true if it yields exactly `pixels` bytes.
 bool unpack(std::string_view packed, std::size_t pixels, std::size_t step, char* out) {
   std::size_t done = 0;
   for (std::size_t at = 0; done < pixels && at < packed.size();) {
@@ -33,7 +33,7 @@ Expected<std::string> decode_rle(std::string_view frame, std::size_t pixels, int
                                  const std::string& origin) {
   const auto words = static_cast<std::size_t>(word_bytes);
   if (frame.size() < header_bytes)
-    return fail(Reason::truncated, fmt::format("{}: the RLE header is cut off", origin));
+    return fail(Reason::truncated, fmt::format("{}: the RLE header is truncated", origin));
   if (number_at(frame, 0) != words)
     return fail(Reason::bad_value,
                 fmt::format("{}: {} RLE segments, must be {}", origin, number_at(frame, 0), words));

@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// A new DICOM UID, 2.25.<128-bit random UUID in decimal> (PS3.5 B.2), from the system's entropy; asks no
-/// host name.
+/// New DICOM UID, 2.25.<128-bit random UUID in decimal> (PS3.5 B.2), from the system's entropy; independent
+/// of host names.
 std::string make_uid();
 
-/// The same, reproducibly.
+/// Reproducible variant.
 std::string make_uid(RandomStream& random);
 
 }  // namespace helicarm

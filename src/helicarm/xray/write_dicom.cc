@@ -64,7 +64,7 @@ void put_identity(DcmDataset& dataset, const DerivedImage& image) {
   put(dataset, DCM_PatientID, image.patient_id);
   put(dataset, DCM_SeriesNumber, "1");
   put(dataset, DCM_InstanceNumber, "1");
-  // Of type 2: must be there, may be empty.
+  // Type 2: must be present, may be empty.
   for (const DcmTagKey& tag :
        {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_PatientBirthDate,
         DCM_PatientSex, DCM_StudyID, DCM_PatientOrientation, DCM_KVP})

@@ -29,7 +29,7 @@ DerivedImage grey_image(int bits) {
   return image;
 }
 
-TEST_F(WriteDicom, WhatIsWrittenIsRead) {
+TEST_F(WriteDicom, RoundTripKeepsImageAndTags) {
   for (int bits : {8, 12, 16})
     for (bool rle : {false, true}) {
       DerivedImage image = grey_image(bits);
@@ -63,7 +63,7 @@ TEST_F(WriteDicom, SameUidsGiveTheSameBytes) {
   EXPECT_EQ(*read_file(folder_ / "a.dcm", 1 << 20), *read_file(folder_ / "b.dcm", 1 << 20));
 }
 
-TEST_F(WriteDicom, WhatDoesNotFitIsRefused) {
+TEST_F(WriteDicom, ImageOutsideTheLimitsIsRefused) {
   DerivedImage image = grey_image(12);
   image.pixels(3, 3) = 4096;
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", image).error().reason, Reason::bad_value);
