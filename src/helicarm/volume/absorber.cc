@@ -24,7 +24,7 @@ float value_of(const Ramp& ramp, float voxel) {
   return static_cast<double>(voxel) < ramp.least ? 0.0F : static_cast<float>(value);
 }
 
-/// What a stretch of voxels spans: the box of those that are not 0, and the greatest.
+/// Bounding box of a range's non-zero voxels, and their maximum.
 struct Extent {
   Vector3i low = Vector3i::Constant(std::numeric_limits<int>::max());
   Vector3i high = Vector3i::Constant(-1);
@@ -56,13 +56,13 @@ Extent extent_of_slice(const Volume& volume, const Ramp& ramp, int z) {
   return extent;
 }
 
-/// A ray meets a new small page in every slab or two: a wish that the system need not grant.
+/// Rays cross a small page every slab or two; the system may ignore this advice.
 void ask_for_large_pages(void* start, std::size_t size) {
   constexpr std::size_t page = 4096;
   if (std::align(page, page, start, size) != nullptr) madvise(start, size / page * page, MADV_HUGEPAGE);
 }
 
-/// A block with room for a margin of zeros, and for what is read, times 0, beyond the margin's last voxel.
+/// Block with a margin of zeros, and padding for reads (multiplied by 0) past the margin's last voxel.
 Absorber::Block empty_block(const Vector3i& size, int along) {
   Absorber::Block block;
   const int other = 1 - along;
@@ -78,7 +78,7 @@ Absorber::Block empty_block(const Vector3i& size, int along) {
   return block;
 }
 
-/// Up to eight rays along one axis, until they are marched.
+/// Up to eight rays along one axis, collected before they are marched.
 struct Bundle {
   MarchRays rays;
   std::array<std::size_t, march_simd> number;
@@ -107,7 +107,7 @@ void clip(const Vector3d& source, const Vector3d& direction, const Vector3d& siz
 }  // namespace
 
 Absorber::Absorber(const Volume& volume, const Ramp& ramp, unsigned threads) {
-  // A voxel's centre is a whole number there, its lower face here.
+  // There, voxel centres are integers; here, lower faces are.
   voxel_from_patient_ = Eigen::Translation3d(0.5, 0.5, 0.5) * volume.patient_from_voxel.inverse();
   whole_ = volume.size.cast<double>();
   const auto slices = static_cast<std::size_t>(volume.size.z());
@@ -147,7 +147,7 @@ const Absorber::Block& Absorber::block_for(int axis) const {
   if (axis != 0) return block_;
   std::call_once(turn_, [&] {
     turned_ = empty_block(size_, 1);
-    constexpr int tile = 32;  // a tile of either order fits the first cache
+    constexpr int tile = 32;  // a tile in either order fits the L1 cache
     for (int z = 1; z <= size_.z(); ++z)
       for (int y0 = 1; y0 <= size_.y(); y0 += tile)
         for (int x0 = 1; x0 <= size_.x(); x0 += tile)
@@ -217,7 +217,7 @@ void Absorber::integrate(const Vector3d& source, std::span<const Vector3d> direc
     bundle.length[static_cast<std::size_t>(lane)] = static_cast<float>(directions[i].norm() * std::abs(per));
     const double a = start[d] + enter * direction[d];
     const double b = start[d] + leave * direction[d];
-    // One slab more on each side: rounding must not lose any, and the margin adds nothing.
+    // One slab more on each side against rounding: the margin adds nothing.
     bundle.first = std::max(0, std::min(bundle.first, static_cast<int>(std::min(a, b)) - 1));
     bundle.last = std::min(size_[d], std::max(bundle.last, static_cast<int>(std::max(a, b)) + 2));
     if (bundle.count == march_simd) finish(d);

@@ -41,7 +41,7 @@ Volume noise_volume() {
   });
 }
 
-/// Siddon's sum done plainly: all crossings with the voxels' faces, sorted; the voxel at each part's middle.
+/// Reference for Siddon's sum: all crossings with voxel faces, sorted; the voxel at each segment's midpoint.
 double plain_integral(const Volume& volume, const Vector3d& source, const Vector3d& direction) {
   const Eigen::Affine3d voxel_from_patient = volume.patient_from_voxel.inverse();
   const Vector3d start = voxel_from_patient * source;
@@ -79,7 +79,7 @@ View view_from(const Vector3d& source, const Vector3d& aim, int width) {
   return view;
 }
 
-TEST(Absorber, AgreesWithSiddonsSumDonePlainlyInAnyDirection) {
+TEST(Absorber, AgreesWithReferenceSumInAnyDirection) {
   Volume volume = noise_volume();
   RandomStream random(2, 900);
   for (int turn = 0; turn < 20; ++turn) {
@@ -100,20 +100,20 @@ TEST(Absorber, AgreesWithSiddonsSumDonePlainlyInAnyDirection) {
   }
 }
 
-TEST(Absorber, UniformBoxGivesTheChord) {
+TEST(Absorber, UniformBoxGivesTheChordLength) {
   const Volume volume = volume_of({20, 30, 40}, [](int, int, int) { return 3.0F; });
   const Absorber absorber(volume, {});
   const std::array<Vector3d, 5> rays = {Vector3d(0, 0, 2), Vector3d(0, 0, -1), Vector3d(0.1, 0, 1),
                                         Vector3d(0.1, 0.15, 1), Vector3d(1, 0, 1)};
   const std::vector<float> sums = integrals(absorber, {0, 0, -100}, rays);
   EXPECT_NEAR(sums[0], 3 * 40, 1e-3);
-  EXPECT_EQ(sums[1], 0);  // the box lies behind
+  EXPECT_EQ(sums[1], 0);  // the box is behind the source
   EXPECT_NEAR(sums[2], 3 * std::hypot(1, 0.1) * (100 - 80), 1e-3);
   EXPECT_NEAR(sums[3], 3 * std::hypot(1, 0.1, 0.15) * (100 - 80), 1e-3);
   EXPECT_EQ(sums[4], 0);
 }
 
-TEST(Absorber, BallIsItsChordsWithinVoxels) {
+TEST(Absorber, BallGivesItsChordLengthsWithinVoxels) {
   const double radius = 50;
   const Volume volume = volume_of({128, 128, 128}, [&](int x, int y, int z) {
     return (Vector3d(x, y, z) - Vector3d::Constant(63.5)).norm() < radius ? 0.0F : -1000.0F;
@@ -135,7 +135,7 @@ TEST(Absorber, BallIsItsChordsWithinVoxels) {
   EXPECT_NEAR(mean, 0, 0.02 * 0.2);
 }
 
-TEST(Absorber, PermutedAndFlippedVoxelsAreTheSameVolume) {
+TEST(Absorber, PermutedAndFlippedVoxelsGiveTheSameVolume) {
   const Volume volume = noise_volume();
   const View view = view_from({300, 120, -90}, {0, 0, 0}, 48);
   const Image<float> expected = *drr(Absorber(volume, {}), view, 48, 48);
@@ -186,7 +186,7 @@ TEST(Absorber, EmptyVolumeAndSingleVoxel) {
   EXPECT_THAT(integrals(Absorber(one, {}), {-10, 0, 0}, rays), testing::Each(testing::FloatNear(7, 1e-4F)));
 }
 
-TEST(Drr, SameBytesForAnyNumberOfThreads) {
+TEST(Drr, ResultIsIndependentOfTheNumberOfThreads) {
   const Absorber absorber(noise_volume(), {});
   const View view = view_from({150, 140, 20}, {1, 0, 2}, 200);
   const Image<float> one = *drr(absorber, view, 200, 130, 1);

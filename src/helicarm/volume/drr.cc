@@ -21,7 +21,7 @@ Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width
   const Eigen::Matrix3d world_from_pixel =
       view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
   Image<float> integrals(width, height);
-  // A tile's rays share the voxels that they bring into the second cache.
+  // A tile's rays share the voxels in the L2 cache.
   constexpr int tile = 64;
   const int across = (width + tile - 1) / tile;
   const int down = (height + tile - 1) / tile;

@@ -7,9 +7,9 @@
 
 namespace helicarm {
 
-/// Line integrals of the attenuation from the source through each pixel's centre, on through the whole
-/// volume. World of `view`: the patient frame. Refuses (bad_value) a source inside the volume. The same bytes
-/// whatever `threads` (0: all cores).
+/// Line integrals of the attenuation from the source through each pixel's centre and the whole volume. World
+/// of `view`: the patient frame. Refuses (bad_value) a source inside the volume. The result does not depend
+/// on `threads` (0: all cores).
 Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width, int height,
                            unsigned threads = 0);
 

@@ -19,7 +19,7 @@ HELICARM_INLINE void load(Floats& lanes, const float* from) { std::memcpy(&lanes
 
 HELICARM_INLINE Floats real(const Ints& lanes) { return __builtin_convertvector(lanes, Floats); }
 
-/// Two voxels side by side along p in each lane, the first in the lower half.
+/// In each 32-bit element two voxels adjacent along p, the first in the lower half.
 HELICARM_INLINE Ints gather_pairs(const std::int16_t* values, const Ints& index) {
   Ints pairs;
   for (int lane = 0; lane < march_simd; ++lane) {
@@ -37,8 +37,8 @@ HELICARM_INLINE Ints deal_pairs(const std::int16_t* values, __m256i bytes) {
 }
 #endif
 
-/// The pairs at `index` and a row further. `least` is the lane (in every lane) whose index is the least, as
-/// a rule: where all are then 0 .. 6 further on, eight voxels side by side are read once and dealt out.
+/// The pairs at `index` and one row further. `least` (broadcast) is usually the smallest index: if all
+/// indices are then 0 .. 6 above it, eight adjacent voxels are loaded once and permuted.
 HELICARM_INLINE void read_pairs(Ints& lower, Ints& upper, const std::int16_t* values, int row,
                                 const Ints& index, [[maybe_unused]] const Ints& least) {
 #ifdef __AVX2__
@@ -70,7 +70,7 @@ HELICARM_INLINE Ints first_less_second(const Ints& pairs) {
 #endif
 }
 
-/// Where along p (or q) the slab is entered, and the part of the slab before the next voxel begins.
+/// Index of the voxel entered along p (or q), and the part of the slab before the next voxel begins.
 HELICARM_INLINE void enter(Ints& index, Floats& share, const Floats& start, const Floats& per_step,
                            float end) {
   Floats place = start < 0 ? Floats{} : start;
@@ -87,7 +87,7 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   load(p, rays.p), load(dp, rays.dp), load(per_dp, rays.per_dp);
   load(q, rays.q), load(dq, rays.dq), load(per_dq, rays.per_dq), load(alike, rays.alike);
   const Ints rising = alike > 0;
-  // Rays from one source keep their order, so one look in mid-way tells which end's index is the least.
+  // Rays from one source keep their order, so the middle slab decides which end has the smallest index.
   const auto middle = static_cast<float>((first + last) / 2);
   const Floats place = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
   const Ints least = Ints{} + (place[0] <= place[march_simd - 1] ? 0 : march_simd - 1);
@@ -101,7 +101,7 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
     enter(j, b, q + slab * dq, per_dq, block.q_end);
     Ints lower, upper;
     read_pairs(lower, upper, values, block.row, i + j * block.row, least);
-    // a and b are the parts in the lower voxel of p and of q, `both` that in the lower of both.
+    // a and b are the parts in the lower voxel of p and of q, `both` the part in the lower voxel of both.
     const Floats together = a < b ? a : b;
     const Floats excess = a + b - 1;
     const Floats apart = excess > 0 ? excess : Floats{};

@@ -12,8 +12,8 @@ inline constexpr int march_simd = 8;
 inline constexpr int march_simd = 4;
 #endif
 
-/// Rays that run mainly along one axis d of a padded block, in voxels; p is the axis of stride 1, q the
-/// third. Within the slab k of one voxel a ray moves by at most one voxel along p and q.
+/// Rays mainly along one axis d of a padded block, in voxels; p is the axis of stride 1, q the third. Within
+/// slab k (one voxel thick) a ray moves by at most one voxel along p and q.
 struct MarchRays {
   float p[march_simd];  ///< lower end of the ray's p within slab 0; the margin's voxel is 0 .. 1
   float dp[march_simd];
@@ -21,7 +21,7 @@ struct MarchRays {
   float q[march_simd];
   float dq[march_simd];
   float per_dq[march_simd];
-  float alike[march_simd];  ///< 1 where p and q rise together, else 0
+  float alike[march_simd];  ///< 1 where p and q increase together, else 0
 };
 
 struct MarchBlock {
@@ -32,7 +32,8 @@ struct MarchBlock {
   float q_end;
 };
 
-/// Sums value times length (in slabs) over the slabs first .. last - 1, exactly for constant voxels.
+/// Sums value times length (in slabs) over the slabs first .. last - 1; exact for values constant within a
+/// voxel.
 void march(const MarchBlock& block, const MarchRays& rays, int first, int last, float* sums);
 
 }  // namespace helicarm

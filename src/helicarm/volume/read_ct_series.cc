@@ -20,11 +20,11 @@ using Eigen::Vector3d;
 
 constexpr std::uintmax_t most_slice_bytes = std::uintmax_t{64} << 20;
 constexpr double most_coordinate_mm = 1e5;
-// Positions are decimal text of some digits; a part of the spacing allows for more rounding in thick slices.
+// Positions are decimal text with few digits; the relative limit allows for more rounding in thick slices.
 constexpr double uneven_mm = 0.1;
 constexpr double uneven_part = 0.02;
 
-/// Where one slice lies; columns of `axes`: along a row, along a column, mm a pixel.
+/// Geometry of one slice; columns of `axes`: along a row, along a column, mm per pixel.
 struct Slice {
   std::filesystem::path path;
   Eigen::Matrix<double, 3, 2> axes;
@@ -55,12 +55,12 @@ Slice slice_of(const DicomOutline& outline) {
   slice.axes.col(1) = Vector3d::Map(turn.data() + 3) * spacing[0];
   const auto directions = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(turn.data());
   if (!(directions.transpose() * directions).isIdentity(1e-3))
-    elements.refuse(Reason::bad_value, tags::image_orientation, "is no pair of perpendicular unit vectors");
+    elements.refuse(Reason::bad_value, tags::image_orientation,
+                    "is not a pair of perpendicular unit vectors");
   return slice;
 }
 
-/// The slices of each series in the folder by its UID; other files, and the scanner's overviews, are left
-/// out.
+/// Slices in the folder by series UID; other files and localizer images are skipped.
 std::map<std::string, std::vector<Slice>> find_series(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder))
@@ -89,11 +89,11 @@ void check_alike(const std::vector<Slice>& slices) {
                                  slice.columns, slice.rows, slices[0].columns, slices[0].rows));
     if (!slice.axes.isApprox(slices[0].axes, 1e-3))
       throw BadInput(Reason::bad_value,
-                     fmt::format("{}: lies another way than the first slice", slice.path.string()));
+                     fmt::format("{}: its orientation differs from the first slice's", slice.path.string()));
   }
 }
 
-/// From slice to slice; refuses slices that are missing, double or out of line.
+/// Step between slices; refuses missing, duplicate and misaligned slices.
 Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) {
   const Vector3d normal = slices[0].normal();
   std::vector<double> gaps;
@@ -108,7 +108,7 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
       throw BadInput(
           Failure{Reason::bad_value,
                   fmt::format("{}: slices {} and {} of {} are {:.4g} mm apart, the others {:.4g} mm: a slice "
-                              "is missing, double or of another stack",
+                              "is missing, duplicate or from another series",
                               origin, i + 1, i + 2, slices.size(), gaps[i], usual),
                   {},
                   {{"gap_mm", gaps[i]}, {"usual_mm", usual}}});
@@ -116,7 +116,7 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
   for (std::size_t i = 0; i < slices.size(); ++i) {
     const double off = (slices[0].corner + static_cast<double>(i) * step - slices[i].corner).norm();
     if (off > std::max(2 * allowed, 0.5 * usual))
-      throw BadInput(Reason::bad_value, fmt::format("{}: slice {} of {} is {:.4g} mm out of line", origin,
+      throw BadInput(Reason::bad_value, fmt::format("{}: slice {} of {} is misaligned by {:.4g} mm", origin,
                                                     i + 1, slices.size(), off));
   }
   return step;
@@ -142,7 +142,8 @@ void decode_slice(const Slice& slice, float* voxels) {
 Volume read_ct_series(const std::filesystem::path& folder) {
   const std::string origin = folder.string();
   auto series = find_series(folder);
-  if (series.empty()) throw BadInput(Reason::not_an_image, origin + ": no file here is a DICOM CT slice");
+  if (series.empty())
+    throw BadInput(Reason::not_an_image, origin + ": the folder contains no DICOM CT slice");
   const auto largest =
       std::ranges::max_element(series, {}, [](const auto& entry) { return entry.second.size(); });
   Volume volume;
@@ -150,14 +151,16 @@ Volume read_ct_series(const std::filesystem::path& folder) {
     std::vector<std::size_t> counts;
     for (const auto& entry : series) counts.push_back(entry.second.size());
     if (std::ranges::count(counts, largest->second.size()) > 1)
-      throw BadInput(Reason::name_clash, fmt::format("{}: {} CT series of {} slices: leave one in the folder",
-                                                     origin, series.size(), fmt::join(counts, ", ")));
+      throw BadInput(Reason::name_clash,
+                     fmt::format("{}: {} CT series of {} slices: keep one series in the folder", origin,
+                                 series.size(), fmt::join(counts, ", ")));
     volume.warnings.push_back(
-        {Reason::name_clash, fmt::format("{}: {} CT series of {} slices: the largest was taken", origin,
+        {Reason::name_clash, fmt::format("{}: {} CT series of {} slices: the largest is used", origin,
                                          series.size(), fmt::join(counts, ", "))});
   }
   std::vector<Slice>& slices = largest->second;
-  if (slices.size() < 2) throw BadInput(Reason::bad_size, origin + ": one slice is no volume");
+  if (slices.size() < 2)
+    throw BadInput(Reason::bad_size, origin + ": only one slice, at least 2 are required");
   check_alike(slices);
   const Vector3d normal = slices[0].normal();
   std::ranges::stable_sort(slices, {}, [&](const Slice& slice) { return normal.dot(slice.corner); });

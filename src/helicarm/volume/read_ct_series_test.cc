@@ -36,7 +36,7 @@ class CtSeries : public testing::Test {
   fs::path folder_ = fs::temp_directory_path() / fmt::format("helicarm_ct_series_{}", ::getpid());
 };
 
-TEST_F(CtSeries, SlicesAreSortedByPlaceAndScaled) {
+TEST_F(CtSeries, SlicesAreSortedByPositionAndScaled) {
   put(slice(12.5).word(0x00280002, 1));
   put(slice(10));
   put(slice(15));
@@ -49,7 +49,7 @@ TEST_F(CtSeries, SlicesAreSortedByPlaceAndScaled) {
   EXPECT_TRUE(volume->warnings.empty());
 }
 
-TEST_F(CtSeries, MissingOrDoubleSliceIsRefusedWithFigures) {
+TEST_F(CtSeries, MissingOrDuplicateSliceIsRefusedWithFigures) {
   for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0}) put(slice(z));
   const auto gap = read();
   ASSERT_FALSE(gap.has_value());
@@ -61,7 +61,7 @@ TEST_F(CtSeries, MissingOrDoubleSliceIsRefusedWithFigures) {
   EXPECT_EQ(read().error().reason, Reason::bad_value);
 }
 
-TEST_F(CtSeries, LargestOfSeveralSeriesIsTakenWithAWarning) {
+TEST_F(CtSeries, LargestOfSeveralSeriesIsUsedWithAWarning) {
   for (const double z : {0.0, 1.0, 2.0}) put(slice(z));
   put(slice(0, "2.25.8"));
   put(slice(1, "2.25.8"));
@@ -74,7 +74,7 @@ TEST_F(CtSeries, LargestOfSeveralSeriesIsTakenWithAWarning) {
   EXPECT_EQ(read().error().reason, Reason::name_clash);
 }
 
-TEST_F(CtSeries, OddSlices) {
+TEST_F(CtSeries, InvalidSlicesAreRefused) {
   EXPECT_EQ(read().error().reason, Reason::not_an_image);
   put(slice(0));
   EXPECT_EQ(read().error().reason, Reason::bad_size);

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The header's lines `Key = Value`, up to and with ElementDataFile; cut off `rest`.
+/// Header lines `Key = Value` up to and including ElementDataFile; removed from `rest`.
 class MetaHeader {
  public:
   MetaHeader(std::string_view& rest, std::string origin) : origin_(std::move(origin)) {
@@ -24,7 +24,7 @@ class MetaHeader {
         throw BadInput(Reason::bad_value, fmt::format("{}: the line {} has no \"=\"", origin_, quote(line)));
       const std::string key(trim(line.substr(0, equals)));
       if (!values_.emplace(key, trim(line.substr(equals + 1))).second)
-        throw BadInput(Reason::bad_value, fmt::format("{}: {} stands twice", origin_, quote(key)));
+        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, quote(key)));
     }
   }
 
@@ -44,7 +44,7 @@ class MetaHeader {
                    fmt::format("{} is {}, must be True or False", field(key), quote(value)));
   }
 
-  /// Under the first of several names that is there; empty where none is.
+  /// Values of the first key that is present; empty if none is.
   std::vector<double> numbers(std::initializer_list<const char*> keys, std::size_t count) const {
     for (const char* key : keys)
       if (has(key)) return read_numbers(text(key), count, field(key));
@@ -72,7 +72,8 @@ VoxelFormat format_of(const MetaHeader& header) {
           header.flag("BinaryDataByteOrderMSB", false) || header.flag("ElementByteOrderMSB", false)};
 }
 
-/// Columns: the axes' directions by their letters, the side from which each begins ("RAI" is L, P, S).
+/// Columns: directions of the axes from their letters, which name the side where each begins ("RAI": L, P,
+/// S).
 Eigen::Matrix3d directions_from_letters(const std::string& letters, const std::string& field) {
   constexpr std::string_view from = "RAILPS";
   Eigen::Matrix3d directions = Eigen::Matrix3d::Zero();
@@ -92,7 +93,7 @@ Eigen::Affine3d place_of(const MetaHeader& header) {
   const auto matrix = header.numbers({"TransformMatrix", "Rotation", "Orientation"}, 9);
   Eigen::Affine3d place = Eigen::Affine3d::Identity();
   const std::string letters = header.text("AnatomicalOrientation", "???");
-  if (!matrix.empty())  // three numbers are the direction of one axis
+  if (!matrix.empty())  // fewer numbers describe fewer axes
     place.linear() = Eigen::Map<const Eigen::Matrix3d>(matrix.data());
   else if (letters != "???")
     place.linear() = directions_from_letters(letters, header.field("AnatomicalOrientation"));
@@ -124,7 +125,7 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
     throw BadInput(Reason::unsupported, header.field("ElementNumberOfChannels") + " must be 1");
   if (!header.flag("BinaryData", true))
     throw BadInput(Reason::unsupported,
-                   header.field("BinaryData") + " is False: numbers as text are not read");
+                   header.field("BinaryData") + " is False: text voxels are not supported");
   const auto size = header.numbers({"DimSize"}, 3);
   if (size.empty()) throw BadInput(Reason::bad_value, header.field("DimSize") + " is missing");
 
@@ -136,7 +137,8 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
   const std::string file = header.text("ElementDataFile");
   std::string data;
   if (file == "LIST" || std::ranges::count(file, '%') > 0)
-    throw BadInput(Reason::unsupported, header.field("ElementDataFile") + " is a list of files, must be one");
+    throw BadInput(Reason::unsupported,
+                   header.field("ElementDataFile") + " is a list of files; one file is supported");
   if (file != "LOCAL") {
     data = read_data_file(path, file);
     rest = data;

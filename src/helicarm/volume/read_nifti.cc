@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 constexpr std::size_t header_bytes = 348;
 
-/// Numbers of the header at their offsets, in the file's byte order.
+/// Header fields by offset, in the file's byte order.
 struct NiftiHeader {
   std::string_view bytes;
   bool swap = false;
@@ -46,8 +46,8 @@ Vector3d size_of(const NiftiHeader& header) {
                    fmt::format("{}: dim[0] is {}, must be 3", header.origin, dimensions));
   for (int i = 4; i <= dimensions; ++i)
     if (const int more = header.at<std::int16_t>(40 + 2 * static_cast<std::size_t>(i)); more != 1)
-      throw BadInput(Reason::unsupported,
-                     fmt::format("{}: dim[{}] is {}, must be 1: one volume a file", header.origin, i, more));
+      throw BadInput(Reason::unsupported, fmt::format("{}: dim[{}] is {}, must be 1 (one volume per file)",
+                                                      header.origin, i, more));
   return Vector3d(header.at<std::int16_t>(42), header.at<std::int16_t>(44), header.at<std::int16_t>(46));
 }
 
@@ -69,7 +69,7 @@ double millimetres(const NiftiHeader& header) {
       return 1000;
     case 3:
       return 1e-3;
-    default:  // mm, or not said
+    default:  // mm, or unit not given
       return 1;
   }
 }
@@ -79,13 +79,13 @@ Eigen::Matrix3d rotation_of(const NiftiHeader& header) {
                    header.real(264, "quatern_d"));
   if (v.squaredNorm() > 1 + 1e-5)
     throw BadInput(Reason::bad_value,
-                   fmt::format("{}: the quaternion's part has the length {}, must be at most 1",
+                   fmt::format("{}: the quaternion's vector part has length {}, must be at most 1",
                                header.origin, v.norm()));
   const double w = std::sqrt(std::max(0.0, 1 - v.squaredNorm()));
   return Eigen::Quaterniond(w, v.x(), v.y(), v.z()).normalized().toRotationMatrix();
 }
 
-/// The file's world is R, A, S.
+/// The file's world frame is R, A, S.
 Eigen::Affine3d place_of(const NiftiHeader& header, std::vector<Warning>& warnings) {
   Eigen::Affine3d place = Eigen::Affine3d::Identity();
   const Vector3d spacing(header.real(80, "pixdim[1]"), header.real(84, "pixdim[2]"),
@@ -104,7 +104,7 @@ Eigen::Affine3d place_of(const NiftiHeader& header, std::vector<Warning>& warnin
   } else {
     place.linear() = spacing.asDiagonal();
     warnings.push_back({Reason::spacing_missing,
-                        header.origin + ": neither sform nor qform: which way the patient lies is not said"});
+                        header.origin + ": neither sform nor qform: the patient's orientation is unknown"});
   }
   return Vector3d(-1, -1, 1).asDiagonal() * (Eigen::Scaling(millimetres(header)) * place);
 }
@@ -121,9 +121,10 @@ Volume read_nifti(const std::filesystem::path& path, std::string_view bytes) {
                    fmt::format("{}: {} bytes, the header has {}", origin, header.bytes.size(), header_bytes));
   const std::string_view magic = header.bytes.substr(344, 4);
   if (magic == std::string_view("ni1\0", 4))
-    throw BadInput(Reason::unsupported, origin + ": header and voxels in two files; must be one .nii");
+    throw BadInput(Reason::unsupported,
+                   origin + ": header and voxels are in two files; convert them to one .nii");
   if (magic != std::string_view("n+1\0", 4))
-    throw BadInput(Reason::not_an_image, origin + ": no NIfTI-1 file");
+    throw BadInput(Reason::not_an_image, origin + ": not a NIfTI-1 file");
   header.swap = header.at<std::int32_t>(0) != static_cast<std::int32_t>(header_bytes);
   if (header.at<std::int32_t>(0) != static_cast<std::int32_t>(header_bytes))
     throw BadInput(Reason::bad_value, fmt::format("{}: sizeof_hdr is not {}", origin, header_bytes));

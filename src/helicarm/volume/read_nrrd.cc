@@ -13,18 +13,18 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Fields of the format that say nothing of place or value here.
-constexpr std::array<std::string_view, 21> idle = {
+/// Fields that affect neither geometry nor values.
+constexpr std::array<std::string_view, 21> ignored = {
     "content",  "number",       "block size",       "blocksize", "thicknesses", "axis mins",
     "axismins", "axis maxs",    "axismaxs",         "centers",   "centerings",  "labels",
     "units",    "kinds",        "space units",      "min",       "max",         "old min",
     "old max",  "sample units", "measurement frame"};
-constexpr std::array<std::string_view, 12> telling = {"type",         "dimension",       "sizes",
-                                                      "encoding",     "endian",          "spacings",
-                                                      "space",        "space dimension", "space directions",
-                                                      "space origin", "data file",       "byte skip"};
+constexpr std::array<std::string_view, 12> interpreted = {
+    "type",      "dimension", "sizes",           "encoding",         "endian",
+    "spacings",  "space",     "space dimension", "space directions", "space origin",
+    "data file", "byte skip"};
 
-/// Lines `field: value` up to an empty one; cut off `rest`.
+/// Lines `field: value` up to an empty one; removed from `rest`.
 class NrrdHeader {
  public:
   NrrdHeader(std::string_view& rest, std::string origin) : origin_(std::move(origin)) {
@@ -35,16 +35,17 @@ class NrrdHeader {
       if (line.starts_with('#') || line.find(":=") != std::string_view::npos) continue;
       const std::size_t colon = line.find(": ");
       if (colon == std::string_view::npos)
-        throw BadInput(Reason::bad_value, fmt::format("{}: the line {} is no field", origin_, quote(line)));
+        throw BadInput(Reason::bad_value,
+                       fmt::format("{}: the line {} is not a field", origin_, quote(line)));
       std::string name(line.substr(0, colon));
       if (name == "datafile") name = "data file";
       if (name == "byteskip") name = "byte skip";
-      if (std::ranges::find(idle, name) != idle.end()) continue;
-      if (std::ranges::find(telling, name) == telling.end())
+      if (std::ranges::find(ignored, name) != ignored.end()) continue;
+      if (std::ranges::find(interpreted, name) == interpreted.end())
         throw BadInput(name == "line skip" ? Reason::unsupported : Reason::unknown_key,
-                       fmt::format("{}: the field {} is not known here", origin_, quote(name)));
+                       fmt::format("{}: the field {} is unknown", origin_, quote(name)));
       if (!values_.emplace(name, trim(line.substr(colon + 2))).second)
-        throw BadInput(Reason::bad_value, fmt::format("{}: {} stands twice", origin_, quote(name)));
+        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, quote(name)));
     }
     detached_end_ = true;
   }
@@ -55,7 +56,7 @@ class NrrdHeader {
     const auto found = values_.find(name);
     return found == values_.end() ? otherwise : found->second;
   }
-  /// Empty where the field is absent.
+  /// Empty if the field is absent.
   std::vector<double> numbers(const std::string& name, std::size_t count) const {
     const std::string value = text(name);
     if (value.empty()) return {};
@@ -117,7 +118,7 @@ VoxelFormat format_of(const NrrdHeader& header) {
   return format;
 }
 
-/// To L, P, S from the file's space; the axes' signs.
+/// From the file's space to L, P, S: signs of the axes.
 Vector3d lps_from(const NrrdHeader& header) {
   const std::string space = header.text("space");
   if (space.empty() || space == "left-posterior-superior" || space == "LPS") return {1, 1, 1};
@@ -168,19 +169,19 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
   if (header.text("space").empty())
     volume.warnings.push_back(
         {Reason::spacing_missing,
-         fmt::format(
-             "{}: no \"space\" says which way the axes run; x to the left, y to the back, z to the head "
-             "are assumed",
-             origin)});
+         fmt::format("{}: no \"space\" gives the axes' directions; x left, y posterior, z superior "
+                     "are assumed",
+                     origin)});
   const VoxelFormat format = format_of(header);
   std::string data;
   if (const std::string file = header.text("data file"); !file.empty()) {
     if (file.starts_with("LIST") || file.find('%') != std::string::npos)
-      throw BadInput(Reason::unsupported, header.field("data file") + " is a list of files, must be one");
+      throw BadInput(Reason::unsupported,
+                     header.field("data file") + " is a list of files; one file is supported");
     data = read_data_file(path, file);
     rest = data;
   } else if (header.ended_without_blank()) {
-    throw BadInput(Reason::truncated, origin + ": the header does not end");
+    throw BadInput(Reason::truncated, origin + ": the header has no end");
   }
   const std::string encoding = header.text("encoding");
   std::string unpacked;

@@ -39,7 +39,7 @@ Expected<Volume> read_volume(const std::filesystem::path& path) {
     Volume volume =
         std::filesystem::is_directory(path, error) ? read_ct_series(path) : read_file_of_voxels(path);
     value_or_throw(check_grid(volume.patient_from_voxel, path.string()));
-    // Scaling by the file's own factor may overflow.
+    // Scaling by the file's factor can overflow.
     if (std::ranges::any_of(volume.voxels, [](float voxel) { return !std::isfinite(voxel); }))
       throw BadInput(Reason::not_finite, path.string() + ": a voxel is not finite");
     return volume;

@@ -77,7 +77,7 @@ std::string nrrd(const std::string& lines, const std::string& data, const std::s
          "\n" + data;
 }
 
-/// A NIfTI-1 header for 2 x 1 x 2 voxels of int16, then the voxels.
+/// NIfTI-1 header for 2 x 1 x 2 voxels of int16, followed by the voxels.
 struct Nifti {
   std::string bytes = std::string(352, '\0');
   bool big = false;
@@ -122,7 +122,7 @@ TEST_F(ReadVolume, MetaImageWithMatrixSpacingAndOffset) {
   EXPECT_EQ(volume->centre(), Vector3d(5, 7, 5));
 }
 
-TEST_F(ReadVolume, MetaImageOfEveryKindOrderAndPacking) {
+TEST_F(ReadVolume, MetaImageOfEveryTypeByteOrderAndCompression) {
   const auto expect = [&](const std::string& lines, const std::string& data) {
     const auto volume = read("a.mha", meta(lines, data));
     ASSERT_TRUE(volume.has_value()) << volume.error().message;
@@ -144,7 +144,7 @@ TEST_F(ReadVolume, MetaImageOfEveryKindOrderAndPacking) {
   expect("ElementType = MET_SHORT\nHeaderSize = -1\n", "abcde" + stored<std::int16_t>({1, 2, 3, 100}));
 }
 
-TEST_F(ReadVolume, MetaImageWhoseVoxelsAreBeside) {
+TEST_F(ReadVolume, MetaImageWithSeparateVoxelFile) {
   put("a.raw", four);
   const std::string head =
       "NDims = 3\nDimSize = 2 1 2\nElementType = MET_SHORT\nAnatomicalOrientation = LPI\nElementDataFile = ";
@@ -156,7 +156,7 @@ TEST_F(ReadVolume, MetaImageWhoseVoxelsAreBeside) {
   EXPECT_EQ(read("a.mhd", head + "LIST\n").error().reason, Reason::unsupported);
 }
 
-TEST_F(ReadVolume, OddMetaImages) {
+TEST_F(ReadVolume, InvalidMetaImagesAreRefused) {
   const std::string type = "ElementType = MET_SHORT\n";
   EXPECT_EQ(refusal(meta(type, four.substr(1))), Reason::truncated);
   EXPECT_EQ(refusal("ObjectType = Image\nNDims = 3\n"), Reason::truncated);
@@ -181,10 +181,10 @@ TEST_F(ReadVolume, OddMetaImages) {
   EXPECT_EQ(read_volume(folder_ / "none.mha").error().reason, Reason::missing_file);
 }
 
-TEST_F(ReadVolume, PackedVoxelsNeitherBurstNorPromiseTooMuch) {
+TEST_F(ReadVolume, CompressedVoxelsAreBoundedInSize) {
   const std::string bomb = packed(std::string(std::size_t{64} << 20, '\0'), false);
   const std::string head = "ElementType = MET_SHORT\nCompressedData = True\n";
-  const auto small = read("a.mha", meta(head, bomb));  // only what is asked for is unpacked
+  const auto small = read("a.mha", meta(head, bomb));  // only the required bytes are decompressed
   ASSERT_TRUE(small.has_value());
   EXPECT_EQ(small->voxels.size(), 4u);
   EXPECT_EQ(refusal(meta(head, bomb, "1024 1024 512")), Reason::truncated);
@@ -214,7 +214,7 @@ TEST_F(ReadVolume, NrrdInEachSpaceAndEncoding) {
   EXPECT_THAT(beside->voxels, ElementsAre(1, 2, -3, 4));
 }
 
-TEST_F(ReadVolume, OddNrrds) {
+TEST_F(ReadVolume, InvalidNrrdsAreRefused) {
   EXPECT_EQ(refusal(nrrd("encoding: raw\nflavour: sweet\n", four)), Reason::unknown_key);
   EXPECT_EQ(refusal(nrrd("encoding: bzip2\n", four)), Reason::unsupported);
   EXPECT_EQ(refusal(nrrd("encoding: raw\n", four.substr(2))), Reason::truncated);
@@ -233,7 +233,7 @@ TEST_F(ReadVolume, OddNrrds) {
   EXPECT_EQ(refusal("NRRD0004\ntype: short\ndimension: 4\nsizes: 2 1 2 1\n\n"), Reason::unsupported);
 }
 
-TEST_F(ReadVolume, NiftiOfEitherEndTurnsToLps) {
+TEST_F(ReadVolume, NiftiOfEitherByteOrderIsConvertedToLps) {
   for (const bool big : {false, true}) {
     const auto volume = read("a.nii", Nifti(big).set(112, 2.0F).set(116, -1.0F).bytes);
     ASSERT_TRUE(volume.has_value()) << volume.error().message;
@@ -245,7 +245,7 @@ TEST_F(ReadVolume, NiftiOfEitherEndTurnsToLps) {
   EXPECT_THAT(volume->voxels, ElementsAre(1, 2, -3, 4));
 }
 
-TEST_F(ReadVolume, NiftiByQuaternionAndByNone) {
+TEST_F(ReadVolume, NiftiWithQuaternionAndWithoutOrientation) {
   Nifti nifti;
   nifti.set<std::int16_t>(254, 0).set<std::int16_t>(252, 1);
   nifti.set(76, -1.0F).set(264, static_cast<float>(std::sqrt(0.5))).set(268, 1.0F);  // 90 degrees about z
@@ -257,7 +257,7 @@ TEST_F(ReadVolume, NiftiByQuaternionAndByNone) {
   EXPECT_EQ(bare->warnings.size(), 1u);
 }
 
-TEST_F(ReadVolume, OddNiftis) {
+TEST_F(ReadVolume, InvalidNiftisAreRefused) {
   EXPECT_EQ(refusal(Nifti().bytes.substr(0, 357)), Reason::truncated);
   EXPECT_EQ(refusal(Nifti().set<std::int16_t>(42, -2).bytes), Reason::bad_size);
   EXPECT_EQ(refusal(Nifti().set<std::int16_t>(40, 30000).bytes), Reason::unsupported);
@@ -274,7 +274,7 @@ TEST_F(ReadVolume, OddNiftis) {
   EXPECT_EQ(refusal(packed("hello", true)), Reason::truncated);
 }
 
-TEST_F(ReadVolume, EveryCutAndEveryChangedByteIsAnsweredWithoutACrash) {
+TEST_F(ReadVolume, TruncationsAndMutationsNeverCrash) {
   for (const std::string& whole :
        {meta("ElementType = MET_SHORT\n", four), nrrd("encoding: raw\n", four), Nifti().bytes})
     for (std::size_t at = 0; at < whole.size(); ++at) {
@@ -289,7 +289,7 @@ TEST_F(ReadVolume, EveryCutAndEveryChangedByteIsAnsweredWithoutACrash) {
     }
 }
 
-TEST(Inflate, MoreBytesThanThirtyTwoBitsCountIsRefused) {
+TEST(Inflate, SizeBeyondThirtyTwoBitsIsRefused) {
   for (const std::size_t size : {std::size_t{1} << 32, (std::size_t{1} << 32) + 352}) {
     const auto bytes = guarded([&] { return inflate("packed", size, "x"); });
     EXPECT_EQ(bytes.error().reason, Reason::bad_size);

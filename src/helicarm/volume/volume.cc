@@ -11,10 +11,10 @@
 namespace helicarm {
 namespace {
 
-// A micro-CT has some micrometres; a gap of 100 mm between voxels is no scan of a knee.
+// Micro-CT voxels are some micrometres; 100 mm between voxels cannot be a scan of a knee.
 constexpr double least_spacing_mm = 1e-3;
 constexpr double most_spacing_mm = 100;
-// Of a unit cell: 0.5 is a shear of 60 degrees, more than any gantry tilts.
+// Of a unit cell: 0.5 is a shear of 60 degrees, beyond any gantry tilt.
 constexpr double least_cell = 0.5;
 
 }  // namespace
@@ -35,7 +35,7 @@ Expected<std::size_t> voxel_count(const Eigen::Vector3d& size, const std::string
 
 Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::string& origin) {
   if (!patient_from_voxel.matrix().allFinite())
-    return fail(Reason::not_finite, fmt::format("{}: the voxels' places are not finite", origin));
+    return fail(Reason::not_finite, fmt::format("{}: the voxels' positions are not finite", origin));
   const Eigen::Vector3d spacing = patient_from_voxel.linear().colwise().norm();
   for (const double step : spacing)
     if (!(step >= least_spacing_mm && step <= most_spacing_mm))

@@ -36,10 +36,9 @@ void decode(std::string_view bytes, bool swap, std::vector<float>& voxels, const
   }
 }
 
-// One byte of deflate gives at most 1032 (RFC 1951: 258 bytes for two bits).
+// One byte of deflate yields at most 1032 (RFC 1951: 258 bytes for two bits).
 constexpr std::size_t most_from_a_byte = 1032;
-// As many bytes of voxels as a file that is not packed may have, after the longest header. zlib counts in 32
-// bits.
+// Limit of an uncompressed file: the voxels after the longest header. zlib counts in 32 bits.
 constexpr std::size_t most_unpacked = max_volume_bytes + 1'000'000;
 
 }  // namespace
@@ -106,12 +105,12 @@ std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, cons
 
 std::string inflate(std::string_view packed, std::size_t size, const std::string& origin) {
   const auto short_of = [&](std::size_t found) {
-    return BadInput(Reason::truncated, fmt::format("{}: {} packed bytes hold at most {}, {} are needed",
+    return BadInput(Reason::truncated, fmt::format("{}: {} compressed bytes hold at most {}, {} are needed",
                                                    origin, packed.size(), found, size));
   };
   if (size > most_unpacked)
     throw BadInput(Reason::bad_size,
-                   fmt::format("{}: {} bytes when unpacked, limit {}", origin, size, most_unpacked));
+                   fmt::format("{}: {} bytes after decompression, limit {}", origin, size, most_unpacked));
   if (size / most_from_a_byte > packed.size()) throw short_of(packed.size() * most_from_a_byte);
   z_stream stream{};
   constexpr int zlib_or_gzip = 15 + 32;
@@ -125,7 +124,7 @@ std::string inflate(std::string_view packed, std::size_t size, const std::string
   const int state = ::inflate(&stream, Z_SYNC_FLUSH);
   if (stream.avail_out == 0) return bytes;
   if (state == Z_OK || state == Z_BUF_ERROR || state == Z_STREAM_END) throw short_of(size - stream.avail_out);
-  throw BadInput(Reason::bad_value, fmt::format("{}: the packed voxels are damaged after {} of {} bytes",
+  throw BadInput(Reason::bad_value, fmt::format("{}: the compressed voxels are damaged after {} of {} bytes",
                                                 origin, size - stream.avail_out, size));
 }
 

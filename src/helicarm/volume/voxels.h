@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// How a file stores a voxel.
+/// Voxel type and byte order in a file.
 struct VoxelFormat {
   enum class Kind { int8, uint8, int16, uint16, int32, uint32, int64, uint64, float32, float64 };
   Kind kind = Kind::int16;
@@ -23,26 +23,26 @@ struct VoxelFormat {
 std::vector<float> decode_voxels(std::string_view bytes, std::size_t count, const VoxelFormat& format,
                                  const std::string& origin);
 
-/// The first `size` bytes of what zlib's or gzip's deflate has packed; not a byte more is unpacked, and no
-/// memory is taken that so small a file could not fill. Throws BadInput: truncated, bad_value (damaged),
-/// bad_size (more than a file that is not packed may have).
+/// The first `size` bytes of zlib or gzip data; decompression stops there, and memory is bounded by the
+/// deflate ratio. Throws BadInput: truncated, bad_value (damaged), bad_size (above the limit of an
+/// uncompressed file).
 std::string inflate(std::string_view packed, std::size_t size, const std::string& origin);
 
-/// `count` finite numbers parted by blanks or `separators`. Throws BadInput: bad_value, not_finite.
+/// `count` finite numbers separated by blanks or `separators`. Throws BadInput: bad_value, not_finite.
 std::vector<double> read_numbers(std::string_view text, std::size_t count, const std::string& origin,
                                  std::string_view separators = "");
 
-/// Content of a volume's file, or of the data file `name` that the header in `header` names: beside it.
+/// Content of a volume file, or of the data file `name` beside `header` that the header names.
 std::string read_volume_file(const std::filesystem::path& path);
 std::string read_data_file(const std::filesystem::path& header, const std::string& name);
 
 /// Without blanks (and a carriage return) at either end.
 std::string_view trim(std::string_view text);
 
-/// Cuts the first line off `rest`, without its end.
+/// Removes the first line from `rest` and returns it without its line end.
 std::string_view take_line(std::string_view& rest);
 
-// The formats; all throw BadInput. `bytes` is the whole file.
+// Readers of the formats; all throw BadInput. `bytes` is the whole file.
 Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes);
 Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes);
 Volume read_nifti(const std::filesystem::path& path, std::string_view bytes);
