@@ -13,7 +13,7 @@ struct ImageLine {
   Eigen::Vector2d tip;
 };
 
-/// The tool's line in a calibrated X-ray (Eq. 6); nothing where it lies behind the source.
+/// Projection of the tool's line into a calibrated view (Eq. 6); nothing if it lies behind the source.
 std::optional<ImageLine> line_in_xray(const View& view, const ToolLine& line);
 
 }  // namespace helicarm

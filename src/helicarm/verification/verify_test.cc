@@ -6,10 +6,10 @@
 namespace helicarm {
 namespace {
 
-/// Looks along +z from 800 mm: 5 px are 1 mm at the origin.
+/// Views along +z from 800 mm: 5 px are 1 mm at the origin.
 View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
 
-/// Looks along +x.
+/// Views along +x.
 View lateral() {
   Eigen::Matrix3d camera_from_world;
   camera_from_world << 0, 1, 0, 0, 0, 1, 1, 0, 0;
@@ -22,7 +22,7 @@ PlannedPoint seen_in_both(const Eigen::Vector3d& point) {
 
 const ToolLine along_y{"femur", "femur", {0, -20, 0}, {0, 30, 0}};
 
-TEST(DistanceToLine, OffsetsOfOneAxisShowInTheViewThatSeesThem) {
+TEST(DistanceToLine, OffsetAppearsInTheViewThatObservesItsAxis) {
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({0, 5, 2}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(*error->per_view_px[0], 0, 1e-9);
@@ -32,7 +32,7 @@ TEST(DistanceToLine, OffsetsOfOneAxisShowInTheViewThatSeesThem) {
   EXPECT_NEAR(error->distance_mm, 2, 1e-12);
 }
 
-TEST(DistanceToLine, TwoViewsCombineAsTheRootOfTheSumOfSquares) {
+TEST(DistanceToLine, TwoViewsCombineAsRootSumOfSquares) {
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 0, 4}), along_y);
   ASSERT_TRUE(error.has_value());
   EXPECT_NEAR(error->distance_mm, 5, 1e-12);
@@ -48,7 +48,7 @@ TEST(DistanceToLine, PointOnTheLineBeyondItsEndsHasNoError) {
   EXPECT_NEAR(error->distance_mm, 0, 1e-12);
 }
 
-TEST(DistanceToLine, ViewThatDidNotSeeThePointIsLeftOut) {
+TEST(DistanceToLine, ViewWithoutThePointIsLeftOut) {
   PlannedPoint point = seen_in_both({3, 0, 4});
   point.uv[1].reset();
   const auto error = distance_to_line({frontal(), lateral()}, point, along_y);
@@ -57,7 +57,7 @@ TEST(DistanceToLine, ViewThatDidNotSeeThePointIsLeftOut) {
   EXPECT_NEAR(error->combined_mm, 3, 1e-9);
 }
 
-TEST(DistanceToLine, ViewThatSeesTheLineEndOnIsLeftOut) {
+TEST(DistanceToLine, ViewAlongTheLineIsLeftOut) {
   const ToolLine along_z{"femur", "femur", {0, 0, -20}, {0, 0, 30}};
   const auto error = distance_to_line({frontal(), lateral()}, seen_in_both({3, 4, 0}), along_z);
   ASSERT_TRUE(error.has_value());
