@@ -11,7 +11,7 @@ namespace {
 
 Marker marker_of(Bone bone) { return bone == Bone::femur ? Marker::femur : Marker::tibia; }
 
-/// Names the readings: each moment's own, or one for all moments. The present is moment -1.
+/// Identifies the tracker readings: one per moment, or one for all moments. The present is moment -1.
 class Readings {
  public:
   explicit Readings(Samples samples) : samples_(samples) {}
@@ -23,15 +23,15 @@ class Readings {
 
 constexpr int present = -1;
 
-/// What one ray says of a point's place: the inverse covariance across the ray, in the bone's frame.
+/// Information of one ray about the point: the inverse covariance across the ray, in the bone's frame.
 Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eigen::Vector3d& point_in_bone) {
   const View view = seen_from_bone(dated.view, *calibrator_from(bone, dated.poses));
   const Eigen::Matrix<double, 2, 3> slope = projection_jacobian(view, point_in_bone);
   return slope.transpose() * slope / (dated.sigma_px * dated.sigma_px);
 }
 
-/// The rays met in the bone's frame, each brought there by its own moment's readings: their errors enter with
-/// the weight that each ray has in the intersection.
+/// Intersects the rays in the bone's frame, each transformed by the readings of its own moment: their errors
+/// enter with the weight of each ray in the intersection.
 PropagatedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
   std::vector<Eigen::Matrix3d> information;
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();

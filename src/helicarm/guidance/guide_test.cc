@@ -35,7 +35,7 @@ XrayPoint femoral_point(const Poses& first, const Poses& second) {
           {{frontal(), first, 1}, {lateral(), second, 1}}};
 }
 
-TEST(Guide, PointOfAMovedFemurFollowsItToTheTool) {
+TEST(Guide, PointFollowsAMovedFemurToTheTool) {
   const RigidTransform bend = motion(3, -2, 5, 12, {1, 0, 0});
   Poses now = all_poses();
   now.tracker_from_femur = *now.tracker_from_femur * bend;
@@ -50,7 +50,7 @@ TEST(Guide, PointOfAMovedFemurFollowsItToTheTool) {
   EXPECT_TRUE(guided.in_tool->isApprox(expected, 1e-12));
 }
 
-TEST(Guide, PointWithoutABoneRestsInTheTracker) {
+TEST(Guide, PointWithoutABoneIsFixedInTheTracker) {
   const XrayPoint point{{10, -5, 20}, Eigen::Matrix3d::Zero(), {}, {{frontal(), all_poses(), 1}}};
   Poses now = all_poses();
   now.tracker_from_femur = motion(0, 0, 0, 90, {0, 0, 1});
@@ -60,7 +60,7 @@ TEST(Guide, PointWithoutABoneRestsInTheTracker) {
   EXPECT_TRUE(guided.in_tool->isApprox(expected, 1e-12));
 }
 
-TEST(Guide, MissingReadingsLeavePlacesAbsent) {
+TEST(Guide, MissingReadingsLeavePositionsAbsent) {
   const XrayPoint point{{1, 2, 3}, Eigen::Matrix3d::Identity(), {}, {{frontal(), {}, 1}}};
   const PointInFrames guided = guide(point, all_poses(), {});
   EXPECT_FALSE(guided.in_femur);
@@ -69,7 +69,7 @@ TEST(Guide, MissingReadingsLeavePlacesAbsent) {
   EXPECT_EQ(guided.in_calibrator, Eigen::Vector3d(1, 2, 3));
 }
 
-TEST(Guide, WithoutNoiseTheCovarianceOnlyTurns) {
+TEST(Guide, WithoutNoiseTheCovarianceIsOnlyRotated) {
   Poses poses = all_poses();
   XrayPoint point = femoral_point(poses, poses);
   point.covariance_in_anchor = Eigen::Vector3d(1, 4, 9).asDiagonal();
@@ -89,7 +89,7 @@ TEST(Guide, SharedReadingOfABoneCancelsInTheTool) {
   EXPECT_NEAR(guide(point, poses, {0.1, 0.05, Samples::shared}).covariance_in_calibrator.trace(), 0, 1e-12);
 }
 
-/// Draws one noisy reading, as the covariance supposes it.
+/// Draws one noisy reading from the covariance's noise model.
 RigidTransform noisy(const RigidTransform& pose, const TrackerNoise& noise, RandomStream& stream) {
   const double rad = noise.sigma_deg * std::numbers::pi / 180;
   const Eigen::Vector3d shift{stream.normal(), stream.normal(), stream.normal()};
@@ -98,7 +98,7 @@ RigidTransform noisy(const RigidTransform& pose, const TrackerNoise& noise, Rand
                                noise.sigma_mm * shift};
 }
 
-/// The point nearest to two rays, in a bone's frame.
+/// Point nearest to two rays, in a bone's frame.
 Eigen::Vector3d meet(const std::vector<DatedView>& views,
                      const std::vector<Eigen::Vector3d>& true_in_calibrator) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
@@ -116,7 +116,7 @@ Eigen::Vector3d meet(const std::vector<DatedView>& views,
   return sum.ldlt().solve(right);
 }
 
-TEST(Guide, CovarianceAgreesWithDrawnReadings) {
+TEST(Guide, CovarianceAgreesWithMonteCarloReadings) {
   const TrackerNoise noise{0.12, 0.05, Samples::independent};
   const Poses first = all_poses();
   Poses second = all_poses();

@@ -10,7 +10,7 @@ namespace helicarm {
 enum class Bone { femur, tibia };
 constexpr Bone other_bone(Bone bone) { return bone == Bone::femur ? Bone::tibia : Bone::femur; }
 
-/// What the tracker read at one moment (Fig. 15b): the pose of each marker, absent where it was not seen.
+/// Tracker readings at one moment (Fig. 15b): the pose of each marker, absent if it was not visible.
 struct Poses {
   std::optional<RigidTransform> tracker_from_calibrator;
   std::optional<RigidTransform> tracker_from_femur;
@@ -25,17 +25,17 @@ struct Poses {
   }
 };
 
-/// Whether one reading of a marker serves all moments, so that its error is common to them.
+/// Whether one reading of a marker is used for all moments, so that its error is common to them.
 enum class Samples { shared, independent };
 
-/// Error of each reading, standard deviation per axis, about the marker's own origin.
+/// Standard deviation of each reading per axis, about the marker's own origin.
 struct TrackerNoise {
   double sigma_mm = 0;
   double sigma_deg = 0;
   Samples samples = Samples::independent;
 };
 
-/// Places a bone in the calibrator at the moment of `poses`; nothing where a marker was not seen.
+/// Pose of a bone in the calibrator at the moment of `poses`; nothing if a marker was not visible.
 std::optional<RigidTransform> calibrator_from(Bone bone, const Poses& poses);
 
 }  // namespace helicarm

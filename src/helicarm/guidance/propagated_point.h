@@ -12,11 +12,11 @@ namespace helicarm {
 
 enum class Marker { calibrator, femur, tibia, tool };
 
-/// One reading of one marker: two points that went through the same reading share its error.
+/// One reading of one marker: points transformed by the same reading share its error.
 using Reading = std::pair<Marker, int>;
 
-/// A point on its way through the frames, with the first-order effect of every tracker reading on it. A
-/// measured pose is the true one times a small motion (shift tau, turn omega) about the marker's own origin.
+/// A point carried through the frames with the first-order effect of every tracker reading on it. A measured
+/// pose is the true one times a small motion (translation tau, rotation omega) about the marker's own origin.
 struct PropagatedPoint {
   Eigen::Vector3d point;
   Eigen::Matrix3d covariance;                                 ///< from the X-rays
@@ -26,8 +26,8 @@ struct PropagatedPoint {
   Eigen::Matrix3d total_covariance(const TrackerNoise& noise) const;
 };
 
-/// Covariance of the way from one point to another in the same frame, mm^2: what both owe to the same
-/// calibration (its covariance given) and to the same readings falls out.
+/// Covariance (mm^2) of the difference of two points in the same frame: errors from the same calibration (its
+/// covariance given) and the same readings cancel.
 Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const PropagatedPoint& to,
                                    const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 

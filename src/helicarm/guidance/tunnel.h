@@ -11,25 +11,26 @@
 
 namespace helicarm {
 
-/// A planned tunnel from `start` to `end` as an order for the tool: data only.
+/// A planned tunnel from `start` to `end` for the tool.
 struct Tunnel {
   std::string name;
   std::optional<Eigen::Vector3d> start_in_tool;  ///< mm
   std::optional<Eigen::Vector3d> end_in_tool;
   std::optional<Eigen::Vector3d> axis_in_tool;  ///< unit, from start to end
   std::optional<double> length_mm;
-  std::optional<Eigen::Matrix3d> axis_covariance = {};  ///< rad^2, across the axis; with the tracker's noise
+  std::optional<Eigen::Matrix3d> axis_covariance =
+      {};  ///< rad^2, across the axis; includes the tracker's noise
   std::optional<double> length_sigma_mm = {};
 
-  /// Standard deviation of the axis' direction (root of the trace), degrees.
+  /// Standard deviation of the axis direction (root of the trace), degrees.
   std::optional<double> axis_sigma_deg() const;
 };
 
 inline constexpr double shortest_tunnel_mm = 1;
 inline constexpr double longest_tunnel_mm = 200;
 
-/// Refuses (bad_tunnel) a length outside these limits. The axis' covariance needs that of the calibration,
-/// which both ends share (empty: taken as exact).
+/// Refuses (bad_tunnel) a length outside the limits above. `axis_covariance` needs the covariance of the
+/// calibration shared by both ends (empty: taken as exact).
 Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start, const PointInFrames& end,
                              const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 

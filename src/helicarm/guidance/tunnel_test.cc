@@ -25,7 +25,7 @@ TEST(PlanTunnel, AxisRunsFromStartToEnd) {
   EXPECT_DOUBLE_EQ(*tunnel->length_mm, 30);
 }
 
-TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsKnown) {
+TEST(PlanTunnel, WithoutATrackerOnlyTheLengthIsGiven) {
   const auto tunnel = plan_tunnel("femur", point_at(40, false), point_at(10, false), {}, {});
   ASSERT_TRUE(tunnel.has_value());
   EXPECT_FALSE(tunnel->start_in_tool);
@@ -43,7 +43,7 @@ TEST(PlanTunnel, LongerThanAKneeIsRefused) {
   EXPECT_FALSE(plan_tunnel("femur", point_at(0, true), point_at(200.1, true), {}, {}).has_value());
 }
 
-/// Two ends 30 mm apart along x that share a calibration of two numbers and one reading of the tool.
+/// Two ends 30 mm apart along x that share a calibration of two parameters and one reading of the tool.
 PointInFrames propagated_point(double x, const Eigen::Matrix<double, 3, 2>& by_calibration,
                                const Eigen::MatrixXd& calibration) {
   PropagatedPoint at{{x, 0, 0}, Eigen::Matrix3d::Zero(), {}, by_calibration};
@@ -56,7 +56,7 @@ PointInFrames propagated_point(double x, const Eigen::Matrix<double, 3, 2>& by_c
   return point;
 }
 
-TEST(PlanTunnel, AxisErrorAgreesWithDrawnErrorsOfWhatBothEndsShare) {
+TEST(PlanTunnel, AxisErrorAgreesWithMonteCarloOfSharedErrors) {
   const Eigen::MatrixXd calibration = Eigen::Vector2d(0.04, 0.09).asDiagonal();
   Eigen::Matrix<double, 3, 2> of_start;
   Eigen::Matrix<double, 3, 2> of_end;
@@ -78,7 +78,7 @@ TEST(PlanTunnel, AxisErrorAgreesWithDrawnErrorsOfWhatBothEndsShare) {
     const Eigen::Vector3d turn = drawn(noise.sigma_deg * std::numbers::pi / 180);
     const Eigen::Vector3d start = of_start * parameters + drawn(0.1);
     const Eigen::Vector3d end = Eigen::Vector3d(30, 0, 0) + of_end * parameters + drawn(0.1);
-    const Eigen::Vector3d along = end - start;  // the tool's shift falls out
+    const Eigen::Vector3d along = end - start;  // the tool's translation cancels
     const Eigen::Vector3d error = (along - turn.cross(along)).normalized() - *tunnel->axis_in_tool;
     spread += error * error.transpose() / trials;
   }
@@ -87,7 +87,7 @@ TEST(PlanTunnel, AxisErrorAgreesWithDrawnErrorsOfWhatBothEndsShare) {
   EXPECT_LT((across - expected).norm(), 0.04 * across.norm());
 }
 
-TEST(PlanTunnel, WhatMovesBothEndsAlikeDoesNotTurnTheAxis) {
+TEST(PlanTunnel, MotionCommonToBothEndsDoesNotTurnTheAxis) {
   const Eigen::MatrixXd calibration = 25 * Eigen::Matrix2d::Identity();
   const Eigen::Matrix<double, 3, 2> shared = Eigen::Matrix<double, 3, 2>::Ones();
   const auto tunnel = plan_tunnel("femur", propagated_point(0, shared, calibration),
