@@ -13,7 +13,7 @@ namespace {
 
 using Polygon = std::vector<Eigen::Vector2d>;
 
-/// Exact signed distance to a polygon, negative inside.
+/// Signed distance to a polygon, negative inside; exact.
 double polygon_distance(const Polygon& polygon, const Eigen::Vector2d& p) {
   double nearest = INFINITY;
   bool inside = false;
@@ -28,7 +28,7 @@ double polygon_distance(const Polygon& polygon, const Eigen::Vector2d& p) {
   return inside ? -nearest : nearest;
 }
 
-/// The outer cone and what follows from it.
+/// The outer cone and its derived quantities.
 struct Cone {
   explicit Cone(const BodyOptions& options)
       : base(options.base_diameter_mm / 2),
@@ -36,7 +36,7 @@ struct Cone {
 
   double radius(double z) const { return base - slope * z; }
   double secant() const { return std::hypot(1, slope); }
-  /// Below the outer surface, along its normal.
+  /// Depth below the outer surface along its normal.
   double depth(const Eigen::Vector3d& p) const { return (radius(p.z()) - p.head<2>().norm()) / secant(); }
   Eigen::Vector3d normal(double azimuth) const {
     return Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), slope) / secant();
@@ -49,7 +49,7 @@ struct Cone {
   double slope;
 };
 
-/// Half of the body's section in (distance from the axis, z); it crosses the axis so that no edge lies there.
+/// Half section of the body in (distance from the axis, z); it crosses the axis so that no edge lies there.
 Polygon section(const Cone& cone, const BodyOptions& options) {
   const double bottom = -options.flange_depth_mm;
   const double flange_top = bottom + std::min(options.wall_mm, options.flange_depth_mm);
@@ -66,7 +66,7 @@ Polygon section(const Cone& cone, const BodyOptions& options) {
           {inner(ceiling), ceiling}};
 }
 
-/// A flat square on the outer surface at half height, thick enough to meet the curved wall at its edges.
+/// Flat square on the outer surface at half height, thick enough to reach the curved wall at its edges.
 struct Facet {
   Eigen::Vector3d centre;
   Eigen::Matrix3d axes;  ///< columns: across, up the slope, outward
@@ -92,8 +92,7 @@ Facet facet_at(const Cone& cone, const BodyOptions& options, double azimuth) {
   return facet;
 }
 
-/// A slot of the outer surface where the plane through two balls and the outward direction between them meets
-/// it.
+/// Groove in the outer surface, in the plane through two balls and the outward direction between them.
 struct Groove {
   Eigen::Vector3d start, end, across, outward;
 
@@ -111,7 +110,7 @@ std::vector<Groove> grooves_of(const Calibrator& calibrator) {
   std::map<std::string, Eigen::Vector3d> places;
   for (const auto& ball : calibrator.balls) places[ball.label] = ball.centre_in_calibrator;
   std::vector<Groove> grooves;
-  // The lines of 2.3.4 (4); a straight one up the cone runs by way of its middle ball.
+  // The lines of 2.3.4 (4); a straight one up the cone passes its middle ball.
   for (const auto& [from, to] : {std::pair{"P3", "P7"},
                                  {"P7", "P11"},
                                  {"P4", "P8"},
@@ -170,8 +169,9 @@ Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOp
         z > options.height_mm)
       return fail(
           Reason::bad_value,
-          fmt::format("{}: ball {} lies {:.2f} mm below the cone's surface at z = {:.2f} mm: off the wall",
-                      calibrator.name, ball.label, depth, z),
+          fmt::format(
+              "{}: ball {} lies {:.2f} mm below the cone's surface at z = {:.2f} mm: outside the wall",
+              calibrator.name, ball.label, depth, z),
           {{"depth_mm", depth}, {"z_mm", z}});
   }
   const double reach = cone.radius(-options.flange_depth_mm) + options.flange_width_mm + 2 * options.step_mm;

@@ -7,27 +7,26 @@
 
 namespace helicarm {
 
-/// The plastic body of 2.3.1 and 2.3.4, in the calibrator's frame: a truncated cone, open at the base, closed
-/// on top, that stands on a flange.
+/// The plastic body of 2.3.1 and 2.3.4 in the calibrator's frame: a truncated cone on a flange, open at the
+/// base and closed at the top.
 struct BodyOptions {
   double base_diameter_mm = 120;  ///< of the outer surface at z = 0
   double top_diameter_mm = 60;    ///< at z = height_mm
   double height_mm = 87.5;
-  double wall_mm = 3;          ///< and around each ball's pocket, less where it meets the surface
-  double flange_depth_mm = 5;  ///< below z = 0, so that the lowest ball is held
+  double wall_mm = 3;          ///< also around each ball's pocket, less at the surface
+  double flange_depth_mm = 5;  ///< below z = 0, holds the lowest ball
   double flange_width_mm = 8;
   double groove_width_mm = 2;
   double groove_depth_mm = 1;
-  double facet_side_mm = 18;  ///< of the four flat squares that carry the tracker's markers
+  double facet_side_mm = 18;  ///< side of the four flat squares for the tracker's markers
   double step_mm = 1;         ///< of the grid; 0.2 to 3
 };
 
-/// Signed distance (mm, negative in the plastic; exact near the shell, a bound elsewhere).
+/// Signed distance (mm, negative in the plastic): exact near the shell, a bound elsewhere.
 SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& options = {});
 
-/// The printable surface. Each ball has a blind pocket of its own diameter, open to the outside; between
-/// balls named as in 2.3.4 run the grooves. Refuses (bad_value) a ball that lies off the wall, and a step out
-/// of range.
+/// The printable surface. Each ball has a blind pocket of its own diameter, open to the outside; grooves
+/// connect balls named as in 2.3.4. Refuses (bad_value) a ball outside the wall, and a step out of range.
 Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options = {});
 
 }  // namespace helicarm

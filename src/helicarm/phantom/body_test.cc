@@ -14,7 +14,7 @@ namespace {
 
 using Place = std::tuple<float, float, float>;
 
-/// Directed edges, by the places that the STL file holds, that are not matched by exactly one reverse.
+/// Number of directed edges (by STL coordinates) without exactly one reverse edge.
 std::size_t open_edges(const std::string& stl) {
   std::map<std::pair<Place, Place>, int> edges;
   for (std::size_t at = 84; at < stl.size(); at += 50) {
@@ -33,14 +33,14 @@ std::size_t open_edges(const std::string& stl) {
   return open;
 }
 
-TEST(SurfaceOf, ABallIsClosedAndHasItsVolume) {
+TEST(SurfaceOf, BallIsClosedAndHasItsVolume) {
   const auto ball = surface_of([](const Eigen::Vector3d& p) { return p.norm() - 10; },
                                {Eigen::Vector3d::Constant(-12), Eigen::Vector3d::Constant(12)}, 0.7);
   EXPECT_EQ(open_edges(to_stl(ball)), 0u);
   EXPECT_NEAR(volume(ball), 4.0 / 3 * std::numbers::pi * 1000, 30);
 }
 
-TEST(SurfaceOf, ACubeWhoseFacesLieOnTheGridIsClosed) {
+TEST(SurfaceOf, CubeWithFacesOnTheGridIsClosed) {
   const auto cube = surface_of([](const Eigen::Vector3d& p) { return p.cwiseAbs().maxCoeff() - 5; },
                                {Eigen::Vector3d::Constant(-7), Eigen::Vector3d::Constant(7)}, 1);
   EXPECT_EQ(open_edges(to_stl(cube)), 0u);
@@ -100,7 +100,7 @@ TEST(PrintableBody, GroovesAreCutBetweenTheirBalls) {
   EXPECT_LT(distance(on_surface(column - std::numbers::pi, 15, 0.6)), 0);       // P1-P5 has none
 }
 
-TEST(PrintableBody, FacetsAreFlatAndStandProud) {
+TEST(PrintableBody, FacetsAreFlatAndRaised) {
   const auto distance = body_distance(udcsc());
   const double azimuth = std::numbers::pi * (1.0 / 6 + 0.25);
   const double slope = 30 / 87.5;
@@ -116,7 +116,7 @@ TEST(PrintableBody, FacetsAreFlatAndStandProud) {
     }
 }
 
-TEST(PrintableBody, BallOffTheConeIsRefused) {
+TEST(PrintableBody, BallOutsideTheConeIsRefused) {
   Calibrator calibrator = udcsc();
   calibrator.balls[2].centre_in_calibrator *= 0.5;
   EXPECT_EQ(printable_body(calibrator).error().reason, Reason::bad_value);

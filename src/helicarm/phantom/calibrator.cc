@@ -22,7 +22,7 @@ constexpr std::size_t most_balls = 1000;
 constexpr Range coordinate_range{-1000, 1000};
 constexpr Range diameter_range{0.5, 30};
 constexpr Range tolerance_range{0, 1};
-constexpr Range variance_range{-100, 100};  // mm^2: a ball off by 10 mm
+constexpr Range variance_range{-100, 100};  // mm^2: a 10 mm error of a ball
 constexpr Range scale_sigma_range{0, 0.1};
 constexpr double least_extent_mm = 10;
 constexpr double least_distance_mm = 0.1;
@@ -38,7 +38,7 @@ std::string name_of(JsonReader& reader, const char* key) {
   return name;
 }
 
-/// Symmetric and without negative eigenvalues, both to rounding.
+/// Symmetric and positive semidefinite, to rounding.
 Eigen::Matrix3d covariance_from(JsonReader& reader) {
   constexpr double rounding = 1e-6;
   const Eigen::Matrix3d given =
@@ -115,13 +115,14 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
     centres.col(static_cast<Eigen::Index>(i)) = balls[i].centre_in_calibrator;
     for (std::size_t j = 0; j < i; ++j)
       if ((balls[i].centre_in_calibrator - balls[j].centre_in_calibrator).norm() < least_distance_mm)
-        throw BadInput(Reason::bad_value, fmt::format("{}: balls {} and {} are at one place", origin,
+        throw BadInput(Reason::bad_value, fmt::format("{}: balls {} and {} have the same position", origin,
                                                       balls[j].label, balls[i].label));
   }
   const double extent = (centres.rowwise().maxCoeff() - centres.rowwise().minCoeff()).maxCoeff();
   if (extent < least_extent_mm)
-    throw BadInput(Reason::bad_value, fmt::format("{}: \"balls\": all within {} mm, at least {} mm (metres?)",
-                                                  origin, extent, least_extent_mm));
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: \"balls\": all within {} mm, at least {} mm; check the unit (metres?)",
+                               origin, extent, least_extent_mm));
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose() /
                                                             double(balls.size()));

@@ -6,7 +6,7 @@
 namespace helicarm {
 namespace {
 
-/// The built-in one with a ball, a cross and a line end as targets.
+/// The built-in calibrator with a ball, a cross and a line end as targets.
 Json example() {
   Calibrator calibrator = udcsc();
   calibrator.name = "mine";
@@ -22,7 +22,7 @@ Failure refusal(const Json& json) {
   return calibrator ? Failure{Reason::usage, ""} : calibrator.error();
 }
 
-TEST(Udcsc, FirstAndLastBallAreThoseOfTheHelix) {
+TEST(Udcsc, FirstAndLastBallAreOnTheHelix) {
   const Calibrator calibrator = udcsc();
   ASSERT_EQ(calibrator.balls.size(), 12u);
   EXPECT_EQ(calibrator.balls.front().label, "P1");
@@ -34,7 +34,7 @@ TEST(Udcsc, FirstAndLastBallAreThoseOfTheHelix) {
   EXPECT_EQ(calibrator.balls.front().diameter_mm, 4.0);
 }
 
-TEST(ReadCalibrator, WhatIsWrittenIsReadBack) {
+TEST(ReadCalibrator, RoundTripKeepsTheCalibrator) {
   const auto calibrator = calibrator_from_json(example(), "c.json");
   ASSERT_TRUE(calibrator.has_value()) << calibrator.error().message;
   EXPECT_EQ(to_json(*calibrator), example());
@@ -42,7 +42,7 @@ TEST(ReadCalibrator, WhatIsWrittenIsReadBack) {
   EXPECT_EQ(calibrator->targets[1].length_mm, 16);
 }
 
-TEST(ReadCalibrator, NullLengthAndNoTargetsAreFine) {
+TEST(ReadCalibrator, NullLengthAndMissingTargetsAreAccepted) {
   Json json = example();
   json["targets"][2]["length_mm"] = nullptr;
   EXPECT_TRUE(calibrator_from_json(json, "c.json").has_value());
@@ -98,13 +98,13 @@ TEST(ReadCalibrator, EqualNamesClash) {
   EXPECT_EQ(refusal(json).reason, Reason::name_clash);
 }
 
-TEST(ReadCalibrator, TwoBallsAtOnePlaceAreRefused) {
+TEST(ReadCalibrator, BallsAtEqualPositionsAreRefused) {
   Json json = example();
   json["balls"][1]["xyz_mm"] = json["balls"][0]["xyz_mm"];
   EXPECT_EQ(refusal(json).reason, Reason::bad_value);
 }
 
-TEST(ReadCalibrator, BallsOfOnePlaneAreCoplanarWithTheFigure) {
+TEST(ReadCalibrator, BallsInOnePlaneAreCoplanarWithTheFigure) {
   Json json = example();
   for (Json& ball : json["balls"]) {
     const auto xyz = ball["xyz_mm"].get<std::vector<double>>();
@@ -116,7 +116,7 @@ TEST(ReadCalibrator, BallsOfOnePlaneAreCoplanarWithTheFigure) {
   EXPECT_LT(failure.figures.at("plane_rms_mm"), 1e-5);
 }
 
-TEST(ReadCalibrator, DirectionsMustFitTheKindAndBeUnitAndApart) {
+TEST(ReadCalibrator, DirectionsMustFitTheKindAndBeDistinctUnitVectors) {
   Json json = example();
   json["targets"][2].erase("directions");
   EXPECT_EQ(refusal(json).reason, Reason::bad_value);
@@ -137,7 +137,7 @@ TEST(ReadCalibrator, NearlyUnitDirectionIsNormalised) {
   EXPECT_NEAR(calibrator_from_json(json, "c.json")->targets[2].directions[0].norm(), 1, 1e-15);
 }
 
-TEST(ReadCalibrator, MeasuredFileIsReadAndWrittenBack) {
+TEST(ReadCalibrator, MeasuredFileRoundTrips) {
   Json json = example();
   json["scale_sigma"] = 0.0005;
   json["measured"] = {{"date", "2026-11-22"}, {"scale", "one distance"}};
@@ -151,7 +151,7 @@ TEST(ReadCalibrator, MeasuredFileIsReadAndWrittenBack) {
   EXPECT_EQ(written["balls"][2]["covariance_mm2"], json["balls"][2]["covariance_mm2"]);
 }
 
-TEST(ReadCalibrator, CovarianceThatIsNoneIsRefused) {
+TEST(ReadCalibrator, InvalidCovarianceIsRefused) {
   Json json = example();
   json["balls"][2]["covariance_mm2"] = {{1, 2, 0}, {0, 1, 0}, {0, 0, 1}};
   EXPECT_NE(refusal(json).message.find("balls[2]: \"covariance_mm2\": is not symmetric"), std::string::npos)
@@ -160,7 +160,7 @@ TEST(ReadCalibrator, CovarianceThatIsNoneIsRefused) {
   EXPECT_NE(refusal(json).message.find("negative eigenvalue -1"), std::string::npos) << refusal(json).message;
 }
 
-TEST(BallCovariances, ScaleIsTakenOutAndTheToleranceAdded) {
+TEST(BallCovariances, ScaleErrorIsRemovedAndTheToleranceAdded) {
   Calibrator calibrator = udcsc();
   EXPECT_TRUE(ball_covariances(calibrator).empty());
   calibrator.scale_sigma = 0.01;
@@ -175,7 +175,7 @@ TEST(BallCovariances, ScaleIsTakenOutAndTheToleranceAdded) {
   EXPECT_LT((covariances[5] - 0.01 * Eigen::Matrix3d::Identity()).norm(), 1e-12);
 }
 
-TEST(SamePlaces, OrderIsFreeAndAShiftIsSeen) {
+TEST(SamePlaces, IgnoresOrderAndDetectsAShift) {
   Calibrator other = udcsc();
   std::swap(other.balls[0], other.balls[5]);
   EXPECT_TRUE(same_places(other, udcsc()));

@@ -8,10 +8,11 @@
 
 namespace helicarm {
 
-/// The conical spiral of Eq. 9 with the paper's figures. Its axis is the calibrator's z; t = 0 at the base.
+/// The conical spiral of Eq. 9 with the paper's parameters. Its axis is the calibrator's z; t = 0 at the
+/// base.
 struct ConicalHelix {
   double rr = 60;      ///< radius at the base, mm
-  double pp = 31.529;  ///< angle over which the radius falls by e, rad
+  double pp = 31.529;  ///< angle over which the radius falls by a factor e, rad
   double h = 3.979;    ///< rise, mm/rad
   double t_end = 7 * std::numbers::pi;
 

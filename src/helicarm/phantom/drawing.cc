@@ -86,7 +86,7 @@ class Sheet {
   std::string body_;
 };
 
-/// One view of the calibrator: `flat` takes mm of the calibrator to mm on the sheet (right, down).
+/// One view of the calibrator: `flat` maps mm of the calibrator to mm on the sheet (right, down).
 void draw_view(Sheet& sheet, const Calibrator& calibrator, const Eigen::Matrix<double, 2, 3>& flat,
                const Eigen::Vector2d& low, const Eigen::Vector2d& high, const Eigen::Vector2d& corner,
                const std::string& title, const char* right, const char* up) {

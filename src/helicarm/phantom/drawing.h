@@ -9,7 +9,7 @@
 
 namespace helicarm {
 
-/// SVG, 1 : 1 in mm, with dimensions, as seen from the source. Refuses (bad_value) an unbounded lattice.
+/// SVG, 1 : 1 in mm, dimensioned, seen from the source. Refuses (bad_value) an unbounded lattice.
 Expected<std::string> drawing_of(const Plate& plate);
 
 /// SVG, 1 : 1 in mm: the balls and targets from above (along -z) and from the side (along +y), with labels.

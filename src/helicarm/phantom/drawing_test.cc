@@ -15,7 +15,7 @@ std::size_t count(const std::string& text, const std::string& part) {
   return found;
 }
 
-TEST(DrawingOfPlate, HasEveryDotToScaleAndItsDimensions) {
+TEST(DrawingOfPlate, EveryDotIsToScaleWithDimensions) {
   const std::string svg = *drawing_of(plate48());
   EXPECT_EQ(count(svg, "<circle"), 48u);
   EXPECT_EQ(count(svg, "r=\"1.250\""), 48u);

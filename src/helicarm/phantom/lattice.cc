@@ -10,10 +10,10 @@
 namespace helicarm {
 namespace {
 
-/// Dots as complex numbers: a turn is then a factor of modulus 1.
+/// Dots as complex numbers: a rotation is a factor of modulus 1.
 using Dots = Eigen::VectorXcd;
 
-/// Sorted by their distance from the one nearest the middle, which comes first, at the origin.
+/// Sorted by distance from the dot nearest the middle, which comes first, at the origin.
 Dots from_the_middle(const std::vector<Eigen::Vector2d>& dots_mm) {
   Dots dots(dots_mm.size());
   std::transform(dots_mm.begin(), dots_mm.end(), dots.begin(),
@@ -34,7 +34,7 @@ Dots nearest_places(const Dots& dots, const Eigen::Matrix2d& steps) {
   });
 }
 
-/// Greatest residual of the lattice grown from the first two dots outwards, beginning with the given turn.
+/// Largest residual of the lattice grown outwards from the first two dots with the given initial rotation.
 double grown_misfit(const Dots& dots, const Eigen::Matrix2d& steps, std::complex<double> turn) {
   std::complex<double> offset = 0;
   for (Eigen::Index count = 2;; count = std::min(2 * count, dots.size())) {

@@ -12,8 +12,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "STL is little endian");
 
-/// The distances of two layers of grid points at a time, and the corners made so far, each on one edge of the
-/// grid.
+/// Distances of two layers of grid points, and the vertices so far, each on one grid edge.
 class Marcher {
  public:
   Marcher(const SignedDistance& distance, const Eigen::AlignedBox3d& box, double step)
@@ -43,7 +42,7 @@ class Marcher {
   std::vector<double> layer(int z) const {
     std::vector<double> values;
     values.reserve(static_cast<std::size_t>(count_.x()) * static_cast<std::size_t>(count_.y()));
-    // Kept off zero, so that no triangle shrinks to nothing when it is written in single precision.
+    // Kept away from zero so that no triangle degenerates in single precision.
     const double least = 0.02 * step_;
     for (int y = 0; y < count_.y(); ++y)
       for (int x = 0; x < count_.x(); ++x) {
@@ -65,12 +64,12 @@ class Marcher {
       inside += cube[static_cast<std::size_t>(i)].value < 0;
     }
     if (inside == 0 || inside == 8) return;
-    // Kuhn's six tetrahedra around the diagonal 0-7; neighbouring cubes split their common face alike.
+    // Kuhn's six tetrahedra around the diagonal 0-7; neighbouring cubes split their common face identically.
     constexpr std::size_t paths[6][2] = {{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}};
     for (const auto& [a, b] : paths) march_tetrahedron({cube[0], cube[a], cube[b], cube[7]});
   }
 
-  /// All four positively oriented: the corners 1, 2, 3 run counter-clockwise as seen from 0.
+  /// All four positively oriented: vertices 1, 2, 3 run counter-clockwise seen from 0.
   void march_tetrahedron(const std::array<Vertex, 4>& t) {
     std::array<std::size_t, 4> order{};
     std::size_t inside = 0;

@@ -12,7 +12,7 @@
 
 namespace helicarm {
 
-/// A closed surface; the corners of a triangle run counter-clockwise as seen from outside.
+/// A closed surface; triangle vertices run counter-clockwise seen from outside.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> corners;  ///< mm
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -21,8 +21,8 @@ struct TriangleMesh {
 /// Signed distance to a body's surface, mm, negative inside.
 using SignedDistance = std::function<double(const Eigen::Vector3d&)>;
 
-/// The body's surface by marching tetrahedra on a grid of the given step: always closed and without
-/// crossings. The body must lie inside the box, at least one step from its walls.
+/// The body's surface by marching tetrahedra with the given grid step: closed, without self-intersection. The
+/// body must lie inside the box, at least one step from its walls.
 TriangleMesh surface_of(const SignedDistance& distance, const Eigen::AlignedBox3d& box, double step_mm);
 
 /// mm^3.

@@ -57,7 +57,7 @@ Expected<Plate> plate_from_json(const Json& json, const std::string& origin) {
     reader.finish();
     if (plate.pitch_mm && plate.diameter_mm >= *plate.pitch_mm)
       reader.refuse(Reason::bad_value, "diameter_mm",
-                    fmt::format("{} is not below the pitch of {} mm", plate.diameter_mm, *plate.pitch_mm));
+                    fmt::format("{} must be below the pitch of {} mm", plate.diameter_mm, *plate.pitch_mm));
     if (plate.pitch_mm &&
         !lattice_misfit(plate.dots_mm, plate.lattice, *plate.pitch_mm, lattice_tolerance_mm))
       reader.refuse(

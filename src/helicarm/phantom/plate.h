@@ -16,8 +16,8 @@ namespace helicarm {
 enum class DotKind { balls, holes };
 enum class Lattice { square, hexagonal };
 
-/// The rectification plate: dots on a lattice, fixed to the receiver. In its own plane, +x right and +y down
-/// as seen from the source.
+/// The rectification plate: dots on a lattice, fixed to the receiver. Plate frame: +x right and +y down seen
+/// from the source.
 struct Plate {
   std::string name;
   DotKind kind = DotKind::balls;
@@ -28,26 +28,26 @@ struct Plate {
   std::optional<double> height_above_receiver_mm;
 };
 
-/// The built-in plate of the paper's 2.1: 7 x 7 balls of 2.5 mm at 25 mm, the centre missing, 15 mm above the
-/// receiver.
+/// The built-in plate of the paper's 2.1: 7 x 7 balls of 2.5 mm at 25 mm pitch, without the centre, 15 mm
+/// above the receiver.
 Plate plate48();
 
-/// plate.json as docs/formats.md describes it. Refuses (bad_value) equal dots, dots more than 0.1 mm off
-/// every lattice of the given pitch (however turned and shifted), and sizes that betray a wrong unit.
+/// Reads plate.json (docs/formats.md). Refuses (bad_value) equal dots, dots more than 0.1 mm off every
+/// lattice of the given pitch (at any rotation and shift), and sizes that indicate a wrong unit.
 Expected<Plate> read_plate(const std::filesystem::path& path);
 Expected<Plate> plate_from_json(const Json& json, const std::string& origin);
 
-/// A built-in by its name, else the file of that name below `folder` (path_outside where it leads out of it).
+/// A built-in plate by name, else the file of that name below `folder` (path_outside if it leads out).
 Expected<Plate> plate_named(const std::string& name_or_path, const std::filesystem::path& folder);
 
-/// What read_plate reads.
+/// Inverse of read_plate.
 Json to_json(const Plate& plate);
 
-/// Columns: the two steps of a lattice of pitch 1, so that its dots lie at integer combinations of them.
+/// Columns: the two basis vectors of a lattice of pitch 1; dots are integer combinations.
 Eigen::Matrix2d lattice_steps(Lattice lattice);
 
-/// Greatest distance (mm) of a dot from the nearest point of the lattice that fits all dots best, whatever
-/// its turn and offset; at most `limit_mm`, else nothing.
+/// Largest distance (mm) of a dot from the best-fitting lattice over all rotations and offsets; nothing if
+/// above `limit_mm`.
 std::optional<double> lattice_misfit(const std::vector<Eigen::Vector2d>& dots_mm, Lattice lattice,
                                      double pitch_mm, double limit_mm);
 

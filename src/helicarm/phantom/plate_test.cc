@@ -34,7 +34,7 @@ TEST(Plate48, HasSevenBySevenDotsWithoutTheCentre) {
   EXPECT_EQ(plate_named("plate48", "/nowhere")->dots_mm.size(), 48u);
 }
 
-TEST(ReadPlate, WhatIsWrittenIsReadBack) {
+TEST(ReadPlate, RoundTripKeepsThePlate) {
   const Json json = to_json(plate48());
   EXPECT_EQ(to_json(*plate_from_json(json, "p.json")), json);
 }
@@ -66,12 +66,12 @@ TEST(ReadPlate, BadFieldsAreRefused) {
   EXPECT_EQ(refusal(with("dots_xy_mm", Json::array())), Reason::bad_value);
 }
 
-TEST(LatticeMisfit, TurnAndShiftAreFree) {
+TEST(LatticeMisfit, RotationAndShiftAreFree) {
   EXPECT_LT(*lattice_misfit(turned(plate48(), 0.37, {7.1, -3.3}), Lattice::square, 25, 0.1), 1e-9);
   EXPECT_LT(*lattice_misfit(hexagonal_dots(10, 8), Lattice::hexagonal, 10, 0.1), 1e-9);
 }
 
-TEST(LatticeMisfit, OneDisplacedDotShows) {
+TEST(LatticeMisfit, DisplacedDotIsDetected) {
   auto dots = turned(plate48(), -0.2, {1, 2});
   dots[11].x() += 0.5;
   EXPECT_FALSE(lattice_misfit(dots, Lattice::square, 25, 0.1));

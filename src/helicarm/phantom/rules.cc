@@ -19,7 +19,7 @@ constexpr double degree = std::numbers::pi / 180;
 
 using Points = std::vector<Eigen::Vector3d>;
 
-/// The balls P1..P12 in that order; empty where a label is missing.
+/// Balls P1..P12 in that order; empty if a label is missing.
 Points numbered(const Calibrator& calibrator) {
   std::map<std::string, Eigen::Vector3d> places;
   for (const auto& ball : calibrator.balls) places[ball.label] = ball.centre_in_calibrator;
@@ -39,7 +39,7 @@ Points pick(const Points& points, std::initializer_list<std::size_t> numbers) {
   return picked;
 }
 
-/// Greatest distance from the best plane (flat of 2 dimensions) or the best line (1).
+/// Largest distance from the best plane (2 dimensions) or the best line (1).
 double misfit_mm(const Points& points, int dimensions) {
   Eigen::Matrix3Xd spread(3, points.size());
   for (std::size_t i = 0; i < points.size(); ++i) spread.col(static_cast<Eigen::Index>(i)) = points[i];
@@ -74,8 +74,8 @@ double imaged(const Calibrator& calibrator, const View& view, const RuleOptions&
       }));
 }
 
-/// Least turn (degrees) at a corner of the quadrilateral, all taken in the sense of most; not positive where
-/// it is not convex.
+/// Smallest turning angle (degrees) at a corner of the quadrilateral, in the majority's sense; not positive
+/// if it is not convex.
 double least_turn_deg(const View& view, const Points& corners) {
   std::array<double, 4> turns{};
   for (std::size_t i = 0; i < 4; ++i) {
@@ -91,20 +91,20 @@ double least_turn_deg(const View& view, const Points& corners) {
 void check_space(const Calibrator& calibrator, const DesignViews& views, const RuleOptions& options,
                  std::vector<RuleFinding>& findings) {
   const auto add = [&](auto... fields) { findings.push_back({fields...}); };
-  add("targets_inside", "the targets' space lies inside the balls' hull",
+  add("targets_inside", "the target region lies inside the balls' convex hull",
       depth_in_hull_mm(calibrator, middle_of(calibrator)) - options.target_radius_mm, Bound::at_least, 0.0,
       "mm");
   add("ball_count", "fewer than 20 balls", double(calibrator.balls.size()), Bound::at_most, 19.0, "balls");
-  add("imaged_ap", "at least 6 balls in the AP picture", imaged(calibrator, views.ap, options),
-      Bound::at_least, 6.0, "balls");
-  add("imaged_lateral", "at least 6 balls in the lateral picture", imaged(calibrator, views.lateral, options),
+  add("imaged_ap", "at least 6 balls in the AP image", imaged(calibrator, views.ap, options), Bound::at_least,
+      6.0, "balls");
+  add("imaged_lateral", "at least 6 balls in the lateral image", imaged(calibrator, views.lateral, options),
       Bound::at_least, 6.0, "balls");
   for (const double range_deg : {0.0, options.range_deg}) {
     const std::string turned = range_deg > 0 ? fmt::format(", turned by up to {} degrees", range_deg) : "";
     const std::string suffix = range_deg > 0 ? "_turned" : "";
-    add("gap_ap" + suffix, "no ball hides another in the AP picture" + turned,
+    add("gap_ap" + suffix, "no balls overlap in the AP image" + turned,
         smallest_gap_mm(calibrator, views.ap, range_deg), Bound::at_least, 0.0, "mm");
-    add("gap_lateral" + suffix, "no ball hides another in the lateral picture" + turned,
+    add("gap_lateral" + suffix, "no balls overlap in the lateral image" + turned,
         smallest_gap_mm(calibrator, views.lateral, range_deg), Bound::at_least, 0.0, "mm");
   }
 }
@@ -131,10 +131,10 @@ void check_helical(const Points& balls, const DesignViews& views, const RuleOpti
     const Points four = pick(balls, {k, k + 1, k + 2, k + 3});
     const std::string sentence =
         fmt::format("P{} to P{} are the corners of a convex quadrilateral in the ", k, k + 3);
-    add(fmt::format("convex_ap_{}", k), sentence + "AP picture", least_turn_deg(views.ap, four),
+    add(fmt::format("convex_ap_{}", k), sentence + "AP image", least_turn_deg(views.ap, four),
         Bound::at_least, 0.0, "deg");
-    add(fmt::format("convex_lateral_{}", k), sentence + "lateral picture",
-        least_turn_deg(views.lateral, four), Bound::at_least, 0.0, "deg");
+    add(fmt::format("convex_lateral_{}", k), sentence + "lateral image", least_turn_deg(views.lateral, four),
+        Bound::at_least, 0.0, "deg");
   }
 }
 

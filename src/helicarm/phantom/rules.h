@@ -14,15 +14,15 @@ namespace helicarm {
 struct RuleOptions {
   ConicalHelix helix;
   double source_detector_mm = 1000;
-  double source_calibrator_mm = 650;  ///< to the mean of the balls
+  double source_calibrator_mm = 650;  ///< to the centroid of the balls
   double field_mm = 228.6;            ///< diameter of the receiver
-  double range_deg = 5;  ///< of the turns about both axes of the image over which no ball may hide another
-  double target_radius_mm = 15;  ///< of the ball about the mean of the balls that the targets lie in
+  double range_deg = 5;          ///< range of rotation about both image axes in which no balls may overlap
+  double target_radius_mm = 15;  ///< radius of the target region about the centroid of the balls
 };
 
 enum class Bound { at_most, at_least };
 
-/// One design rule of 2.3.1 or 2.3.4 with the figure that decides it.
+/// One design rule of 2.3.1 or 2.3.4 with the figure it is decided by.
 struct RuleFinding {
   std::string rule;
   std::string sentence;
@@ -33,19 +33,19 @@ struct RuleFinding {
   bool passed() const { return bound == Bound::at_most ? figure <= limit : figure >= limit; }
 };
 
-/// Every rule that applies. Those of 2.3.4 that go by label do so only where the balls are named P1 to P12.
+/// All applicable rules. Those of 2.3.4 that refer to labels need balls named P1 to P12.
 std::vector<RuleFinding> check_rules(const Calibrator& calibrator, const RuleOptions& options = {});
 
-/// The calibrator's mean at the given distance from the source, the beam along +z (AP) or -y (lateral, alpha
-/// = 90 degrees in Eq. 5). Pixels are mm in the detector plane, from the central ray.
+/// Views with the calibrator's centroid at the given distance from the source, the beam along +z (AP) or -y
+/// (lateral, alpha = 90 degrees in Eq. 5). Pixels are mm in the detector plane, from the central ray.
 struct DesignViews {
   View ap;
   View lateral;
 };
 DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options = {});
 
-/// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative where they
-/// overlap. The source turns about both axes of the image within `range_deg`.
+/// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative if they overlap.
+/// The source rotates about both image axes within `range_deg`.
 double smallest_gap_mm(const Calibrator& calibrator, const View& view, double range_deg);
 
 /// Depth of a point below the nearest face of the balls' convex hull, mm; negative outside.

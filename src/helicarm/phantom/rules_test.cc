@@ -26,19 +26,19 @@ double figure(const Calibrator& calibrator, const std::string& rule) {
   return NAN;
 }
 
-TEST(CheckRules, TheBuiltInKeepsThemAll) {
+TEST(CheckRules, BuiltInCalibratorMeetsAll) {
   const auto findings = check_rules(udcsc());
   EXPECT_EQ(findings.size(), 25u);
   for (const auto& finding : findings)
     EXPECT_TRUE(finding.passed()) << finding.rule << ": " << finding.figure << " " << finding.unit;
 }
 
-TEST(CheckRules, TheTwoPlanesAreKeptWithinHalfAMillimetre) {
+TEST(CheckRules, TwoPlanesAreMetWithinHalfAMillimetre) {
   EXPECT_NEAR(figure(udcsc(), "first_plane"), 0.46, 0.005);
   EXPECT_LT(figure(udcsc(), "second_plane"), 0.46);
 }
 
-TEST(CheckRules, TheTriplesAreAsFarOffALineAsTheExponentialSpiralMakesThem) {
+TEST(CheckRules, TriplesDeviateFromALineAsTheSpiralPredicts) {
   for (const char* k : {"1", "2", "3", "4"}) {
     EXPECT_THAT(figure(udcsc(), std::string("line_") + k),
                 testing::AllOf(testing::Ge(0.5), testing::Le(0.6)));
@@ -47,7 +47,7 @@ TEST(CheckRules, TheTriplesAreAsFarOffALineAsTheExponentialSpiralMakesThem) {
   }
 }
 
-TEST(CheckRules, TheBuiltInStaysApartWhereAnotherStartOfTheSpiralDoesNot) {
+TEST(CheckRules, BuiltInHasNoOverlapUnlikeAnotherStartOfTheSpiral) {
   const Calibrator other = four_a_turn(3 * pi / 4);
   for (const char* rule : {"gap_ap", "gap_lateral", "gap_ap_turned", "gap_lateral_turned"}) {
     EXPECT_GT(figure(udcsc(), rule), 1.5);
@@ -57,14 +57,14 @@ TEST(CheckRules, TheBuiltInStaysApartWhereAnotherStartOfTheSpiralDoesNot) {
   EXPECT_LT(figure(other, "gap_lateral_turned"), 0);
 }
 
-TEST(CheckRules, ABallOffTheHelixIsFound) {
+TEST(CheckRules, BallOffTheHelixIsFound) {
   Calibrator calibrator = udcsc();
   calibrator.balls[4].centre_in_calibrator += Eigen::Vector3d(0.2, 0, 0);
   EXPECT_GT(figure(calibrator, "on_helix"), 0.1);
   EXPECT_LT(figure(calibrator, "on_helix"), 0.2);
 }
 
-TEST(CheckRules, WithoutTheLabelsOnlyTheRulesOfSpaceApply) {
+TEST(CheckRules, WithoutLabelsOnlyTheGeometricRulesApply) {
   Calibrator calibrator = udcsc();
   calibrator.balls[0].label += "a";
   EXPECT_EQ(check_rules(calibrator).size(), 8u);
@@ -76,7 +76,7 @@ TEST(CheckRules, CrossedQuadrilateralIsNotConvex) {
   EXPECT_LT(figure(calibrator, "convex_ap_1"), 0);
 }
 
-TEST(CheckRules, BallsOutsideTheFieldAreNotImaged) {
+TEST(CheckRules, BallsOutsideTheFieldAreNotCounted) {
   Calibrator calibrator = udcsc();
   for (auto& ball : calibrator.balls) ball.centre_in_calibrator *= 4;
   EXPECT_LT(figure(calibrator, "imaged_lateral"), 6);

@@ -9,7 +9,7 @@
 namespace helicarm {
 namespace {
 
-/// A cube of space and the most that the distance to the nearest point can be anywhere in it.
+/// A cube and an upper bound of the distance to the nearest point within it.
 struct Cell {
   Eigen::Vector3d centre;
   double half_side;
@@ -27,8 +27,8 @@ double nearest_mm(const std::vector<Eigen::Vector3d>& points, const Eigen::Vecto
 
 double largest_gap_mm(const std::vector<Eigen::Vector3d>& points, const SurgicalSpace& space,
                       double tolerance_mm) {
-  // Branch and bound: the distance to the nearest point changes by no more than one moves, and moving a
-  // cell's centre to the nearest place in the space brings no place of the space farther from it.
+  // Branch and bound: the distance to the nearest point is 1-Lipschitz, and moving a cell's centre to the
+  // nearest point of the space does not increase its distance to any point of the space.
   double best = 0;
   std::priority_queue<Cell> open;
   const auto examine = [&](const Eigen::Vector3d& centre, double half_side) {

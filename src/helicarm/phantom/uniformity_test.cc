@@ -19,7 +19,7 @@ std::vector<Eigen::Vector3d> random_points(std::uint64_t trial, int count) {
   return points;
 }
 
-/// Every place of a grid over the ball, and of a net over its surface.
+/// Grid points in the ball and on its surface.
 double brute_force_gap(const std::vector<Eigen::Vector3d>& points, double radius, double step) {
   double best = 0;
   const auto examine = [&](const Eigen::Vector3d& place) {
@@ -51,22 +51,22 @@ TEST(LargestGap, AgreesWithBruteForce) {
   }
 }
 
-TEST(LargestGap, OnePointInTheMiddleLeavesTheRadius) {
+TEST(LargestGap, PointInTheMiddleLeavesTheRadius) {
   EXPECT_NEAR(largest_gap_mm({Eigen::Vector3d(0, 0, 0)}, {}, 1), 100, 1e-9);
 }
 
-TEST(LargestGap, OnePointAsideLeavesTheFarSide) {
+TEST(LargestGap, PointAsideLeavesTheFarSide) {
   const SurgicalSpace space{{5, 6, 7}, 50};
   EXPECT_NEAR(largest_gap_mm({Eigen::Vector3d(5, 6, 37)}, space), 80, 0.01);
 }
 
-TEST(LargestGap, CornersOfACubeLeaveItsMiddle) {
+TEST(LargestGap, CornersOfACubeLeaveItsCentre) {
   std::vector<Eigen::Vector3d> corners;
   for (int i = 0; i < 8; ++i) corners.emplace_back(i & 1 ? 30 : -30, i & 2 ? 30 : -30, i & 4 ? 30 : -30);
   EXPECT_NEAR(largest_gap_mm(corners, {Eigen::Vector3d::Zero(), 30}), 30 * std::sqrt(3.0), 0.01);
 }
 
-TEST(Uniformity, IsSmallerForTheCalibratorThanForABunch) {
+TEST(Uniformity, IsSmallerForTheCalibratorThanForACluster) {
   std::vector<Eigen::Vector3d> spread;
   std::vector<Eigen::Vector3d> bunch;
   for (const auto& ball : udcsc().balls) {
