@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 constexpr double dip_deg = 65;  // of the earth's field below the horizon, as in central Europe
 
-/// About 13 px of pincushion at the edge of a 1024 px field, with faults of half a pixel.
+/// About 13 px of pincushion at the edge of a 1024 px field, with local faults of half a pixel.
 IntensifierDistortion draw_distortion(RandomStream& random, int size) {
   const double unit = size / 1024.0;
   const Vector2d middle = Vector2d::Constant(0.5 * (size - 1));
@@ -33,7 +33,7 @@ IntensifierDistortion draw_distortion(RandomStream& random, int size) {
   return distortion;
 }
 
-/// Of at most that length.
+/// Uniform in a ball of this radius.
 Vector3d in_ball_of(RandomStream& random, double radius) {
   return random_rotation(random).col(0) * radius * std::cbrt(random.uniform());
 }
@@ -64,7 +64,7 @@ ArmFlex draw_arm(std::uint64_t seed, const CArmModel& model, int size) {
   RandomStream random(seed, stream::arm);
   ArmFlex arm;
   arm.f_mm = model.source_detector_mm + random.uniform(-4, 4);
-  // At most 6 mm here and 5.4 mm of sag: within 12 mm of the middle in every view.
+  // At most 6 mm here and 5.4 mm of sag: within 12 mm of the image centre in every view.
   arm.principal_mm = in_disc(random, 6);
   arm.roll_deg = random.uniform(-3, 3);
   arm.f_per_weight = in_ball_of(random, 0.9);
@@ -78,7 +78,7 @@ ArmFlex draw_arm(std::uint64_t seed, const CArmModel& model, int size) {
   const double heading = random.uniform(0, 2 * EIGEN_PI);
   arm.field_in_patient = {std::cos(dip_deg * radian) * std::cos(heading),
                           std::cos(dip_deg * radian) * std::sin(heading), -std::sin(dip_deg * radian)};
-  // 1 degree of S is 3 to 8 px at the edge; the screen's magnet may lie either way.
+  // 1 degree of S is 3 to 8 px at the edge; the screen's magnetisation has either sign.
   const double strength = model.intensifier ? random.uniform(-1, 1) : 0;
   arm.s_rotation = strength * radian;
   arm.shift_mm = 0.45 * strength;

@@ -11,7 +11,7 @@
 
 namespace helicarm::simulation {
 
-/// A make of C-arm, as its data sheet has it.
+/// A C-arm model with its data sheet values.
 struct CArmModel {
   bool intensifier;    ///< round field, distortion and plate; else a flat panel
   double receiver_mm;  ///< side of the image
@@ -21,40 +21,40 @@ struct CArmModel {
 
 CArmModel model_of(Preset preset);
 
-/// What one C-arm does at one angle. Camera axes: x right, y down, z from the source to the receiver.
+/// State of one C-arm at one angle. Camera axes: x right, y down, z from the source to the receiver.
 struct ArmState {
   double f_mm;
-  Eigen::Vector2d principal_mm;  ///< from the image's middle
-  Eigen::Vector3d source_mm;     ///< from its place in an unbent arm
+  Eigen::Vector2d principal_mm;  ///< from the image centre
+  Eigen::Vector3d source_mm;     ///< offset from its position in an undeformed arm
   double roll_deg;               ///< of the image about its axis
   double s_rotation;             ///< of the intensifier's S, rad
   Eigen::Vector2d shift_mm;      ///< of the intensifier's image
 };
 
-/// One C-arm with its faults: it bends under its own weight, and its intensifier's electrons go astray in the
-/// earth's field, so both depend on where it points, smoothly and each time alike.
+/// One C-arm with its systematic errors: gravity bends the arm and the earth's magnetic field deflects the
+/// intensifier's electrons, so both depend smoothly and reproducibly on the pose.
 struct ArmFlex {
   double f_mm;
   Eigen::Vector2d principal_mm;
   double roll_deg;
-  // Per weight, as a unit vector (down) along the camera's axes.
+  // Per unit weight, as a unit vector (down) along the camera's axes.
   Eigen::RowVector3d f_per_weight;
-  Eigen::Matrix2d principal_per_weight;  ///< of its part across the beam
+  Eigen::Matrix2d principal_per_weight;  ///< per component across the beam
   Eigen::Matrix3d source_per_weight;
   Eigen::RowVector3d roll_per_weight;
   IntensifierDistortion distortion;  ///< without S and shift, px
-  Eigen::Vector3d field_in_patient;  ///< the earth's field's direction
-  double s_rotation;                 ///< where it lies along the beam, rad
-  double shift_mm;                   ///< where it lies across
+  Eigen::Vector3d field_in_patient;  ///< direction of the earth's field
+  double s_rotation;                 ///< for a field along the beam
+  double shift_mm;                   ///< for a field across the beam
 
-  /// `camera_from_patient`: where the arm points; patient: x distal, y lateral, z up.
+  /// `camera_from_patient`: orientation of the arm; patient: x distal, y lateral, z up.
   ArmState at(const Eigen::Matrix3d& camera_from_patient) const;
 };
 
 /// The C-arm of a seed.
 ArmFlex draw_arm(std::uint64_t seed, const CArmModel& model, int size);
 
-/// The little that is not alike the next time the arm comes to the angle.
+/// Adds the part that does not repeat when the arm returns to an angle.
 ArmState unrepeated(const ArmState& state, RandomStream& random);
 
 }  // namespace helicarm::simulation

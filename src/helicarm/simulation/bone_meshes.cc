@@ -11,7 +11,7 @@
 namespace helicarm::simulation {
 namespace {
 
-/// Of the outer solids of these bones: a bone's first body in the scene.
+/// Mesh of the outer solids of these bones: a bone's first body in the scene.
 TriangleMesh mesh_of(const Scene& knee, std::initializer_list<std::string_view> names, double step_mm) {
   std::vector<Solid> solids;
   Eigen::AlignedBox3d box;

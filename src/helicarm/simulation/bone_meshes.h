@@ -6,16 +6,16 @@
 
 namespace helicarm::simulation {
 
-/// Surfaces of what moves together: the fibula goes with the tibia, and so does the patella on its tendon.
+/// Surfaces of rigid groups: fibula and patella (on its tendon) move with the tibia.
 struct BoneMeshes {
   TriangleMesh femur;
   TriangleMesh tibia;
 };
 
-/// The outer surfaces of knee_body's bones in the knee's frame, mm, by marching with the given step.
+/// Outer surfaces of knee_body's bones in the knee's frame, mm, by marching with the given step.
 BoneMeshes bone_meshes(double step_mm);
 
-/// The same surfaces elsewhere.
+/// The surfaces in another frame.
 BoneMeshes moved(const BoneMeshes& bones, const RigidTransform& a_from_knee);
 
 }  // namespace helicarm::simulation

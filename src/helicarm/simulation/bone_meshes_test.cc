@@ -8,7 +8,7 @@
 namespace helicarm::simulation {
 namespace {
 
-/// Volume of the named body by rays on a fine grid along z.
+/// Volume of the named body by ray casting on a fine grid along z.
 double volume_by_rays(const std::string& name) {
   for (const Body& body : knee_body())
     if (body.name == name) {
@@ -20,20 +20,20 @@ double volume_by_rays(const std::string& name) {
   return 0;
 }
 
-TEST(BoneMeshes, HoldTheVolumesOfTheBones) {
+TEST(BoneMeshes, VolumesAgreeWithTheBones) {
   const BoneMeshes bones = bone_meshes(2);
   EXPECT_NEAR(volume(bones.femur) / volume_by_rays("femur"), 1, 0.01);
   const double below = volume_by_rays("tibia") + volume_by_rays("fibula") + volume_by_rays("patella");
   EXPECT_NEAR(volume(bones.tibia) / below, 1, 0.02);  // the fibula's head overlaps the tibia
 }
 
-TEST(BoneMeshes, CoarseOnesAreSmall) {
+TEST(BoneMeshes, CoarseMeshesAreSmall) {
   const BoneMeshes bones = bone_meshes(6);
   EXPECT_LT(bones.femur.triangles.size() + bones.tibia.triangles.size(), 20000u);
   EXPECT_GT(bones.femur.triangles.size(), 1000u);
 }
 
-TEST(BoneMeshes, MoveAsAWhole) {
+TEST(BoneMeshes, MoveRigidly) {
   const BoneMeshes bones = bone_meshes(8);
   const RigidTransform motion{Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()).toRotationMatrix(), {1, 2, 3}};
   const BoneMeshes there = moved(bones, motion);

@@ -38,7 +38,7 @@ Imaging draw_imaging(const SimulationOptions& options, double field_radius_px, d
 
 double rounded(double value, double step) { return step * std::round(value / step); }
 
-/// The angles asked for, or those of a hurried hand.
+/// The requested angles, or AP and lateral with a random positioning error.
 std::vector<ViewAngles> angles_of(const SimulationOptions& options, RandomStream& random) {
   const double orbit = random.uniform(-3, 3);
   const double between = random.uniform(85, 95);
@@ -57,8 +57,8 @@ TrueView named_view(const SimulationOptions& options, const ViewAngles& view, st
   return true_view;
 }
 
-/// 2.3.3: Eq. 5 at (0, 0, 0) and (90, 0, 0) degrees, T = (0, 0, 800) mm. The world's origin is put to the
-/// middle of the cone, since from its base the top of the spiral falls outside the lateral image.
+/// 2.3.3: Eq. 5 at (0, 0, 0) and (90, 0, 0) degrees, T = (0, 0, 800) mm. The world's origin is moved to the
+/// middle of the cone: from its base the top of the spiral is outside the lateral image.
 std::vector<TrueView> paper_stand(const SimulationOptions& options) {
   const CArmModel model = model_of(Preset::paper_sim);
   const ConicalHelix helix;
@@ -83,8 +83,8 @@ std::vector<TrueView> paper_stand(const SimulationOptions& options) {
   return true_views;
 }
 
-/// Where an unbent arm points. Seen from the patient (x distal, y lateral, z anterior); images from the
-/// side are turned by a quarter, so that the leg lies across as in the operating room.
+/// Orientation of an undeformed arm in the patient's frame (x distal, y lateral, z anterior); lateral images
+/// are rotated by 90 degrees, so that the leg lies across as in the operating room.
 Matrix3d pointing(const ArmAngles& angles) {
   const Matrix3d from_below = (Matrix3d() << 0, -1, 0, 1, 0, 0, 0, 0, 1).finished();
   const bool from_the_side = std::abs(std::sin(angles.primary_deg * radian)) > std::sqrt(0.5);
@@ -146,7 +146,7 @@ std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_
     true_view.detector.distortion.shift_px = state.shift_mm / pixel_mm;
     if (model.intensifier) true_view.detector.field_radius_px = arm.distortion.radius_px;
     true_view.imaging = draw_imaging(options, 0.4925 * options.size, pixel_mm);
-    // The plate is laid on by hand, and centred on the receiver, not on the central ray.
+    // The plate is positioned manually and centred on the receiver, not on the central ray.
     true_view.camera_from_plate = {
         turn(once.uniform(-0.5, 0.5), Vector3d::UnitZ()),
         {once.uniform(-2, 2), once.uniform(-2, 2), true_view.f_mm - plate_height_mm}};

@@ -12,32 +12,32 @@
 
 namespace helicarm::simulation {
 
-/// The C-arm as it truly stands when one view is taken.
+/// Ground truth of the C-arm for one view.
 struct TrueView {
   std::string name;
   std::uint32_t number = 0;  ///< in the case, from 0
-  View view;                 ///< to ideal pixels before any mirroring; world = calibrator
+  View view;                 ///< projects to ideal pixels before mirroring; world = calibrator
   VirtualDetector detector;
   Imaging imaging;
   RigidTransform camera_from_plate;  ///< origin in the plate's plane
   bool mirrored = false;             ///< the stored image is flipped left to right
   double f_mm = 0;
-  double nominal_f_mm = 0;  ///< what the tag says
+  double nominal_f_mm = 0;  ///< value in the tag
   ArmAngles true_angles;
   double primary_angle_deg = 0;  ///< tags, rounded
   double secondary_angle_deg = 0;
 
   double pixel_mm() const { return detector.pixel_mm; }
-  /// K of the stored image: fx < 0 where it is mirrored.
+  /// View with the K of the stored image: fx < 0 if it is mirrored.
   View stored_view() const;
-  /// Both in the stored image, mirrored or not.
+  /// Pixels of the stored image, mirrored or not.
   Eigen::Vector2d ideal_image(const Eigen::Vector3d& point_in_calibrator) const;
   Eigen::Vector2d raw_image(const Eigen::Vector3d& point_in_calibrator) const;
 };
 
-/// The views asked for, or an AP and a lateral one, by the C-arm of the arm's seed: two views at one angle
-/// share its flex and distortion but for a little. Of paper_sim exactly the poses of 2.3.3, about the middle
-/// of the cone.
+/// The requested views, or an AP and a lateral one, by the C-arm of the arm's seed: two views at one angle
+/// share its flex and distortion except for a small random part. For paper_sim exactly the poses of 2.3.3
+/// about the middle of the cone.
 std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_height_mm,
                                  const RigidTransform& calibrator_from_patient);
 

@@ -32,7 +32,7 @@ Vector3d beam_direction(const TrueView& true_view) {
   return true_view.view.camera_from_world.rotation.row(2);
 }
 
-/// Greatest and rms difference in raw pixels over the field.
+/// Largest and rms difference in raw pixels over the field.
 double greatest_difference_px(const IntensifierDistortion& a, const IntensifierDistortion& b) {
   double greatest = 0;
   for (double u = 150; u < 900; u += 50)
@@ -41,7 +41,7 @@ double greatest_difference_px(const IntensifierDistortion& a, const IntensifierD
   return greatest;
 }
 
-TEST(CArm, SameAngleTwiceIsTheSameButForALittle) {
+TEST(CArm, SameAngleTwiceDiffersOnlyByTheUnrepeatedPart) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto true_views = true_views_at({{0, 0}, {90, 5}, {90, 5}}, seed);
     EXPECT_LT((principal_mm(true_views[1]) - principal_mm(true_views[2])).norm(), 0.21);
@@ -53,7 +53,7 @@ TEST(CArm, SameAngleTwiceIsTheSameButForALittle) {
   }
 }
 
-TEST(CArm, OneArmBendsAlikeInTwoCases) {
+TEST(CArm, SameArmHasTheSameFlexInTwoCases) {
   const auto monday = true_views_at({{0, 0}, {90, 0}}, 1, 77);
   const auto tuesday = true_views_at({{0, 0}, {90, 0}}, 2, 77);
   const auto other = true_views_at({{0, 0}, {90, 0}}, 2, 78);
@@ -65,7 +65,7 @@ TEST(CArm, OneArmBendsAlikeInTwoCases) {
 }
 
 TEST(CArm, FlexAndDistortionVarySmoothlyWithTheAngle) {
-  // Images from the side are turned by a quarter beyond 45 degrees, so stay on one side of that.
+  // Lateral images are rotated by 90 degrees beyond 45 degrees: the angles stay on one side.
   const CArmModel model = model_of(Preset::ii_9in);
   const ArmFlex arm = draw_arm(4, model, 1024);
   const auto at = [&](double primary) {
@@ -82,7 +82,7 @@ TEST(CArm, FlexAndDistortionVarySmoothlyWithTheAngle) {
   EXPECT_GT(travelled_mm, 0.5);
 }
 
-TEST(CArm, TheSTurnsOverWithTheArm) {
+TEST(CArm, SDistortionReversesWithTheArm) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto true_views = true_views_at({{0, 0}, {180, 0}, {90, 0}}, seed);
     const double up = true_views[0].detector.distortion.s_rotation;
@@ -91,7 +91,7 @@ TEST(CArm, TheSTurnsOverWithTheArm) {
   }
 }
 
-TEST(CArm, LooksWhereTheAnglesSay) {
+TEST(CArm, ViewDirectionFollowsTheAngles) {
   const auto true_views = true_views_at({{0, 0}, {90, 0}, {45, 0}, {0, 30}});
   const double tilt = std::sqrt(0.5);
   const std::vector<Vector3d> expected = {

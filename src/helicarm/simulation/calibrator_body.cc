@@ -26,8 +26,7 @@ double wire_length(const CalibratorTarget& target) {
   return target.length_mm > 0 ? target.length_mm : wire_length_mm;
 }
 
-/// Half of the wire to the end that faces this one (the other end has the other half), or as long as told
-/// where none does.
+/// Half of the wire to the end that faces this one, or its given length if there is none.
 Solid wire_from(const CalibratorTarget& end, const std::vector<CalibratorTarget>& targets) {
   const Vector3d& into = end.directions.front();
   double length = wire_length(end);

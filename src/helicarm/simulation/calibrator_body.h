@@ -11,8 +11,8 @@
 
 namespace helicarm::simulation {
 
-/// The plastic cone around the balls, in the calibrator's frame: its wall (r = radius + slope z) follows the
-/// balls' middles.
+/// The plastic cone around the balls in the calibrator's frame: its wall (r = radius + slope z) follows the
+/// balls' centres.
 struct ConeWall {
   double radius_mm;
   double slope;
@@ -22,20 +22,20 @@ struct ConeWall {
   double radius_at(double z) const { return radius_mm + slope * z; }
 };
 
-/// Least squares through the balls, from 6 mm under the lowest to 8 mm over the highest.
+/// Least squares through the balls, from 6 mm below the lowest to 8 mm above the highest.
 ConeWall cone_wall(const Calibrator& calibrator);
 
-/// Check targets as in the paper's 3.2: a 3 mm ball on a post, two crosses of wires on the wall, the two ends
-/// of one wire on the top.
+/// Check targets as in the paper's 3.2: a 3 mm ball on a post, two wire crosses on the wall, the two ends of
+/// one wire on the top.
 std::vector<CalibratorTarget> check_targets(const Calibrator& calibrator);
 
-/// The calibrator as it is made: steel balls and targets, plastic cone, flange, top disc and posts.
+/// The manufactured calibrator: steel balls and targets, plastic cone, flange, top disc and posts.
 Scene calibrator_body(const Calibrator& calibrator);
 
-/// Name of the body of the plate's dot.
+/// Name of the body of a plate dot.
 std::string plate_dot_name(std::size_t index);
 
-/// The plate's balls, placed on the receiver. `camera_from_plate` has its origin in the plate's plane.
+/// The plate's balls on the receiver. `camera_from_plate` has its origin in the plate's plane.
 Scene plate_body(const Plate& plate, const RigidTransform& camera_from_plate, const View& view);
 
 }  // namespace helicarm::simulation

@@ -8,10 +8,10 @@
 namespace helicarm::simulation {
 namespace {
 
-/// NIST's tables, as the other materials.
+/// NIST tables, as for the other materials.
 const Attenuation water{0.02683, 0.02059, 0.01837};
 
-// At the some 70 keV of a CT's 120 kV beam cortical bone weakens 0.0503 / mm, water 0.0193 / mm (NIST).
+// At about 70 keV, the effective energy of CT at 120 kV: cortical bone 0.0503 / mm, water 0.0193 / mm (NIST).
 constexpr double bone_hu = 1600;
 constexpr double air_hu = -800;
 

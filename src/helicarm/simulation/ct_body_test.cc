@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A block of 40 x 40 x 40 mm of one density; its corner voxel lies at -20, -20, -20.
+/// Block of 40 x 40 x 40 mm of one density; its corner voxel is at -20, -20, -20.
 CtOptions block(float hu) {
   CtOptions ct;
   ct.volume.size = {20, 20, 20};
@@ -30,14 +30,14 @@ Attenuation through(float hu) {
   return depth[0] / 40;
 }
 
-TEST(CtBody, AirWaterAndBoneWeakenAsTheyShould) {
+TEST(CtBody, AirWaterAndBoneAttenuateAsTabulated) {
   EXPECT_TRUE((through(-1000) == 0).all());
   EXPECT_NEAR(through(0)[1], 0.02059, 1e-6);
   EXPECT_NEAR(through(-500)[1], 0.02059 / 2, 1e-6);
   EXPECT_TRUE(through(1600).isApprox(material::cortical_bone, 1e-4));
 }
 
-TEST(CtBody, LeftKneeOnTheBackLiesDistalLateralAnterior) {
+TEST(CtBody, SupineLeftKneeIsOrientedDistalLateralAnterior) {
   CtOptions ct = block(0);
   ct.centre = Vector3d(1, 2, 3);
   const RigidTransform placed = knee_from_patient(ct);
@@ -50,7 +50,7 @@ TEST(CtBody, LeftKneeOnTheBackLiesDistalLateralAnterior) {
   EXPECT_TRUE((knee_from_patient(ct) * Vector3d(1, 2, -7)).isApprox(Vector3d(0, 10, 0)));
 }
 
-TEST(CtBody, CaseIsSeenThroughItAndTheTruthNamesIt) {
+TEST(CtBody, CaseIsRenderedThroughTheCtAndNamedInTheTruth) {
   SimulationOptions options;
   options.kind = CaseKind::flat;
   options.size = 512;
@@ -72,7 +72,7 @@ TEST(CtBody, CaseIsSeenThroughItAndTheTruthNamesIt) {
       std::ranges::equal(simulate_case(options)->views[1].pixels.pixels(), with.views[1].pixels.pixels()));
 }
 
-TEST(CtBody, OddWishesAreRefused) {
+TEST(CtBody, InvalidOptionsAreRefused) {
   SimulationOptions options;
   options.ct = std::make_shared<CtOptions>(block(0));
   options.knee = false;

@@ -13,7 +13,7 @@
 namespace helicarm::simulation {
 namespace {
 
-/// In logarithmic images: this part of the open beam is black.
+/// Logarithmic images: this fraction of the open beam is black.
 constexpr double floor_signal = 0.004;
 
 void blur(Image<float>& image, double sigma_px) {
@@ -22,7 +22,7 @@ void blur(Image<float>& image, double sigma_px) {
   cv::GaussianBlur(mat, mat, {}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
-/// A wide blur, done on a coarse grid: scatter carries no detail.
+/// Wide blur on a coarse grid: scatter has no detail.
 void add_scatter(Image<float>& image, double fraction, double sigma_px) {
   if (fraction <= 0) return;
   constexpr int coarse = 16;
@@ -60,7 +60,7 @@ double mean_of_the_field(const Image<float>& image) {
 
 double poisson(double mean, RandomStream& random) {
   if (mean > 40) return std::max(0.0, std::round(mean + std::sqrt(mean) * random.normal()));
-  // Knuth: arrivals until the product of uniforms falls below exp(-mean).
+  // Knuth's Poisson sampler: counts until the product of uniforms falls below exp(-mean).
   const double limit = std::exp(-mean);
   double product = random.uniform();
   int count = 0;

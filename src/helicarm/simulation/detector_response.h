@@ -7,32 +7,32 @@
 
 namespace helicarm::simulation {
 
-/// What happens between the beam behind the patient and the grey values in the file.
+/// Detector parameters from the beam behind the patient to the stored grey values.
 struct Imaging {
-  double quanta_per_pixel = 1000;  ///< mean over the field: the automatic exposure control's set point
+  double quanta_per_pixel = 1000;  ///< mean over the field: set point of the automatic exposure control
   double electronic_noise = 0.8;   ///< rms, in quanta
-  double scatter_fraction = 0.1;   ///< scattered over direct signal, locally
+  double scatter_fraction = 0.1;   ///< scattered over primary signal, locally
   double scatter_sigma_px = 110;
   double focus_sigma_px = 0.6;    ///< penumbra of the focal spot
-  double screen_sigma_px = 0.65;  ///< light spread behind the screen: blurs the quantum noise too
-  double vignette = 0.2;          ///< fall of the light from the middle to the field's edge
+  double screen_sigma_px = 0.65;  ///< light spread in the screen: blurs the quantum noise too
+  double vignette = 0.2;          ///< fall-off of the light from the centre to the field's edge
   double field_radius_px = 504;
   bool logarithmic = false;  ///< grey value is the logarithm of the signal
   int bits = 12;
-  double open_level = 0.86;  ///< grey of the open beam as a part of the highest; above 1 it saturates
+  double open_level = 0.86;  ///< grey value of the open beam relative to full scale; above 1 it saturates
 };
 
-/// What falls on the screen, on average.
+/// Expected light on the screen.
 struct Light {
   Image<float> level;  ///< open beam, without scatter = 1
   double quanta;       ///< per pixel at level 1
 };
 
-/// A noise-free image (open beam = 1) with the focal spot's penumbra and scatter.
+/// Adds the focal spot's penumbra and scatter to a noise-free image (open beam = 1).
 Light illuminate(const Image<float>& signal, const Imaging& imaging);
 
-/// The grey values of a noise-free image (open beam = 1). `stream` sets views of one seed apart. The same
-/// bytes whatever `threads` (0: all cores).
+/// Grey values of a noise-free image (open beam = 1). `stream` separates views of one seed. The result does
+/// not depend on `threads` (0: all cores).
 Image<std::uint16_t> detector_response(const Image<float>& signal, const Imaging& imaging, std::uint64_t seed,
                                        std::uint32_t stream, unsigned threads = 0);
 

@@ -9,7 +9,7 @@
 namespace helicarm::simulation {
 namespace {
 
-/// Nothing but counting: no blur, scatter, vignette or amplifier.
+/// Quantum noise only: no blur, scatter, vignetting or electronic noise.
 Imaging plain() {
   Imaging imaging;
   imaging.electronic_noise = 0;
@@ -28,12 +28,12 @@ bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
 
 class QuantumNoise : public testing::TestWithParam<double> {};
 
-TEST_P(QuantumNoise, VarianceAndMeanAreThoseOfTheCount) {
+TEST_P(QuantumNoise, VarianceAndMeanFollowPoisson) {
   Imaging imaging = plain();
   imaging.quanta_per_pixel = GetParam();
-  imaging.open_level = 0.1;  // room for the largest count
+  imaging.open_level = 0.1;  // headroom for the largest count
   const Image<std::uint16_t> grey = detector_response(Image<float>(256, 256, 1.0f), imaging, 3, 0);
-  const double unit = 0.1 * 65535 / GetParam();  // grey levels a quantum
+  const double unit = 0.1 * 65535 / GetParam();  // grey levels per quantum
   double sum = 0;
   double squares = 0;
   for (std::uint16_t pixel : grey.pixels()) {
@@ -49,7 +49,7 @@ TEST_P(QuantumNoise, VarianceAndMeanAreThoseOfTheCount) {
 
 INSTANTIATE_TEST_SUITE_P(FewAndMany, QuantumNoise, testing::Values(4.0, 30.0, 50.0, 1000.0));
 
-TEST(DetectorResponse, SameSeedSameBytesOtherSeedOtherBytesWhateverTheThreads) {
+TEST(DetectorResponse, ReproducibleFromTheSeedForAnyNumberOfThreads) {
   const Image<float> signal(64, 48, 0.5f);
   const Imaging imaging;
   const auto one = detector_response(signal, imaging, 7, 0, 1);
@@ -58,7 +58,7 @@ TEST(DetectorResponse, SameSeedSameBytesOtherSeedOtherBytesWhateverTheThreads) {
   EXPECT_FALSE(same(one, detector_response(signal, imaging, 7, 2, 1)));
 }
 
-TEST(DetectorResponse, TooMuchLightIsWhiteAtEveryDepth) {
+TEST(DetectorResponse, OverexposureIsWhiteAtEveryBitDepth) {
   for (int bits : {8, 12, 16}) {
     Imaging imaging = plain();
     imaging.bits = bits;
@@ -68,7 +68,7 @@ TEST(DetectorResponse, TooMuchLightIsWhiteAtEveryDepth) {
   }
 }
 
-TEST(DetectorResponse, LogarithmSpacesEqualFactorsEqually) {
+TEST(DetectorResponse, LogarithmMapsEqualFactorsToEqualSteps) {
   Imaging imaging = plain();
   imaging.logarithmic = true;
   imaging.quanta_per_pixel = 1e9;
@@ -80,7 +80,7 @@ TEST(DetectorResponse, LogarithmSpacesEqualFactorsEqually) {
   EXPECT_GT(grey(24, 8), grey(40, 8) + 1000);
 }
 
-TEST(DetectorResponse, ScatterLightensADarkPlaceByTheFractionOfItsSurroundings) {
+TEST(DetectorResponse, ScatterAddsTheFractionOfTheSurroundings) {
   Imaging imaging = plain();
   imaging.quanta_per_pixel = 1e9;
   imaging.scatter_fraction = 0.1;
@@ -92,7 +92,7 @@ TEST(DetectorResponse, ScatterLightensADarkPlaceByTheFractionOfItsSurroundings) 
   EXPECT_NEAR(grey(256, 256), 0.5 * 65535 * (0.01 + 0.1 * 0.5), 0.5 * 65535 * 0.002);
 }
 
-TEST(Mirrored, TwiceIsTheSameAndOnceSwapsTheColumns) {
+TEST(Mirrored, TwiceIsTheIdentityAndOnceSwapsTheColumns) {
   Image<std::uint16_t> image(5, 2);
   for (std::size_t i = 0; i < 10; ++i) image.pixels()[i] = static_cast<std::uint16_t>(i);
   const auto mirror = mirrored(image);

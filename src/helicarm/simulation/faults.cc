@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 
 constexpr double wire_radius_mm = 1;
 
-/// A K-wire that crosses a ball's shadow in this view, 15 mm nearer the source.
+/// A K-wire across a ball's shadow in this view, 15 mm nearer the source.
 Body wire_over(const Vector3d& ball, const TrueView& true_view, RandomStream& random) {
   const Vector3d towards_source = (true_view.view.source_in_world() - ball).normalized();
   const Vector3d middle = ball + 15 * towards_source;
@@ -20,7 +20,7 @@ Body wire_over(const Vector3d& ball, const TrueView& true_view, RandomStream& ra
   return steel("wire", {cylinder(middle - 50 * axis, middle + 100 * axis, wire_radius_mm)});
 }
 
-/// A cancellous screw: thread's core and head.
+/// A cancellous screw: core of the thread, and head.
 Body screw(const Vector3d& tip, const Vector3d& axis, double length) {
   const Vector3d neck = tip + length * axis;
   return steel("screw", {cylinder(tip, neck, 2.2), frustum(neck, neck + 4 * axis, 2.2, 4)});
@@ -61,10 +61,10 @@ Scene shutter_leaves(const SimulationOptions& options, const TrueView& true_view
   const double reach = field_mm * scale * 2;
   Scene leaves;
   for (int side : {-1, 1}) {
-    // The leaf's inner edge lies at 55 to 70 % of the half field.
+    // The leaf's inner edge is at 55 to 70 % of the half field.
     const double edge = side * random.uniform(0.55, 0.7) * field_mm * scale;
     Body leaf{"shutter", {box({edge + side * reach, 0, depth_mm}, {reach, reach, 1})}, {}};
-    leaf.attenuation.setConstant(1.8);  // 2 mm of it let 2.7 % through
+    leaf.attenuation.setConstant(1.8);  // 2 mm transmit 2.7 %
     leaves.push_back(moved(leaf, world_from_camera));
   }
   return leaves;

@@ -9,12 +9,12 @@
 
 namespace helicarm::simulation {
 
-/// Metal that does not belong to the calibrator, as the options ask; in the calibrator's frame, for both
-/// views.
+/// Metal that is not part of the calibrator, as requested by the options; in the calibrator's frame, common
+/// to both views.
 Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator,
                   const std::vector<TrueView>& true_views, const RigidTransform& calibrator_from_knee);
 
-/// Collimator leaves that cut a part of this view's field off.
+/// Collimator leaves that cover a part of this view's field.
 Scene shutter_leaves(const SimulationOptions& options, const TrueView& true_view);
 
 }  // namespace helicarm::simulation

@@ -17,14 +17,14 @@ Eigen::Vector2d IntensifierDistortion::ideal_from_raw(const Eigen::Vector2d& raw
   ideal += Eigen::Vector2d(c * offset.x() - s * offset.y(), s * offset.x() + c * offset.y());
   for (const DistortionBump& bump : bumps) {
     const double distance2 = (raw - bump.centre_px).squaredNorm() / (bump.sigma_px * bump.sigma_px);
-    if (distance2 > 64) continue;  // 1e-14 of it, but most pixels' exponentials
+    if (distance2 > 64) continue;  // below 1e-14 of the amplitude: saves most of the exponentials
     ideal += std::exp(-0.5 * distance2) * bump.shift_px;
   }
   return ideal;
 }
 
 Eigen::Vector2d IntensifierDistortion::raw_from_ideal(const Eigen::Vector2d& ideal) const {
-  // The map is the identity but for a few per cent, so Newton's Jacobian may be taken as the identity too.
+  // The map is close to the identity, so Newton's Jacobian is approximated by the identity.
   Eigen::Vector2d raw = ideal;
   for (int round = 0; round < 60; ++round) {
     const Eigen::Vector2d step = ideal - ideal_from_raw(raw);

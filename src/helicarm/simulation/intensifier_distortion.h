@@ -7,17 +7,17 @@
 
 namespace helicarm::simulation {
 
-/// A local fault of the intensifier's screen: a Gaussian displacement.
+/// A local distortion of the intensifier's screen: a Gaussian displacement.
 struct DistortionBump {
   Eigen::Vector2d centre_px;
   double sigma_px;
   Eigen::Vector2d shift_px;
 };
 
-/// Where a raw pixel's light came from: raw -> ideal pixel, in closed form. With rho the distance from
-/// `centre_px` over `radius_px`, the offset from the centre is scaled by 1 + k1 rho^2 + k2 rho^4 (the curved
-/// input screen; pincushion: k1 < 0), turned by s_rotation * sin(pi rho^2 / 2) (the earth's field) and
-/// shifted. It is no polynomial on purpose.
+/// Maps raw to ideal pixels in closed form. With rho the distance from `centre_px` over `radius_px`, the
+/// offset from the centre is scaled by 1 + k1 rho^2 + k2 rho^4 (curved input screen; pincushion: k1 < 0),
+/// rotated by s_rotation * sin(pi rho^2 / 2) (the earth's field) and shifted. Deliberately not a polynomial,
+/// unlike the model that is fitted to it.
 struct IntensifierDistortion {
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
   double radius_px = 1;
@@ -28,7 +28,7 @@ struct IntensifierDistortion {
   std::vector<DistortionBump> bumps;
 
   Eigen::Vector2d ideal_from_raw(const Eigen::Vector2d& raw) const;
-  /// The inverse to 1e-10 px or better.
+  /// Inverse, accurate to 1e-10 px.
   Eigen::Vector2d raw_from_ideal(const Eigen::Vector2d& ideal) const;
 };
 

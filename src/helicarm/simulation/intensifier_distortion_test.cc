@@ -25,7 +25,7 @@ TEST(IntensifierDistortion, NoneIsTheIdentity) {
   EXPECT_EQ(none.ideal_from_raw({3.25, 700}), Vector2d(3.25, 700));
 }
 
-TEST(IntensifierDistortion, ThereAndBackIsTheSamePixelEvenInTheCorners) {
+TEST(IntensifierDistortion, RoundTripIsTheIdentityEvenInTheCorners) {
   const IntensifierDistortion distortion = strong();
   for (double u = 0; u <= 1023; u += 93)
     for (double v = 0; v <= 1023; v += 93) {
@@ -35,7 +35,7 @@ TEST(IntensifierDistortion, ThereAndBackIsTheSamePixelEvenInTheCorners) {
     }
 }
 
-TEST(IntensifierDistortion, PincushionPushesTheEdgeOutByKnownPixels) {
+TEST(IntensifierDistortion, PincushionMovesTheEdgeOutByTheExpectedPixels) {
   IntensifierDistortion distortion;
   distortion.centre_px = {500, 500};
   distortion.radius_px = 500;
@@ -43,7 +43,7 @@ TEST(IntensifierDistortion, PincushionPushesTheEdgeOutByKnownPixels) {
   EXPECT_NEAR(distortion.ideal_from_raw({1000, 500}).x(), 500 + 500 * (1 - 0.026), 1e-12);
 }
 
-TEST(IntensifierDistortion, SDistortionTurnsTheEdgeAndNotTheMiddle) {
+TEST(IntensifierDistortion, SDistortionRotatesTheEdgeAndNotTheCentre) {
   IntensifierDistortion distortion;
   distortion.radius_px = 500;
   distortion.s_rotation = 0.01;

@@ -13,18 +13,18 @@ Eigen::Matrix3d bent(double degrees) {
   return Eigen::AngleAxisd(degrees * EIGEN_PI / 180, Vector3d::UnitY()).toRotationMatrix();
 }
 
-/// A part of a bone, `inset` mm inside its surface.
+/// Part of a bone, `inset` mm inside its surface.
 Solid knob(const Vector3d& centre, const Vector3d& semi_axes, double degrees, double inset) {
   return ellipsoid(centre, semi_axes.array() - inset, bent(degrees));
 }
 
-/// A shaft, flattened front to back.
+/// A shaft, flattened in the anterior-posterior direction.
 Solid shaft(const Vector3d& from, const Vector3d& to, double from_radius, double to_radius, double inset,
             double flattening = 1) {
   return flat_frustum(from, to, from_radius - inset, to_radius - inset, Vector3d::UnitZ(), flattening);
 }
 
-/// A shaft's shell is this much thicker than that of the ends.
+/// ratio of the shaft's shell thickness to that of the ends
 constexpr double shaft_shell = 4;
 
 std::vector<Solid> femur(double inset) {

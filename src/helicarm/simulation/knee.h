@@ -7,11 +7,11 @@
 
 namespace helicarm::simulation {
 
-/// A slightly bent knee of ellipsoids and cones with dense shells. Its frame: origin in the middle of the
+/// A slightly flexed knee of ellipsoids and cones with dense shells. Its frame: origin in the middle of the
 /// joint line, x distal, y lateral, z anterior (mm).
 Scene knee_body();
 
-/// An ACL tunnel: where its mouth in the joint and its far end lie, in the knee's frame.
+/// An ACL tunnel: its joint end and its far end in the knee's frame.
 struct KneeTunnel {
   Eigen::Vector3d start;
   Eigen::Vector3d end;

@@ -13,7 +13,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Somewhere around a place in the tracker's frame, turned any way that the tracker sees.
+/// Random pose around a position in the tracker's frame, with an orientation visible to the tracker.
 RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
                          RandomStream& random) {
   for (;;) {
@@ -23,7 +23,7 @@ RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double 
   }
 }
 
-/// Takes the readings and tells how far they truly scatter.
+/// Draws the readings and records their actual rms error.
 void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>& bodies,
                 std::uint64_t seed) {
   const TrackerModel model = virtual_tracker();
@@ -45,8 +45,8 @@ void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>
   truth.sigma_mm = std::sqrt(shift2);
 }
 
-/// A drilled line: the tunnel's, missed by a normal 0.5 mm per axis 40 mm before its start and half way
-/// through.
+/// A drilled line: misses the tunnel by a normal 0.5 mm per axis, 40 mm before its start and at half its
+/// length.
 ToolLine missed(const std::string& name, const TunnelPoint& start, const TunnelPoint& end,
                 RandomStream& random) {
   const Vector3d axis = (end.in_calibrator - start.in_calibrator).normalized();
@@ -74,7 +74,7 @@ TrackerModel virtual_tracker() {
   TrackerModel model;
   model.drift_sigma_mm = {0.07, 0.07, 0.17};
   model.lost_sample = 0.02;
-  model.nearest_mm = 300;  // the markers lie about 900 mm away, up to 300 mm from each other
+  model.nearest_mm = 300;  // the markers are about 900 mm away and up to 300 mm from each other
   model.half_field_deg = 50;
   return model;
 }
@@ -86,7 +86,7 @@ NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& cali
   for (const char* frame : {"femur", "tibia", "tool"}) bodies[frame] = marker_array();
   bodies["calibrator"] = calibrator_markers();
   const RigidTransform tracker_from_calibrator = somewhere(bodies["calibrator"], {-80, -60, 900}, 40, random);
-  // Markers on both bones some way from the joint, the tool beside the knee.
+  // Markers on both bones at a distance from the joint, the tool beside the knee.
   truth.tracker_from["calibrator"] = tracker_from_calibrator;
   const auto beside = [&](const char* frame, const Vector3d& in_calibrator, double spread_mm) {
     truth.tracker_from[frame] =

@@ -14,7 +14,7 @@ namespace helicarm::simulation {
 
 inline constexpr double tunnel_ball_mm = 3;
 
-/// A ball at a tunnel's end, and where it truly is in every frame.
+/// A ball at a tunnel's end, and its true position in every frame.
 struct TunnelPoint {
   std::string name;  ///< FS, FE, TS, TE
   std::string bone;  ///< femur or tibia
@@ -23,7 +23,7 @@ struct TunnelPoint {
   Eigen::Vector3d in_tool;
 };
 
-/// A line that the tool has drilled or will drill, and how far it truly misses the tunnel's ends.
+/// A tool line drilled or to be drilled, and its true distance from the tunnel's ends.
 struct ToolLine {
   std::string name;
   std::string start;
@@ -34,29 +34,29 @@ struct ToolLine {
   double end_error_mm;
 };
 
-/// The tracker of the operating room. Besides the markers' noise each body keeps an error of its place in the
-/// volume, which no short mean takes away.
+/// The operating room's tracker. Besides the markers' noise each body has a position-dependent error that a
+/// short mean does not reduce.
 TrackerModel virtual_tracker();
 
-/// A reading is the mean of this many samples of bodies at rest, less those that were lost.
+/// A reading is the mean of this many samples of bodies at rest, less lost samples.
 inline constexpr int samples_per_reading = 6;
 inline constexpr double tracker_rate_hz = 60;
 
-/// An ACL navigation: the tracker's true and read poses ("calibrator", "femur", "tibia", "tool") and the
+/// An ACL navigation: true and measured tracker poses ("calibrator", "femur", "tibia", "tool") and the
 /// tunnels.
 struct NavigationTruth {
-  double sigma_mm = 0;  ///< of a reading, per axis: rms over the axes and bodies
+  double sigma_mm = 0;  ///< of a reading per axis: rms over axes and bodies
   double sigma_deg = 0;
   std::map<std::string, RigidTransform> tracker_from;  ///< true
-  std::map<std::string, RigidTransform> read;          ///< one reading serves every view and now
-  std::map<std::string, Matrix6d> covariance;          ///< of `read`, as of pose_covariance
+  std::map<std::string, RigidTransform> read;  ///< one reading is used for every view and for the present
+  std::map<std::string, Matrix6d> covariance;  ///< of `read`, in the convention of pose_covariance
   std::vector<TunnelPoint> points;
   std::vector<ToolLine> lines;
 };
 
 NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& calibrator_from_knee);
 
-/// Distance of a point from the straight line through two others.
+/// Distance of a point from the line through two others.
 double distance_to_line(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b);
 
 }  // namespace helicarm::simulation

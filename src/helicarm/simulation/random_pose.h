@@ -8,13 +8,13 @@ namespace helicarm::simulation {
 
 inline constexpr double radian = EIGEN_PI / 180;
 
-/// A rotation of normal spread (deg) and a shift of normal spread (mm) per axis.
+/// Rotation of normal spread (deg) and translation of normal spread (mm) per axis.
 RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm);
 
-/// A rotation drawn evenly from all.
+/// Uniform random rotation.
 Eigen::Matrix3d random_rotation(RandomStream& random);
 
-/// Even over a disc.
+/// Uniform in a disc.
 Eigen::Vector2d in_disc(RandomStream& random, double radius);
 
 }  // namespace helicarm::simulation

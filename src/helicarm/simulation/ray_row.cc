@@ -8,7 +8,7 @@
 namespace helicarm::simulation {
 namespace {
 
-// The loops below are Solid::intersect without branches: the compiler makes vectors of them.
+// The loops below are Solid::intersect without branches, so that the compiler vectorises them.
 
 void row_in_ball(const Solid& solid, const RayRow& rays, const RayRange& range, double* enter,
                  double* leave) {
@@ -30,7 +30,7 @@ void row_in_ball(const Solid& solid, const RayRow& rays, const RayRange& range, 
   }
 }
 
-/// False where a ray runs along the wall or an end: these want the careful way.
+/// False if a ray is parallel to the wall or an end: these need the scalar path.
 bool row_in_frustum(const Solid& solid, const RayRow& rays, const RayRange& range, double* enter,
                     double* leave) {
   const Eigen::Matrix3d m = solid.unit_from_world.linear();
@@ -58,7 +58,7 @@ bool row_in_frustum(const Solid& solid, const RayRow& rays, const RayRange& rang
     const double root = std::sqrt(discriminant > 0 ? discriminant : 0);
     const double first = (-b - root) / a;
     const double second = (-b + root) / a;
-    // a > 0: between the roots. a < 0 (steeper than the wall): before the second or after the first, or all.
+    // a > 0: between the roots. a < 0 (steeper than the wall): before the first or after the second, or all.
     const double until = high < second ? high : second;
     const double since = low > first ? low : first;
     const bool steep = a < 0;
@@ -87,7 +87,7 @@ void row_in_solid(const Solid& solid, const RayRow& rays, const RayRange& range,
   }
 }
 
-/// Orders two rows of intervals by their beginnings, ray by ray.
+/// Orders two rows of intervals by their starts, ray by ray.
 void order(std::size_t count, double* enter_a, double* leave_a, double* enter_b, double* leave_b) {
   for (std::size_t i = 0; i < count; ++i) {
     const bool swap = enter_a[i] > enter_b[i];

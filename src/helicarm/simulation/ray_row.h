@@ -10,7 +10,7 @@
 
 namespace helicarm::simulation {
 
-/// Rays of one source side by side, so that several are intersected at a time.
+/// Rays from one source in struct-of-arrays form for SIMD intersection.
 struct RayRow {
   explicit RayRow(const Eigen::Vector3d& from, std::size_t count)
       : source(from), x(count), y(count), z(count) {}
@@ -29,8 +29,8 @@ struct RayRange {
   bool empty() const { return first >= last; }
 };
 
-/// Lengths (in t) of the rays `range` inside any of the solids, as `union_length`, into path[range]. Of each
-/// solid only its own range, a part of `range`, is looked at: the caller knows that no other ray meets it.
+/// Lengths (in t) of the rays `range` inside any of the solids, as `union_length`, into path[range]. Each
+/// solid is intersected only with its own sub-range; the caller guarantees that other rays miss it.
 void union_lengths(const std::vector<Solid>& solids, const RayRow& rays, const RayRange& range,
                    const std::vector<RayRange>& of_solid, double* path);
 

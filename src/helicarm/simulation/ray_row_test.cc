@@ -18,7 +18,7 @@ void expect_as_one_by_one(const std::vector<Solid>& solids, const RayRow& rays) 
     EXPECT_NEAR(path[i], union_length(solids, rays.source, rays.direction(i)), 1e-10) << i;
 }
 
-/// From 600 mm away to anywhere about the origin.
+/// From 600 mm away to random points about the origin.
 RayRow uniform_rays(RandomStream& random) {
   RayRow rays({random.uniform(-50, 50), 40, -600}, 333);
   for (std::size_t i = 0; i < rays.x.size(); ++i) {
@@ -31,7 +31,7 @@ RayRow uniform_rays(RandomStream& random) {
   return rays;
 }
 
-TEST(RayRow, AgreesWithEachRayAloneForEveryKindAndTheirUnions) {
+TEST(RayRow, AgreesWithSingleRaysForEveryKindAndTheirUnions) {
   RandomStream random(3, 0);
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   const std::vector<Solid> solids = {sphere({1, 0, 0}, 5),
@@ -48,17 +48,17 @@ TEST(RayRow, AgreesWithEachRayAloneForEveryKindAndTheirUnions) {
   }
 }
 
-TEST(RayRow, RaysAlongAWallOrAnEndAreTakenWithCare) {
+TEST(RayRow, RaysParallelToAWallOrAnEndAgree) {
   RayRow rays({0, 0, -600}, 5);
   std::fill(rays.z.begin(), rays.z.end(), 1);
   rays.x[4] = 0.001;
   expect_as_one_by_one({cylinder({1, 0, -20}, {1, 0, 20}, 3)}, rays);  // along the axis
-  expect_as_one_by_one({cylinder({-20, 1, 5}, {20, 1, 5}, 3)}, rays);  // at right angles to it
+  expect_as_one_by_one({cylinder({-20, 1, 5}, {20, 1, 5}, 3)}, rays);  // perpendicular to it
   expect_as_one_by_one({frustum({0, 0, -5}, {0, 0, 5}, 3, 1)}, rays);  // steeper than the wall
-  expect_as_one_by_one({cylinder({5, 0, -20}, {5, 0, 20}, 3)}, rays);  // beside it
+  expect_as_one_by_one({cylinder({5, 0, -20}, {5, 0, 20}, 3)}, rays);  // parallel beside it
 }
 
-TEST(RayRow, OnlyTheRangesAreLookedAt) {
+TEST(RayRow, OnlyTheGivenRangesAreIntersected) {
   RayRow rays({0, 0, -600}, 9);
   std::fill(rays.z.begin(), rays.z.end(), 1);
   std::vector<double> path(9, -1);

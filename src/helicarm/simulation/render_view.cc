@@ -17,7 +17,7 @@ using Eigen::Array3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Metal's path (mm) may differ by this much between neighbours before the pixel is supersampled.
+/// Metal path length (mm) may differ by this much between neighbours before a pixel is supersampled.
 constexpr double edge_mm = 0.05;
 
 struct Bounds {
@@ -31,7 +31,7 @@ struct Bounds {
 
 const Bounds everywhere{Bounds{}.high, Bounds{}.low};
 
-/// A rectangle of ideal pixels that holds the solid's shadow.
+/// A rectangle of ideal pixels that contains the solid's shadow.
 Bounds shadow(const Solid& solid, const View& view) {
   Bounds bounds;
   for (const Vector3d& corner : solid.corners()) {
@@ -43,14 +43,14 @@ Bounds shadow(const Solid& solid, const View& view) {
   return bounds;
 }
 
-/// Where the pixels of a row look, without distortion.
+/// Ideal pixel coordinates of a row, without distortion.
 struct IdealRow {
   std::vector<Vector2d> pixels;
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
 };
 
-/// From the first to the last of the pixels that the box holds.
+/// The range of pixels inside the box.
 RayRange rays_within(const Bounds& box, const IdealRow& ideal, RayRange range) {
   if (box.high.y() < ideal.low || box.low.y() > ideal.high) return {};
   while (range.first < range.last && !box.holds(ideal.pixels[range.first])) ++range.first;
@@ -58,7 +58,7 @@ RayRange rays_within(const Bounds& box, const IdealRow& ideal, RayRange range) {
   return range;
 }
 
-/// The pixels inside the field, and one more each side, whose metal tells whether there is an edge.
+/// Pixels inside the field, and one more on each side to detect metal edges.
 RayRange lit_range(const std::vector<double>& weight) {
   RayRange lit{0, weight.size()};
   while (lit.first < lit.last && weight[lit.first] == 0) ++lit.first;
@@ -79,7 +79,7 @@ class RayTracer {
     }
   }
 
-  /// Traces the row's central rays; `metal` takes their paths in metal (mm).
+  /// Traces the row's central rays; `metal` receives their path lengths in metal (mm).
   void trace_row(int v, float* signal, float* metal) const {
     const std::vector<double> weight = row_of_weights(v);
     const RayRange lit = lit_range(weight);
@@ -142,7 +142,7 @@ class RayTracer {
   }
 
  private:
-  /// Of unit length.
+  /// Unit vector.
   Vector3d ray(const Vector2d& ideal) const {
     return (direction_from_pixel_ * Vector3d(ideal.x(), ideal.y(), 1)).normalized();
   }
@@ -177,7 +177,7 @@ class RayTracer {
   const CtBody* ct_;
   Vector3d source_;
   Eigen::Matrix3d direction_from_pixel_;
-  std::vector<std::vector<Bounds>> bounds_;  ///< of each body's solids
+  std::vector<std::vector<Bounds>> bounds_;  ///< for each body's solids
 };
 
 bool at_edge(const Image<float>& metal, int u, int v) {

@@ -13,7 +13,7 @@
 
 namespace helicarm::simulation {
 
-/// What the receiver is and does to the place of a pixel.
+/// The receiver and its mapping of pixels.
 struct VirtualDetector {
   int width = 1024;
   int height = 1024;
@@ -23,13 +23,13 @@ struct VirtualDetector {
 };
 
 /// The noise-free image, open beam = 1, black outside the round field. Every raw pixel's own ray is traced
-/// (nothing is resampled); pixels at the edge of metal average 3 x 3 rays. `view`: ideal pixels, world = the
-/// scene's frame, in which the image is not mirrored. `ct`, if any, is in the beam too; the source must not
-/// be in it. The same numbers whatever `threads` (0: all cores).
+/// (no resampling); pixels at the edge of metal average 3 x 3 rays. `view`: ideal pixels, world = the scene's
+/// frame, not mirrored. `ct`, if any, is also in the beam; the source must be outside it. The result does not
+/// depend on `threads` (0: all cores).
 Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
                          unsigned threads = 0, const CtBody* ct = nullptr);
 
-/// 1 well inside the field, 0 outside, a one-pixel ramp on its edge; 1 everywhere without one.
+/// 1 inside the field, 0 outside, a one-pixel ramp at its edge; 1 everywhere if there is no round field.
 double field_weight(const VirtualDetector& detector, const Eigen::Vector2d& raw);
 
 }  // namespace helicarm::simulation

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 constexpr double f_mm = 1000;
 constexpr double depth_mm = 650;
 
-/// A small receiver, looking along z from the origin; the scene's middle is 650 mm away.
+/// Small receiver, looking along z from the origin; the scene's centre is 650 mm away.
 VirtualDetector small_detector() {
   VirtualDetector detector;
   detector.width = 128;
@@ -34,7 +34,7 @@ View straight_view(const VirtualDetector& detector) {
   return {{f_px, f_px, 63.3, 47.6}, {Eigen::Matrix3d::Identity(), {0, 0, depth_mm}}};
 }
 
-/// All three lines attenuate alike, so that the logarithm of the signal is the path.
+/// Equal attenuation at all three lines, so that the logarithm of the signal is the path length.
 Body grey(Solid solid, double per_mm, bool metal = false) {
   return {"grey", {std::move(solid)}, Attenuation::Constant(per_mm), metal};
 }
@@ -49,7 +49,7 @@ TEST(RenderView, EmptySceneIsTheOpenBeam) {
   for (float pixel : image.pixels()) EXPECT_FLOAT_EQ(pixel, 1);
 }
 
-TEST(RenderView, BallsChordFollowsTheClosedFormFromCentreToEdge) {
+TEST(RenderView, BallChordFollowsTheClosedFormFromCentreToEdge) {
   const VirtualDetector detector = small_detector();
   const View view = straight_view(detector);
   const Image<float> image = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
@@ -74,15 +74,15 @@ TEST(RenderView, AbsorbedMassOfABallIsItsVolume) {
   EXPECT_NEAR(volume / (4.0 / 3.0 * EIGEN_PI * std::pow(radius, 3)), 1, 1e-3);
 }
 
-TEST(RenderView, SteelBallsCentroidIsTheCentreOfItsProjectedEllipse) {
+TEST(RenderView, SteelBallCentroidIsTheCentreOfItsProjectedEllipse) {
   VirtualDetector detector = small_detector();
   View view = straight_view(detector);
-  view.intrinsics.u0 = -400;  // the ball is seen 5 degrees off the axis
+  view.intrinsics.u0 = -400;  // the ball is 5 degrees off the axis
   constexpr double radius = 2;
   const Vector3d centre((63.4 + 400) / view.intrinsics.fx * depth_mm, 0.31, 0);
   const Image<float> image = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
-  // The shadow's outline is the conic K (c c' - (c.c - r^2) I) K', whose centre follows from its dual's last
-  // column.
+  // The outline is the conic K (c c' - (c.c - r^2) I) K'; its centre follows from the last column of its
+  // dual.
   const Vector3d c = view.camera_from_world * centre;
   const Eigen::Matrix3d k = view.intrinsics.matrix();
   const Eigen::Matrix3d dual =
@@ -99,7 +99,7 @@ TEST(RenderView, SteelBallsCentroidIsTheCentreOfItsProjectedEllipse) {
   EXPECT_LT((sum / weight - ellipse).norm(), 0.005);
 }
 
-TEST(RenderView, DistortionMovesTheBallToWhereItsInverseSays) {
+TEST(RenderView, DistortionMovesTheBallByItsInverse) {
   VirtualDetector detector = small_detector();
   detector.distortion.centre_px = {60, 50};
   detector.distortion.radius_px = 64;
@@ -118,7 +118,7 @@ TEST(RenderView, DistortionMovesTheBallToWhereItsInverseSays) {
   EXPECT_LT((sum / weight - detector.distortion.raw_from_ideal(view.project(centre))).norm(), 0.1);
 }
 
-TEST(RenderView, NestedShellIsItsTwoChordsDifference) {
+TEST(RenderView, NestedShellIsTheDifferenceOfItsTwoChords) {
   const VirtualDetector detector = small_detector();
   const Scene shell = {grey(sphere({0, 0, 0}, 6), 0.05), grey(sphere({0, 0, 0}, 5), -0.05)};
   const View view = straight_view(detector);
@@ -126,7 +126,7 @@ TEST(RenderView, NestedShellIsItsTwoChordsDifference) {
   EXPECT_NEAR(render_view(shell, detector, view, 1)(63, 48), std::exp(-0.05 * 2), 1e-4);
 }
 
-TEST(RenderView, RoundFieldIsBlackOutsideAndWholeInside) {
+TEST(RenderView, RoundFieldIsBlackOutsideAndUnchangedInside) {
   VirtualDetector detector = small_detector();
   detector.distortion.centre_px = {64, 48};
   detector.field_radius_px = 40;
@@ -139,8 +139,8 @@ TEST(RenderView, RoundFieldIsBlackOutsideAndWholeInside) {
   EXPECT_NEAR(area, EIGEN_PI * 40 * 40, 10);
 }
 
-/// Every ray through every body, nothing left out.
-Image<float> render_by_an_oracle(const Scene& scene, const VirtualDetector& detector, const View& view) {
+/// Reference: every ray through every body.
+Image<float> render_by_brute_force(const Scene& scene, const VirtualDetector& detector, const View& view) {
   const Vector3d source = view.source_in_world();
   const auto ray = [&](double u, double v) -> Vector3d {
     const Vector2d ideal = detector.distortion.ideal_from_raw({u, v});
@@ -174,7 +174,7 @@ Image<float> render_by_an_oracle(const Scene& scene, const VirtualDetector& dete
   return image;
 }
 
-TEST(RenderView, WholeSceneIsWhatEveryRayThroughEveryBodyGives) {
+TEST(RenderView, SceneAgreesWithBruteForceRayCasting) {
   SimulationOptions options;
   options.size = 256;
   for (const Preset preset : {Preset::ii_9in, Preset::flat_panel}) {
@@ -188,13 +188,13 @@ TEST(RenderView, WholeSceneIsWhatEveryRayThroughEveryBodyGives) {
     for (const Body& dot : plate_body(plate48(), true_view.camera_from_plate, true_view.view))
       scene.push_back(dot);
     const Image<float> image = render_view(scene, true_view.detector, true_view.view, 2);
-    const Image<float> truth = render_by_an_oracle(scene, true_view.detector, true_view.view);
+    const Image<float> truth = render_by_brute_force(scene, true_view.detector, true_view.view);
     for (int v = 0; v < image.height(); ++v)
       for (int u = 0; u < image.width(); ++u) ASSERT_NEAR(image(u, v), truth(u, v), 1e-6) << u << ' ' << v;
   }
 }
 
-TEST(RenderView, ThreadsDoNotChangeABit) {
+TEST(RenderView, ResultIsIndependentOfTheNumberOfThreads) {
   VirtualDetector detector = small_detector();
   const Scene scene = {steel("ball", {sphere({1, 2, 3}, 2)}),
                        grey(cylinder({-20, 3, 1}, {20, -4, 9}, 6), 0.03)};

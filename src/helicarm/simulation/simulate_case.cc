@@ -27,7 +27,7 @@ Expected<void> check_grid(const SimulationOptions& options) {
   if (options.ct) return fail(Reason::usage, "CT: kind grid has no knee");
   if (options.machine() == Preset::paper_sim)
     return fail(Reason::bad_value,
-                "preset: paper-sim has no distortion, and its picture does not hold the plate; "
+                "preset: paper-sim has no distortion, and its image does not contain the plate; "
                 "kind grid is for ii-9in and flat-panel");
   for (const Fault fault : options.faults)
     if (fault != Fault::low_dose && fault != Fault::saturated)
@@ -49,7 +49,7 @@ Expected<void> check_grid(const SimulationOptions& options) {
   return {};
 }
 
-/// The name becomes a file's.
+/// The name becomes a file name.
 bool is_plain(const std::string& name) {
   return !name.empty() && name.size() <= 32 && std::ranges::all_of(name, [](unsigned char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
@@ -64,8 +64,9 @@ Expected<void> check_views(const SimulationOptions& options) {
                                                grid ? "1 is" : fmt::format("2 to {} are", most_views)));
   for (const ViewAngles& view : views) {
     if (!is_plain(view.name))
-      return fail(Reason::bad_value,
-                  fmt::format("view: a name has 1 to 32 letters, digits, - or _; \"{}\" has not", view.name));
+      return fail(
+          Reason::bad_value,
+          fmt::format("view: a name has 1 to 32 letters, digits, - or _; \"{}\" does not match", view.name));
     if (std::ranges::count(views, view.name, &ViewAngles::name) > 1)
       return fail(Reason::bad_value, fmt::format("view: {} is given twice", view.name));
     if (!(std::abs(view.angles.primary_deg) <= 180 && std::abs(view.angles.secondary_deg) <= 60))
@@ -85,8 +86,7 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
                                                word(options.machine())));
-  if (options.ct && !options.knee)
-    return fail(Reason::usage, "CT: it is the knee, so the knee cannot be left out");
+  if (options.ct && !options.knee) return fail(Reason::usage, "CT: --no-knee cannot be combined with --ct");
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
                      [&](const CalibratorBall& ball) { return ball.label == lost; }))
@@ -94,7 +94,7 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   return {};
 }
 
-/// Within 3 px of the ball's centre, to a tenth of a pixel as a mouse on a zoomed image gives it.
+/// Within 3 px of the ball's centre, rounded to 0.1 px as by a mouse on a zoomed image.
 Click click(const TruePoint& point, RandomStream& random) {
   const double distance = 3 * std::sqrt(random.uniform());
   const double angle = random.uniform(0, 2 * EIGEN_PI);

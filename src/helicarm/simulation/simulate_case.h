@@ -17,13 +17,13 @@
 
 namespace helicarm::simulation {
 
-/// A surgeon's click near a tunnel's ball, raw pixels.
+/// A user's pick near a tunnel's ball, raw pixels.
 struct Click {
   std::string point;
   Eigen::Vector2d raw;
 };
 
-/// One stored image and everything that is true of it.
+/// One stored image with its ground truth.
 struct SimulatedView {
   TrueView true_view;
   Image<std::uint16_t> pixels;
@@ -41,15 +41,15 @@ struct SimulatedCase {
   std::optional<Plate> plate;
   std::vector<SimulatedView> views;
   std::optional<NavigationTruth> navigation;
-  std::optional<RigidTransform> calibrator_from_knee;  ///< of knee_body; nothing without a knee
-  std::optional<RigidTransform> calibrator_from_ct;    ///< the CT's patient frame (L, P, S)
+  std::optional<RigidTransform> calibrator_from_knee;  ///< pose of knee_body; nothing without a knee
+  std::optional<RigidTransform> calibrator_from_ct;    ///< pose of the CT's patient frame (L, P, S)
 };
 
-/// A whole case from its options: the same bytes for the same seed. Refuses (bad_value) an unknown size,
-/// depth or ball, a preset that does not suit the kind, and a grid that is not before the plate.
+/// A whole case from its options; reproducible from the seed. Refuses (bad_value) an unknown size, depth or
+/// ball, a preset that does not suit the kind, and a grid that is not in front of the plate.
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
 
-/// The image as the reader would hand it over, without the detour through a file.
+/// The image as the reader would return it, without a file.
 XrayImage exposure_of(const SimulatedView& view);
 
 }  // namespace helicarm::simulation

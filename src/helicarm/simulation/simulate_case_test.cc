@@ -28,7 +28,7 @@ bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
   return std::equal(a.pixels().begin(), a.pixels().end(), b.pixels().begin(), b.pixels().end());
 }
 
-/// Centroid of what is darker than half way between the middle and the rim of a round window.
+/// Centroid of the pixels darker than half-way between the centre and the rim of a round window.
 Vector2d dark_centroid(const Image<std::uint16_t>& image, const Vector2d& near, int half) {
   const int u0 = static_cast<int>(std::lround(near.x()));
   const int v0 = static_cast<int>(std::lround(near.y()));
@@ -45,7 +45,7 @@ Vector2d dark_centroid(const Image<std::uint16_t>& image, const Vector2d& near, 
   return sum / weight;
 }
 
-TEST(SimulateCase, SameSeedSameBytesWhateverTheThreads) {
+TEST(SimulateCase, ReproducibleFromTheSeedForAnyNumberOfThreads) {
   SimulationOptions options = small(CaseKind::accuracy);
   options.knee = true;
   options.threads = 1;
@@ -60,7 +60,7 @@ TEST(SimulateCase, SameSeedSameBytesWhateverTheThreads) {
   }
 }
 
-TEST(SimulateCase, ClearBallsAreDarkWhereTheTruthPutsThem) {
+TEST(SimulateCase, ClearBallsAreDarkAtTheirTruePositions) {
   for (CaseKind kind : {CaseKind::accuracy, CaseKind::flat}) {
     const SimulatedCase simulated = *simulate_case(small(kind));
     for (const SimulatedView& view : simulated.views) {
@@ -76,7 +76,7 @@ TEST(SimulateCase, ClearBallsAreDarkWhereTheTruthPutsThem) {
   }
 }
 
-TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
+TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePaper) {
   SimulationOptions options = small(CaseKind::accuracy);
   options.preset = Preset::paper_sim;
   const SimulatedCase simulated = *simulate_case(options);
@@ -84,7 +84,7 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
   const View& ap = simulated.views[0].true_view.view;
   const View& lateral = simulated.views[1].true_view.view;
   for (const View& view : {ap, lateral}) {
-    EXPECT_NEAR(view.intrinsics.fx, 3000, 1e-9);  // 900 mm over twice 0.15 mm
+    EXPECT_NEAR(view.intrinsics.fx, 3000, 1e-9);  // 900 mm over 0.3 mm
     EXPECT_EQ(view.intrinsics.u0, 256);
   }
   const Eigen::Vector3d middle(0, 0, 0.5 * 3.979 * 7 * EIGEN_PI);
@@ -97,7 +97,7 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePrint) {
     }
 }
 
-TEST(SimulateCase, PresetTakesThePlaceOfTheKindsOwnMachine) {
+TEST(SimulateCase, PresetOverridesTheDefaultOfTheKind) {
   SimulationOptions options = small(CaseKind::flat);
   EXPECT_EQ(options.machine(), Preset::flat_panel);
   const SimulatedCase flat = *simulate_case(options);
@@ -111,7 +111,7 @@ TEST(SimulateCase, PresetTakesThePlaceOfTheKindsOwnMachine) {
   EXPECT_EQ(preset("ii_9in").error().reason, Reason::usage);
 }
 
-TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreSeen) {
+TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreVisible) {
   const SimulatedCase simulated = *simulate_case(small(CaseKind::accuracy));
   for (const SimulatedView& view : simulated.views) {
     ASSERT_EQ(view.plate_dots.size(), 48u);
@@ -123,7 +123,7 @@ TEST(SimulateCase, PlateDotsLieInTheirPlaneAndAreSeen) {
   }
 }
 
-TEST(SimulateCase, StandKeepsItsPromisesForManySeeds) {
+TEST(SimulateCase, StandMeetsItsLimitsForManySeeds) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     SimulationOptions options;
     options.seed = seed;
@@ -144,7 +144,7 @@ TEST(SimulateCase, StandKeepsItsPromisesForManySeeds) {
   }
 }
 
-TEST(SimulateCase, MirroredViewFlipsImageAndTruthTogether) {
+TEST(SimulateCase, MirroredViewFlipsImageAndTruth) {
   SimulationOptions options = small(CaseKind::accuracy);
   const SimulatedCase plain = *simulate_case(options);
   options.faults = {Fault::mirrored};
@@ -161,7 +161,7 @@ TEST(SimulateCase, MirroredViewFlipsImageAndTruthTogether) {
   }
 }
 
-TEST(SimulateCase, FaultsShowInTheTruth) {
+TEST(SimulateCase, FaultsAppearInTheTruth) {
   SimulationOptions options = small(CaseKind::accuracy);
   options.lost_balls = {"P3"};
   options.faults = {Fault::wires, Fault::shutters, Fault::saturated};
@@ -197,7 +197,7 @@ TEST(SimulateCase, TunnelPointsAgreeInEveryFrame) {
       EXPECT_LT((view.clicks[i].raw - view.tunnel_points[i].raw).norm(), 3.1);
 }
 
-TEST(SimulateCase, ReadingsScatterAsTheCaseSaysOverManySeeds) {
+TEST(SimulateCase, ReadingsScatterByTheStatedSigmaOverManySeeds) {
   double shift2 = 0;
   double turn2 = 0;
   constexpr int seeds = 500;
@@ -233,7 +233,7 @@ TEST(SimulateCase, TunnelsRunInsideTheirBones) {
   }
 }
 
-TEST(SimulateCase, EveryDepthAndResponseFillsItsGreyValues) {
+TEST(SimulateCase, EveryDepthAndResponseUsesItsGreyRange) {
   for (const int bits : {8, 10, 12, 14, 16})
     for (const Response response : {Response::linear, Response::logarithmic}) {
       SimulationOptions options = small(CaseKind::flat);
@@ -248,7 +248,7 @@ TEST(SimulateCase, EveryDepthAndResponseFillsItsGreyValues) {
     }
 }
 
-TEST(SimulateCase, ViewsAreTakenWhereAskedFor) {
+TEST(SimulateCase, ViewsAreTakenAtTheRequestedAngles) {
   SimulationOptions options = small(CaseKind::accuracy);
   options.views = {{"AP", {0, 0}}, {"OBL", {45, 10}}, {"LAT", {90, 0}}};
   const SimulatedCase simulated = *simulate_case(options);
@@ -284,7 +284,7 @@ TEST(SimulateCase, UnknownSizeDepthAndBallAreRefusedByName) {
   EXPECT_THAT(simulate_case(options).error().message, testing::HasSubstr("P99"));
 }
 
-TEST(SimulateCase, KneeLiesWhereTheTunnelsAre) {
+TEST(SimulateCase, KneeMatchesTheTunnels) {
   SimulationOptions options = small(CaseKind::tunnels);
   EXPECT_FALSE(simulate_case(options)->calibrator_from_knee);
   options.knee = true;

@@ -11,7 +11,7 @@
 namespace helicarm::simulation {
 namespace {
 
-/// In the order of the enumerations.
+/// In the order of the enumerators.
 constexpr std::array<std::string_view, 4> kinds = {"accuracy", "tunnels", "flat", "grid"};
 constexpr std::array<std::string_view, 3> presets = {"paper-sim", "ii-9in", "flat-panel"};
 constexpr std::array<std::string_view, 7> faults = {"decoys",   "wires",    "screws",   "low_dose",

@@ -24,7 +24,7 @@ Interval both(const Interval& a, const Interval& b) {
   return part.leave > part.enter ? part : nothing;
 }
 
-/// Where low <= o + t d <= high.
+/// Interval of t with low <= o + t d <= high.
 Interval slab(double o, double d, double low, double high) {
   if (d == 0) return o < low || o > high ? nothing : Interval{-infinity, infinity};
   const double a = (low - o) / d;
@@ -32,7 +32,7 @@ Interval slab(double o, double d, double low, double high) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-/// Both for a ray whose t = 0 lies nearest the solid, which keeps the differences small against the terms.
+/// Both for a ray whose t = 0 is nearest the solid, which avoids cancellation.
 Interval in_ball(const Eigen::Vector3d& o, const Eigen::Vector3d& d) {
   const double a = d.squaredNorm();
   const double middle = -o.dot(d) / a;
@@ -62,8 +62,8 @@ Interval in_frustum(const Eigen::Vector3d& o, const Eigen::Vector3d& d, double t
   const double first = (-b - root) / a;
   const double second = (-b + root) / a;
   if (a > 0) return both(ends, {first, second});
-  // Steeper than the wall: inside beyond either root, each on its own nappe; between the ends there is only
-  // one.
+  // Steeper than the wall: inside beyond either root, one per nappe; between the ends there is only one
+  // nappe.
   const Interval before = both(ends, {-infinity, second});
   return before.leave > before.enter ? before : both(ends, {first, infinity});
 }
@@ -141,7 +141,7 @@ double signed_distance(const Solid& solid, const Eigen::Vector3d& point) {
   };
   switch (solid.kind) {
     case Solid::Kind::ball: {
-      // In the middle every direction is as good as another.
+      // At the centre the direction is arbitrary.
       const Eigen::Vector3d out = u.norm() > 1e-12 ? u.normalized() : Eigen::Vector3d::UnitX();
       return to_wall(u.norm() - 1, out.transpose());
     }

@@ -17,14 +17,14 @@ double chord(const Solid& solid, const Vector3d& source, const Vector3d& directi
   return (part.leave - part.enter) * direction.norm();
 }
 
-TEST(Solid, BallsChordIsTheClosedFormAtAnyImpactParameter) {
+TEST(Solid, BallChordIsTheClosedFormAtAnyImpactParameter) {
   const Solid ball = sphere({3, -2, 650}, 2);
   for (double miss : {0.0, 0.5, 1.0, 1.9, 1.999, 2.0, 2.1})
     EXPECT_NEAR(chord(ball, {3 + miss, -2, 0}, {0, 0, 0.3}), 2 * std::sqrt(std::max(0.0, 4 - miss * miss)),
                 1e-9);
 }
 
-TEST(Solid, ObliqueCylinderIsItsDiameterOverTheSine) {
+TEST(Solid, ObliqueCylinderChordIsItsDiameterOverTheSine) {
   const Solid wire = cylinder({-50, 0, 0}, {50, 0, 0}, 1);
   const double angle = 0.4;
   EXPECT_NEAR(
@@ -42,7 +42,7 @@ TEST(Solid, FrustumAgreesAlongAcrossAndSteeperThanItsWall) {
   EXPECT_NEAR(chord(cone, {45, 0, 500}, {0, 0, -1}), 40, 1e-9);
 }
 
-TEST(Solid, EveryKindAgreesWithCountedSteps) {
+TEST(Solid, EveryKindAgreesWithSampling) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   const std::vector<Solid> solids = {ellipsoid({1, 2, 3}, {9, 5, 7}, turn), box({1, 2, 3}, {4, 5, 6}, turn),
                                      flat_frustum({-5, 0, 2}, {6, 3, 9}, 7, 3, {0, 0, 1}, 0.6)};
@@ -75,7 +75,7 @@ TEST(Solid, EveryKindAgreesWithCountedSteps) {
   }
 }
 
-TEST(Solid, MovingSolidAndRayTogetherChangesNothing) {
+TEST(Solid, InvariantToACommonMotionOfSolidAndRay) {
   const RigidTransform move{Eigen::AngleAxisd(1.1, Vector3d(2, -1, 1).normalized()).toRotationMatrix(),
                             {5, 6, -7}};
   const Solid cone = frustum({0, 0, 0}, {0, 10, 80}, 6, 3);
@@ -86,7 +86,7 @@ TEST(Solid, MovingSolidAndRayTogetherChangesNothing) {
               chord(cone, source, direction), 1e-9);
 }
 
-TEST(Solid, SignedDistanceIsThatOfABallAndOfABoxAndOfAConesWall) {
+TEST(Solid, SignedDistanceOfABallABoxAndAConeWall) {
   EXPECT_NEAR(signed_distance(sphere({3, -2, 5}, 4), {3, 5, 5}), 3, 1e-12);
   EXPECT_NEAR(signed_distance(sphere({3, -2, 5}, 4), {3, -2, 5}), -4, 1e-12);
   EXPECT_NEAR(signed_distance(box({0, 0, 0}, {1, 2, 3}), {0, 1.5, 0}), -0.5, 1e-12);
@@ -95,7 +95,7 @@ TEST(Solid, SignedDistanceIsThatOfABallAndOfABoxAndOfAConesWall) {
   EXPECT_NEAR(signed_distance(cone, {1, 0, 83}), 3, 1e-12);
 }
 
-TEST(Solid, SignedDistanceIsNegativeExactlyWhereARayIsInside) {
+TEST(Solid, SignedDistanceIsNegativeExactlyInside) {
   RandomStream random(3, 1);
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, -1).normalized()).toRotationMatrix();
   for (const Solid& solid :
@@ -110,7 +110,7 @@ TEST(Solid, SignedDistanceIsNegativeExactlyWhereARayIsInside) {
     }
 }
 
-TEST(Solid, SignedDistanceGrowsByAMillimetrePerMillimetreAtTheSurface) {
+TEST(Solid, SignedDistanceHasUnitSlopeAtTheSurface) {
   const Solid egg = ellipsoid({0, 0, 0}, {12, 30, 21});
   const Vector3d on = Vector3d(12 * 0.6, 0, 21 * 0.8);
   const Vector3d normal = Vector3d(0.6 / 12, 0, 0.8 / 21).normalized();

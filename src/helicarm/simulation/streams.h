@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-/// What each random stream of a simulated case is used for.
+/// Purpose of each random stream of a simulated case.
 namespace helicarm::simulation::stream {
 
 inline constexpr std::uint32_t c_arm = 1000;
@@ -13,9 +13,9 @@ inline constexpr std::uint32_t tracker = 1003;
 inline constexpr std::uint32_t clicks = 1004;
 inline constexpr std::uint32_t uids = 1005;
 inline constexpr std::uint32_t grid = 1006;
-inline constexpr std::uint32_t readings = 1100;  ///< and the next: two per tracked body
+inline constexpr std::uint32_t readings = 1100;  ///< and following: two per tracked body
 inline constexpr std::uint32_t arm = 1007;
 inline constexpr std::uint32_t true_views = 1008;
-inline constexpr std::uint32_t noise = 1010;  ///< and the next: two per view
+inline constexpr std::uint32_t noise = 1010;  ///< and following: two per view
 
 }  // namespace helicarm::simulation::stream

@@ -7,7 +7,7 @@ namespace helicarm::simulation {
 
 using Eigen::Vector3d;
 
-// The paper draws four facets and gives no sizes; these are clear of the flange and of the beam to the balls.
+// The paper shows four facets without dimensions; these avoid the flange and the beam to the balls.
 TrackedBody calibrator_markers() {
   TrackedBody body;
   for (int side = 0; side < 4; ++side) {
@@ -20,7 +20,7 @@ TrackedBody calibrator_markers() {
 }
 
 TrackedBody marker_array() {
-  // No two sides of the figure are alike, or a tracker could take one disc for another.
+  // All side lengths differ, so that a tracker cannot confuse the discs.
   const std::vector<Vector3d> detections = {{-45, -30, 0}, {40, -38, 0}, {32, 44, 0}, {-27, 24, 0}};
   return {{{Vector3d::UnitZ(), detections}}};
 }

@@ -39,7 +39,7 @@ std::vector<const MarkerFacet*> facets_seen(const TrackerModel& model, const Tra
 }
 
 /// The pose is fitted to the markers with equal weights; to first order its error is this matrix times
-/// theirs: (A'A)^-1 A', where marker i, at r from the body's origin, moves by turn x r + shift.
+/// theirs: (A'A)^-1 A', where marker i, at r from the body's origin, moves by rotation x r + translation.
 Eigen::MatrixXd pose_from_marker_errors(const std::vector<const MarkerFacet*>& facets,
                                         const Matrix3d& rotation) {
   std::vector<Vector3d> arms;
@@ -51,8 +51,7 @@ Eigen::MatrixXd pose_from_marker_errors(const std::vector<const MarkerFacet*>& f
   return (a.transpose() * a).ldlt().solve(a.transpose());
 }
 
-/// A sum of waves with drawn frequencies and phases: normal and smooth, yet any moment can be asked for
-/// alone.
+/// Sum of waves with random frequencies and phases: normal and smooth, and each time can be evaluated alone.
 Vector3d drift(const TrackerModel& model, double time_s, std::uint64_t seed, std::uint32_t stream) {
   if (model.drift_sigma_mm.isZero()) return Vector3d::Zero();
   constexpr int waves = 32;

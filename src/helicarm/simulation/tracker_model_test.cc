@@ -18,7 +18,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::uint64_t seed = 5;
 
-/// The array's normal towards the camera, a little askew.
+/// The array's normal towards the camera, slightly tilted.
 RigidTransform facing_pose() {
   const Eigen::Matrix3d back = Vector3d(1, -1, -1).asDiagonal();
   return {rotation_from_vector({0.2, -0.3, 0.4}) * back, {60, -40, 900}};
@@ -39,7 +39,7 @@ std::size_t valid_among(const std::vector<TrackerSample>& samples) {
   return static_cast<std::size_t>(std::ranges::count_if(samples, &TrackerSample::valid));
 }
 
-TEST(TrackerModel, SamplesScatterAsTheCovarianceSays) {
+TEST(TrackerModel, SamplesScatterByTheCovariance) {
   constexpr std::size_t count = 20000;
   for (const TrackedBody& body : {marker_array(), calibrator_markers()}) {
     RigidTransform pose = facing_pose();
@@ -48,7 +48,7 @@ TEST(TrackerModel, SamplesScatterAsTheCovarianceSays) {
     const auto samples = track(model, body, at_rest(pose), steady_times(60, count), seed, 7);
     Matrix6d sum = Matrix6d::Zero();
     for (const TrackerSample& sample : samples) sum += error_of(sample) * error_of(sample).transpose();
-    // Whitened by the model's own covariance the scatter is the identity, to 5 standard errors.
+    // Whitened by the model's covariance the scatter is the identity within 5 standard errors.
     const Matrix6d model_root = pose_covariance(model, body, pose)->llt().matrixL();
     const Matrix6d inverse = model_root.inverse();
     const Matrix6d white = inverse * (sum / count) * inverse.transpose();
@@ -61,7 +61,7 @@ TEST(TrackerModel, DepthIsWorseThanAcross) {
   EXPECT_NEAR(std::sqrt(covariance(5, 5) / covariance(3, 3)), 2.5, 0.1);
 }
 
-TEST(TrackerModel, MeanOfAWindowScattersAsItsCovarianceSays) {
+TEST(TrackerModel, MeanOfAWindowScattersByItsCovariance) {
   TrackerModel model;
   model.drift_sigma_mm = {0.07, 0.07, 0.17};
   constexpr int readings = 3000;
@@ -77,7 +77,7 @@ TEST(TrackerModel, MeanOfAWindowScattersAsItsCovarianceSays) {
   EXPECT_LT((squares.cwiseQuotient(expected).array() - 1).abs().maxCoeff(), 5 * std::sqrt(2.0 / readings));
 }
 
-TEST(TrackerModel, ABodyThatTurnsAwayIsNotSeen) {
+TEST(TrackerModel, BodyTurnedAwayIsNotVisible) {
   const TrackerModel model;
   const auto spun = [](double angle) {
     return RigidTransform{rotation_from_vector({0, angle, 0}), {0, 0, 900}};
@@ -96,7 +96,7 @@ TEST(TrackerModel, ABodyThatTurnsAwayIsNotSeen) {
   }
 }
 
-TEST(TrackerModel, CalibratorShowsOneOrTwoFacetsAllTheWayRoundAndNoneFromItsEnds) {
+TEST(TrackerModel, CalibratorShowsOneOrTwoFacetsAroundItsAxisAndNoneFromItsEnds) {
   const Eigen::Matrix3d upright = rotation_from_vector({EIGEN_PI / 2, 0, 0});
   for (double angle = 0; angle < 6.28; angle += 0.1) {
     const RigidTransform pose{upright * rotation_from_vector({0, 0, angle}), {0, 0, 900}};
@@ -107,7 +107,7 @@ TEST(TrackerModel, CalibratorShowsOneOrTwoFacetsAllTheWayRoundAndNoneFromItsEnds
   EXPECT_FALSE(pose_covariance({}, calibrator_markers(), {Eigen::Matrix3d::Identity(), {0, 0, 900}}));
 }
 
-TEST(TrackerModel, OutsideTheVolumeNothingIsSeen) {
+TEST(TrackerModel, NothingIsVisibleOutsideTheVolume) {
   for (const Vector3d& place : {Vector3d(0, 0, 400), Vector3d(0, 0, 2600), Vector3d(800, 0, 900)}) {
     RigidTransform pose = facing_pose();
     pose.translation = place;
@@ -115,7 +115,7 @@ TEST(TrackerModel, OutsideTheVolumeNothingIsSeen) {
   }
 }
 
-TEST(TrackerModel, SamplesAndFacetsAreLostAsOftenAsAsked) {
+TEST(TrackerModel, SamplesAndFacetsAreLostAtTheGivenRates) {
   constexpr std::size_t count = 20000;
   TrackerModel model;
   model.lost_sample = 0.1;
@@ -134,7 +134,7 @@ TEST(TrackerModel, SamplesAndFacetsAreLostAsOftenAsAsked) {
   EXPECT_FALSE(mean_pose(track(model, marker_array(), at_rest(facing_pose()), steady_times(60, 9), seed, 7)));
 }
 
-TEST(TrackerModel, StampsAreLateAndJitterWhileThePathIsTakenAtTheTrueTime) {
+TEST(TrackerModel, StampsAreLateAndJitterWhileThePoseIsOfTheTrueTime) {
   TrackerModel model;
   model.stamp_delay_s = 0.03;
   model.stamp_jitter_s = 0.002;
@@ -156,7 +156,7 @@ TEST(TrackerModel, StampsAreLateAndJitterWhileThePathIsTakenAtTheTrueTime) {
   EXPECT_NEAR(std::sqrt(squares / count), 0.002, 0.0002);
 }
 
-TEST(TrackerModel, DriftIsSlowAndAsLargeAsAsked) {
+TEST(TrackerModel, DriftHasTheGivenTimeAndAmplitude) {
   TrackerModel model;
   model.marker_sigma_mm.setZero();
   model.drift_sigma_mm = {0.1, 0.1, 0.3};
@@ -178,7 +178,7 @@ TEST(TrackerModel, DriftIsSlowAndAsLargeAsAsked) {
   EXPECT_NEAR(late, std::exp(-0.5), 0.1);
 }
 
-TEST(TrackerModel, EverySampleCanBeDrawnAlone) {
+TEST(TrackerModel, EverySampleIsIndependentlyReproducible) {
   TrackerModel model;
   model.stamp_jitter_s = 0.001;
   model.lost_sample = 0.2;

@@ -12,13 +12,13 @@
 namespace helicarm::simulation {
 
 enum class Visibility {
-  clear,    ///< its whole shadow lies in the image and no other metal touches it
-  hidden,   ///< other metal covers a part of it
-  outside,  ///< a part of it lies beyond the image, the field or under a shutter
-  absent    ///< it is not there
+  clear,    ///< its whole shadow lies in the image and touches no other metal
+  hidden,   ///< partly covered by other metal
+  outside,  ///< partly outside the image or the field, or under a shutter
+  absent    ///< not present
 };
 
-/// Where the centre of a small thing is truly seen, in the stored image.
+/// True image of the centre of a small object in the stored image.
 struct TruePoint {
   std::string name;
   Eigen::Vector3d in_calibrator;
@@ -27,7 +27,7 @@ struct TruePoint {
   Visibility visibility;
 };
 
-/// `scene` is what was rendered; the thing itself is its body called `name`, absent if there is none.
+/// `scene` is the rendered scene; the object is its body called `name`, absent if there is none.
 TruePoint true_point(const std::string& name, const Eigen::Vector3d& in_calibrator, double diameter_mm,
                      const Scene& scene, const TrueView& true_view);
 

@@ -85,7 +85,7 @@ Json view_json(const SimulatedView& view, const char* world) {
   return json;
 }
 
-/// Distances in ideal pixels of the tunnel's true ends from the tool line's image.
+/// Distances (ideal pixels) of the tunnel's true ends from the tool line's image.
 Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const TrueView& true_view) {
   const View view = true_view.stored_view();
   const auto flat = [&](const Eigen::Vector3d& point) {

@@ -6,7 +6,7 @@
 
 namespace helicarm::simulation {
 
-/// truth.json, format "helicarm-truth/1": everything that is true of the case. Never an input.
+/// truth.json, format "helicarm-truth/1": the ground truth of the case. Never an input.
 Json truth_json(const SimulatedCase& simulated);
 
 /// Row major nested lists.

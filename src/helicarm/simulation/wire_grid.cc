@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Of every wire's body, so that wires do not count as hiding a cross.
+/// Common to all wires, so that wires do not count as hiding a cross.
 constexpr const char* wire_name = "grid wire";
 
 }  // namespace

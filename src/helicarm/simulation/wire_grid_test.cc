@@ -38,7 +38,7 @@ TEST(WireGrid, PlateComesFirstAndStaysWhileTheGridMoves) {
   }
 }
 
-TEST(WireGrid, CrossesAreDarkestWhereTheTruthPutsThem) {
+TEST(WireGrid, CrossesAreDarkestAtTheirTruePositions) {
   const SimulatedCase simulated = *simulate_case(small_grid({45}));
   const SimulatedView& view = simulated.views[1];
   EXPECT_EQ(view.true_view.name, "GRID");
@@ -49,7 +49,7 @@ TEST(WireGrid, CrossesAreDarkestWhereTheTruthPutsThem) {
     ++clear;
     const int u = static_cast<int>(std::lround(cross.raw.x()));
     const int v = static_cast<int>(std::lround(cross.raw.y()));
-    int brighter = 0;  // 10 px beside it lies the mesh's inside, in one of its corners perhaps a dot
+    int brighter = 0;  // 10 px beside it is the mesh's interior, possibly with a dot in one of its corners
     for (const int side : {-10, 10})
       for (const int upright : {-10, 10})
         brighter += view.pixels(u, v) < 0.8 * view.pixels(u + side, v + upright);
@@ -58,7 +58,7 @@ TEST(WireGrid, CrossesAreDarkestWhereTheTruthPutsThem) {
   EXPECT_GE(clear, 40);
 }
 
-TEST(WireGrid, WhatTheSceneCannotHoldIsRefused) {
+TEST(WireGrid, InvalidScenesAreRefused) {
   const auto reason = [](const SimulationOptions& options) { return simulate_case(options).error().reason; };
   for (const std::vector<double>& distances :
        {std::vector<double>{}, {19}, {501}, {45, 45}, {45, std::nan("")}, std::vector<double>(21, 45)})

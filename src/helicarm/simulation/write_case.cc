@@ -18,7 +18,7 @@ constexpr const char* plate_file = "plate.json";
 constexpr const char* calibrator_file = "calibrator.json";
 constexpr const char* case_file = "case.json";
 
-/// From an image's pixels, so that a case is written alike each time and different images differ.
+/// From the pixels: a case is written identically each time, and different images have different UIDs.
 std::string uid(const Image<std::uint16_t>& pixels, std::uint64_t item) {
   const auto values = pixels.pixels();
   const std::string content = digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
@@ -59,7 +59,7 @@ Expected<void> write_json(const std::filesystem::path& path, const Json& json) {
   return write_file(path, to_text(json) + "\n");
 }
 
-/// What an earlier simulation of another kind wrote: its views by the names in its truth.
+/// Files of an earlier simulation of another kind: its views by the names in its truth.
 void remove_leftovers(const std::filesystem::path& folder) {
   const auto truth = read_json(folder / truth_file);
   if (!truth) return;
@@ -119,9 +119,9 @@ Expected<void> check_case_folder(const std::filesystem::path& folder) {
   if (fs::is_empty(folder, error)) return {};
   const auto truth = read_json(folder / truth_file);
   if (truth && truth->is_object() && truth->value("format", Json()) == "helicarm-truth/1") return {};
-  return fail(
-      Reason::cannot_write,
-      fmt::format("{}: holds files that are no earlier simulation; not overwritten", folder.string()));
+  return fail(Reason::cannot_write,
+              fmt::format("{}: contains files other than an earlier simulation; choose an empty folder",
+                          folder.string()));
 }
 
 Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCase& simulated) {
@@ -131,7 +131,7 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
   if (error) return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), error.message()));
   return guarded([&] {
     remove_leftovers(folder);
-    // The truth goes first: it marks the folder as a simulation should the rest be cut short.
+    // truth.json first: it marks the folder as a simulation if writing is interrupted.
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)
       value_or_throw(

@@ -37,7 +37,7 @@ class WriteCase : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(WriteCase, DicomComesBackWithItsPixelsAndTags) {
+TEST_F(WriteCase, DicomRoundTripKeepsPixelsAndTags) {
   for (int bits : {8, 12, 16}) {
     const SimulatedCase simulated_case = simulated(CaseKind::tunnels, bits);
     ASSERT_TRUE(write_case(folder_, simulated_case));
@@ -55,7 +55,7 @@ TEST_F(WriteCase, DicomComesBackWithItsPixelsAndTags) {
   }
 }
 
-TEST_F(WriteCase, DifferentImagesHaveDifferentUidsWhateverTheSeed) {
+TEST_F(WriteCase, DifferentImagesHaveDifferentUidsForAnySeed) {
   const DerivedImage one = dicom_of(simulated(CaseKind::accuracy, 12), 0);
   const DerivedImage same = dicom_of(simulated(CaseKind::accuracy, 12), 0);
   const DerivedImage other = dicom_of(simulated(CaseKind::tunnels, 12), 0);
@@ -66,7 +66,7 @@ TEST_F(WriteCase, DifferentImagesHaveDifferentUidsWhateverTheSeed) {
   EXPECT_NE(one.study_uid, other.study_uid);
 }
 
-TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
+TEST_F(WriteCase, FilesAgreeWithTheSimulation) {
   const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
   ASSERT_TRUE(write_case(folder_, simulated_case));
   const auto calibrator = read_calibrator(folder_ / "calibrator.json");
@@ -78,7 +78,7 @@ TEST_F(WriteCase, FilesReadAsWhatWasSimulated) {
   EXPECT_EQ(plate->dots_mm.size(), 48u);
 }
 
-TEST_F(WriteCase, TruthProjectsTheBallsOntoTheirIdealPixels) {
+TEST_F(WriteCase, TruthProjectsTheBallsToTheirIdealPixels) {
   const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
   const Json truth = truth_json(simulated_case);
   EXPECT_EQ(truth["format"], "helicarm-truth/1");
@@ -96,7 +96,7 @@ TEST_F(WriteCase, TruthProjectsTheBallsOntoTheirIdealPixels) {
     }
 }
 
-TEST_F(WriteCase, TunnelCaseHoldsPosesPicksTunnelsAndLines) {
+TEST_F(WriteCase, TunnelCaseContainsPosesPicksTunnelsAndLines) {
   const Json json = case_json(simulated(CaseKind::tunnels, 12));
   EXPECT_EQ(json["picks"].size(), 8u);
   EXPECT_EQ(json["tunnels"].size(), 2u);
@@ -105,14 +105,14 @@ TEST_F(WriteCase, TunnelCaseHoldsPosesPicksTunnelsAndLines) {
   EXPECT_EQ(json["views"][0]["poses"]["tracker_from_femur"], json["poses_now"]["tracker_from_femur"]);
 }
 
-TEST_F(WriteCase, EarlierSimulationIsReplacedWithNothingLeftOver) {
+TEST_F(WriteCase, EarlierSimulationIsReplacedWithoutLeftovers) {
   ASSERT_TRUE(write_case(folder_, simulated(CaseKind::accuracy, 12)));
   ASSERT_TRUE(write_case(folder_, simulated(CaseKind::flat, 16)));
   EXPECT_FALSE(fs::exists(folder_ / "plate.json"));
   EXPECT_TRUE((*read_json(folder_ / "case.json"))["plate"].is_null());
 }
 
-TEST_F(WriteCase, StrangersFilesAreNotOverwritten) {
+TEST_F(WriteCase, OtherFilesAreNotOverwritten) {
   fs::create_directories(folder_);
   ASSERT_TRUE(write_file(folder_ / "case.json", "{}"));
   const auto written = write_case(folder_, simulated(CaseKind::accuracy, 12));
