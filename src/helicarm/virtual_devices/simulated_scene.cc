@@ -13,12 +13,12 @@ using Eigen::Vector3d;
 using simulation::MarkerFacet;
 using simulation::TrackedBody;
 
-/// The base beside the knee at the height of the table's edge, x towards the patient, z up (the knee's
-/// anterior side): both tunnels' axes lie within the arm's reach.
+/// The base stands beside the knee at the height of the table's edge, x towards the patient, z up (the knee's
+/// anterior side): both tunnels' axes are within the arm's reach.
 const RigidTransform calibrator_from_base{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(),
                                           {60, 520, -160}};
 
-/// Turns z into the direction.
+/// Rotates z onto the direction.
 Eigen::Matrix3d facing(const Vector3d& direction) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
 }
@@ -63,7 +63,7 @@ RigidTransform SimulatedScene::tracker_from_pointer() const {
     const std::lock_guard lock(mutex_);
     return touched_;
   }();
-  const Eigen::Matrix3d turn = tracker_from(bone).rotation;  // which the tracker sees
+  const Eigen::Matrix3d turn = tracker_from(bone).rotation;  // as observed by the tracker
   return {turn, point_in_tracker(bone == "femur" ? "FE" : "TS") - turn * tip_in_pointer};
 }
 
@@ -104,7 +104,7 @@ Vector3d SimulatedScene::point_in_tracker(const std::string& name) const {
 RobotTool SimulatedScene::tool() const { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
 
 RigidTransform SimulatedScene::flange_from_marker() const {
-  // Clamped to the drill's side, by hand.
+  // Manually clamped to the drill's side.
   return {Eigen::AngleAxisd(0.35, Vector3d(0.2, 0.9, -0.4).normalized()).toRotationMatrix(), {12, 70, 40}};
 }
 

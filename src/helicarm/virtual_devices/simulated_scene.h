@@ -10,43 +10,44 @@
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/tracker_model.h"
 
-/// The virtual operating room: C-arm, tracker and robot that share one truth and speak their real protocols.
+/// The virtual operating room: C-arm, tracker and robot that share one ground truth and use their real
+/// protocols.
 namespace helicarm::virtual_devices {
 
-/// What stands where, truly: the simulated knee with its calibrator, bones that can be moved, and the robot
-/// beside the table. All members may be called from any thread.
+/// Ground truth of the scene: the simulated knee with its calibrator, movable bones, and the robot beside the
+/// table. All members are thread-safe.
 class SimulatedScene {
  public:
-  /// Draws the X-rays of the seed's AP and lateral view. Refuses as `simulate_case`.
+  /// Renders the X-ray images of the seed's AP and lateral view. Refuses as `simulate_case`.
   static Expected<std::unique_ptr<SimulatedScene>> set_up(std::uint64_t seed, int image_size = 1024);
 
   const simulation::SimulatedCase& simulated_case() const { return simulated_case_; }
 
   /// "calibrator", "femur" or "tibia".
   RigidTransform tracker_from(const std::string& body) const;
-  /// Where the tracker would see the bone's marker: in the bone's frame until somebody bumps it.
+  /// Pose of the bone's marker: the bone's own frame until `bump_marker`.
   RigidTransform tracker_from_marker(const std::string& bone) const;
-  /// Shifts a bone's marker against the bone (bone's axes).
+  /// Shifts a bone's marker relative to the bone (bone's axes).
   void bump_marker(const std::string& bone, const Eigen::Vector3d& shift_mm);
   /// Moves a bone with its marker, about the marker (tracker's axes).
   void move_bone(const std::string& bone, const RigidTransform& motion_in_tracker);
 
-  /// The same about this point (tracker's frame).
+  /// Rotates about this point (tracker's frame).
   void turn_bone(const std::string& bone, const Eigen::Vector3d& about, const Eigen::Matrix3d& turn);
 
-  /// A ball at a tunnel's end (FS, FE, TS, TE) where it is now.
+  /// Present position of a ball at a tunnel's end (FS, FE, TS, TE).
   Eigen::Vector3d point_in_tracker(const std::string& name) const;
 
-  /// A pointer whose tip rests on a tunnel's outer end in this bone, and goes with it.
+  /// A pointer with its tip on a tunnel's outer end in this bone; it moves with the bone.
   RigidTransform tracker_from_pointer() const;
   void touch(const std::string& bone);
 
   RigidTransform tracker_from_base() const;
-  /// As if somebody had pushed the robot's table (tracker's axes).
+  /// Moves the robot's base, e.g. after a push against its table (tracker's axes).
   void move_base(const Eigen::Vector3d& shift_mm);
-  /// Of the drill in the robot's hand: tip and axis (z).
+  /// The drill: tip and axis (z).
   RobotTool tool() const;
-  /// The robot's marker: a crown of facets, of which some face the tracker whatever the hand does.
+  /// The robot's marker: a ring of facets, some of which face the tracker in any pose.
   RigidTransform flange_from_marker() const;
 
  private:
@@ -56,17 +57,17 @@ class SimulatedScene {
   RigidTransform tracker_from_base_;
   mutable std::mutex mutex_;
   std::map<std::string, RigidTransform> tracker_from_;
-  std::map<std::string, Eigen::Vector3d> marker_in_bone_;  ///< of those that were bumped
+  std::map<std::string, Eigen::Vector3d> marker_in_bone_;  ///< of bumped markers
   std::string touched_ = "femur";
 };
 
-/// From the middle of its markers to its tip.
+/// From the centre of its markers to its tip.
 inline const Eigen::Vector3d tip_in_pointer(0, -140, -20);
 
 /// Facets on all sides of a cube.
 simulation::TrackedBody tool_markers();
 
-/// The calibrator's facets as bodies of their own; origin in the middle of a facet's markers, z outward.
+/// The calibrator's facets as separate bodies; origin at the centre of a facet's markers, z outward.
 struct TrackedFacet {
   std::string name;  ///< calibrator/1 .. calibrator/4
   RigidTransform calibrator_from_facet;

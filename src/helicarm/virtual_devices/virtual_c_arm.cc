@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr std::array<std::string_view, 7> c_arm_fault_words = {
     "none", "wrong_title", "breaks_off", "same_picture", "other_patient", "held_back", "no_tags"};
 
-/// Nobody sets a C-arm's clock by ours.
+/// A C-arm's clock is not synchronised with this machine's.
 constexpr double clock_ahead_s = 31.7;
 constexpr std::chrono::seconds held_back_for{4};
 constexpr double leg_moves_mm = 6;
@@ -58,13 +58,13 @@ void send(const fs::path& file, const ImageReceiver& receiver, CArmFault fault) 
   need(sender.negotiateAssociation(), "association");
   if (fault == CArmFault::breaks_off) {
     need(sender.abortAssociation(), "abort");
-    throw BadInput(Reason::not_connected, "virtual C-arm: broke the association off");
+    throw BadInput(Reason::not_connected, "virtual C-arm: association aborted");
   }
   Uint16 status = 0;
-  need(sender.sendSTORERequest(0, file.c_str(), nullptr, status), "picture");
+  need(sender.sendSTORERequest(0, file.c_str(), nullptr, status), "image");
   if (status != 0)
     throw BadInput(Reason::not_connected,
-                   fmt::format("virtual C-arm: the receiver refused the picture with status {:04X}", status));
+                   fmt::format("virtual C-arm: the receiver refused the image with status {:04X}", status));
   need(sender.releaseAssociation(), "release");
 }
 
@@ -90,7 +90,7 @@ Expected<void> shoot(SimulatedScene& simulated_scene, const std::string& view, c
     std::size_t number = std::size_t(true_view - views.begin());
     if (fault == CArmFault::same_image) number = (number + 1) % views.size();
     DerivedImage image = simulation::dicom_of(simulated_scene.simulated_case(), number);
-    image.instance_uid.clear();  // each exposure has one of its own
+    image.instance_uid.clear();  // each acquisition has its own
     if (fault == CArmFault::other_patient) {
       image.study_uid.clear();
       image.patient_id = "ANOTHER";

@@ -9,7 +9,7 @@
 namespace helicarm::virtual_devices {
 namespace {
 
-/// Real arms differ from their drawing by their factory calibration.
+/// Real arms differ from the nominal model by their factory calibration.
 RobotModel arm_as_built() {
   RobotModel arm = ur5();
   arm.d1 += 0.4;

@@ -15,16 +15,16 @@ struct VirtualDevicesOptions {
   std::uint64_t seed = 1;
   int image_size = 1024;
   double tracker_rate_hz = 30;
-  std::uint16_t tracker_port = 18944;  ///< each 0: any that is free
+  std::uint16_t tracker_port = 18944;  ///< 0 for any port: a free one is chosen
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
-  /// A line for a log on each client of tracker or robot that was cut off; from their threads.
+  /// Log line for each disconnected client of tracker or robot; called on their threads.
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
 };
 
-/// A theatre with tracker and robot switched on; the C-arm shoots by `shoot`. Everything listens on this
-/// machine alone.
+/// A simulated scene with running tracker and robot; the C-arm sends by `shoot`. All servers listen on the
+/// local host only.
 class VirtualDevices {
  public:
   /// Refuses as `SimulatedScene::set_up`, VirtualTracker and VirtualUr.
@@ -34,17 +34,17 @@ class VirtualDevices {
   VirtualTracker& tracker() { return *tracker_; }
   VirtualUr& robot() { return *robot_; }
 
-  /// Where the tip of the tool truly is, and its axis (z).
+  /// True pose of the tool's tip; z is its axis.
   RigidTransform tracker_from_tip();
 
-  /// Switches a fault on or off by its name, one of `virtual_fault_names`. An unknown one is bad_value.
+  /// Switches a fault on or off by name, one of `virtual_fault_names`. An unknown one is bad_value.
   Expected<void> set_fault(const std::string& name, bool on);
 
-  /// Holds the pointer's tip to a bone ("femur" or "tibia"), still; before and after, it is not seen.
+  /// Holds the pointer's tip on a bone ("femur" or "tibia") at rest; before and after, it is not visible.
   void touch(const std::string& bone);
   void lift_pointer();
 
-  /// As somebody at the robot does after an emergency stop: power on, brakes open. The robot's answers.
+  /// Recovery at the robot after an emergency stop: power on, brakes open. Returns the robot's answers.
   std::string power_on();
 
  private:
@@ -55,10 +55,10 @@ class VirtualDevices {
   std::unique_ptr<VirtualTracker> tracker_;
 };
 
-/// hide:BODY, and all faults of tracker and robot, for a person.
+/// hide:BODY, and all faults of tracker and robot, for messages.
 std::string virtual_fault_names();
 
-/// Names of the tools that the tracker follows: the bones, the tool and the calibrator's facets.
+/// Names of the tracked tools: the bones, the tool and the calibrator's facets.
 inline constexpr const char* tool_marker = "tool";
 inline constexpr const char* pointer_marker = "pointer";
 

@@ -34,7 +34,7 @@ class VirtualDevicesTest : public testing::Test {
 };
 std::unique_ptr<VirtualDevices> VirtualDevicesTest::virtual_or_;
 
-/// Follows the room's tracker until the tool's poses number so many.
+/// Records the scene's tracker until this many poses of the tool have arrived.
 class Follower {
  public:
   explicit Follower(VirtualDevices& virtual_or) {
@@ -65,7 +65,7 @@ class Follower {
   std::unique_ptr<IgtlClient> client_;
 };
 
-TEST_F(VirtualDevicesTest, TrackerReportsWhereBonesAreWithinItsNoise) {
+TEST_F(VirtualDevicesTest, TrackerReportsBonePosesWithinItsNoise) {
   Follower follower(*virtual_or_);
   for (const char* bone : {"femur", "tibia"}) {
     const auto seen = follower.wait_for(bone, 5);
@@ -75,7 +75,7 @@ TEST_F(VirtualDevicesTest, TrackerReportsWhereBonesAreWithinItsNoise) {
   }
 }
 
-TEST_F(VirtualDevicesTest, TrackerSeesTheToolWhereTheRobotTrulyHoldsIt) {
+TEST_F(VirtualDevicesTest, TrackerReportsTheTrueToolPose) {
   Follower follower(*virtual_or_);
   const auto seen = follower.wait_for(tool_marker, 5);
   ASSERT_TRUE(seen);
@@ -84,7 +84,7 @@ TEST_F(VirtualDevicesTest, TrackerSeesTheToolWhereTheRobotTrulyHoldsIt) {
   EXPECT_LT((tip.translation - virtual_or_->tracker_from_tip().translation).norm(), 3);
 }
 
-TEST_F(VirtualDevicesTest, SomeFacetOfTheCalibratorIsSeenAndReportsItsPose) {
+TEST_F(VirtualDevicesTest, OneFacetOfTheCalibratorIsVisibleAndReportsItsPose) {
   Follower follower(*virtual_or_);
   ASSERT_TRUE(follower.wait_for("femur", 20));
   int seen = 0;
@@ -100,7 +100,7 @@ TEST_F(VirtualDevicesTest, SomeFacetOfTheCalibratorIsSeenAndReportsItsPose) {
   EXPECT_GE(seen, 1);
 }
 
-TEST_F(VirtualDevicesTest, HiddenMarkerIsLeftOut) {
+TEST_F(VirtualDevicesTest, HiddenMarkerIsAbsent) {
   ASSERT_TRUE(virtual_or_->set_fault("hide:tibia", true));
   Follower follower(*virtual_or_);
   ASSERT_TRUE(follower.wait_for("femur", 20));
@@ -109,7 +109,7 @@ TEST_F(VirtualDevicesTest, HiddenMarkerIsLeftOut) {
   EXPECT_TRUE(follower.wait_for("tibia", 1));
 }
 
-TEST_F(VirtualDevicesTest, BoneThatMovesTakesItsBallsAlong) {
+TEST_F(VirtualDevicesTest, MovedBoneMovesItsBalls) {
   const Eigen::Vector3d before = virtual_or_->simulated_scene().point_in_tracker("FS");
   virtual_or_->simulated_scene().move_bone("femur", {Eigen::Matrix3d::Identity(), {1, 2, 3}});
   EXPECT_NEAR(
@@ -145,7 +145,7 @@ class Acquisitions : public VirtualDevicesTest {
   std::unique_ptr<DicomReceiver> receiver_;
 };
 
-TEST_F(Acquisitions, ImageOfAnotherProgramsSenderArrives) {
+TEST_F(Acquisitions, ImageOfAnotherProgramArrives) {
   ASSERT_TRUE(acquired_view("AP"));
   ASSERT_TRUE(acquired_view("LAT"));
   EXPECT_EQ(receiver_->counters().stored, 2u);
@@ -156,7 +156,7 @@ TEST_F(Acquisitions, WrongTitleIsRejected) {
   EXPECT_EQ(receiver_->counters().rejected, 1u);
 }
 
-TEST_F(Acquisitions, AssociationThatBreaksOffLeavesNothing) {
+TEST_F(Acquisitions, AbortedAssociationLeavesNothing) {
   EXPECT_FALSE(acquired_view("AP", CArmFault::breaks_off));
   ASSERT_TRUE(acquired_view("AP"));
   EXPECT_EQ(receiver_->counters().stored, 1u);

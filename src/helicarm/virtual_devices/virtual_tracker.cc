@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint32_t samples_stream = 2000;  // and the next: two per body
+constexpr std::uint32_t samples_stream = 2000;  // and following: two per body
 constexpr double hour_s = 3600;
 
 std::uint64_t stamp_now(double offset_s) {
@@ -80,13 +80,13 @@ void VirtualTracker::run(const std::stop_token& stop) {
   auto next = Clock::now();
   for (std::uint64_t number = 0; !stop.stop_requested(); ++number) {
     notify(number);
-    next = std::max(next + period, Clock::now() - period);  // samples that were missed are not made up for
+    next = std::max(next + period, Clock::now() - period);  // missed samples are skipped
     pause.wait_until(lock, stop, next, [] { return false; });
   }
 }
 
 void VirtualTracker::notify(std::uint64_t number) {
-  // Not held while it computes: a machine too slow for the rate would never let others have it.
+  // Released while computing: otherwise a machine too slow for the rate would block other threads.
   std::unique_lock lock(mutex_);
   const auto faults = faults_;
   const auto hidden = hidden_;

@@ -16,7 +16,7 @@
 
 namespace helicarm::virtual_devices {
 
-/// Something that the tracker follows, and where it truly is.
+/// A tracked body and its true pose.
 struct FollowedBody {
   std::string name;
   simulation::TrackedBody body;
@@ -32,16 +32,16 @@ struct VirtualTrackerOptions {
 
 enum class TrackerFault {
   frozen,              ///< repeats its last poses
-  identity,            ///< sends the identity for what it does not see
+  identity,            ///< sends the identity for bodies that are not visible
   not_finite,          ///< sends NaN
-  time_jump,           ///< its clock goes an hour wrong
-  silent,              ///< connected, but says nothing
-  swapped,             ///< takes the femur's marker for the tibia's, and the other way round
-  swapped_calibrator,  ///< takes the femur's marker for one of the calibrator's, and the other way round
+  time_jump,           ///< its clock is off by one hour
+  silent,              ///< connected, but sends nothing
+  swapped,             ///< exchanges the femur's and the tibia's markers
+  swapped_calibrator,  ///< exchanges the femur's marker and one of the calibrator's
 };
 
-/// An OpenIGTLink server that tells the bodies' poses (TDATA) with the noise of a real tracker; what is not
-/// seen is left out.
+/// An OpenIGTLink server that sends the bodies' poses (TDATA) with the noise of a real tracker; bodies that
+/// are not visible are absent.
 class VirtualTracker {
  public:
   /// Refuses as IgtlServer.
@@ -49,9 +49,9 @@ class VirtualTracker {
                                                          std::vector<FollowedBody> bodies);
 
   std::uint16_t port() const { return server_->port(); }
-  /// Names of all that it follows.
+  /// Names of all tracked bodies.
   std::vector<std::string> bodies() const;
-  /// Covers a body's markers; whether there is such a body.
+  /// Covers a body's markers; returns whether the body exists.
   bool hide(const std::string& body, bool hidden);
   void set(TrackerFault fault, bool on);
 
