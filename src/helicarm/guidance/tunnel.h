@@ -18,8 +18,7 @@ struct Tunnel {
   std::optional<Eigen::Vector3d> end_in_tool;
   std::optional<Eigen::Vector3d> axis_in_tool;  ///< unit, from start to end
   std::optional<double> length_mm;
-  std::optional<Eigen::Matrix3d> axis_covariance =
-      {};  ///< rad^2, across the axis; includes the tracker's noise
+  std::optional<Eigen::Matrix3d> axis_covariance = {};  ///< rad^2, across the axis; with tracker noise
   std::optional<double> length_sigma_mm = {};
 
   /// Standard deviation of the axis direction (root of the trace), degrees.

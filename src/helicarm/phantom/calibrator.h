@@ -26,7 +26,7 @@ enum class TargetKind { ball, cross, line_end };
 struct CalibratorTarget {
   std::string name;
   Eigen::Vector3d
-      point_in_calibrator;  ///< cross: intersection of the axes, line_end: centre of the flat end face
+      point_in_calibrator;  ///< mm; cross: intersection of the axes, line_end: centre of the flat end face
   TargetKind kind;
   double diameter_mm;  ///< of the ball or of the wire
   std::vector<Eigen::Vector3d>

@@ -23,8 +23,7 @@ struct ToolLine {
 /// A planned point: its position and its images.
 struct PlannedPoint {
   Eigen::Vector3d point_in_calibrator;
-  std::vector<std::optional<Eigen::Vector2d>>
-      uv;  ///< rectified, one per view; nothing in a view without a pick
+  std::vector<std::optional<Eigen::Vector2d>> uv;  ///< rectified, one per view; nothing without a pick
 };
 
 /// Distance of a point from the instrument's line (Fig. 17).
