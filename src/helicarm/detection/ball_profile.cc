@@ -40,7 +40,7 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   per_unit_ = static_cast<float>(1 / step);
   last_ = count - 1;
   values_.resize(static_cast<std::size_t>(count));
-  // The rings stand closer towards the rim, where the chord length falls like a square root, and towards the
+  // Rings are denser towards the rim, where the chord length varies like a square root, and towards the
   // centre.
   double radius[rings];
   double weight[rings];
@@ -63,7 +63,7 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
     values_[static_cast<std::size_t>(i)] = static_cast<float>(sum / (blur * blur));
   }
   values_.back() = 0;
-  values_.push_back(0);  // one beyond, for the interpolation at the end
+  values_.push_back(0);  // one extra value for the interpolation at the end
 }
 
 }  // namespace helicarm

@@ -6,12 +6,12 @@
 
 namespace helicarm {
 
-/// The radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian
-/// and scaled to 1 at the centre of the sharp image. Tabulated over s = distance / radius.
+/// Radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian and
+/// scaled to 1 at the centre of the sharp image. Tabulated over s = distance / radius.
 class BallProfile {
  public:
   /// `blur`: standard deviation of the Gaussian over the ball's radius. `absorbance`: attenuation times
-  /// diameter; small for a faint ball (profile like the chord length), large for an opaque one or a hole
+  /// diameter; small for a faint ball (profile like the chord length), large for an opaque ball or a hole
   /// (flat disc).
   BallProfile(double blur, double absorbance);
 
@@ -19,7 +19,7 @@ class BallProfile {
     float value;
     float slope;  ///< d value / d s
   };
-  /// By value, so that a loop over pixels can look up several at once.
+  /// Passed by value, so that a loop over pixels can vectorise its lookups.
   struct Table {
     const float* values;
     float per_unit;
@@ -34,7 +34,7 @@ class BallProfile {
   };
   Table table() const { return {values_.data(), per_unit_, static_cast<float>(last_)}; }
   Sample at(float s) const { return table().at(s); }
-  /// Beyond this s the profile is nought.
+  /// The profile is 0 beyond this s.
   float reach() const { return static_cast<float>(last_) / per_unit_; }
   double blur() const { return blur_; }
   double absorbance() const { return absorbance_; }

@@ -22,13 +22,13 @@ double mass(const BallProfile& profile) {
   return sum;
 }
 
-TEST(BallProfile, FaintBallsMassIsHalfTheSpheresVolume) {
-  // The chord is 2 sqrt(1 - r^2) and the profile half of it: 2 pi / 3.
+TEST(BallProfile, FaintBallMassIsHalfTheSphereVolume) {
+  // The chord is 2 sqrt(1 - r^2), the profile half of it: 2 pi / 3.
   for (const double blur : {0.08, 0.2, 0.45})
     EXPECT_NEAR(mass(BallProfile(blur, 1e-3)) / (2 * pi / 3), 1, 2e-3);
 }
 
-TEST(BallProfile, OpaqueBallsMassIsTheDiscsArea) {
+TEST(BallProfile, OpaqueBallMassIsTheDiscArea) {
   for (const double blur : {0.08, 0.2, 0.45}) EXPECT_NEAR(mass(BallProfile(blur, 500)) / pi, 1, 2e-3);
 }
 
@@ -39,7 +39,7 @@ TEST(BallProfile, MassBetweenFollowsTheClosedForm) {
   }
 }
 
-TEST(BallProfile, SlopeMatchesNumbers) {
+TEST(BallProfile, SlopeAgreesWithDifferences) {
   const BallProfile profile(0.2, 2);
   const float h = 1.0f / 32;
   for (float s = h; s < profile.reach() - h; s += 0.013f) {
@@ -49,19 +49,19 @@ TEST(BallProfile, SlopeMatchesNumbers) {
   EXPECT_NEAR(profile.at(0).slope, 0, 0.03);
 }
 
-TEST(BallProfile, IsNoughtBeyondItsReach) {
+TEST(BallProfile, IsZeroBeyondItsReach) {
   const BallProfile profile(0.2, 2);
   EXPECT_EQ(profile.at(profile.reach() + 0.01f).value, 0);
   EXPECT_EQ(profile.at(1e6f).slope, 0);
   EXPECT_LT(profile.at(profile.reach() - 0.02f).value, 1e-3);
 }
 
-TEST(BallProfile, MatchesABallDrawnPixelByPixel) {
+TEST(BallProfile, AgreesWithARenderedBall) {
   const double radius = 12;
   for (const double absorbance : {0.2, 3.0}) {
     drawn::Shade shade(41, 41);
     drawn::add_ball(shade, {20.3, 19.8}, radius, 1.2, absorbance);
-    // A pixel's area widens the blur by its own variance, 1/12.
+    // The pixel aperture adds its variance, 1/12, to the blur.
     const BallProfile profile(std::sqrt(1.2 * 1.2 + 1.0 / 12) / radius, absorbance);
     for (int v = 0; v < 41; ++v)
       for (int u = 0; u < 41; ++u)

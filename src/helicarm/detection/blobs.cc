@@ -16,8 +16,8 @@ constexpr int levels_per_octave = 3;
 constexpr double first_sigma = 1.1;
 constexpr double ratio = 1.2599210498948732;  // 2^(1/3)
 
-/// Least answer worth a look: so many times the robust spread of the answers over a coarse grid (nought left
-/// out: black surround), but never more than a quarter of the strongest, for plates that are full of holes.
+/// Detection threshold: a multiple of the robust spread of the filter responses on a coarse grid (zeros
+/// excluded: black surround), but at most a quarter of the maximum, for plates full of holes.
 float threshold(const cv::Mat& view_image, double sigmas) {
   std::vector<float> values;
   for (int v = 3; v < view_image.rows; v += 5)

@@ -14,26 +14,26 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double absorbance = 3;
-constexpr double contrast = 0.5;  // the rest of the shadow is scatter
+constexpr double contrast = 0.5;  // reduced by scatter
 constexpr double quanta = 400;    // per pixel of open background
 constexpr double electronic = 3;  // in quanta
 constexpr double grey_per_quantum = 5;
 constexpr double focus_px = 0.6;
 
-constexpr int side = 96;  // of the square that holds one ball
+constexpr int side = 96;  // side of the square around one ball
 
 struct Situation {
   double radius;
-  double fwhm_px;  ///< of the detector's blur, which makes the noise of neighbours alike
+  double fwhm_px;  ///< detector blur, which correlates the noise of neighbouring pixels
 };
 
 double detector_sigma(const Situation& s) { return s.fwhm_px / 2.3548; }
 
-/// What decides the image, and may all be unknown: six of the background, then each ball's contrast,
-/// centre and radius.
+/// Image parameters, all taken as unknown: six of the background, then each ball's contrast, centre and
+/// radius.
 using Truth = Eigen::VectorXd;
 
-/// Expected quanta of a square with some balls, before the detector blurs them.
+/// Expected quanta in a square with some balls, before the detector blur.
 Image<float> expected(const Truth& truth) {
   Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
@@ -60,7 +60,7 @@ Image<float> blurred(Image<float> image, const Situation& s) {
 
 Image<float> exposed(const Image<float>& expected_quanta, const Situation& s, RandomStream& random) {
   Image<float> image = expected_quanta;
-  for (float& quantum : image.pixels())  // so many that Poisson's distribution is Gauss's
+  for (float& quantum : image.pixels())  // large counts: Poisson is approximated by a Gaussian
     quantum = std::max(0.f, quantum + std::sqrt(quantum) * static_cast<float>(random.normal()));
   image = blurred(std::move(image), s);
   for (float& grey : image.pixels())
@@ -69,8 +69,8 @@ Image<float> exposed(const Image<float>& expected_quanta, const Situation& s, Ra
   return image;
 }
 
-/// The bound on the first ball's standard deviation per axis from the pixels of the fit's own window, all
-/// else unknown.
+/// Cramer-Rao bound of the first ball's standard deviation per axis from the pixels of the fit's own window,
+/// all parameters unknown.
 double bound_px(const Truth& truth, const Situation& s, const DotFitOptions& options) {
   std::vector<std::pair<int, int>> pixels;
   for (int v = 0; v < side; ++v)
@@ -96,7 +96,7 @@ double bound_px(const Truth& truth, const Situation& s, const DotFitOptions& opt
       slopes(i, k) = double(high(u, v) - low(u, v)) / (2 * step);
     }
   }
-  // Two pixels share the quanta that fall between them; the quanta's density hardly changes over the blur.
+  // Neighbouring pixels share quanta through the blur; the quanta's density is nearly constant over it.
   const Image<float> mean = blurred(expected(truth), s);
   const double sigma = detector_sigma(s);
   cv::Mat taps(1, 1, CV_64F, cv::Scalar(1));
@@ -130,8 +130,7 @@ BallProfile profile_of(const Situation& s) {
   return BallProfile(std::hypot(focus_px, detector_sigma(s), std::sqrt(1.0 / 12)) / s.radius, absorbance);
 }
 
-/// Fits the first ball of many images: `fit(exposure, corner)` says how, the corner being that of its
-/// square.
+/// Fits the first ball of many images with `fit(exposure, corner)`; `corner` is that of its square.
 template <class Fit>
 Answer tried(const Situation& s, const std::vector<Vector2d>& further_balls, Fit&& fit) {
   RandomStream random(17, 3);
@@ -180,7 +179,7 @@ Dot start_at(const Vector2d& place, double radius) {
   return start;
 }
 
-/// For --gtest_output=xml.
+/// Properties for --gtest_output=xml.
 void record(const Answer& answer) {
   testing::Test::RecordProperty("error_over_bound", std::to_string(answer.over_bound));
   testing::Test::RecordProperty("error_over_sigma", std::to_string(answer.z));
@@ -188,7 +187,7 @@ void record(const Answer& answer) {
 
 class CentreLimit : public testing::TestWithParam<Situation> {};
 
-TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreTrue) {
+TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreCorrect) {
   const Situation s = GetParam();
   const BallProfile profile = profile_of(s);
   std::optional<NoiseCorrelation> noise;
@@ -211,7 +210,7 @@ INSTANTIATE_TEST_SUITE_P(BallsAndDetectors, CentreLimit,
 
 class OverlapLimit : public testing::TestWithParam<Situation> {};
 
-TEST_P(OverlapLimit, OverlapOfHalfARadiusCostsLittle) {
+TEST_P(OverlapLimit, OverlapOfHalfARadiusHasLittleEffect) {
   const Situation s = GetParam();
   const Vector2d beside = 1.5 * s.radius * Vector2d(0.8, 0.6);
   DotLook look{profile_of(s), {}};

@@ -7,22 +7,22 @@
 
 namespace helicarm {
 
-/// The image of a ball or of a hole, in raw pixels.
+/// Image of a ball or a hole, raw pixels.
 struct Dot {
   Eigen::Vector2d centre_px;  ///< sub-pixel
-  double sigma_px = 0;        ///< standard deviation of the centre by the noise, per axis
-  double jackknife_px = 0;    ///< how far the centre goes, per axis, when one side is left out
+  double sigma_px = 0;        ///< standard deviation of the centre per axis due to noise
+  double jackknife_px = 0;    ///< shift of the centre per axis when one sector is left out (jackknife)
   double radius_px = 0;
-  double contrast = 0;  ///< grey value of the background less that of the dot: negative for a bright dot
+  double contrast = 0;  ///< background minus dot grey value: negative for a bright dot
   double misfit = 0;    ///< rms of the fit's residual over |contrast|
 
-  /// Standard deviation of the centre, per axis: by the noise, or by the sides' contradiction where that is
-  /// more than chance.
+  /// Standard deviation of the centre per axis: from the noise, or from the jackknife where it is
+  /// significantly larger.
   double error_px() const;
 };
 
-/// A variance by the noise, or by a jackknife of eight groups where that is more than chance would have it
-/// (above the 95th percentile for two axes).
+/// Variance from the noise, or from a jackknife of eight groups where it is significantly larger (above the
+/// 95th percentile for two axes).
 inline double prior_variance(double noise, double jackknife) {
   constexpr double chance = 1.69;
   return jackknife > chance * noise ? jackknife : noise;

@@ -27,10 +27,9 @@ DotModel::DotModel(std::span<const BallProfile> profiles_of, const DotPatch& pat
 
 namespace {
 
-// Loops over pixels that GCC 12 shall vectorise stand in functions of their own: inlined, `__restrict` is
-// lost.
+// Loops that GCC 12 must vectorise are separate functions: inlining would lose `__restrict`.
 
-/// One dot's profile (negative) and its derivatives, not yet multiplied by what they change.
+/// One dot's profile (negative) and its derivatives, before scaling by contrast.
 [[gnu::noinline]] void draw_dot(std::size_t n, const float* __restrict xs, const float* __restrict ys,
                                 BallProfile::Table profile, const float* of_dot, float* __restrict covered,
                                 float* __restrict by_u, float* __restrict by_v, float* __restrict by_radius) {
@@ -51,7 +50,7 @@ namespace {
   }
 }
 
-/// The background, of which dots hide a share, off the grey values.
+/// Subtracts the background, of which dots hide a share, from the grey values.
 [[gnu::noinline]] void take_background(std::size_t n, const float* __restrict xs, const float* __restrict ys,
                                        const float* __restrict grey, const float* __restrict open,
                                        float per_window, const DotModel::Parameters& p,
@@ -93,7 +92,7 @@ void DotModel::evaluate(const DotPatch& patch, const Parameters& p) {
   float* residuals = row(parameters());
   Array left = array(residuals);
   Array open = array(open_.data());
-  Array change = array(scratch_.data());  // of the model by one dot's profile
+  Array change = array(scratch_.data());  // change of the model per unit profile of one dot
   open = 1;
   for (std::size_t k = 0; k < dots(); ++k) {
     const Index at = contrast_of(k);

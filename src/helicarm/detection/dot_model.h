@@ -12,9 +12,9 @@
 
 namespace helicarm {
 
-/// The image of a few dots on a quadratic background as a function of its parameters: background b0 bx by bxx
-/// bxy byy (patch coordinates in units of the window) and the hidden share; contrast, centre, radius of each
-/// dot; what the absorptions of each two dots have in common.
+/// Model of a few dots on a quadratic background. Parameters: background b0 bx by bxx bxy byy (patch
+/// coordinates in units of the window) and the hidden share; contrast, centre, radius of each dot; the
+/// overlap term of each pair of dots.
 struct DotModel {
   static constexpr Eigen::Index hidden = 6;
   static constexpr Eigen::Index first_dot = 7;
@@ -39,7 +39,7 @@ struct DotModel {
   void evaluate(const DotPatch& patch, const Parameters& p);
 
   std::span<const BallProfile> profiles;
-  PixelRows rows;  ///< the model's derivatives, and below them the residuals
+  PixelRows rows;  ///< the model's derivatives, then the residuals
   Eigen::Index parameters() const { return rows.rows() - 1; }
   const float* residual() const { return rows.row(parameters()).data(); }
 
@@ -51,7 +51,7 @@ struct DotModel {
 struct DotSums {
   DotModel::Normal normal;
   DotModel::Vector right;
-  double squares = 0;  ///< weighted, of the residuals
+  double squares = 0;  ///< weighted sum of squared residuals
 };
 
 DotSums accumulate(const DotModel& model, const DotPatch& patch);

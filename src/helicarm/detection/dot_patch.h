@@ -13,11 +13,11 @@
 
 namespace helicarm {
 
-/// Aligned, so that sums add up in the same order wherever they lie.
+/// Aligned, so that the order of summation does not depend on the address.
 using Floats = std::vector<float, Eigen::aligned_allocator<float>>;
 
-/// The pixels around dots as columns, octant by octant about the origin, filled up with weightless ones to a
-/// multiple of the registers' width.
+/// Pixels around dots as columns, ordered by octant about the origin and padded with zero-weight pixels to a
+/// multiple of the SIMD width.
 struct DotPatch {
   static constexpr std::size_t octants = 8;
   Eigen::Index count = 0;
@@ -25,14 +25,14 @@ struct DotPatch {
   Floats x, y;  ///< from the origin, px
   Floats grey, weight;
   std::vector<char> clipped;  ///< the true value is at least `grey`
-  std::vector<int> cell;      ///< place in a grid of width `side`
+  std::vector<int> cell;      ///< index in a grid of width `side`
   int side = 0;
   float inverse_window = 0;
   float scale = 1;  ///< grey values are divided by it
 };
 
-/// The pixels within the windows (about the origin u, v) and not within others. Nothing where too few are
-/// open.
+/// The pixels inside the windows (about the origin u, v) and outside the masked discs. Nothing if too few are
+/// usable.
 std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v,
                                          std::span<const Disc> windows, std::span<const Disc> others,
                                          const DotFitOptions& options);

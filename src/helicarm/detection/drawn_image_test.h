@@ -13,13 +13,13 @@
 #include "helicarm/image/opencv.h"
 #include "helicarm/xray/xray_image.h"
 
-/// For tests: images drawn by brute force, so that they share no model with what is tested.
+/// For tests: images rendered by brute force, independent of the models under test.
 namespace helicarm::drawn {
 
-using Shade = Image<float>;  ///< share of the rays that is absorbed, 0 .. 1
+using Shade = Image<float>;  ///< absorbed fraction of the rays, 0 .. 1
 
-/// Adds what `absorbed(x, y)` says at the places within `reach` of `middle`: sampled on a fine grid, blurred
-/// there and averaged over each pixel's area.
+/// Adds `absorbed(x, y)` within `reach` of `middle`: sampled on a fine grid, blurred there and averaged over
+/// each pixel.
 template <class Absorbed>
 void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double blur_px,
                Absorbed&& absorbed) {
@@ -41,7 +41,7 @@ void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double
       if (shade.contains(u0 + u, v0 + v)) shade(u0 + u, v0 + v) += small.at<float>(v, u);
 }
 
-/// A ball whose diameter has the given absorbance, 1 at the centre of the sharp image.
+/// A ball of the given absorbance along its diameter, 1 at the centre of the sharp image.
 inline void add_ball(Shade& shade, const Eigen::Vector2d& centre, double radius, double blur_px,
                      double absorbance) {
   add_shade(shade, centre, radius, blur_px, [&](double x, double y) {
@@ -54,7 +54,7 @@ struct Wire {
   Eigen::Vector2d from, to;
 };
 
-/// Round wires with flat ends, 0.9 at their axes; one behind the other takes its share of what is left.
+/// Round wires with flat ends, 0.9 at their axes; overlapping wires multiply their transmission.
 inline void add_wires(Shade& shade, const std::vector<Wire>& wires, double radius, double blur_px) {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Wire& wire : wires) middle += 0.5 / double(wires.size()) * (wire.from + wire.to);
@@ -79,7 +79,7 @@ inline void add_noise(Image<float>& image, double sigma, RandomStream& random) {
   for (float& grey : image.pixels()) grey += static_cast<float>(sigma * random.normal());
 }
 
-/// Grey values on an even background of 3000, of which the shade takes `contrast`; negative: brighter.
+/// Grey values on a uniform background of 3000, of which the shade takes `contrast`; negative: brighter.
 inline Image<float> grey(const Shade& shade, double contrast) {
   Image<float> image(shade.width(), shade.height());
   for (int v = 0; v < shade.height(); ++v)
@@ -88,7 +88,7 @@ inline Image<float> grey(const Shade& shade, double contrast) {
   return image;
 }
 
-/// An image of 12 bits, rounded and clipped as a file stores it.
+/// A 12-bit image, rounded and clipped as in a file.
 inline XrayImage xray_image(Image<float> image) {
   for (float& value : image.pixels()) value = std::clamp(std::round(value), 0.f, 4095.f);
   XrayImage xray_image;

@@ -17,9 +17,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int ring_steps = 90;  // over half a turn
+constexpr int ring_steps = 90;  // over 180 degrees
 
-/// Background b0 bx by bxx bxy byy; per wire depth, angle, offset; one width.
+/// Background b0 bx by bxx bxy byy; per wire depth, angle, offset; one common width.
 constexpr int n_background = 6;
 constexpr int n_parameters = n_background + 7;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
@@ -40,7 +40,7 @@ struct Arms {
   double depth;  ///< of the fainter
 };
 
-/// Directions in which the image is dark on both sides of a place, at two distances.
+/// Directions in which the image is dark on both sides of a position, at two distances.
 std::optional<Arms> arms_at(const Image<float>& image, const Vector2d& place, double radius, double sign,
                             const CrossOptions& options) {
   std::array<double, ring_steps> dark{};
@@ -84,7 +84,7 @@ struct Wire {
   double depth, angle, offset;
 };
 
-/// Value of one wire's profile (a Gaussian across) at a pixel, and its derivatives by angle, offset and
+/// One wire's profile (a Gaussian across) at a pixel, and its derivatives with respect to angle, offset and
 /// width.
 struct Across {
   double value, by_angle, by_offset, by_width;
@@ -112,7 +112,7 @@ struct Pixel {
 
 /// Whether a pixel lies outside the field or in its blurred rim.
 bool at_the_rim(const XrayImage& xray_image, int u, int v) {
-  constexpr int rim_px = 3;  // the screen's blur and the ramp of the field's edge
+  constexpr int rim_px = 3;  // screen blur and the ramp at the field's edge
   const float black =
       xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);  // as in usable.cc
   const Image<float>& image = xray_image.pixels;
@@ -172,7 +172,7 @@ std::optional<Dot> fit_wires(const XrayImage& xray_image, const Vector2d& start,
         const double y = pixel.y / window;
         const Across wa = across(a, p[12], pixel.x, pixel.y);
         const Across wb = across(b, p[12], pixel.x, pixel.y);
-        // Where the wires cross the second takes its share of what the first has left.
+        // At the crossing the second wire attenuates what the first transmits.
         const double left_b = 1 - std::clamp(a.depth / std::max(1e-9, std::abs(p[0])), 0.0, 0.9) * wa.value;
         Vector row;
         row << 1, x, y, x * x, x * y, y * y, -wa.value, -a.depth * wa.by_angle, -a.depth * wa.by_offset,
@@ -235,7 +235,7 @@ std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& o
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = 0.5 * options.min_width_px;
   blob_options.max_radius_px = 0.9 * options.max_width_px;
-  blob_options.max_elongation = 12;  // wires that cross at a slant
+  blob_options.max_elongation = 12;  // wires that cross obliquely
   const double sign = options.polarity == Polarity::dark ? 1 : -1;
   std::vector<Dot> crosses;
   for (const Dot& blob : find_blobs(xray_image.pixels, blob_options)) {

@@ -20,13 +20,13 @@ struct CrossOptions {
   double max_sigma_px = 0.5;
 };
 
-/// Crossings of two wires, each with the sub-pixel place where the wires' axes meet. `radius_px` is half the
-/// wires' width. Round dots, single wires and wire ends are no crossings; black pixels (outside
-/// the field) and those beside them tell nothing.
+/// Crossings of two wires with the sub-pixel intersection of their axes. `radius_px` is half the wires'
+/// width. Round dots, single wires and wire ends are not crossings; black pixels (outside the field) and
+/// those next to them are ignored.
 std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& options);
 
-/// The crossing near `start` (place, half width, contrast) of two wires that run about along the given angles
-/// (radians), or nothing where the pixels do not show one. The discs are left out.
+/// The crossing near `start` (centre, half width, contrast) of two wires at about the given angles (rad), or
+/// nothing if the pixels show none. Pixels in `discs` are masked.
 std::optional<Dot> fit_cross(const XrayImage& xray_image, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs);
 

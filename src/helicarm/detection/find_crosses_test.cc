@@ -30,7 +30,7 @@ std::vector<drawn::Wire> cross(const Vector2d& place, double first_deg, double s
   return {wire_through(place, first_deg), wire_through(place, second_deg)};
 }
 
-TEST(FindCrosses, PlaceIsWhereTheAxesMeet) {
+TEST(FindCrosses, CentreIsTheIntersectionOfTheAxes) {
   for (const double radius : {2.0, 3.2})
     for (const double between : {90.0, 65.0})
       for (const double turn : {0.0, 33.0, 71.0}) {
@@ -54,7 +54,7 @@ TEST(FindCrosses, BrightWires) {
   EXPECT_LT((found[0].centre_px - place).norm(), 0.05);
 }
 
-TEST(FindCrosses, DotsAreNone) {
+TEST(FindCrosses, DotsAreNotCrossings) {
   drawn::Shade shade(128, 128);
   drawn::add_ball(shade, {40, 40}, 3, 0.9, 3);
   drawn::add_ball(shade, {80, 60}, 6, 0.9, 3);
@@ -62,7 +62,7 @@ TEST(FindCrosses, DotsAreNone) {
   EXPECT_TRUE(find_crosses(noisy(shade), {}).empty());
 }
 
-TEST(FindCrosses, SingleWireIsNone) {
+TEST(FindCrosses, SingleWireIsNotACrossing) {
   for (const double turn : {0.0, 33.0, 71.0}) {
     drawn::Shade shade(128, 128);
     drawn::add_wires(shade, {wire_through({64.2, 63.1}, turn, 90)}, 3, 0.9);
@@ -70,7 +70,7 @@ TEST(FindCrosses, SingleWireIsNone) {
   }
 }
 
-TEST(FindCrosses, WireEndIsNone) {
+TEST(FindCrosses, WireEndIsNotACrossing) {
   for (const double turn : {0.0, 33.0, 71.0}) {
     drawn::Shade shade(128, 128);
     drawn::add_wires(shade, {wire_through({64.2, 63.1}, turn, 30)}, 3, 0.9);
@@ -82,7 +82,7 @@ TEST(FindCrosses, NoisyEmptyFieldHasNone) {
   EXPECT_TRUE(find_crosses(noisy(drawn::Shade(128, 128)), {}).empty());
 }
 
-TEST(FitCross, DiscOverAnArmIsLeftOut) {
+TEST(FitCross, DiscOverAnArmIsMasked) {
   const Vector2d place(64.3, 63.6);
   const Vector2d beside = place + Vector2d(9, 3);
   drawn::Shade shade(128, 128);
@@ -98,7 +98,7 @@ TEST(FitCross, DiscOverAnArmIsLeftOut) {
   EXPECT_LT((found->centre_px - place).norm(), 0.06);
 }
 
-TEST(FitCross, NothingWhereThereIsNone) {
+TEST(FitCross, NothingWithoutACrossing) {
   Dot start;
   start.centre_px = {64, 64};
   start.radius_px = 2.5;

@@ -9,7 +9,8 @@
 namespace helicarm {
 namespace {
 
-/// Noise of a linear image grows with its root, so the search runs on the root; a logarithmic one stays.
+/// The noise of a linear image grows with the root of the signal, so the search runs on the root; a
+/// logarithmic image is used as is.
 Image<float> even_noise(const XrayImage& xray_image) {
   Image<float> even = xray_image.pixels;
   if (!xray_image.acquisition.logarithmic.value_or(false))
@@ -17,7 +18,7 @@ Image<float> even_noise(const XrayImage& xray_image) {
   return even;
 }
 
-/// Of dots that lie in one another only the best stays.
+/// Of overlapping duplicates only the best is kept.
 std::vector<Dot> without_doubles(std::vector<Dot> dots) {
   std::stable_sort(dots.begin(), dots.end(), [](const Dot& a, const Dot& b) { return a.misfit < b.misfit; });
   std::vector<Dot> kept;
@@ -40,7 +41,8 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
   return discs;
 }
 
-/// Behind its neighbours' discs, or together with those that overlap it, whichever tells the centre better.
+/// Fits with the neighbours masked, or jointly with those that overlap, whichever gives the smaller centre
+/// error.
 std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotLook& look,
                          const std::vector<Dot>& neighbours) {
   auto best = fit_dot(xray_image.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options);
@@ -55,7 +57,7 @@ std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotL
   std::vector<BallProfile> profiles;
   std::vector<Disc> discs;
   for (const Dot& member : group) {
-    const double ratio = member.radius_px / dot.radius_px;  // of one metal, behind one blur
+    const double ratio = member.radius_px / dot.radius_px;  // same metal and blur
     profiles.emplace_back(look.profile.blur() / ratio, look.profile.absorbance() * ratio);
     const auto beside = discs_beside(member, others);
     discs.insert(discs.end(), beside.begin(), beside.end());
@@ -86,7 +88,7 @@ DotLook estimate_look(const XrayImage& xray_image, const NoiseCorrelation& noise
   if (dots.size() > sample) dots.resize(sample);
   const double radius = dots.empty() ? 5.0 : dots[dots.size() / 2].radius_px;
   DotFitOptions options = fit_options_for(xray_image);
-  options.rough = 0.1;  // the dots have been fitted before
+  options.rough = 0.1;  // the dots are already fitted
   double blur = 1;
   double absorbance = 2;
   const auto total = [&] {
@@ -133,11 +135,11 @@ std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& option
   blob_options.max_radius_px = options.max_radius_px;
   const std::vector<Dot> blobs = find_blobs(even_noise(xray_image), blob_options);
   DotFitOptions fit = fit_options_for(xray_image);
-  fit.tolerance = 0.1;  // the profile is only a guess so far, and so is the place
+  fit.tolerance = 0.1;  // profile and centre are only approximate here
   fit.margin_share = 0.35;
   fit.margin_px = 3.5;
   const double least_contrast = options.min_contrast_share * double(xray_image.highest - xray_image.lowest);
-  std::vector<BallProfile> profiles;  // by the radius' octave: the blur is about a pixel whatever the size
+  std::vector<BallProfile> profiles;  // per octave of the radius: the blur is about a pixel at any size
   for (double radius = 1.5; radius < 2 * options.max_radius_px; radius *= 1.5)
     profiles.emplace_back(1 / radius, 2.0);
   std::vector<Dot> dots;

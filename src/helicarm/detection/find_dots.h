@@ -19,32 +19,31 @@ struct DotOptions {
   double min_contrast_share = 0.012;  ///< contrast over the image's range of grey values
 };
 
-/// Fit options for one exposure: where its grey values are clipped.
+/// Fit options for one image: its clipping limits.
 DotFitOptions fit_options_for(const XrayImage& xray_image);
 
-/// How dots of one size and make look in one exposure.
+/// Appearance of dots of one size and material in one image.
 struct DotLook {
   BallProfile profile;
   DotFitOptions options;
 };
 
-/// The look that fits the given dots of one size best: blur and absorbance of least total sigma.
+/// The appearance (blur and absorbance of least total sigma) of the given dots of one size.
 DotLook estimate_look(const XrayImage& xray_image, const NoiseCorrelation& noise, std::vector<Dot> dots);
 
-/// All round dots of one polarity, each with the fitted sub-pixel centre, its standard deviation and its
-/// radius.
+/// All round dots of one polarity, each with sub-pixel centre, standard deviation and radius.
 std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& options);
 
-/// The dots that are none of `taken`: farther from each than 0.7 of the larger radius.
+/// The dots that are not in `taken`: farther from each than 0.7 of the larger radius.
 std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot>& taken);
 
-/// As `find_dots`, for a reader who wants no doubtful ones: dots of one size are fitted again with a look of
-/// their own, and what then stays uncertain (sigma over `clear_sigma_px`) is left out.
+/// Like `find_dots`, without uncertain dots: dots of one size are fitted again with their common appearance,
+/// and those with sigma over `clear_sigma_px` are dropped.
 std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& options,
                                  double clear_sigma_px = 0.15);
 
-/// Fits every dot again with the look of its kind and with its neighbours masked; those that fail are left
-/// out.
+/// Refits every dot with the appearance of its kind and its neighbours masked; dots whose fit fails are
+/// dropped.
 std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots, const DotLook& look,
                             const std::vector<Dot>& neighbours);
 

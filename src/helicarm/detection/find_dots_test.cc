@@ -18,7 +18,7 @@ struct Ball {
   double radius;
 };
 
-/// Balls of 2.7 to 13 px at odd places.
+/// Balls of 2.7 to 13 px at fractional positions.
 std::vector<Ball> some_balls() {
   std::vector<Ball> balls;
   RandomStream random(3, 1);
@@ -48,14 +48,14 @@ double distance(const std::vector<Dot>& dots, const Vector2d& place) {
   return least;
 }
 
-TEST(FindDots, FindsAllAndNothingElse) {
+TEST(FindDots, FindsAllBallsAndNothingElse) {
   const std::vector<Ball> balls = some_balls();
   const auto dots = find_dots(noisy(drawn::grey(shade_of(balls), 1200)), {});
   EXPECT_EQ(dots.size(), balls.size());
   for (const Ball& ball : balls) EXPECT_LT(distance(dots, ball.centre), 0.1) << ball.centre.transpose();
 }
 
-TEST(FindDots, RadiiAreTheBallsOwn) {
+TEST(FindDots, RadiiAgree) {
   const std::vector<Ball> balls = some_balls();
   for (const Dot& dot : find_dots(noisy(drawn::grey(shade_of(balls), 1200)), {})) {
     const auto ball = std::min_element(balls.begin(), balls.end(), [&](const Ball& a, const Ball& b) {
@@ -72,11 +72,11 @@ TEST(FindDots, NoisyEmptyFieldHasNone) {
   EXPECT_TRUE(find_dots(noisy(Image<float>(256, 256, 2000), 10), bright).empty());
 }
 
-TEST(FindDots, VeryNoisyEmptyFieldHasNextToNone) {
+TEST(FindDots, VeryNoisyEmptyFieldHasAlmostNone) {
   EXPECT_LE(find_dots(noisy(Image<float>(256, 256, 2000), 60), {}).size(), 5u);
 }
 
-TEST(FindDots, RoundFieldsEdgeIsNoDot) {
+TEST(FindDots, EdgeOfARoundFieldIsNotADot) {
   Image<float> image(256, 256);
   for (int v = 0; v < 256; ++v)
     for (int u = 0; u < 256; ++u)
@@ -96,18 +96,18 @@ TEST(FindDots, BrightHolesAreFoundAsBrightOnly) {
   EXPECT_TRUE(find_dots(xray_image, {}).empty());
 }
 
-TEST(FindDots, SingleWireIsNoDot) {
+TEST(FindDots, SingleWireIsNotADot) {
   drawn::Shade shade(256, 256);
   drawn::add_wires(shade, {{{-20, 40}, {276, 220}}}, 3, 0.9);
   EXPECT_TRUE(find_dots(noisy(drawn::grey(shade, 1200)), {}).empty());
 }
 
-TEST(FindDots, ImageTooSmallForAnyHasNone) {
+TEST(FindDots, ImageTooSmallHasNone) {
   EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(8, 8, 1000)), {}).empty());
   EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(1, 1, 1000)), {}).empty());
 }
 
-TEST(EstimateLook, RefitWithTheBallsOwnLookIsExact) {
+TEST(EstimateLook, RefitWithTheEstimatedLookIsExact) {
   std::vector<Ball> balls = some_balls();
   for (Ball& ball : balls) ball.radius = 6;
   const XrayImage xray_image = noisy(drawn::grey(shade_of(balls), 1200), 4);
@@ -119,12 +119,12 @@ TEST(EstimateLook, RefitWithTheBallsOwnLookIsExact) {
   for (const Ball& ball : balls) EXPECT_LT(distance(dots, ball.centre), 0.02);
 }
 
-TEST(EstimateLook, NoDotsGiveAnOrdinaryLook) {
+TEST(EstimateLook, WithoutDotsTheDefaultLookIsReturned) {
   const DotLook look = estimate_look(drawn::xray_image(Image<float>(64, 64, 1000)), {}, {});
   EXPECT_GT(look.profile.blur(), 0);
 }
 
-TEST(FindBlobs, DiscsPlaceAndSizeWithinAPixel) {
+TEST(FindBlobs, DiscPositionAndSizeWithinAPixel) {
   const std::vector<Ball> balls = some_balls();
   const auto blobs = find_blobs(drawn::grey(shade_of(balls), 1200), {});
   for (const Ball& ball : balls) {
@@ -135,7 +135,7 @@ TEST(FindBlobs, DiscsPlaceAndSizeWithinAPixel) {
   }
 }
 
-TEST(FindBlobs, StrongestFirstAndNoMoreThanAsked) {
+TEST(FindBlobs, StrongestFirstAndAtMostTheRequestedNumber) {
   BlobOptions options;
   options.max_count = 5;
   const auto blobs = find_blobs(drawn::grey(shade_of(some_balls()), 1200), options);

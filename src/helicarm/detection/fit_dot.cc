@@ -19,9 +19,9 @@ using Normal = DotModel::Normal;
 using Parameters = DotModel::Parameters;
 using Vector = DotModel::Vector;
 
-constexpr double least_contrast = 1e-4;  ///< as a share of the patch's mean: below, rounding errors speak
+constexpr double least_contrast = 1e-4;  ///< relative to the patch's mean: rounding errors dominate below
 
-/// Tukey's weights. The pixels' spread is taken as `least` at least.
+/// Tukey's weights. The pixels' spread is taken as at least `least`.
 float reweight(DotPatch& patch, const DotModel& model, float least) {
   const std::span residuals(model.residual(), static_cast<std::size_t>(patch.count));
   const float cut = tukey_cut(residuals, std::max(least, 1e-6f));
@@ -30,10 +30,10 @@ float reweight(DotPatch& patch, const DotModel& model, float least) {
   return cut;
 }
 
-/// What is known beforehand of the hidden share and of what overlapping dots have in common, as so many more
-/// observations. Returns what it adds to the normal matrix' diagonal.
+/// Priors of the hidden share and of the overlap terms, as additional observations. Returns their
+/// contribution to the normal matrix' diagonal.
 Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, const DotFitOptions& options) {
-  const double weight = sums.normal(0, 0);  // the background's level: every pixel counts once
+  const double weight = sums.normal(0, 0);  // of the background's level: every pixel counts once
   const double noise = sums.squares / std::max(1.0, weight - double(p.size()));
   Vector pull = Vector::Zero(p.size());
   const auto add = [&](Index k, double mean, double sigma) {
@@ -44,7 +44,7 @@ Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, con
   add(DotModel::hidden, options.hidden_share, options.hidden_sigma);
   for (std::size_t j = 0; j < model.dots(); ++j)
     for (std::size_t i = 0; i < j; ++i) {
-      // Nothing in a logarithmic image, the product of both shares in a linear one.
+      // 0 in a logarithmic image, the product of both shares in a linear one.
       const double both =
           double(p[DotModel::contrast_of(i)]) * double(p[DotModel::contrast_of(j)]) / double(p[0]);
       add(model.overlap_of(i, j), 0.5 * both, std::abs(both) + 1e-6);
@@ -52,15 +52,15 @@ Vector add_priors(DotSums& sums, const DotModel& model, const Parameters& p, con
   return pull;
 }
 
-/// Variances of a centre, mean of both axes.
+/// Variances of a centre, averaged over both axes.
 struct CentreError {
   double by_noise;
   double jackknife;
 };
 
-/// The spread of a centre when each octant in turn is left out (delete-a-group jackknife; `pulls`: what each
-/// pixel adds to a coordinate of the centre, `shares`: of the information about it). What is wrong on one
-/// side only, such as a wire or a shutter across the dot, shows here.
+/// Spread of a centre when each octant in turn is left out (delete-a-group jackknife; `pulls`: each pixel's
+/// contribution to a coordinate of the centre, `shares`: to the information about it). Detects one-sided
+/// disturbances such as a wire or a shutter across the dot.
 double jackknife_variance(const DotPatch& patch, const Eigen::ArrayXf& pulls, const Eigen::ArrayXf& shares) {
   constexpr double groups = DotPatch::octants;
   const double all = double(shares.sum());
@@ -78,12 +78,12 @@ double jackknife_variance(const DotPatch& patch, const Eigen::ArrayXf& pulls, co
   return (groups - 1) / groups * (squares - sum * sum / groups);
 }
 
-/// Errors of each dot's centre in a fit with Tukey's weights (Huber 1981) to noise that neighbours share and
-/// that is another behind a dot: what the noise does to the sums that the centre is made of.
+/// Errors of each dot's centre in a fit with Tukey's weights (Huber 1981) under noise that is correlated
+/// between pixels and differs behind a dot.
 std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& patch, const DotSums& sums,
                                        const Vector& pull, float cut, const NoiseCorrelation& noise) {
   using Array = Eigen::Map<const Eigen::ArrayXf>;
-  const auto n = static_cast<Index>(patch.weight.size());  // those that fill up have no weight
+  const auto n = static_cast<Index>(patch.weight.size());  // padding pixels have no weight
   const Array weight(patch.weight.data(), n);
   const Array residual(model.residual(), n);
   Eigen::ArrayXf behind = Eigen::ArrayXf::Zero(n);
@@ -93,10 +93,10 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
   const Eigen::ArrayXf pulls = (weight * residual).square();
   const Eigen::ArrayXf t = (residual / cut).square();
   const double used = double(counts.sum());
-  const double slopes = double((counts * (1 - t) * (1 - 5 * t)).sum());  // of weighted residuals by residuals
+  const double slopes = double((counts * (1 - t) * (1 - 5 * t)).sum());  // d weighted residual / d residual
   const double squares = double(pulls.sum());
   const double mean = squares / used;
-  // Straight line through the weighted residuals' squares.
+  // Linear fit of the squared weighted residuals.
   Eigen::Matrix2d sides;
   const double behind_sum = double((counts * behind).sum());
   sides << used, behind_sum, behind_sum, double((counts * behind.square()).sum());
@@ -106,7 +106,7 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
 
   const Index parameters = model.parameters();
   const Normal inverse = sums.normal.llt().solve(Normal::Identity(parameters, parameters));
-  // The centres as sums over pixels, side by side.
+  // Influence of each pixel on the centres.
   PixelRows influence(2 * static_cast<Index>(model.dots()), n);
   Eigen::VectorXd by_priors(influence.rows());
   Eigen::VectorXd jackknife(influence.rows());
@@ -122,7 +122,7 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
   influence.array().rowwise() *= level.transpose();
   const Eigen::MatrixXd spread = correlated_normal(noise, influence, patch.cell, patch.side);
   const Eigen::MatrixXd white = correlated_normal({}, influence, patch.cell, patch.side);
-  // What the fit takes from the residuals, more where neighbours are alike.
+  // Variance absorbed by the fit's parameters; larger for correlated noise.
   const double freedom = double(parameters) * spread.trace() / white.trace();
   const double variance = squares / std::max(0.1 * used, used - freedom) * (used * used) / (slopes * slopes);
   std::vector<CentreError> errors;
@@ -188,7 +188,7 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
     if (linear) hold(DotModel::hidden);
     return sums;
   };
-  // Background and contrasts first, at the given places.
+  // First a linear fit of background and contrasts at the given positions.
   model.evaluate(*patch, p);
   DotSums sums = equations(true);
   p += sums.normal.llt().solve(sums.right).cast<float>();

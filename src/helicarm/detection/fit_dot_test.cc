@@ -31,7 +31,7 @@ drawn::Shade ball(const Vector2d& centre, double radius) {
   return shade;
 }
 
-/// The ball takes a share of the background...
+/// The ball takes a share of the background.
 Image<float> multiplied(const drawn::Shade& shade, const Background& background, double share) {
   Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
@@ -39,7 +39,7 @@ Image<float> multiplied(const drawn::Shade& shade, const Background& background,
   return image;
 }
 
-/// ... or, in a logarithmic image, the same everywhere.
+/// Logarithmic image: the ball takes a constant.
 Image<float> subtracted(const drawn::Shade& shade, const Background& background, double contrast) {
   Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
@@ -51,7 +51,7 @@ BallProfile profile_for(double radius) {
   return BallProfile(std::sqrt(blur_px * blur_px + 1.0 / 12) / radius, absorbance);
 }
 
-/// From a rough start, as the search gives it.
+/// From an approximate start, as the search gives it.
 std::optional<Dot> fit(const Image<float>& image, const Vector2d& centre, double radius,
                        std::vector<Disc> others = {}, DotFitOptions options = {}) {
   Dot start;
@@ -64,7 +64,7 @@ double error(const std::optional<Dot>& dot, const Vector2d& centre) {
   return dot ? (dot->centre_px - centre).norm() : 1e9;
 }
 
-/// Greatest error over sub-pixel places.
+/// Largest error over sub-pixel positions.
 double worst(double radius, double noise, const std::function<Image<float>(const drawn::Shade&)>& image_of) {
   RandomStream random(5, 1);
   double most = 0;
@@ -80,7 +80,7 @@ double worst(double radius, double noise, const std::function<Image<float>(const
 
 class FitDotOfRadius : public testing::TestWithParam<double> {};
 
-TEST_P(FitDotOfRadius, EveryPhaseOnAnEvenBackground) {
+TEST_P(FitDotOfRadius, EveryPhaseOnAUniformBackground) {
   EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, even, 0.4); }), 0.02);
 }
 
@@ -88,11 +88,11 @@ TEST_P(FitDotOfRadius, SlopeUnderATransparentBall) {
   EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, sloping, 0.4); }), 0.02);
 }
 
-TEST_P(FitDotOfRadius, SlopeUnderABallThatTakesTheSameEverywhere) {
+TEST_P(FitDotOfRadius, SlopeUnderABallThatSubtractsAConstant) {
   EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return subtracted(shade, sloping, 800); }), 0.02);
 }
 
-TEST_P(FitDotOfRadius, BentBackground) {
+TEST_P(FitDotOfRadius, CurvedBackground) {
   EXPECT_LT(worst(GetParam(), 2, [](const auto& shade) { return subtracted(shade, bent, 800); }), 0.02);
   EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return multiplied(shade, bent, 0.4); }), 0.02);
 }
@@ -101,7 +101,7 @@ TEST_P(FitDotOfRadius, BrightDot) {
   EXPECT_LT(worst(GetParam(), 3, [](const auto& shade) { return subtracted(shade, even, -800); }), 0.02);
 }
 
-TEST_P(FitDotOfRadius, MaskedNeighbourDoesNotPull) {
+TEST_P(FitDotOfRadius, MaskedNeighbourHasNoEffect) {
   const double radius = GetParam();
   const Vector2d centre = middle + Vector2d(0.2, 0.4);
   const Vector2d other = centre + 2.1 * radius * Vector2d(0.8, 0.6);
@@ -121,7 +121,7 @@ TEST_P(FitDotOfRadius, SaturatedOnOneSide) {
   EXPECT_LT(error(fit(image, centre, radius, {}, options), centre), 0.05);
 }
 
-TEST_P(FitDotOfRadius, RadiusAndContrastAreTheDrawnOnes) {
+TEST_P(FitDotOfRadius, RadiusAndContrastAgree) {
   const auto dot = fit(subtracted(ball(middle, GetParam()), even, 800), middle, GetParam());
   ASSERT_TRUE(dot);
   EXPECT_NEAR(dot->radius_px / GetParam(), 1, 0.01);
@@ -129,7 +129,7 @@ TEST_P(FitDotOfRadius, RadiusAndContrastAreTheDrawnOnes) {
   EXPECT_LT(dot->misfit, 0.01);
 }
 
-TEST_P(FitDotOfRadius, SigmaIsHonest) {
+TEST_P(FitDotOfRadius, SigmaAgreesWithTheScatter) {
   const double radius = GetParam();
   RandomStream random(11, 2);
   double squares = 0;
@@ -153,7 +153,7 @@ TEST_P(FitDotOfRadius, SigmaIsHonest) {
 
 INSTANTIATE_TEST_SUITE_P(Radii, FitDotOfRadius, testing::Values(2.7, 5.5, 13.0));
 
-TEST(FitDot, KeepsTheRadiusWhereReported) {
+TEST(FitDot, KeepsTheRadiusIfRequested) {
   DotFitOptions options;
   options.free_radius = false;
   const auto dot = fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options);
@@ -162,43 +162,43 @@ TEST(FitDot, KeepsTheRadiusWhereReported) {
   EXPECT_LT(error(dot, middle), 0.02);
 }
 
-TEST(FitDot, RefusesAPlaceOutsideTheImage) {
+TEST(FitDot, PositionOutsideTheImageIsRefused) {
   const Image<float> image = subtracted(ball(middle, 5.5), even, 800);
   EXPECT_FALSE(fit(image, {-3, 20}, 5.5));
   EXPECT_FALSE(fit(image, {20, 200}, 5.5));
 }
 
-TEST(FitDot, RefusesABlankPatch) {
+TEST(FitDot, BlankPatchIsRefused) {
   EXPECT_FALSE(fit(subtracted(drawn::Shade(side, side), even, 0), middle, 5.5));
   EXPECT_FALSE(fit(Image<float>(side, side, 0), middle, 5.5));
 }
 
-TEST(FitDot, RefusesAPatchOutsideTheField) {
+TEST(FitDot, PatchOutsideTheFieldIsRefused) {
   DotFitOptions options;
   options.floor = 2500;
   EXPECT_FALSE(fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options));
 }
 
-TEST(FitDot, RefusesAPatchThatIsWhollyClipped) {
+TEST(FitDot, FullyClippedPatchIsRefused) {
   DotFitOptions options;
   options.ceiling = 1000;
   EXPECT_FALSE(fit(subtracted(ball(middle, 5.5), even, 800), middle, 5.5, {}, options));
 }
 
-TEST(FitDot, RefusesAStartWithoutRadius) {
+TEST(FitDot, StartWithoutRadiusIsRefused) {
   Dot start;
   start.centre_px = middle;
   EXPECT_FALSE(fit_dot(subtracted(ball(middle, 5.5), even, 800), start, profile_for(5.5), {}, {}));
 }
 
-/// A dark band over a part of one side of the ball, as a shutter's soft edge or a faint wire makes it.
+/// Dark band over part of one side of the ball, like a shutter's soft edge or a faint wire.
 Image<float> with_band(Image<float> image, double from_u, double depth) {
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) image(u, v) -= float(depth / (1 + std::exp(from_u - u)));
   return image;
 }
 
-TEST(FitDot, WhatOnlyOneSideSaysShowsInTheError) {
+TEST(FitDot, OneSidedDisturbanceRaisesTheError) {
   const Image<float> clean = multiplied(ball(middle, 9), even, 0.5);
   const auto undisturbed = fit(clean, middle, 9);
   const auto pulled = fit(with_band(clean, 38, 120), middle, 9);

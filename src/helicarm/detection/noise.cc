@@ -19,12 +19,12 @@ using Block = Eigen::Matrix<float, side, side, Eigen::RowMajor>;
 using Column = Eigen::Matrix<float, side * side, 1>;
 using Quadratic = Eigen::Matrix<float, side * side, 6>;
 
-/// Covariances in a block: at the distances along the axes, and summed over those of one or two pixels on
-/// both.
+/// Autocovariances in a block: at lags along the axes, and summed over lags of one or two pixels on both
+/// axes.
 struct Lags {
   std::array<double, reach + 1> along{};
   double across = 0;
-  float open = 0;  ///< pixels that are nothing but noise
+  float open = 0;  ///< number of pixels that contain only noise
 };
 
 /// Orthonormal columns that span all quadratics over a block.
@@ -41,7 +41,7 @@ const Quadratic& quadratics() {
   return columns;
 }
 
-/// From the pixels that are open (1, else 0).
+/// From the noise-only pixels (1, else 0).
 Lags lags_of(const Block& block, const Block& open) {
   const bool all_open = open.minCoeff() > 0;
   const auto covariance_at = [&](int dx, int dy) {
@@ -63,7 +63,7 @@ Lags lags_of(const Block& block, const Block& open) {
   return lags;
 }
 
-/// What taking off the quadratic takes of each lag, for noise of one per spatial frequency.
+/// Reduction of each lag by removing the quadratic, for unit noise per spatial frequency.
 const Lags& lags_of_quadratics() {
   static const Lags sum = [] {
     Lags lags;
@@ -86,8 +86,7 @@ std::optional<Lags> lags_of_block(const XrayImage& xray_image, int u, int v, flo
   if (block.minCoeff() <= floor || block.maxCoeff() >= ceiling) return std::nullopt;
   Eigen::Map<Column> grey(block.data());
   grey.array() -= grey.mean();
-  // A dot or a wire in the block is drawn in to the noise's reach until the quadratic passes it by (Huber
-  // 1981).
+  // Clips a dot or a wire in the block to the noise level until the quadratic is not affected (Huber 1981).
   Column fitted = Column::Zero();
   float cut = 1e30f;
   for (int pass = 0; pass < 3; ++pass) {
@@ -122,7 +121,7 @@ NoiseCorrelation noise_correlation(const XrayImage& xray_image, float floor, flo
       if (const auto lags = lags_of_block(xray_image, u, v, floor, ceiling)) all.push_back(*lags);
   NoiseCorrelation noise;
   if (all.size() < enough) return noise;
-  // The half with the least else in it.
+  // The half of the blocks with the most noise-only pixels.
   std::stable_sort(all.begin(), all.end(), [](const Lags& a, const Lags& b) { return a.open > b.open; });
   all.resize(std::max(enough, all.size() / 2));
   const auto typical = [&](auto&& of) {
@@ -134,16 +133,14 @@ NoiseCorrelation noise_correlation(const XrayImage& xray_image, float floor, flo
   for (std::size_t d = 1; d < along.size(); ++d)
     along[d] = typical([&](const Lags& lags) { return lags.along[d]; });
   const double across = typical([](const Lags& lags) { return lags.across; });
-  constexpr double least = 0.03;  // below, chance
+  constexpr double least = 0.03;  // below: statistical fluctuation
   if (along[1] + along[2] < least) return noise;
   const Lags& taken = lags_of_quadratics();
-  double origin =
-      0;  // of the noise's spectrum, where the quadratics lie; in units of the variance that is left
+  double origin = 0;  // noise spectrum at the quadratics' frequencies, relative to the remaining variance
   for (int pass = 0; pass < 4; ++pass) {
     const double variance = 1 + origin * taken.along[0];
     const auto whole = [&](std::size_t d) { return (along[d] + origin * taken.along[d]) / variance; };
-    // Two that lie across err together by share a_i a_j, along an axis by share a_i: the quotient is the
-    // share.
+    // Diagonal lags have correlation share a_i a_j, axial ones share a_i: the ratio gives the share.
     const double both = whole(1) + whole(2);
     const double both_across = std::max((across + origin * taken.across) / variance, both * both);
     const double share = std::max(both * both / both_across, whole(1));
@@ -163,7 +160,7 @@ Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows
   const std::vector<float> white(cells.size(), 1 - noise.share);
   Eigen::MatrixXd normal = weighted_products(rows, white);
   if (noise.share > 0) {
-    // A rim of `reach` cells on the right of each row and around all keeps every step inside the grid.
+    // A margin of `reach` cells right of each row and around the grid keeps every lag inside it.
     const int stride = width + reach;
     const int size = stride * (*std::max_element(cells.begin(), cells.end()) / width + 1);
     const int rim = reach * stride;

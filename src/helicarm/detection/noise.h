@@ -11,23 +11,23 @@
 
 namespace helicarm {
 
-/// How the noise of an image's pixels hangs together: the blur of a detector spreads each quantum over some
-/// pixels. Correlation at a distance of (i, j) pixels: share along[|i|] along[|j|], and 1 at (0, 0).
+/// Noise correlation between pixels due to detector blur: share along[|i|] along[|j|] at a lag of (i, j)
+/// pixels, and 1 at (0, 0).
 struct NoiseCorrelation {
   static constexpr int reach = 5;
-  float share = 0;  ///< of the variance that is blurred; the rest is white
+  float share = 0;  ///< fraction of the variance that is blurred; the rest is white
   std::array<float, reach + 1> along{1, 0, 0, 0, 0, 0};
 };
 
-/// The correlation that most of the image's blocks have, after a quadratic is taken off each. White where
-/// too few blocks lie inside the field.
+/// Correlation of most of the image's blocks after removing a quadratic from each. White if too few blocks
+/// lie inside the field.
 NoiseCorrelation noise_correlation(const XrayImage& xray_image, float floor, float ceiling);
 
-/// The same within the exposure's own limits.
+/// With the image's own limits.
 NoiseCorrelation noise_correlation(const XrayImage& xray_image);
 
-/// Sum over all pairs of pixels of their correlation times row_i row_j': what stands between two inverse
-/// normal matrices in a covariance. `cells`: each pixel's place in a grid of the given width, row by row.
+/// Sum over all pairs of pixels of their correlation times row_i row_j': the middle factor of the covariance
+/// between two inverse normal matrices. `cells`: each pixel's index in a grid of the given width, row by row.
 Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows& rows,
                                   std::span<const int> cells, int width);
 

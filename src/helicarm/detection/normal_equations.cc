@@ -12,7 +12,7 @@ using Eigen::Index;
 constexpr int lanes = 8;
 using Simd = Eigen::Array<float, lanes, 1>;
 
-// So many sums as fit the registers beside what they are made of.
+// As many sums as fit the registers besides their operands.
 constexpr int tall = 4;
 constexpr int wide = 3;
 
@@ -48,7 +48,7 @@ void add_tile(const Rows<tall>& left, const Rows<wide>& right, const float* weig
 }  // namespace
 
 Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> weights) {
-  constexpr Index block = 1024;  // floats sum up well over so many
+  constexpr Index block = 1024;  // float sums stay accurate over this many
   const Index n = rows.rows();
   const auto end = static_cast<Index>(weights.size());
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(n, n);
@@ -56,7 +56,7 @@ Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> 
     const Index count = std::min(block, end - start);
     for (Index i = 0; i < n; i += tall)
       for (Index j = 0; j < std::min(n, i + tall); j += wide) {
-        // Beyond the last row the last one again, for nothing.
+        // Past the last row, repeats the last row; the result is not used.
         Rows<tall> left;
         Rows<wide> right;
         for (Index a = 0; a < tall; ++a)

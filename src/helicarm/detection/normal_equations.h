@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// One row for each parameter, one column for each pixel.
+/// One row per parameter, one column per pixel.
 using PixelRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Sum over the pixels of weight * row_i * row_j, one weight for each pixel: the whole
-/// symmetric matrix. The order of the additions is fixed by the numbers of rows and pixels alone.
+/// Sum over the pixels of weight * row_i * row_j: the whole symmetric matrix. The order of summation depends
+/// only on the numbers of rows and pixels.
 Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> weights);
 
 }  // namespace helicarm

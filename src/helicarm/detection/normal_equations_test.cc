@@ -12,7 +12,7 @@ namespace {
 
 class WeightedProducts : public testing::TestWithParam<std::pair<int, int>> {};
 
-TEST_P(WeightedProducts, AreThoseOfTheMatrices) {
+TEST_P(WeightedProducts, AgreeWithMatrixProducts) {
   const auto [parameters, pixels] = GetParam();
   RandomStream random(5, 1);
   const PixelRows rows = PixelRows::NullaryExpr(parameters, pixels, [&] { return float(random.normal()); });
@@ -23,13 +23,13 @@ TEST_P(WeightedProducts, AreThoseOfTheMatrices) {
   EXPECT_LT((weighted_products(rows, weights) - plain).cwiseAbs().maxCoeff(), 1e-4 * (1 + plain.norm()));
 }
 
-// Tiles of 4 x 3 rows, 8 lanes and blocks of 1024 pixels, whole and cut.
+// Tiles of 4 x 3 rows, 8 SIMD elements and blocks of 1024 pixels, whole and partial.
 INSTANTIATE_TEST_SUITE_P(Sizes, WeightedProducts,
                          testing::Values(std::pair{1, 1}, std::pair{3, 7}, std::pair{4, 8},
                                          std::pair{12, 887}, std::pair{13, 1024}, std::pair{14, 1025},
                                          std::pair{29, 3001}));
 
-TEST(WeightedProducts, PixelsWithoutWeightCountForNothing) {
+TEST(WeightedProducts, PixelsOfZeroWeightAreIgnored) {
   PixelRows rows = PixelRows::Constant(2, 16, 3);
   rows.rightCols(8).setConstant(1e30f);
   std::vector<float> weights(16, 0);

@@ -8,8 +8,8 @@
 
 namespace helicarm {
 
-/// Beyond this residual Tukey's weight is nought: 4.7 robust standard deviations (95 % efficient for normal
-/// noise), of which each is taken as `least` at least. A few hundred residuals, evenly picked, stand for all.
+/// Residual at which Tukey's weight becomes 0: 4.7 robust standard deviations (95 % efficient for normal
+/// noise), each at least `least`. Estimated from a few hundred evenly spaced residuals.
 template <class Real>
 Real tukey_cut(std::span<const Real> residuals, Real least) {
   constexpr std::size_t enough = 400;
