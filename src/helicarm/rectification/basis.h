@@ -10,7 +10,7 @@ namespace helicarm {
 /// Number of monomials in two variables up to an order.
 constexpr Eigen::Index term_count(int order) { return (order + 1) * (order + 2) / 2; }
 
-/// 1, x, y, x^2, xy, y^2, x^3, ...: by degree, falling power of x.
+/// 1, x, y, x^2, xy, y^2, x^3, ...: by degree, falling powers of x.
 inline Eigen::VectorXd monomials(const Eigen::Vector2d& t, int order) {
   Eigen::VectorXd terms(term_count(order));
   terms[0] = 1;
@@ -22,7 +22,7 @@ inline Eigen::VectorXd monomials(const Eigen::Vector2d& t, int order) {
   return terms;
 }
 
-/// Rows: d/dx and d/dy of the monomials, one row a term.
+/// d/dx and d/dy of the monomials, one row per term.
 inline Eigen::MatrixX2d monomial_slopes(const Eigen::Vector2d& t, int order) {
   const Eigen::VectorXd lower = monomials(t, order);
   Eigen::MatrixX2d slopes = Eigen::MatrixX2d::Zero(term_count(order), 2);
@@ -34,18 +34,18 @@ inline Eigen::MatrixX2d monomial_slopes(const Eigen::Vector2d& t, int order) {
   return slopes;
 }
 
-/// Matern's covariance of smoothness 3/2: as rough between dots as real screens are.
+/// Matern covariance of smoothness 3/2: matches the roughness of real screens between dots.
 inline double kernel(double squared_distance, double length) {
   const double s = std::sqrt(3 * squared_distance) / length;
   return (1 + s) * std::exp(-s);
 }
 
-/// Its gradient over the offset.
+/// Its gradient with respect to the offset.
 inline double kernel_slope(double squared_distance, double length) {
   return -3 / (length * length) * std::exp(-std::sqrt(3 * squared_distance) / length);
 }
 
-/// Monomials followed by the kernels at the knots.
+/// Monomials, then the kernels at the knots.
 inline Eigen::VectorXd basis_row(const Eigen::Vector2d& t, int order, const Eigen::MatrixX2d& knots,
                                  double length) {
   const Eigen::Index terms = term_count(order);

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Pincushion of some 15 px at the edge of a 512 px image, a quadratic part and three kernels.
+/// About 15 px of pincushion at the edge of a 512 px image, a quadratic part and three kernels.
 DistortionMap curved_map() {
   DistortionMap map;
   map.model = "for this test";
@@ -45,13 +45,13 @@ DistortionMap curved_map() {
   return map;
 }
 
-TEST(Monomials, StandByDegreeInFallingPowersOfX) {
+TEST(Monomials, AreOrderedByDegreeInFallingPowersOfX) {
   const Eigen::VectorXd terms = monomials({2, 3}, 3);
   const Eigen::VectorXd expected = (Eigen::VectorXd(10) << 1, 2, 3, 4, 6, 9, 8, 12, 18, 27).finished();
   EXPECT_TRUE(terms.isApprox(expected, 1e-15)) << terms.transpose();
 }
 
-TEST(Monomials, SlopesMatchNumbers) {
+TEST(Monomials, SlopesAgreeWithDifferences) {
   const Vector2d t(0.37, -0.61);
   const double h = 1e-5;
   for (int order = 1; order <= 7; ++order)
@@ -62,7 +62,7 @@ TEST(Monomials, SlopesMatchNumbers) {
     }
 }
 
-TEST(DistortionMap, RawToRectifiedAndBackIsExact) {
+TEST(DistortionMap, RawToRectifiedRoundTripIsExact) {
   const DistortionMap map = curved_map();
   RandomStream random(1, 1);
   for (int k = 0; k < 500; ++k) {
@@ -73,7 +73,7 @@ TEST(DistortionMap, RawToRectifiedAndBackIsExact) {
   }
 }
 
-TEST(DistortionMap, JacobianMatchesNumbers) {
+TEST(DistortionMap, JacobianAgreesWithDifferences) {
   const DistortionMap map = curved_map();
   const double h = 1e-3;
   for (const Vector2d& place : {Vector2d(250, 260), Vector2d(30, 470), Vector2d(411.5, 77.25)})
@@ -85,11 +85,11 @@ TEST(DistortionMap, JacobianMatchesNumbers) {
     }
 }
 
-TEST(DistortionMap, FarOutsideThePlateHasNoRectifiedPlace) {
+TEST(DistortionMap, PointFarOutsideThePlateHasNoRectifiedPosition) {
   EXPECT_FALSE(curved_map().rectified_from_raw({1e4, -3e4}));
 }
 
-TEST(DistortionMap, SigmaIsTheBasisRowsForm) {
+TEST(DistortionMap, SigmaIsTheQuadraticFormOfTheBasisRow) {
   DistortionMap map = curved_map();
   const Eigen::VectorXd row = basis_row((Vector2d(100, 300) - map.centre) / map.scale, 3, map.knots, 0.3);
   EXPECT_NEAR(map.sigma_px({100, 300}), 1e-2 * row.norm(), 1e-12);
@@ -97,7 +97,7 @@ TEST(DistortionMap, SigmaIsTheBasisRowsForm) {
   EXPECT_EQ(map.sigma_px({100, 300}), 0);
 }
 
-TEST(DistortionMap, CarriesNothingThatIsOffTheImage) {
+TEST(DistortionMap, PointsOutsideTheImageAreNotMapped) {
   const DistortionMap map = curved_map();
   for (const Vector2d& raw : {Vector2d(-0.4, 100), Vector2d(511.4, 511.4), Vector2d(300, 200)}) {
     const auto there = rectified_in_image(map, raw);
@@ -110,14 +110,14 @@ TEST(DistortionMap, CarriesNothingThatIsOffTheImage) {
     EXPECT_FALSE(rectified_in_image(map, off));
   EXPECT_FALSE(raw_in_image(map, {530, 530}));
   EXPECT_FALSE(raw_in_image(map, {1e6, -1e6}));
-  DistortionMap folded = map;  // x beyond its fold leads back into the image
+  DistortionMap folded = map;  // x beyond its fold maps back into the image
   folded.coefficients(3, 0) = -100;
   const Vector2d beyond = folded.centre + folded.scale * Vector2d(2, 0);
   ASSERT_TRUE(folded.shows(folded.raw_from_rectified(beyond)));
   EXPECT_FALSE(raw_in_image(folded, beyond));
 }
 
-TEST(IdentityMap, LeavesPointsWhereTheyAre) {
+TEST(IdentityMap, LeavesPointsUnchanged) {
   const DistortionMap map = identity_map(640, 480, 0.2);
   EXPECT_TRUE(map.is_identity());
   EXPECT_EQ(map.raw_from_rectified({3.5, 7}), Vector2d(3.5, 7));
@@ -139,7 +139,7 @@ TEST(DistortionMapJson, RoundTripKeepsEveryBit) {
   }
 }
 
-TEST(DistortionMapJson, RefusesWhatDoesNotFitTogether) {
+TEST(DistortionMapJson, InconsistentFieldsAreRefused) {
   const Json sound = to_json(curved_map());
   const auto refused = [&](const char* key, Json value) {
     Json json = sound;

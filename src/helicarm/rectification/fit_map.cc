@@ -21,7 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-constexpr double centre_floor_px = 0.02;  // what a centre's own sigma does not know of
+constexpr double centre_floor_px = 0.02;  // centre error that the centre's own sigma does not include
 constexpr std::size_t max_knots = 240;
 
 struct Frame {
@@ -40,7 +40,7 @@ Frame frame_of(const std::vector<Vector2d>& places) {
   return {0.5 * (low + high), 0.5 * (high - low).maxCoeff()};
 }
 
-/// Points so thinned that at most `max_knots` are left, evenly spread.
+/// A thinned, evenly spread subset of at most `max_knots` points.
 MatrixX2d thinned(const std::vector<Vector2d>& points) {
   std::vector<Vector2d> kept = points;
   for (double gap = 0.05; kept.size() > max_knots; gap *= 1.05) {
@@ -54,7 +54,7 @@ MatrixX2d thinned(const std::vector<Vector2d>& points) {
   return knots;
 }
 
-/// Of the models of falling simplicity the last that earns its terms: whose held-out error is clearly less.
+/// Of models in the order of decreasing simplicity, the last whose held-out error is clearly smaller.
 template <class ModelOf>
 KrigingModel simplest_good(int low, int high, const ModelOf& model_of) {
   KrigingModel best = model_of(low);
@@ -66,7 +66,7 @@ KrigingModel simplest_good(int low, int high, const ModelOf& model_of) {
 }
 
 KrigingModel best_model(const KrigingData& data, const MatrixX2d& knots, const MapOptions& options) {
-  constexpr int cubic = 3;  // beyond the dots the trend alone speaks: it must not be wild
+  constexpr int cubic = 3;  // beyond the dots only the trend remains: it must extrapolate moderately
   const Index n = data.raw.rows();
   if (options.order) return polynomial_model(data, *options.order);
   int highest = 1;
@@ -102,7 +102,7 @@ KrigingData gather(const std::vector<Correspondence>& dots, const std::vector<Ve
   return data;
 }
 
-/// For each dot the nearest others, nearest first.
+/// For each dot its nearest neighbours, nearest first.
 std::vector<std::vector<std::size_t>> neighbours_of(const std::vector<Vector2d>& places) {
   const std::size_t count = std::min<std::size_t>(8, places.size() - 1);
   std::vector<std::vector<std::size_t>> neighbours(places.size());
@@ -118,8 +118,8 @@ std::vector<std::vector<std::size_t>> neighbours_of(const std::vector<Vector2d>&
   return neighbours;
 }
 
-/// Drops dots that their neighbours contradict, the gravest first (of many dots, several at a time). What
-/// neighbours share is a bump of the screen.
+/// Rejects dots inconsistent with their neighbours, largest residual first (of many dots, several at a time).
+/// A deviation shared by neighbours is local distortion of the screen, not an outlier.
 void reject_outliers(const std::vector<Correspondence>& dots, const std::vector<Vector2d>& places,
                      const Frame& frame, std::vector<bool>& used) {
   const auto neighbours = neighbours_of(places);
@@ -192,13 +192,14 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   MapFit fit;
   fit.used.assign(dots.size(), true);
   const auto too_few = [&] {
-    return fail(Reason::plate_not_found, fmt::format("{} plate dots carry no rectification", dots.size()),
+    return fail(Reason::plate_not_found,
+                fmt::format("{} plate dots do not determine a rectification", dots.size()),
                 {{"dots_found", double(dots.size())}});
   };
   const int least_order = options.order.value_or(1);
   if (static_cast<Index>(dots.size()) < std::max<Index>(6, term_count(least_order) + 2)) return too_few();
 
-  // First on the plate, to learn the scale and turn at the middle of the image.
+  // First in plate coordinates, to obtain scale and rotation at the image centre.
   std::vector<Vector2d> places = places_of(dots);
   Frame frame = frame_of(places);
   if (!(frame.scale > 0)) return too_few();
@@ -222,7 +223,7 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   const Matrix2d turn = svd.matrixU() * svd.matrixV().transpose();
   if (!middle_mm.allFinite() || !(px_per_mm > 0)) return too_few();
 
-  // Then in rectified pixels: raw scale and no turn at the middle.
+  // Then in rectified pixels: raw scale and no rotation at the image centre.
   fit.rectified_from_plate.linear() = px_per_mm * turn;
   fit.rectified_from_plate.translation() = middle - px_per_mm * (turn * middle_mm);
   for (Vector2d& place : places) place = fit.rectified_from_plate * place;

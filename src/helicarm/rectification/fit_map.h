@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// Where a plate dot is on the plate and in the raw image.
+/// A plate dot: position on the plate and in the raw image.
 struct Correspondence {
   Eigen::Vector2d place_mm;
   Eigen::Vector2d raw_px;
@@ -20,7 +20,7 @@ struct Correspondence {
 struct MapOptions {
   std::optional<int> order;  ///< fixed order, 1..7; otherwise chosen by held-out error
   int max_order = 7;
-  bool remainder = true;  ///< allow the smooth remainder on top of the polynomial
+  bool remainder = true;  ///< allow the smooth remainder in addition to the polynomial
   bool reject_outliers = true;
 };
 
@@ -32,9 +32,9 @@ struct MapFit {
   Eigen::Affine2d rectified_from_plate = Eigen::Affine2d::Identity();  ///< a similarity
 };
 
-/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder are those of least held-out error,
-/// each dot being predicted by the others (closed form of leave-one-out). plate_not_found below 6
-/// correspondences or when they do not carry an affine map.
+/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder minimise the held-out error of
+/// each dot predicted from the others (closed-form leave-one-out). plate_not_found below 6 correspondences or
+/// if they do not determine an affine map.
 Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
                          const MapOptions& options);
 

@@ -18,7 +18,7 @@ using Bend = std::function<Vector2d(const Vector2d&)>;
 
 constexpr int side = 512;
 
-/// A plate of n x n dots, 2 px a millimetre and turned by 0.1 rad; `bend` acts on (-1 .. 1)^2, in px.
+/// Plate of n x n dots, 2 px per mm, rotated by 0.1 rad; `bend` acts on (-1 .. 1)^2, in px.
 std::vector<Correspondence> plate(int n, const Bend& bend, double noise = 0, std::uint64_t seed = 1) {
   RandomStream random(seed, 3);
   std::vector<Correspondence> dots;
@@ -59,7 +59,7 @@ TEST(FitMap, ExactOnPolynomialData) {
   EXPECT_LT(fit->map.held_out_rms_px, 1e-8);
 }
 
-TEST(FitMap, RectifiedDotsAreThePlateTurnedAndScaled) {
+TEST(FitMap, RectifiedDotsAreThePlateRotatedAndScaled) {
   const auto dots = plate(7, pincushion);
   const auto fit = fit_map(dots, side, side, fixed(3));
   ASSERT_TRUE(fit);
@@ -69,7 +69,7 @@ TEST(FitMap, RectifiedDotsAreThePlateTurnedAndScaled) {
               1e-8);
 }
 
-TEST(FitMap, RawScaleAndNoTurnAtTheMiddle) {
+TEST(FitMap, RawScaleAndNoRotationAtTheCentre) {
   const auto fit = fit_map(plate(7, pincushion), side, side, fixed(3));
   ASSERT_TRUE(fit);
   EXPECT_LT((fit->map.jacobian({255.5, 255.5}) - Eigen::Matrix2d::Identity()).norm(), 1e-6);
@@ -119,7 +119,7 @@ TEST(FitMap, ChoosesTheOrderOfTheData) {
   EXPECT_EQ(fit_map(plate(9, pincushion, 0.05), side, side, options)->map.order, 3);
 }
 
-TEST(FitMap, QuadraticLeavesMuchOfAPincushion) {
+TEST(FitMap, QuadraticLeavesMostOfAPincushion) {
   const auto second = fit_map(plate(7, pincushion), side, side, fixed(2));
   ASSERT_TRUE(second);
   EXPECT_GT(second->map.residual_rms_px, 0.5);
@@ -141,7 +141,7 @@ TEST(FitMap, RemainderFollowsALocalBump) {
   EXPECT_LT(most, 0.1);
 }
 
-/// Displacements (px, both axes) drawn from a Matern field of the given length at places of (-1 .. 1)^2.
+/// Displacements (px, both axes) from a Matern field of the given length at positions in (-1 .. 1)^2.
 Eigen::MatrixX2d drawn_field(const std::vector<Vector2d>& places, double length, double sigma,
                              RandomStream& random) {
   const auto n = static_cast<Eigen::Index>(places.size());
@@ -155,7 +155,7 @@ Eigen::MatrixX2d drawn_field(const std::vector<Vector2d>& places, double length,
   return covariance.llt().matrixL() * white;
 }
 
-TEST(FitMap, ErrorBetweenDotsIsAsLargeAsReported) {
+TEST(FitMap, ErrorBetweenDotsAgreesWithTheReportedSigma) {
   constexpr int draws = 40;
   const auto dots = plate(7, pincushion);
   const auto between = plate(6, pincushion);
@@ -184,7 +184,7 @@ TEST(FitMap, ErrorBetweenDotsIsAsLargeAsReported) {
   EXPECT_LT(z, 1.15);
 }
 
-TEST(FitMap, FarFromEveryDotTheRemainderIsAsUncertainAsBefore) {
+TEST(FitMap, FarFromDotsTheRemainderHasItsPriorUncertainty) {
   const auto fit = fit_map(plate(7, bumpy, 0.05), side, side, {});
   ASSERT_TRUE(fit);
   const double at_a_dot = fit->map.sigma_px(fit->rectified_from_plate * Vector2d(0, 0));
@@ -194,7 +194,7 @@ TEST(FitMap, FarFromEveryDotTheRemainderIsAsUncertainAsBefore) {
   EXPECT_GT(outside, 5 * between);
 }
 
-TEST(FitMap, NeighboursOfADotShareItsError) {
+TEST(FitMap, ErrorIsCorrelatedWithNeighbouringDots) {
   const auto fit = fit_map(plate(7, bumpy, 0.05), side, side, {});
   ASSERT_TRUE(fit);
   std::vector<Vector2d> places;
@@ -205,7 +205,7 @@ TEST(FitMap, NeighboursOfADotShareItsError) {
   EXPECT_LT(std::abs(covariance(0, 2)), 0.3 * covariance(0, 0));
 }
 
-TEST(FitMap, OutliersAreRejectedAndNothingElse) {
+TEST(FitMap, OnlyOutliersAreRejected) {
   auto dots = plate(7, pincushion, 0.04);
   dots[10].raw_px += Vector2d(4, -3);
   dots[37].raw_px += Vector2d(-1.5, 0.5);
@@ -216,7 +216,7 @@ TEST(FitMap, OutliersAreRejectedAndNothingElse) {
   EXPECT_LT(fit->map.residual_max_px, 0.2);
 }
 
-TEST(FitMap, KeepsOutliersWhereReported) {
+TEST(FitMap, KeepsOutliersIfRequested) {
   auto dots = plate(7, pincushion);
   dots[10].raw_px += Vector2d(4, -3);
   const auto fit = fit_map(dots, side, side, fixed(3));
@@ -247,7 +247,7 @@ TEST(FitMap, DotsInOnePlaceAreRefused) {
   EXPECT_EQ(fit_map(same, side, side, {}).error().reason, Reason::plate_not_found);
 }
 
-TEST(FitMap, SigmaCoversTheMapsOwnError) {
+TEST(FitMap, SigmaCoversTheErrorOfTheMap) {
   const auto exact = plate(24, pincushion);
   double squares = 0;
   int count = 0;
@@ -267,7 +267,7 @@ TEST(FitMap, SigmaCoversTheMapsOwnError) {
   EXPECT_LT(ratio, 1.25);
 }
 
-TEST(FitMap, HullHoldsTheUsedDots) {
+TEST(FitMap, HullContainsTheUsedDots) {
   const auto fit = fit_map(plate(7, straight), side, side, fixed(1));
   ASSERT_TRUE(fit);
   EXPECT_LT((fit->map.hull_low - fit->rectified_from_plate * Vector2d(-110, 110)).x(), 1e-9);

@@ -11,7 +11,7 @@
 namespace helicarm {
 
 Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots) {
-  constexpr double rim_px = 2;  // the blur about a dot
+  constexpr double rim_px = 2;  // blur around a dot
   constexpr int reach_px = 3;
   Image<std::uint8_t> hidden(image.width(), image.height());
   cv::Mat mask = as_mat(hidden);
@@ -22,7 +22,7 @@ Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots) 
   }
   Image<float> filled = image;
   cv::Mat target = as_mat(filled);
-  // Patch by patch: over a whole image of holes OpenCV's front is a list that it walks from the start.
+  // Patch by patch: for a whole image of holes OpenCV's front is a list searched from its start.
   cv::Mat labels;
   cv::Mat boxes;
   cv::Mat centroids;

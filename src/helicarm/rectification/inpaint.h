@@ -8,8 +8,8 @@
 
 namespace helicarm {
 
-/// A copy of the image with the dots hidden: filled from their rims inwards by fast marching (2.1, step 4;
-/// Telea 2004). For the eye only: nothing is ever measured on it.
+/// A copy of the image with the dots filled from their rims by fast marching (2.1, step 4; Telea 2004). For
+/// display only, never for measurement.
 Image<float> inpainted(const Image<float>& image, const std::vector<Dot>& dots);
 
 }  // namespace helicarm

@@ -25,7 +25,7 @@ TEST(Inpainted, DotOnASlopeIsFilledWithTheSlope) {
     for (int u = 0; u < 80; ++u) EXPECT_NEAR(filled(u, v), 1000 + 4 * u, 25) << u << ' ' << v;
 }
 
-TEST(Inpainted, PixelsAwayFromTheDotsStayAsTheyWere) {
+TEST(Inpainted, PixelsAwayFromTheDotsAreUnchanged) {
   Image<float> image(80, 60);
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u) image(u, v) = float((u * 37 + v * 91) % 256);

@@ -16,7 +16,7 @@ using Eigen::MatrixX2d;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// `penalty` (none: 0 x 0) is that of the last coefficients.
+/// `penalty` (none: 0 x 0) applies to the last coefficients.
 LinearFit solve(const KrigingData& data, const MatrixXd& rows, const MatrixXd& penalty) {
   const MatrixX2d& raw = data.raw;
   const VectorXd& weights = data.weights;
@@ -68,16 +68,16 @@ MatrixXd gram_of(const MatrixX2d& knots, double length) {
   return gram;
 }
 
-/// How rough the remainder is and how noisy the dots are, as likely as they come.
+/// Maximum-likelihood estimate of the remainder's strength and the dots' noise.
 struct Roughness {
   double length = 0;
-  double gain = 0;      ///< remainder's variance over that of a dot of weight one
+  double gain = 0;      ///< remainder's variance relative to that of a dot of weight one
   double variance = 0;  ///< of a dot of weight one, px^2
   double misfit = std::numeric_limits<double>::infinity();  ///< -2 log of the restricted likelihood
 };
 
-/// The restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, the trend projected
-/// out, over gains; the dots' own sigmas are believed to within a factor of 1.5.
+/// Restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, with the trend projected
+/// out, maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
 Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const MatrixXd& gram, double length) {
   constexpr double log_variance_sigma = 0.8;
   const Index knots = gram.rows();
@@ -95,7 +95,7 @@ Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const Matr
   const double freedom = 2.0 * double(rows.rows() - terms);
   Roughness best;
   for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
-    // y' (I + gain K K')^-1 y and log det (I + gain K K') of both axes, by the modes of K'K.
+    // y' (I + gain K K')^-1 y and log det (I + gain K K') for both axes, in the eigenbasis of K'K.
     double energy = raw.squaredNorm();
     double log_determinant = 0;
     for (Index k = 0; k < knots; ++k) {
@@ -140,7 +140,7 @@ KrigingModel smooth_model(const KrigingData& data, int order, const MatrixX2d& k
   const MatrixXd gram = gram_of(knots, best.length);
   KrigingModel model{order, best.length, std::sqrt(best.gain * best.variance),
                      solve(data, rows_for(data, order, knots, best.length), gram / best.gain)};
-  // What the dots leave of the remainder's own variance: see DistortionMap::coefficient_covariance.
+  // Reduction of the remainder's prior variance by the dots: see DistortionMap::coefficient_covariance.
   MatrixXd& covariance = model.fit.covariance;
   covariance *= best.variance;
   covariance.bottomRightCorner(gram.rows(), gram.cols()) -=

@@ -14,13 +14,13 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector2i;
 
-/// Dots in square cells, for neighbours in constant time.
+/// Dots in square cells, for constant-time neighbour search.
 class Cells {
  public:
   Cells(const std::vector<Dot>& dots, double size) : dots_(dots), size_(size) {
     for (std::size_t i = 0; i < dots.size(); ++i) cells_[key(dots[i].centre_px)].push_back(i);
   }
-  /// Nearest dot to a place within `reach` (at most the cell size), or -1.
+  /// Nearest dot to a position within `reach` (at most the cell size), or -1.
   int nearest(const Vector2d& place, double reach) const {
     int best = -1;
     double least = reach;
@@ -59,7 +59,7 @@ double commonest_spacing(const std::vector<Dot>& dots) {
     nearest.push_back(least);
   }
   std::sort(nearest.begin(), nearest.end());
-  // The densest stretch: most values within 8 % of one another.
+  // The densest interval: most values within 8 % of one another.
   std::size_t most = 0;
   double spacing = 0;
   for (std::size_t i = 0, j = 0; i < nearest.size(); ++i) {
@@ -83,7 +83,7 @@ struct Seed {
   double misfit;
 };
 
-/// Dots whose neighbours stand where the lattice says, best first.
+/// Dots whose neighbours match the lattice, best first.
 std::vector<Seed> seeds(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, double pitch,
                         double tolerance) {
   const double turn = kind == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
@@ -124,7 +124,7 @@ struct IndexLess {
 };
 using Places = std::map<Vector2i, std::size_t, IndexLess>;
 
-/// Local step vectors at a placed dot, from its placed neighbours where there are any, else inherited.
+/// Local step vectors at a placed dot, from its placed neighbours if there are any, else inherited.
 struct Frame {
   Vector2d a, b;
 };
@@ -139,7 +139,7 @@ Places grow(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, doub
   frames[{0, 0}] = {seed.a, seed.b};
   taken[seed.dot] = true;
   const auto refined = [&](const Vector2i& at, Frame frame) {
-    // Differences to placed neighbours, blended with what was inherited.
+    // Differences to placed neighbours, averaged with the inherited vectors.
     Vector2d sum_a = frame.a;
     Vector2d sum_b = frame.b;
     int na = 1;

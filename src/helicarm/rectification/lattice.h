@@ -12,28 +12,27 @@
 
 namespace helicarm {
 
-/// A dot with its place on the lattice: position = index.x() a + index.y() b.
+/// A dot with its lattice index: position = index.x() a + index.y() b.
 struct IndexedDot {
-  std::size_t dot;  ///< place in the list that was searched
+  std::size_t dot;  ///< index in the input list
   Eigen::Vector2i index;
 };
 
 struct LatticeOptions {
-  std::optional<double> pitch_px;  ///< where known; otherwise the commonest distance between neighbours
+  std::optional<double> pitch_px;  ///< if known; otherwise the most frequent distance between neighbours
   double pitch_tolerance = 0.12;   ///< relative, when the pitch is known
-  double match_tolerance = 0.22;   ///< of a dot to its predicted place, in pitches
-  int max_gap = 3;                 ///< missing dots in a row that are bridged
+  double match_tolerance = 0.22;   ///< distance of a dot from its predicted position, in pitches
+  int max_gap = 3;                 ///< consecutive missing dots that are bridged
 };
 
 struct IndexedLattice {
   std::vector<IndexedDot> dots;
-  double pitch_px = 0;  ///< mean near the middle
+  double pitch_px = 0;  ///< mean near the image centre
 };
 
-/// Places dots on a distorted lattice, with dots missing or extra, from the images's geometry alone: a
-/// regular neighbourhood is taken as the seed and grown with the local spacing. The lattice axes are the ones
-/// nearest to +u and (square) +v, or (hexagonal) 60 degrees on from it. Fewer than 5 dots in place: an empty
-/// lattice.
+/// Indexes dots of a distorted lattice with missing and extra dots, from the image geometry alone: a regular
+/// neighbourhood is the seed and is grown with the local spacing. The lattice axes are those nearest to +u
+/// and (square) +v, or (hexagonal) 60 degrees from it. Fewer than 5 indexed dots give an empty lattice.
 IndexedLattice index_lattice(const std::vector<Dot>& dots, Lattice kind, const LatticeOptions& options);
 
 /// Lattice coordinates of an index in pitches: square (i, j); hexagonal (i + j/2, j sqrt(3)/2).

@@ -17,17 +17,18 @@ using Eigen::Vector2i;
 
 struct Scatter {
   std::vector<Dot> dots;
-  std::vector<Vector2i> index;  ///< of the first dots; the rest are strays
+  std::vector<Vector2i> index;  ///< of the first dots; the rest are extra
   double pitch;
 };
 
 struct Trouble {
-  double missing = 0.3;  ///< share of the lattice
-  double extra = 0.3;    ///< strays over dots left
+  double missing = 0.3;  ///< fraction of the lattice
+  double extra = 0.3;    ///< extra dots relative to those left
   double pincushion_px = 15;
 };
 
-/// A field of 1000 px with a lattice of about 9 x 9, in any order of turn that leaves its axes named alike.
+/// A field of 1000 px with a lattice of about 9 x 9, rotated within the range that keeps the axes'
+/// assignment.
 Scatter scatter(Lattice kind, const Trouble& trouble, std::uint64_t seed) {
   RandomStream random(seed, 1);
   Scatter made;
@@ -56,11 +57,11 @@ Scatter scatter(Lattice kind, const Trouble& trouble, std::uint64_t seed) {
 
 struct Score {
   int right = 0;
-  int wrong = 0;   ///< a lattice dot under another's index
-  int strays = 0;  ///< placed
+  int wrong = 0;   ///< lattice dots with a wrong index
+  int strays = 0;  ///< extra dots that were indexed
 };
 
-/// Right up to the commonest shift.
+/// Correct up to the most frequent shift.
 Score score(const Scatter& made, const IndexedLattice& lattice) {
   std::map<std::pair<int, int>, int> shifts;
   for (const IndexedDot& d : lattice.dots)
@@ -81,7 +82,7 @@ Score score(const Scatter& made, const IndexedLattice& lattice) {
 
 class IndexLatticeOf : public testing::TestWithParam<Lattice> {};
 
-TEST_P(IndexLatticeOf, CleanLatticeIsIndexedWhole) {
+TEST_P(IndexLatticeOf, CleanLatticeIsIndexedCompletely) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const Scatter made = scatter(GetParam(), {0, 0, 15}, seed);
     const Score s = score(made, index_lattice(made.dots, GetParam(), {}));
@@ -89,7 +90,7 @@ TEST_P(IndexLatticeOf, CleanLatticeIsIndexedWhole) {
   }
 }
 
-TEST_P(IndexLatticeOf, PitchIsTheOneDrawn) {
+TEST_P(IndexLatticeOf, PitchAgrees) {
   const Scatter made = scatter(GetParam(), {0, 0, 0}, 3);
   EXPECT_NEAR(index_lattice(made.dots, GetParam(), {}).pitch_px / made.pitch, 1, 0.02);
 }
@@ -103,7 +104,7 @@ TEST_P(IndexLatticeOf, ThirdMissingThirdExtraAndDistorted) {
   }
 }
 
-TEST_P(IndexLatticeOf, KnownPitchServesAsWell) {
+TEST_P(IndexLatticeOf, KnownPitchGivesTheSame) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const Scatter made = scatter(GetParam(), {}, seed);
     LatticeOptions options;
@@ -114,7 +115,7 @@ TEST_P(IndexLatticeOf, KnownPitchServesAsWell) {
   }
 }
 
-TEST_P(IndexLatticeOf, NoIndexAndNoDotTwice) {
+TEST_P(IndexLatticeOf, IndicesAndDotsAreUnique) {
   const Scatter made = scatter(GetParam(), {}, 7);
   std::map<std::pair<int, int>, int> places;
   std::map<std::size_t, int> dots;
@@ -130,13 +131,13 @@ INSTANTIATE_TEST_SUITE_P(Kinds, IndexLatticeOf, testing::Values(Lattice::square,
                            return kind.param == Lattice::square ? "Square" : "Hexagonal";
                          });
 
-TEST(IndexLattice, AFewDotsAreNoLattice) {
+TEST(IndexLattice, FewDotsGiveNoLattice) {
   EXPECT_TRUE(index_lattice({}, Lattice::square, {}).dots.empty());
   const Scatter made = scatter(Lattice::square, {0, 0, 0}, 1);
   EXPECT_TRUE(index_lattice({made.dots.begin(), made.dots.begin() + 4}, Lattice::square, {}).dots.empty());
 }
 
-TEST(IndexLattice, AllDotsInOnePlaceAreNoLattice) {
+TEST(IndexLattice, CoincidentDotsGiveNoLattice) {
   EXPECT_TRUE(index_lattice(std::vector<Dot>(50), Lattice::square, {}).dots.empty());
 }
 

@@ -14,12 +14,12 @@ std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float 
                                  double max_radius_px) {
   cv::Mat filtered;
   cv::medianBlur(as_mat(image), filtered, 5);
-  // To eight bits as a display would show it: a root lifts what is dark.
+  // To eight bits as for display: the square root raises dark values.
   cv::Mat lifted = cv::max(filtered - double(lowest), 0.0) / std::max(1e-6, double(highest - lowest));
   cv::sqrt(lifted, lifted);
   cv::Mat grey;
   lifted.convertTo(grey, CV_8U, 255);
-  // The transform needs a few pixels of radius to vote with.
+  // The Hough transform needs a radius of a few pixels.
   const double zoom = min_radius_px < 4 ? 2 : 1;
   if (zoom > 1) cv::resize(grey, grey, {}, zoom, zoom, cv::INTER_LINEAR);
   std::vector<cv::Vec3f> circles;

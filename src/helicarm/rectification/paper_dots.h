@@ -8,8 +8,8 @@
 
 namespace helicarm {
 
-/// Circles as the paper finds them (2.1, step 1): median 5x5, Canny, Hough. Radii in [min, max] px; sigma is
-/// the 0.45 px that Hough centres are known to scatter by.
+/// Circles by the paper's method (2.1, step 1): median 5x5, Canny, Hough. Radii in [min, max] px; sigma is
+/// 0.45 px, the typical scatter of Hough centres.
 std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float highest, double min_radius_px,
                                  double max_radius_px);
 

@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-TEST(FindDotsPaper, CirclesOfTheRightSizeWithinAPixelAndAHalf) {
+TEST(FindDotsPaper, CirclesOfTheGivenSizeWithinOneAndAHalfPixels) {
   drawn::Shade shade(256, 256);
   std::vector<Vector2d> places;
   for (int k = 0; k < 9; ++k) places.emplace_back(50.3 + 75.4 * (k % 3), 50.6 + 75.2 * (k / 3));

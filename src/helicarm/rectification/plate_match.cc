@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 using Eigen::Vector2i;
 using Cell = std::pair<int, int>;
 
-/// Columns are the lattice's axes, in pitches.
+/// Columns: the lattice's axes, in pitches.
 Matrix2d basis(Lattice kind) {
   Matrix2d axes;
   axes << lattice_point({1, 0}, kind), lattice_point({0, 1}, kind);
@@ -34,7 +34,7 @@ struct PlateLattice {
   double pitch;
 };
 
-/// The plate's own lattice: its dots as indices from the first of them. The dots may be given turned.
+/// The plate's lattice: its dots as indices relative to the first. The dots may be rotated.
 PlateLattice lattice_of(const Plate& plate) {
   double pitch = plate.pitch_mm.value_or(0);
   const Vector2d origin = plate.dots_mm.front();
@@ -53,7 +53,7 @@ PlateLattice lattice_of(const Plate& plate) {
   return lattice;
 }
 
-/// All ways a lattice can be laid on itself about a node: first without mirror, smallest turn first.
+/// All symmetries of a lattice about a node: proper ones first, smallest rotation first.
 std::vector<Eigen::Matrix2i> symmetries(Lattice kind) {
   const int n = kind == Lattice::square ? 4 : 6;
   const Matrix2d axes = basis(kind);
@@ -87,7 +87,7 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   Vector2d seen_middle = Vector2d::Zero();
   for (const IndexedDot& d : lattice.dots)
     seen_middle += d.index.cast<double>() / double(lattice.dots.size());
-  // Where the middle of the plate falls in the image: an affine map from index to pixel.
+  // Position of the plate's centre in the image: an affine map from index to pixel.
   Eigen::Matrix<double, Eigen::Dynamic, 3> design(lattice.dots.size(), 3);
   Eigen::MatrixX2d pixels(lattice.dots.size(), 2);
   for (Eigen::Index r = 0; r < design.rows(); ++r) {
@@ -104,10 +104,10 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   int best_hits = 0;
   for (const Eigen::Matrix2i& way : symmetries(plate.lattice)) {
     std::set<Cell> shifts;
-    // Every shift that lays one dot on another; on a large plate only those that bring the middles together.
+    // Every shift that maps one dot to another; on a large plate only those that align the centres.
     const Vector2d about = own_middle - way.cast<double>() * seen_middle;
     for (std::size_t k = 0; k < 3 * own.indices.size(); ++k) {
-      // Three anchors, for one of them may be a stray.
+      // Three anchors, because one of them may be an outlier.
       const Vector2i anchor = way * lattice.dots[(1 + k % 3) * lattice.dots.size() / 4].index;
       const Vector2i shift = own.indices[k / 3] - anchor;
       if (own.indices.size() < 200 || (shift.cast<double>() - about).norm() < 4)
@@ -120,7 +120,7 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
         const Vector2i at = way * d.index + shift;
         hits += occupied.contains({at.x(), at.y()});
       }
-      // A dot seen where the plate has none counts against, a dot of the plate not seen does not.
+      // A detected dot where the plate has none counts against, an undetected plate dot does not.
       const int score = 2 * hits - static_cast<int>(lattice.dots.size());
       const Vector2d middle = way.cast<double>().inverse() * (own_middle - shift.cast<double>());
       const Vector2d pixel = affine.transpose() * Eigen::Vector3d(1, middle.x(), middle.y());
@@ -138,8 +138,8 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   const auto strays = static_cast<int>(lattice.dots.size()) - best_hits;
   if (10 * strays > 3 * static_cast<int>(lattice.dots.size()))
     return fail(Reason::plate_mismatch,
-                fmt::format("{} of {} dots on the lattice stand where the plate \"{}\" has none", strays,
-                            lattice.dots.size(), plate.name),
+                fmt::format("{} of {} dots on the lattice are at positions where the plate \"{}\" has none",
+                            strays, lattice.dots.size(), plate.name),
                 {{"strays", strays}, {"indexed", double(lattice.dots.size())}});
   const auto place_of = [&](const Vector2i& index) -> int {
     for (std::size_t k = 0; k < own.indices.size(); ++k)

@@ -11,15 +11,15 @@
 
 namespace helicarm {
 
-/// A dot of the image and its place on the plate.
+/// A dot of the image and its position on the plate.
 struct PlateDot {
   std::size_t dot;
-  Eigen::Vector2d place_mm;  ///< in pitches where the plate has no pitch
+  Eigen::Vector2d place_mm;  ///< in pitches if the plate has no pitch
 };
 
-/// Finds how the plate lies: which of its turned, mirrored and shifted positions explains the indexed dots,
-/// and of equal ones the one nearest the raw image. An unbounded lattice takes the indices as they are.
-/// plate_mismatch where dots stand in numbers where the plate has none.
+/// Finds the plate's placement: the rotation, mirroring and shift that explains the indexed dots best and,
+/// among equals, is nearest to the raw image. For an unbounded lattice the indices are used as they are.
+/// plate_mismatch if many dots are at positions where the plate has none.
 Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const std::vector<Dot>& dots,
                                             const Plate& plate, const Eigen::Vector2d& image_centre);
 

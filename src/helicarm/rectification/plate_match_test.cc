@@ -17,7 +17,7 @@ using Eigen::Vector2d;
 constexpr double px_per_mm = 2;
 const Vector2d middle(255.5, 255.5);
 
-/// Pixels of all the plate's dots, the plate lying turned or mirrored by `way`.
+/// Pixels of all the plate's dots, the plate rotated or mirrored by `way`.
 std::vector<Dot> image(const Plate& plate, const Matrix2d& way = Matrix2d::Identity()) {
   std::vector<Dot> dots;
   for (const Vector2d& place : plate.dots_mm) {
@@ -32,7 +32,7 @@ Expected<std::vector<PlateDot>> match(const std::vector<Dot>& dots, const Plate&
   return match_plate(index_lattice(dots, plate.lattice, {}), dots, plate, middle);
 }
 
-/// Greatest distance (px) of a dot from where its plate place lies with no turn and no mirror.
+/// Largest distance (px) of a dot from its plate position without rotation and mirroring.
 double worst(const std::vector<PlateDot>& matched, const std::vector<Dot>& dots) {
   double most = 0;
   for (const PlateDot& d : matched)
@@ -40,7 +40,7 @@ double worst(const std::vector<PlateDot>& matched, const std::vector<Dot>& dots)
   return most;
 }
 
-/// Without any symmetry: the corner and a few others are missing.
+/// Without any symmetry: the corner and a few other dots are missing.
 Plate lopsided() {
   Plate plate = plate48();
   plate.name = "lopsided";
@@ -62,7 +62,7 @@ Plate hexagonal() {
   return plate;
 }
 
-TEST(MatchPlate, AllEightWaysOfASymmetricPlateGiveTheWayNearestRaw) {
+TEST(MatchPlate, SymmetricPlateTakesThePlacementNearestToRaw) {
   for (const double mirror : {1.0, -1.0})
     for (int quarter = 0; quarter < 4; ++quarter) {
       Matrix2d way = Eigen::Rotation2Dd(quarter * M_PI / 2).toRotationMatrix();
@@ -75,7 +75,7 @@ TEST(MatchPlate, AllEightWaysOfASymmetricPlateGiveTheWayNearestRaw) {
     }
 }
 
-TEST(MatchPlate, PlateWithoutSymmetryShowsHowItLies) {
+TEST(MatchPlate, AsymmetricPlateDeterminesItsPlacement) {
   const Plate plate = lopsided();
   for (const double mirror : {1.0, -1.0})
     for (int quarter = 0; quarter < 4; ++quarter) {
@@ -89,7 +89,7 @@ TEST(MatchPlate, PlateWithoutSymmetryShowsHowItLies) {
     }
 }
 
-TEST(MatchPlate, StrayInTheEmptyMiddleShiftsNothing) {
+TEST(MatchPlate, ExtraDotAtTheMissingCentreShiftsNothing) {
   auto dots = image(plate48());
   Dot stray;
   stray.centre_px = middle;
@@ -112,8 +112,8 @@ TEST(MatchPlate, MissingDotsShiftNothing) {
   }
 }
 
-TEST(MatchPlate, PartOfThePlateInTheImageIsPlacedByItsHole) {
-  // The three columns on the right are out of sight, the missing centre is not.
+TEST(MatchPlate, PartlyVisiblePlateIsPlacedByItsMissingCentre) {
+  // The three columns on the right are outside the image, the missing centre is inside.
   auto dots = image(plate48());
   std::erase_if(dots, [](const Dot& dot) { return dot.centre_px.x() > middle.x() + 60; });
   const auto matched = match(dots, plate48());
@@ -132,7 +132,7 @@ TEST(MatchPlate, HexagonalPlate) {
   }
 }
 
-TEST(MatchPlate, TurnedCoordinatesInTheFileAreTheSamePlate) {
+TEST(MatchPlate, RotatedCoordinatesInTheFileGiveTheSamePlacement) {
   Plate turned = lopsided();
   for (Vector2d& place : turned.dots_mm) place = Eigen::Rotation2Dd(0.2) * place + Vector2d(40, -10);
   const auto dots = image(turned);
@@ -142,7 +142,7 @@ TEST(MatchPlate, TurnedCoordinatesInTheFileAreTheSamePlate) {
   for (const PlateDot& d : *matched) EXPECT_EQ(d.place_mm, turned.dots_mm[d.dot]);
 }
 
-TEST(MatchPlate, UnboundedLatticeTakesTheIndices) {
+TEST(MatchPlate, UnboundedLatticeKeepsTheIndices) {
   Plate endless = plate48();
   const auto dots = image(endless);
   endless.dots_mm.clear();
@@ -154,7 +154,7 @@ TEST(MatchPlate, UnboundedLatticeTakesTheIndices) {
   EXPECT_LT((gap - seen).norm(), 1e-6);
 }
 
-TEST(MatchPlate, DotsWhereThePlateHasNoneAreRefused) {
+TEST(MatchPlate, DotsAtPositionsWithoutPlateDotAreRefused) {
   Plate small = plate48();
   std::erase_if(small.dots_mm, [](const Vector2d& p) { return p.cwiseAbs().maxCoeff() > 30; });
   const auto matched = match(image(plate48()), small);

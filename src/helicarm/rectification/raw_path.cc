@@ -9,11 +9,11 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Between places so near each other the distortion bends a line by less than a tenth of a pixel.
+/// Over this distance the distortion bends a line by less than 0.1 px.
 constexpr double step_px = 16;
 
-/// The part of a line, as shares from 0 to 1, in the image, or within half an image of it where a map
-/// bends it: no map reaches farther.
+/// Part of a line (parameters from 0 to 1) in the image, or within half an image size of it if there is a
+/// map: no map displaces farther.
 std::pair<double, double> part_near(const DistortionMap& map, const Vector2d& from, const Vector2d& to) {
   const Vector2d size(map.width, map.height);
   std::pair<double, double> part{0, 1};

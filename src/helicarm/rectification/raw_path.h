@@ -8,11 +8,11 @@
 
 namespace helicarm {
 
-/// A chain of straight pieces through pixels.
+/// A polyline in pixels.
 using PixelPath = std::vector<Eigen::Vector2d>;
 
-/// How a path in rectified pixels runs through the raw image: bent by the distortion, and cut where it
-/// leaves the image or the map folds.
+/// A path in rectified pixels mapped to the raw image: curved by the distortion, and cut where it leaves the
+/// image or the map folds.
 std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Eigen::Vector2d> rectified);
 
 }  // namespace helicarm

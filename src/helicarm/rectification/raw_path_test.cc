@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// Pincushion of some 15 px at the edge of a 512 px image.
+/// About 15 px of pincushion at the edge of a 512 px image.
 DistortionMap pincushion() {
   DistortionMap map = identity_map(512, 512, {});
   map.order = 3;
@@ -32,7 +32,7 @@ double distance_to_piece(const Vector2d& at, const Vector2d& a, const Vector2d& 
   return (at - a - share * (b - a)).norm();
 }
 
-TEST(RawPaths, FollowTheBentLine) {
+TEST(RawPaths, FollowTheCurvedLine) {
   const DistortionMap map = pincushion();
   const Vector2d from(30, 60), to(450, 110);
   const auto paths = raw_paths(map, PixelPath{from, to});
@@ -51,7 +51,7 @@ TEST(RawPaths, FollowTheBentLine) {
   EXPECT_GT(straight, 2);
 }
 
-TEST(RawPaths, EndAtTheImageHoweverLongTheLine) {
+TEST(RawPaths, EndAtTheImageBorderForAnyLength) {
   const DistortionMap map = pincushion();
   const auto paths = raw_paths(map, PixelPath{{-1e6, 256}, {1e6, 256}});
   ASSERT_EQ(paths.size(), 1u);
@@ -61,7 +61,7 @@ TEST(RawPaths, EndAtTheImageHoweverLongTheLine) {
   for (const Vector2d& place : paths[0]) EXPECT_TRUE(map.shows(place));
 }
 
-TEST(RawPaths, AreCutWhereTheyLeaveTheImage) {
+TEST(RawPaths, AreCutAtTheImageBorder) {
   const DistortionMap map = identity_map(100, 100, {});
   const auto paths = raw_paths(map, PixelPath{{10, 10}, {10, 500}, {90, 500}, {90, 10}, {50, 10}});
   ASSERT_EQ(paths.size(), 2u);
@@ -71,7 +71,7 @@ TEST(RawPaths, AreCutWhereTheyLeaveTheImage) {
   EXPECT_TRUE(raw_paths(map, {}).empty());
 }
 
-TEST(RawPaths, OfALineThatComesFromAfarGoOnAtACorner) {
+TEST(RawPaths, LineFromFarAwayContinuesAtACorner) {
   const DistortionMap map = identity_map(100, 100, {});
   const auto paths = raw_paths(map, PixelPath{{-1000, 50}, {50, 50}, {50, 1000}});
   ASSERT_EQ(paths.size(), 1u);

@@ -19,15 +19,15 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double pitch_tolerance = 0.04;  // measured against expected
+constexpr double pitch_tolerance = 0.04;  // measured relative to expected pitch
 constexpr std::size_t least_dots = 10;
-/// Where no plate is described, one may be in the image all the same: more dots than a calibrator's balls
-/// and some stray ones could feign.
+/// Without a plate description a plate may still be present: more dots than a calibrator's balls and some
+/// outliers can form.
 constexpr std::size_t least_dots_of_any_plate = 20;
 const Plate any_plate{"", DotKind::balls, Lattice::square, {}, 2.5, {}, {}};
-constexpr double max_ball_radius = 0.04;  // of the image's width: nothing larger is a ball
+constexpr double max_ball_radius = 0.04;  // relative to the image width: no larger ball is accepted
 
-/// Pixels per plate millimetre in the middle of the image, where the file and the plate tell.
+/// Pixels per plate millimetre at the image centre, if file and plate provide it.
 std::optional<double> expected_scale(const XrayImage& xray_image, const Plate& plate) {
   const auto& pixel = xray_image.acquisition.pixel_mm;
   if (!pixel) return std::nullopt;
@@ -43,8 +43,7 @@ std::vector<Dot> with_radius_near(const std::vector<Dot>& dots, double radius) {
   return near;
 }
 
-/// The dots as a lattice: of the expected size where that is known, else of the size that gives the largest
-/// lattice.
+/// The dots as a lattice: of the expected pitch if known, else of the pitch that gives the largest lattice.
 struct SeenLattice {
   std::vector<Dot> dots;
   IndexedLattice lattice;
@@ -72,7 +71,7 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
   return best;
 }
 
-/// Fits the lattice's dots again with a profile of their own and their neighbours masked.
+/// Refits the lattice's dots with their own profile and their neighbours masked.
 DotLook sharpen(const XrayImage& xray_image, const NoiseCorrelation& noise, const std::vector<Dot>& all,
                 SeenLattice& seen) {
   std::vector<Dot> members;
@@ -94,7 +93,7 @@ Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, st
   if (std::abs(ratio - 1) <= pitch_tolerance) return {};
   return fail(
       Reason::plate_mismatch,
-      fmt::format("the plate in the picture has a pitch of {:.2f} mm, \"{}\" says {} mm (tolerance {:.0f} %)",
+      fmt::format("the plate in the image has a pitch of {:.2f} mm, \"{}\" has {} mm (tolerance {:.0f} %)",
                   *plate.pitch_mm * ratio, plate.name, *plate.pitch_mm, 100 * pitch_tolerance),
       {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
 }
@@ -109,7 +108,7 @@ void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& pl
   map.rectified_plane = RectifiedPlane::detector;
 }
 
-/// Plate dots that the search missed, fitted at the places where the map expects them.
+/// Fits plate dots that the search missed at the positions predicted by the map.
 void rescue(const XrayImage& xray_image, const Plate& plate, const MapFit& fit, const DotLook& look,
             const std::vector<Dot>& all, std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
@@ -152,7 +151,7 @@ struct Attempt {
   std::size_t size() const { return seen.lattice.dots.size(); }
 };
 
-/// Metal is dark and a hole bright, unless the whole image is inverted.
+/// Metal is dark and holes are bright, unless the whole image is inverted.
 Attempt find_lattice(const XrayImage& xray_image, const Plate& plate, Method method,
                      std::optional<double> scale) {
   const auto attempt = [&](Polarity polarity) {
@@ -175,12 +174,12 @@ Failure without_lattice(const XrayImage& xray_image, Plate plate, Method method,
   const std::size_t of_other_kind = find_lattice(xray_image, plate, method, scale).size();
   if (of_other_kind >= least_dots)
     return {Reason::plate_mismatch,
-            fmt::format("{} dots stand on a {} lattice, that of \"{}\" is {}", of_other_kind,
+            fmt::format("{} dots form a {} lattice, that of \"{}\" is {}", of_other_kind,
                         square ? "hexagonal" : "square", plate.name, square ? "square" : "hexagonal"),
             {},
             {{"dots_found", double(of_other_kind)}}};
   return {Reason::plate_not_found,
-          fmt::format("only {} dots stand on a lattice like that of \"{}\", at least {} are needed", found,
+          fmt::format("only {} dots form a lattice like that of \"{}\", at least {} are needed", found,
                       plate.name, least_dots),
           {},
           {{"dots_found", double(found)}}};
@@ -264,7 +263,7 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
                                  const std::optional<Plate>& plate) {
   if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
     return fail(Reason::plate_mismatch,
-                fmt::format("the map is for {} x {} pixels, the picture has {} x {}", map.width, map.height,
+                fmt::format("the map is for {} x {} pixels, the image has {} x {}", map.width, map.height,
                             xray_image.pixels.width(), xray_image.pixels.height()));
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
@@ -273,7 +272,7 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
   result.other_dots = find_dots(xray_image, metal_search(xray_image, result.metal));
   const Plate sought = plate.value_or(any_plate);
   if (sought.kind == DotKind::holes) return result;
-  // A plate in the image tells whether the map still holds: rectified, its dots must stand on a lattice.
+  // A plate in the image verifies the map: rectified, its dots must form a lattice.
   const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(xray_image, sought));
   if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
@@ -293,7 +292,7 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
     return fail(
         Reason::plate_mismatch,
         fmt::format(
-            "{} the plate in the picture: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
+            "{} the plate in the image: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
             map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
@@ -303,7 +302,7 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
 
 Image<float> resample(const XrayImage& xray_image, const DistortionMap& map) {
   if (map.is_identity()) return xray_image.pixels;
-  // The map is smooth: exact at every 8th pixel, bilinear between.
+  // The map is smooth: exact at every 8th pixel, bilinear in between.
   constexpr int step = 8;
   const int width = xray_image.pixels.width();
   const int height = xray_image.pixels.height();

@@ -30,8 +30,8 @@ const Rectification& rectified_ap() {
   return result;
 }
 
-/// Rectified pixels differ from ideal ones by a similarity; distances from the best one at places inside the
-/// plate.
+/// Rectified and ideal pixels differ by a similarity; distances from the best-fitting one at positions inside
+/// the plate.
 struct Misfit {
   double rms, max;
 };
@@ -47,7 +47,7 @@ Misfit misfit_of(const DistortionMap& map, const SimulatedView& view) {
       ideal.emplace_back(a.x(), a.y());
       rectified.emplace_back(b.x(), b.y());
     }
-  // With complex numbers a similarity is a straight line.
+  // With complex numbers a similarity is an affine function.
   const auto middle = [](const auto& z) {
     return std::accumulate(z.begin(), z.end(), 0i) / double(z.size());
   };
@@ -79,7 +79,7 @@ TEST(Rectify, FindsEveryClearDotOfThePlate) {
   EXPECT_EQ(rectified_ap().metal, Polarity::dark);
 }
 
-TEST(Rectify, DotsLieWithinATenthOfAPixelOfTheTruth) {
+TEST(Rectify, DotsAreWithinATenthOfAPixelOfTheTruth) {
   int near = 0;
   for (const Dot& dot : rectified_ap().plate_dots)
     for (const auto& truth : simulated_case().views[0].plate_dots)
@@ -88,7 +88,7 @@ TEST(Rectify, DotsLieWithinATenthOfAPixelOfTheTruth) {
   EXPECT_GE(near, 0.9 * rectified_ap().dots_found);
 }
 
-TEST(Rectify, ResidualsAreSmallAndAddUp) {
+TEST(Rectify, ResidualsAreSmallAndConsistent) {
   const Rectification& result = rectified_ap();
   ASSERT_EQ(result.residual_px.size(), result.plate_dots.size());
   double squares = 0;
@@ -100,20 +100,20 @@ TEST(Rectify, ResidualsAreSmallAndAddUp) {
   EXPECT_GT(result.raw_max_px, result.raw_mean_px);
 }
 
-TEST(Rectify, RectifiedImageIsTheIdealOneUpToASimilarity) {
+TEST(Rectify, RectifiedImageIsIdealUpToASimilarity) {
   const Misfit best = misfit_of(rectified_ap().map, simulated_case().views[0]);
   EXPECT_LT(best.rms, 0.2);
   EXPECT_LT(best.max, 0.6);
 }
 
-TEST(Rectify, PixelSizeIsTheDetectors) {
+TEST(Rectify, PixelSizeIsThatOfTheDetector) {
   ASSERT_TRUE(rectified_ap().map.rectified_pixel_mm);
   EXPECT_EQ(rectified_ap().map.rectified_plane, RectifiedPlane::detector);
   EXPECT_NEAR(*rectified_ap().map.rectified_pixel_mm / simulated_case().views[0].true_view.pixel_mm(), 1,
               0.01);
 }
 
-TEST(Rectify, WithoutDistancePixelSizeIsThePlates) {
+TEST(Rectify, WithoutDistancePixelSizeIsThatOfThePlate) {
   XrayImage xray_image = exposure_of(simulated_case().views[0]);
   xray_image.acquisition.source_detector_mm.reset();
   const auto result = rectify(xray_image, plate48(), {});
@@ -137,7 +137,7 @@ TEST(Rectify, InvertedImageGivesTheSameMap) {
   EXPECT_LT(most, 0.04);
 }
 
-TEST(Rectify, PaperMethodIsAQuadraticAndWorse) {
+TEST(Rectify, PaperMethodIsAQuadraticAndLessAccurate) {
   RectificationOptions options;
   options.method = Method::paper;
   const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
@@ -149,7 +149,7 @@ TEST(Rectify, PaperMethodIsAQuadraticAndWorse) {
             2 * misfit_of(rectified_ap().map, simulated_case().views[0]).rms);
 }
 
-TEST(Rectify, OrderIsTheOneAskedFor) {
+TEST(Rectify, OrderIsTheRequestedOne) {
   RectificationOptions options;
   options.order = 4;
   const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
@@ -200,7 +200,7 @@ TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
   }
 }
 
-/// Some dots here and there, on no lattice.
+/// Some dots on no lattice.
 XrayImage uniform(const drawn::Shade& shade) {
   Image<float> image = drawn::grey(shade, 1200);
   RandomStream random(1, 1);
@@ -249,7 +249,7 @@ TEST(Rectify, PlateOfHoles) {
   EXPECT_LT(result->raw_max_px, 0.1);
 }
 
-TEST(WithMap, ItsOwnMapIsAcceptedAndTheBallsFound) {
+TEST(WithMap, OwnMapIsAcceptedAndTheBallsFound) {
   const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, plate48());
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(to_json(result->map), to_json(rectified_ap().map));
@@ -257,7 +257,7 @@ TEST(WithMap, ItsOwnMapIsAcceptedAndTheBallsFound) {
 }
 
 TEST(WithMap, MapOfAnotherAngleIsAMismatch) {
-  // Three pixels more of S distortion at the edge, as the earth's field gives it when the arm turns.
+  // Three pixels more of S distortion at the edge, as the earth's field causes when the arm rotates.
   DistortionMap turned = rectified_ap().map;
   ASSERT_GE(turned.order, 3);
   Eigen::Matrix<double, 4, 2> twist;
@@ -274,19 +274,19 @@ TEST(WithMap, MapOfAnotherSizeIsAMismatch) {
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
-TEST(FlatPanel, BentPlateInTheImageIsAMismatch) {
+TEST(FlatPanel, CurvedPlateInTheImageIsAMismatch) {
   const auto result = flat_panel(exposure_of(simulated_case().views[0]));
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
 
-TEST(WithMap, PlateThatIsNotDescribedIsSeenAllTheSame) {
+TEST(WithMap, UndescribedPlateIsDetected) {
   const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LT(result->other_dots->size(), 25u);
 }
 
-TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixels) {
+TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixelSize) {
   const SimulatedCase flat = small_case(5, simulation::CaseKind::flat);
   const auto result = flat_panel(exposure_of(flat.views[0]));
   ASSERT_TRUE(result);
@@ -295,7 +295,7 @@ TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixels) {
   EXPECT_FALSE(result->dots_expected);
 }
 
-TEST(Resample, TakesEachPixelFromWhereTheMapSays) {
+TEST(Resample, SamplesEachPixelAtItsMappedPosition) {
   XrayImage ramp = exposure_of(simulated_case().views[0]);
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u) ramp.pixels(u, v) = 1000 + 3 * float(u) - 2 * float(v);

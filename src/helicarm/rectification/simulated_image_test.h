@@ -5,7 +5,7 @@
 
 namespace helicarm {
 
-/// A case of 512 pixels a side.
+/// A case of 512 pixels per side.
 inline simulation::SimulatedCase small_case(std::uint64_t seed, simulation::CaseKind kind,
                                             std::vector<simulation::Fault> faults = {},
                                             std::vector<std::string> lost_balls = {}) {

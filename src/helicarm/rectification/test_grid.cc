@@ -24,7 +24,7 @@ using Eigen::Vector2i;
 using Complex = std::complex<double>;
 using Points = std::vector<Complex>;
 
-/// In the plane a similarity is w = scale z + shift with complex numbers, and its least-squares fit is one
+/// In the plane a similarity is w = scale z + shift with complex numbers; its least-squares fit is one
 /// division.
 Points ideal_places(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
   Complex ideal_middle;
@@ -69,7 +69,7 @@ struct IndexLess {
 };
 using Grid = std::map<Vector2i, Dot, IndexLess>;
 
-/// A missing crossing as its neighbours in one direction predict it: between two, or beyond two.
+/// A missing crossing predicted by its neighbours in one direction: between two, or beyond two.
 std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Vector2i& step) {
   const auto place = [&](int k) -> std::optional<Vector2d> {
     const auto found = grid.find(at + k * step);
@@ -81,8 +81,8 @@ std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Ve
   return std::nullopt;
 }
 
-/// All wires of a grid are of one width. What only seems a crossing (a wire at the edge of the field, a wire
-/// behind a plate's dot) is wider or far less sharp; the factors part the two kinds on simulated images.
+/// All wires of a grid have one width. False crossings (a wire at the edge of the field, a wire behind a
+/// plate dot) are wider or much less sharp; the factors separate both kinds on simulated images.
 struct Likeness {
   double radius_px = 0;
   double sigma_px = 0;
@@ -111,8 +111,8 @@ struct Likeness {
   }
 };
 
-/// Where the plate's dots are in the way of some crossings: those found, and those that a wire hides from the
-/// search, between or beyond two others.
+/// Plate dots that cover crossings: those found, and those that a wire hides from the search, between or
+/// beyond two others.
 std::vector<Disc> plate_dots(const XrayImage& xray_image, const Grid& crossings) {
   std::vector<Dot> found = find_dots(xray_image, {});
   std::erase_if(found, [&](const Dot& dot) {
@@ -205,7 +205,7 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
     indices.push_back(d.index);
   }
   grid.crosses = static_cast<int>(indices.size());
-  // The centre is the crossing nearest to the image's middle that has all eight neighbours.
+  // The centre is the crossing nearest to the image centre that has all eight neighbours.
   const Vector2d middle(0.5 * (map.width - 1), 0.5 * (map.height - 1));
   std::vector<std::size_t> central;
   double nearest = 1e9;
@@ -221,7 +221,7 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
   if (central.empty())
     return fail(
         Reason::too_few_fiducials,
-        fmt::format("{} crossings on a grid were found, but no nine that form its middle", grid.crosses),
+        fmt::format("{} crossings on a grid were found, but no 3 x 3 block at its centre", grid.crosses),
         {{"crosses", double(grid.crosses)}});
   if (fit == GridFit::all) {
     central.resize(indices.size());

@@ -17,8 +17,8 @@ struct GridError {
   double max_px = 0;
 };
 
-/// The test of 3.1: crossings of a square grid of wires against the grid that its nine central crossings
-/// define.
+/// The test of 3.1: crossings of a square wire grid compared with the grid defined by its nine central
+/// crossings.
 struct TestGrid {
   GridError raw;
   GridError rectified;
@@ -26,20 +26,20 @@ struct TestGrid {
   std::vector<Eigen::Vector2d> raw_px;  ///< the crossings on the grid
   std::vector<Eigen::Vector2d> rectified_px;
   std::vector<Eigen::Vector2d> raw_ideal_px;  ///< Eq. 14 in the raw image
-  std::vector<double> raw_error_px;           ///< Eq. 15, each by its own image's similarity
+  std::vector<double> raw_error_px;           ///< Eq. 15, each with its own image's similarity
   std::vector<double> rectified_error_px;
 };
 
-/// The crossings of a square grid of wires; those that a plate's dot disturbs are fitted where their
-/// neighbours put them, without the dots' pixels.
+/// Crossings of a square wire grid; those disturbed by a plate dot are fitted at the position predicted by
+/// their neighbours, with the dots' pixels masked.
 std::vector<Dot> find_grid(const XrayImage& xray_image);
 
-/// The crossings that define the ideal grid: the paper's nine, or all of them.
+/// The crossings that define the ideal grid: the paper's nine, or all.
 enum class GridFit { nine, all };
 
-/// Similarity of the nine central crossings by least squares (Eq. 14, Umeyama 1991), then the distance of
-/// every crossing from its ideal place (Eq. 15), before and after rectification. too_few_fiducials unless the
-/// nine are there.
+/// Least-squares similarity of the nine central crossings (Eq. 14, Umeyama 1991), then the distance of every
+/// crossing from its ideal position (Eq. 15), before and after rectification. too_few_fiducials without the
+/// nine.
 Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map,
                                      GridFit fit = GridFit::nine);
 

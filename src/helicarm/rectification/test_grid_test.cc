@@ -18,7 +18,7 @@ using Eigen::Vector2d;
 constexpr int side = 192;
 const Vector2d middle(95.5, 95.5);
 
-/// 7 x 7 crossings, 30 px apart, a little turned.
+/// 7 x 7 crossings, 30 px apart, slightly rotated.
 std::vector<Dot> grid() {
   std::vector<Dot> crosses;
   for (int j = -3; j <= 3; ++j)
@@ -54,7 +54,7 @@ TEST(MeasureTestGrid, PerfectGridHasNoError) {
   EXPECT_LT(measured->rectified.max_px, 1e-9);
 }
 
-TEST(MeasureTestGrid, OneMovedCornerIsTheGreatestErrorAndItsShareTheMean) {
+TEST(MeasureTestGrid, MovedCornerIsTheLargestErrorAndSetsTheMean) {
   auto crosses = grid();
   crosses.front().centre_px += Vector2d(-1.2, 1.6);
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
@@ -67,7 +67,7 @@ TEST(MeasureTestGrid, OneMovedCornerIsTheGreatestErrorAndItsShareTheMean) {
   }
 }
 
-TEST(MeasureTestGrid, TheRightMapTakesTheDistortionAway) {
+TEST(MeasureTestGrid, CorrectMapRemovesTheDistortion) {
   auto crosses = grid();
   for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
   const auto measured = measure_test_grid(crosses, pincushion_map());
@@ -76,7 +76,7 @@ TEST(MeasureTestGrid, TheRightMapTakesTheDistortionAway) {
   EXPECT_LT(measured->rectified.max_px, 1e-8);
 }
 
-TEST(MeasureTestGrid, GridThroughAllCrossingsLiesNearerToThemThanTheOneThroughNine) {
+TEST(MeasureTestGrid, GridThroughAllCrossingsFitsBetterThanThroughNine) {
   auto crosses = grid();
   for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
   const auto nine = measure_test_grid(crosses, pincushion_map());
@@ -86,9 +86,9 @@ TEST(MeasureTestGrid, GridThroughAllCrossingsLiesNearerToThemThanTheOneThroughNi
   EXPECT_LT(all->rectified.max_px, 1e-8);
 }
 
-TEST(MeasureTestGrid, WithoutItsMiddleIsRefused) {
+TEST(MeasureTestGrid, WithoutItsCentreIsRefused) {
   auto crosses = grid();
-  std::erase_if(crosses, [](const Dot& cross) {  // two rows are left
+  std::erase_if(crosses, [](const Dot& cross) {  // two rows remain
     return cross.centre_px.y() - middle.y() < -40 || cross.centre_px.y() - middle.y() > 12;
   });
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
@@ -97,7 +97,7 @@ TEST(MeasureTestGrid, WithoutItsMiddleIsRefused) {
   EXPECT_EQ(measure_test_grid({}, identity_map(side, side, {})).error().reason, Reason::too_few_fiducials);
 }
 
-/// Five wires each way.
+/// Five wires in each direction.
 drawn::Shade wires() {
   std::vector<drawn::Wire> wires;
   for (int k = -2; k <= 2; ++k) {
@@ -122,7 +122,7 @@ TEST(FindGrid, EveryCrossingOfAGridOfWires) {
   EXPECT_EQ(crosses.size(), 25u);
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
   ASSERT_TRUE(measured);
-  EXPECT_LT(measured->raw.max_px, 0.5);  // the wires themselves are not quite square
+  EXPECT_LT(measured->raw.max_px, 0.5);  // the rendered wires are not exactly square
 }
 
 TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
@@ -136,8 +136,8 @@ TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
   EXPECT_LT(measured->raw.max_px, 0.5);
 }
 
-TEST(FindGrid, NeitherThePlatesDotsNorTheFieldsRimMoveACrossing) {
-  for (const std::uint64_t seed : {1, 8}) {  // at 30 and 90 mm wires run over dots and cross on the rim
+TEST(FindGrid, PlateDotsAndFieldRimDoNotMoveCrossings) {
+  for (const std::uint64_t seed : {1, 8}) {  // at 30 and 90 mm wires pass over dots and cross on the rim
     simulation::SimulationOptions options;
     options.seed = seed;
     options.kind = simulation::CaseKind::grid;

@@ -9,10 +9,10 @@
 namespace helicarm {
 namespace {
 
-constexpr double least_range = 0.01;    // of block means, as a share of the grey scale
+constexpr double least_range = 0.01;    // of block means, relative to the grey scale
 constexpr double most_saturated = 0.9;  // of the field
 
-/// Means of blocks of 16 x 16 pixels: noise averages out, structure stays.
+/// Means of 16 x 16 pixel blocks: averages noise, keeps structure.
 std::vector<float> block_means(const Image<float>& image) {
   constexpr int side = 16;
   std::vector<float> means;
@@ -42,7 +42,7 @@ double saturated_share(const XrayImage& xray_image) {
 Expected<void> check_usable(const XrayImage& xray_image) {
   std::vector<float> means = block_means(xray_image.pixels);
   if (means.size() < 9)
-    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few to hold a calibrator",
+    return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few for a calibrator",
                                               xray_image.pixels.width(), xray_image.pixels.height()));
   std::sort(means.begin(), means.end());
   const double share = saturated_share(xray_image);
@@ -56,7 +56,7 @@ Expected<void> check_usable(const XrayImage& xray_image) {
   const double range = (at(0.99) - at(0.01)) / double(xray_image.highest - xray_image.lowest);
   if (range < least_range)
     return fail(Reason::blank_image,
-                fmt::format("the picture is blank: its grey values span {:.2f} % of the scale", 100 * range),
+                fmt::format("the image is blank: its grey values span {:.2f} % of the scale", 100 * range),
                 {{"grey_range", range}});
   return {};
 }

@@ -6,10 +6,10 @@
 
 namespace helicarm {
 
-/// Share of the pixels inside the field (above black) that are clipped at the highest value.
+/// Fraction of the pixels inside the field (above black) that are clipped at the highest value.
 double saturated_share(const XrayImage& xray_image);
 
-/// Refuses an image that shows nothing (blank_image) or is clipped nearly everywhere (saturated).
+/// Refuses an image without structure (blank_image) or clipped nearly everywhere (saturated).
 Expected<void> check_usable(const XrayImage& xray_image);
 
 }  // namespace helicarm

@@ -17,7 +17,7 @@ XrayImage ramp(int side = 128) {
 
 Reason refusal(const XrayImage& xray_image) { return check_usable(xray_image).error().reason; }
 
-TEST(CheckUsable, OrdinaryImagePasses) { EXPECT_TRUE(check_usable(ramp())); }
+TEST(CheckUsable, OrdinaryImageIsAccepted) { EXPECT_TRUE(check_usable(ramp())); }
 
 TEST(CheckUsable, ConstantImageIsBlank) {
   EXPECT_EQ(refusal(drawn::xray_image(Image<float>(128, 128, 1800))), Reason::blank_image);
@@ -38,7 +38,7 @@ TEST(CheckUsable, WhiteImageIsSaturated) {
   EXPECT_EQ(refusal(mostly), Reason::saturated);
 }
 
-TEST(CheckUsable, HalfSaturatedImagePasses) {
+TEST(CheckUsable, HalfSaturatedImageIsAccepted) {
   XrayImage half = ramp();
   for (int v = 0; v < 64; ++v) std::fill_n(half.pixels.row(v), 128, 4095.f);
   EXPECT_TRUE(check_usable(half));
