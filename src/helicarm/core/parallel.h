@@ -16,15 +16,15 @@ namespace helicarm {
 template <class Work>
 void parallel_for(std::size_t count, unsigned threads, Work&& work) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  const std::size_t crew = std::min<std::size_t>(threads, count);
-  if (crew <= 1) {
+  const std::size_t workers = std::min<std::size_t>(threads, count);
+  if (workers <= 1) {
     for (std::size_t i = 0; i < count; ++i) work(i);
     return;
   }
   std::atomic<std::size_t> next{0};
   std::exception_ptr first;
   std::mutex guard;
-  const auto labour = [&] {
+  const auto run = [&] {
     for (std::size_t i = next++; i < count; i = next++) {
       try {
         work(i);
@@ -35,8 +35,8 @@ void parallel_for(std::size_t count, unsigned threads, Work&& work) {
     }
   };
   std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < crew; ++i) others.emplace_back(labour);
-  labour();
+  for (std::size_t i = 1; i < workers; ++i) others.emplace_back(run);
+  run();
   others.clear();
   if (first) std::rethrow_exception(first);
 }
