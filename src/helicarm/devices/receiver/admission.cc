@@ -12,7 +12,8 @@ unsigned Admission::count(bool associated_only, const std::string* address) cons
   }));
 }
 
-/// Ends the longest without an image of those that are (or are not) associated, if it is so since `latest`.
+/// Ends the connection that is (or is not) associated and has been longest without an image, if since before
+/// `latest`.
 bool Admission::make_room(bool associated, const std::string* address, Clock::time_point latest) {
   auto longest = peers_.end();
   for (auto it = peers_.begin(); it != peers_.end(); ++it) {

@@ -11,17 +11,17 @@
 
 namespace helicarm {
 
-/// Room for peers. One address may be a C-arm, or many behind one router: hence two limits.
+/// Connection limits. One address may be one C-arm or many behind a router: hence two limits.
 struct AdmissionLimits {
   unsigned associations = 32;
-  unsigned of_address = 16;  ///< associations of one address
-  unsigned connections = 4;  ///< for each association's place: also those that asked for no association yet
-  double spared_s = 2;       ///< an association makes room for another after so long without an image
+  unsigned of_address = 16;  ///< associations from one address
+  unsigned connections = 4;  ///< connections per association slot, including those not yet associated
+  double spared_s = 2;       ///< an association can be replaced after this time without an image
 };
 
-/// Who may connect and associate. Where there is no room, whoever is least likely to send an image makes
-/// some: the oldest connection without an association, and the association that sent none for longest. An
-/// association with an image on the way is never ended. Knows no sockets; from any thread.
+/// Decides which peers may connect and associate. When full, the peer least likely to send an image is
+/// closed: the oldest connection without an association, or the association longest without an image. An
+/// association that is receiving an image is never closed. Has no sockets; thread-safe.
 class Admission {
  public:
   using Clock = std::chrono::steady_clock;
@@ -29,10 +29,10 @@ class Admission {
 
   explicit Admission(const AdmissionLimits& limits) : limits_(limits) {}
 
-  /// `evict` is called, once and within another member, if this connection must make room; it must not wait
-  /// and call no member. Nothing where there is no room.
+  /// `evict` is called at most once, from within another member, if this connection must close; it must not
+  /// block and must not call a member. Nothing if the limit is reached.
   std::optional<Id> connect(const std::string& address, std::function<void()> evict, Clock::time_point now);
-  /// Whether there is room for this connection's association.
+  /// Whether this connection may associate.
   bool associate(Id id, Clock::time_point now);
   void image_begins(Id id);
   void image_ends(Id id, Clock::time_point now);
@@ -45,7 +45,7 @@ class Admission {
     std::function<void()> evict;
     bool associated = false;
     bool sends_image = false;
-    Clock::time_point since;  ///< of the connection, the association, its last image
+    Clock::time_point since;  ///< start of the connection or association, or end of its last image
   };
   using Peers = std::map<Id, Peer>;
 

@@ -26,14 +26,14 @@ class AdmissionOfPeers : public testing::Test {
            std::chrono::duration_cast<Admission::Clock::duration>(std::chrono::duration<double>(now_s_));
   }
 
-  // 4 associations, 2 of one address; 8 connections, 4 of one address.
+  // 4 associations, 2 per address; 8 connections, 4 per address.
   Admission admission_{{.associations = 4, .of_address = 2, .connections = 2, .spared_s = 2}};
   double now_s_ = 0;
   int connected_ = 0;
   std::vector<int> evicted_;  ///< connections, counted from 1
 };
 
-TEST_F(AdmissionOfPeers, OldestSilentConnectionOfAFullAddressMakesRoom) {
+TEST_F(AdmissionOfPeers, OldestSilentConnectionOfAFullAddressIsReplaced) {
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(connect("a"));
   EXPECT_TRUE(connect("b"));
   EXPECT_TRUE(evicted_.empty());
@@ -42,13 +42,13 @@ TEST_F(AdmissionOfPeers, OldestSilentConnectionOfAFullAddressMakesRoom) {
   EXPECT_EQ(evicted_, (std::vector{1, 2}));
 }
 
-TEST_F(AdmissionOfPeers, OldestSilentConnectionOfAllMakesRoomForAnotherAddress) {
+TEST_F(AdmissionOfPeers, OldestSilentConnectionOfAllIsReplacedForAnotherAddress) {
   for (const char* address : {"a", "b", "c", "d", "e", "f", "g", "h"}) EXPECT_TRUE(connect(address));
   EXPECT_TRUE(connect("i"));
   EXPECT_EQ(evicted_, std::vector{1});
 }
 
-TEST_F(AdmissionOfPeers, ConnectionIsTurnedAwayWhereAllOthersAreAssociated) {
+TEST_F(AdmissionOfPeers, ConnectionIsRejectedIfAllOthersAreAssociated) {
   Admission full({.associations = 2, .of_address = 2, .connections = 1, .spared_s = 2});
   for (int i = 0; i < 2; ++i) {
     const auto id = full.connect(
@@ -59,7 +59,7 @@ TEST_F(AdmissionOfPeers, ConnectionIsTurnedAwayWhereAllOthersAreAssociated) {
       "b", [] {}, at()));
 }
 
-TEST_F(AdmissionOfPeers, AssociationsBeyondTheLimitOfAnAddressAreRejectedForNow) {
+TEST_F(AdmissionOfPeers, AssociationsAboveTheLimitPerAddressAreRejected) {
   associated("a"), associated("a");
   now_s_ = 1.9;
   EXPECT_FALSE(admission_.associate(connect("a").value(), at()));
@@ -67,7 +67,7 @@ TEST_F(AdmissionOfPeers, AssociationsBeyondTheLimitOfAnAddressAreRejectedForNow)
   EXPECT_TRUE(evicted_.empty());
 }
 
-TEST_F(AdmissionOfPeers, AssociationWithoutAnImageForLongestMakesRoom) {
+TEST_F(AdmissionOfPeers, AssociationLongestWithoutAnImageIsReplaced) {
   associated("a");
   now_s_ = 1;
   associated("a");
@@ -79,7 +79,7 @@ TEST_F(AdmissionOfPeers, AssociationWithoutAnImageForLongestMakesRoom) {
   EXPECT_FALSE(admission_.associate(connect("a").value(), at()));
 }
 
-TEST_F(AdmissionOfPeers, AssociationWithAnImageOnTheWayIsNeverEnded) {
+TEST_F(AdmissionOfPeers, AssociationReceivingAnImageIsNeverClosed) {
   const Admission::Id sender = associated("a");
   associated("a");
   admission_.image_begins(sender);
@@ -97,7 +97,7 @@ TEST_F(AdmissionOfPeers, AssociationWithAnImageOnTheWayIsNeverEnded) {
   EXPECT_EQ(evicted_, (std::vector{2, 3, 1}));
 }
 
-TEST_F(AdmissionOfPeers, WhoLeavesMakesRoom) {
+TEST_F(AdmissionOfPeers, LeavingFreesASlot) {
   const Admission::Id first = associated("a");
   associated("a");
   admission_.leave(first);
@@ -105,7 +105,7 @@ TEST_F(AdmissionOfPeers, WhoLeavesMakesRoom) {
   EXPECT_TRUE(evicted_.empty());
 }
 
-TEST_F(AdmissionOfPeers, WhoWasEvictedMayStillLeaveAndAsk) {
+TEST_F(AdmissionOfPeers, EvictedConnectionMayStillLeaveAndAssociate) {
   const Admission::Id first = associated("a");
   associated("a");
   now_s_ = 3;

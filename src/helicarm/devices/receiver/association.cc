@@ -15,8 +15,8 @@ using dicom::AbortReason, dicom::Operation, dicom::PduType, dicom::Status;
 
 constexpr std::size_t most_request_bytes = std::size_t{256} << 10;
 constexpr std::size_t most_command_bytes = std::size_t{64} << 10;
-// More says nothing new; a flood of strangers may write no more into a log.
-constexpr unsigned lines_a_second = 20;
+// Bounds what remote peers can write into a log.
+constexpr unsigned max_lines_per_s = 20;
 
 template <class T>
 T or_breach(Expected<T> value) {
@@ -39,7 +39,7 @@ ReceiverShared::ReceiverShared(const ReceiverOptions& given, Inbox& into, Receiv
       inbox(into),
       hooks(std::move(told)),
       admission(limits_of(given)),
-      lines(lines_a_second) {}
+      lines(max_lines_per_s) {}
 
 Association::Association(ReceiverShared& shared, std::string origin, Admission::Id id)
     : shared_(shared), origin_(std::move(origin)), id_(id) {}
@@ -159,9 +159,10 @@ std::pair<Status, std::string> Association::store(const dicom::ContextAnswer& co
     shared_.hooks.refused(failure);
     return std::pair{status, std::string(code(failure.reason)) + ": " + failure.message};
   };
-  const std::string origin = "picture from " + title_;
+  const std::string origin = "image from " + title_;
   if (!is_xray_class(command_->sop_class) || command_->sop_class != context.abstract_syntax)
-    return refuse(Status::sop_class_unknown, {Reason::unsupported, origin + ": SOP class was not agreed on"});
+    return refuse(Status::sop_class_unknown,
+                  {Reason::unsupported, origin + ": SOP class was not negotiated"});
   const std::string file =
       dicom_file(command_->sop_class, command_->sop_instance, context.transfer_syntax, bytes_);
   const auto elements = walk_dicom(file, origin);
@@ -188,7 +189,7 @@ void Association::take_memory(std::size_t bytes) {
     throw Breach{AbortReason::unspecified, fmt::format("image over {} bytes", options.most_object_bytes)};
   if (all > options.most_bytes)
     throw Breach{AbortReason::unspecified,
-                 fmt::format("images on the way over {} bytes in all", options.most_bytes)};
+                 fmt::format("images being received exceed {} bytes in total", options.most_bytes)};
 }
 
 void Association::release_memory() { shared_.counters.bytes_on_the_way -= std::exchange(memory_taken_, 0); }

@@ -16,7 +16,7 @@
 
 namespace helicarm {
 
-/// What all associations share.
+/// State shared by all associations.
 struct ReceiverShared {
   ReceiverShared(const ReceiverOptions& given, Inbox& into, ReceiverHooks told);
 
@@ -25,10 +25,10 @@ struct ReceiverShared {
   ReceiverHooks hooks;
   ReceiverCounters counters;
   Admission admission;
-  LineLimit lines;  ///< about peers that sent no image
+  LineLimit lines;  ///< limits log lines about peers that sent no image
 };
 
-/// The peer broke the protocol.
+/// A protocol violation by the peer.
 struct Breach {
   dicom::AbortReason reason;
   std::string why;
@@ -37,29 +37,29 @@ struct Breach {
 /// One association without its socket: protocol data units in, bytes to send out.
 class Association {
  public:
-  /// `origin` is the peer's address; `id` of its connection in the shared admission.
+  /// `origin` is the peer's address; `id` identifies its connection in the shared admission.
   Association(ReceiverShared& shared, std::string origin, Admission::Id id);
   ~Association() { release_memory(); }
   Association(const Association&) = delete;
   Association& operator=(const Association&) = delete;
 
-  /// Longest body of the next PDU.
+  /// Largest allowed body of the next PDU.
   std::size_t most_pdu_bytes() const;
-  /// Takes a PDU's type and whole body; what to send back, perhaps nothing. Throws Breach. An image is in the
-  /// inbox when this returns.
+  /// Processes a PDU's type and whole body; returns the bytes to send, possibly none. Throws Breach. An image
+  /// is in the inbox when this returns.
   std::string take(std::uint8_t type, std::string_view body);
 
   bool associated() const { return associated_; }
-  /// Released, aborted by the peer or rejected: nothing more is to be read.
+  /// Released, aborted by the peer or rejected: no more input is read.
   bool over() const { return over_; }
   bool aborted_by_peer() const { return aborted_by_peer_; }
-  /// Number, from 1, of the message that has begun and not ended; 0 where there is none.
+  /// Number, from 1, of the message being received; 0 if there is none.
   std::uint64_t message_on_the_way() const { return message_on_the_way_ ? messages_ : 0; }
-  /// An image has begun, of which so many bytes are here.
+  /// Bytes received so far of the image being received.
   std::optional<std::size_t> image_on_the_way() const;
-  /// Images that came whole, taken or refused.
+  /// Complete images, accepted or refused.
   std::uint64_t images() const { return images_; }
-  /// The peer, for a log: its title, if it gave one, and its address.
+  /// The peer's title, if known, and address, for a log.
   std::string peer() const;
 
  private:
@@ -79,7 +79,7 @@ class Association {
   std::map<std::uint8_t, dicom::ContextAnswer> contexts_;
   std::uint64_t images_ = 0;
   std::uint64_t messages_ = 0;
-  // The message that is on the way.
+  // The message being received.
   bool message_on_the_way_ = false;
   std::uint8_t context_ = 0;
   std::optional<dicom::Command> command_;

@@ -54,7 +54,7 @@ std::uint16_t word(Element number, std::string_view value) {
 
 std::string uid(Element number, std::string_view value) {
   if (value.ends_with('\0') || value.ends_with(' ')) value.remove_suffix(1);
-  if (!is_uid(value)) refuse(number, "is no valid UID");
+  if (!is_uid(value)) refuse(number, "is not a valid UID");
   return std::string(value);
 }
 
@@ -70,7 +70,7 @@ Expected<Command> read_command(std::string_view bytes) {
       const auto number = static_cast<Element>(little_endian(bytes.substr(2, 2)));
       const std::uint32_t length = little_endian(bytes.substr(4, 4));
       if (little_endian(bytes.substr(0, 2)) != 0 || number <= before)
-        throw BadInput(Reason::bad_value, "command holds an element out of order or of another group");
+        throw BadInput(Reason::bad_value, "command contains an element out of order or of another group");
       before = number;
       if (length > bytes.size() - 8) throw BadInput(Reason::truncated, "command ends within a value");
       const std::string_view value = bytes.substr(8, length);

@@ -7,13 +7,13 @@
 
 #include "helicarm/core/failure.h"
 
-/// DICOM's messages (PS3.7): the two that an image receiver understands.
+/// DICOM messages (PS3.7): the two that the receiver supports.
 namespace helicarm::dicom {
 
 enum class Operation : std::uint16_t { store = 0x0001, echo = 0x0030, cancel = 0x0FFF };
 
 struct Command {
-  std::uint16_t field = 0;  ///< may be none of Operation
+  std::uint16_t field = 0;  ///< can be a value outside Operation
   std::uint16_t message_id = 0;
   std::string sop_class;
   std::string sop_instance;
@@ -32,10 +32,10 @@ enum class Status : std::uint16_t {
   cannot_understand = 0xC000
 };
 
-/// A whole command set (group 0000, implicit, little endian). Refuses truncated, bad_value.
+/// A complete command set (group 0000, implicit, little endian). Refuses truncated, bad_value.
 Expected<Command> read_command(std::string_view bytes);
 
-/// The answer to a command; `comment` (at most 64 characters are sent) says why it was refused.
+/// Response to a command; `comment` (at most 64 characters are sent) states why it was refused.
 std::string write_response(const Command& command, Status status, std::string_view comment = {});
 
 }  // namespace helicarm::dicom

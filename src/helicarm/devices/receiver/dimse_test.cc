@@ -9,7 +9,7 @@
 namespace helicarm::dicom {
 namespace {
 
-TEST(Command, OfStoreReportsClassInstanceAndThatDataFollow) {
+TEST(Command, StoreReportsClassInstanceAndFollowingData) {
   const Command command = read_command(peer::command(1, xa_class, "2.25.17")).value();
   EXPECT_TRUE(command.is(Operation::store));
   EXPECT_EQ(command.message_id, 7);
@@ -18,9 +18,9 @@ TEST(Command, OfStoreReportsClassInstanceAndThatDataFollow) {
   EXPECT_TRUE(command.data_set_follows);
 }
 
-TEST(Command, EveryCutIsRefused) {
+TEST(Command, EveryTruncationIsRefused) {
   const std::string whole = peer::command(1, xa_class, "2.25.17");
-  const std::size_t instance = whole.size() - 16;  // an optional element: without it the command is sound
+  const std::size_t instance = whole.size() - 16;  // an optional element: without it the command is valid
   for (std::size_t length = 0; length < whole.size(); ++length)
     EXPECT_TRUE(length == instance || !read_command(whole.substr(0, length))) << length;
 }
@@ -36,7 +36,7 @@ TEST(Command, ElementsOutOfOrderAreRefused) {
                             peer::command_element(0x0100, std::string(2, '\1'))));
 }
 
-TEST(Command, ChangedBytesNeverCrash) {
+TEST(Command, MutationsNeverCrash) {
   const std::string whole = peer::command(1, xa_class, "2.25.17");
   RandomStream random(1, 2);
   for (int trial = 0; trial < 20000; ++trial) {
@@ -49,7 +49,7 @@ TEST(Command, ChangedBytesNeverCrash) {
   }
 }
 
-TEST(Response, RepeatsTheMessageAndCarriesTheStatus) {
+TEST(Response, RepeatsTheMessageIdAndContainsTheStatus) {
   const Command command = read_command(peer::command(1, xa_class, "2.25.17")).value();
   const std::string bytes = write_response(command, Status::cannot_understand, "why");
   EXPECT_NE(bytes.find(peer::command_element(0x0100, std::string("\1\x80", 2))), std::string::npos);

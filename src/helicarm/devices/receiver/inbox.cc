@@ -33,7 +33,7 @@ void remove_parts(const fs::path& folder) {
   }
 }
 
-/// Proves that every frame's structure is sound and the first one can be decoded.
+/// Checks the structure of every frame and decodes the first.
 void check_image(std::string_view file, const std::string& origin) {
   value_or_throw(read_dicom(file, origin, 1));
 }
@@ -51,14 +51,17 @@ Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
   std::error_code ec;
   const bool made = fs::create_directories(folder, ec);
   if (ec || !fs::is_directory(folder))
-    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be made", folder.string()));
+    return fail(Reason::cannot_write,
+                fmt::format("{}: is not a folder and cannot be created", folder.string()));
   if (made) fs::permissions(folder, fs::perms::owner_all, ec);
   const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
     return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), std::strerror(errno)));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock);
-    return fail(Reason::cannot_write, fmt::format("{}: another program receives into it", folder.string()));
+    return fail(
+        Reason::cannot_write,
+        fmt::format("{}: in use by another program; close it or choose another folder", folder.string()));
   }
   remove_parts(folder);
   return std::unique_ptr<Inbox>(new Inbox(folder, lock));
@@ -72,7 +75,7 @@ void Inbox::check_folder(const std::string& origin) const {
       ours.st_dev == named.st_dev && ours.st_ino == named.st_ino)
     return;
   throw BadInput(Reason::cannot_write,
-                 fmt::format("{}: the inbox {} was deleted or replaced in operation: start the program again",
+                 fmt::format("{}: the inbox {} was deleted or replaced during operation: restart the program",
                              origin, folder_.string()));
 }
 
@@ -95,11 +98,11 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
       }
       if (version == most_versions)
         throw BadInput(Reason::cannot_write,
-                       fmt::format("{}: {} pictures with this UID are here already", origin, most_versions));
+                       fmt::format("{}: {} images with this UID are stored already", origin, most_versions));
       if (version == 1)
         arrival.warnings.push_back(
             {Reason::uid_reused,
-             fmt::format("{}: another picture with the same SOP Instance UID is here already; both are kept",
+             fmt::format("{}: another image with the same SOP Instance UID is stored already; both are kept",
                          origin)});
     }
     value_or_throw(write_file_in_folder(arrival.path, file));

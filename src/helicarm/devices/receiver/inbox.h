@@ -12,31 +12,29 @@
 
 namespace helicarm {
 
-/// An image that is safely on disk.
+/// A stored image.
 struct Arrival {
   std::filesystem::path path;
   std::string digest;     ///< of the file's bytes
-  bool repeated = false;  ///< these very bytes were there already
+  bool repeated = false;  ///< identical bytes were already stored
   std::vector<Warning> warnings;
 };
 
-/// A folder of received DICOM X-rays, kept as they came and readable by the owner alone: they hold what the
-/// C-arm knows of the patient. One program at a time uses it: a lock file says so. Safe to call from several
-/// threads.
+/// A folder of received DICOM X-ray images, stored unchanged and readable by the owner only, because they
+/// contain patient data. One program at a time, enforced by a lock file. Thread-safe.
 class Inbox {
  public:
-  /// Makes the folder where there is none and clears away what an earlier program left half written. Refuses
-  /// cannot_write, also when another program uses it.
+  /// Creates the folder if needed and removes incomplete files of an earlier run. Refuses cannot_write, also
+  /// if another program uses the folder.
   static Expected<std::unique_ptr<Inbox>> open(const std::filesystem::path& folder);
   ~Inbox();
   Inbox(const Inbox&) = delete;
   Inbox& operator=(const Inbox&) = delete;
 
-  /// Checks a whole DICOM file as `read_dicom` does, writes it aside, syncs and renames it to
-  /// SOP-INSTANCE-UID.dcm. Other bytes under a known UID keep both files, the new one as UID~2.dcm, with the
-  /// warning uid_reused. A folder that was deleted or replaced in operation, or whose lock was, is
-  /// cannot_write from then on: it is not made again. `origin` begins each message; no message holds patient
-  /// data.
+  /// Checks a whole DICOM file like `read_dicom` and stores it atomically as SOP-INSTANCE-UID.dcm. Different
+  /// bytes under a known UID keep both files, the new one as UID~2.dcm, with the warning uid_reused. If the
+  /// folder or its lock was deleted or replaced during operation, this and all later calls fail with
+  /// cannot_write; it is not recreated. `origin` begins each message; no message contains patient data.
   Expected<Arrival> store(std::string_view file, const std::string& origin);
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -50,7 +48,7 @@ class Inbox {
   std::mutex naming_;
 };
 
-/// A DICOM file (PS3.10) around a data set as it came; the UIDs are checked ones.
+/// A DICOM file (PS3.10) with the data set as received; the UIDs must be valid.
 std::string dicom_file(std::string_view sop_class, std::string_view sop_instance,
                        std::string_view transfer_syntax, std::string_view data_set);
 

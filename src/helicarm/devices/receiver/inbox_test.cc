@@ -21,7 +21,7 @@ class InboxOnDisk : public testing::Test {
   std::unique_ptr<Inbox> inbox_ = Inbox::open(folder_).value();
 };
 
-TEST_F(InboxOnDisk, ImageIsKeptAsItCame) {
+TEST_F(InboxOnDisk, ImageIsStoredUnchanged) {
   const std::string file = DicomBuilder().bytes();
   const Arrival arrival = inbox_->store(file, "test").value();
   EXPECT_EQ(arrival.path, folder_ / "2.25.17.dcm");
@@ -52,22 +52,22 @@ TEST_F(InboxOnDisk, UnreadableImageIsRefusedAndLeavesNothing) {
   EXPECT_EQ(inbox_->store("hello", "test").error().reason, Reason::not_an_image);
   EXPECT_FALSE(inbox_->store(DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
   EXPECT_FALSE(inbox_->store(DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // the lock
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // only the lock file
 }
 
-TEST_F(InboxOnDisk, UidThatIsNoNumberIsRefused) {
+TEST_F(InboxOnDisk, InvalidUidIsRefused) {
   EXPECT_EQ(inbox_->store(DicomBuilder().text(0x00080018, "UI", "..").bytes(), "test").error().reason,
             Reason::bad_value);
 }
 
-TEST_F(InboxOnDisk, NoMessageHoldsThePatientsName) {
+TEST_F(InboxOnDisk, NoMessageContainsThePatientName) {
   const auto refused =
       inbox_->store(DicomBuilder().text(0x00100010, "PN", "CANARY^NAME").word(0x00280010, 0).bytes(), "test");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message.find("CANARY"), std::string::npos);
 }
 
-TEST_F(InboxOnDisk, IsOneProgramsAtATime) {
+TEST_F(InboxOnDisk, SecondProgramIsRefused) {
   const auto second = Inbox::open(folder_);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().reason, Reason::cannot_write);
@@ -75,7 +75,7 @@ TEST_F(InboxOnDisk, IsOneProgramsAtATime) {
   EXPECT_TRUE(Inbox::open(folder_));
 }
 
-TEST_F(InboxOnDisk, FolderDeletedInOperationIsAnErrorAndNotMadeAnew) {
+TEST_F(InboxOnDisk, FolderDeletedInOperationIsAnErrorAndNotRecreated) {
   fs::remove_all(folder_);
   const auto refused = inbox_->store(DicomBuilder().bytes(), "test");
   ASSERT_FALSE(refused);
@@ -95,14 +95,14 @@ TEST_F(InboxOnDisk, LockDeletedInOperationIsAnError) {
   EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
 }
 
-TEST_F(InboxOnDisk, HalfWrittenImagesOfAKilledProgramAreClearedAway) {
+TEST_F(InboxOnDisk, IncompleteImagesOfAKilledProgramAreRemoved) {
   inbox_.reset();
   std::ofstream(folder_ / ".2.25.17.dcm.123.0.part") << "half";
   inbox_ = Inbox::open(folder_).value();
   EXPECT_FALSE(fs::exists(folder_ / ".2.25.17.dcm.123.0.part"));
 }
 
-TEST(Inbox, ThatCannotBeMadeIsRefused) {
+TEST(Inbox, FolderThatCannotBeCreatedIsRefused) {
   EXPECT_EQ(Inbox::open("/dev/null/inbox").error().reason, Reason::cannot_write);
 }
 

@@ -12,7 +12,7 @@ namespace {
 constexpr std::string_view dicom_application = "1.2.840.10008.3.1.1.1";
 constexpr std::string_view verification = "1.2.840.10008.1.1";
 
-/// What costs least to read comes first; lossy ones last.
+/// Cheapest to decode first, lossy ones last.
 constexpr std::array<std::string_view, 7> transfer_syntaxes{
     "1.2.840.10008.1.2.1",    "1.2.840.10008.1.2",      "1.2.840.10008.1.2.5",   "1.2.840.10008.1.2.4.70",
     "1.2.840.10008.1.2.4.57", "1.2.840.10008.1.2.4.51", "1.2.840.10008.1.2.4.50"};
@@ -23,7 +23,7 @@ constexpr Rejection calling_title_unknown{1, 1, 3};
 constexpr Rejection called_title_unknown{1, 1, 7};
 constexpr Rejection no_reason_given{1, 1, 1};
 
-// Our longest answer: header, fragment, command with two UIDs and a comment.
+// Longest response: header, fragment, command with two UIDs and a comment.
 constexpr std::uint32_t least_pdu_bytes = 512;
 
 ContextAnswer answer(const PresentationContext& context) {

@@ -11,13 +11,13 @@
 namespace helicarm::dicom {
 
 struct NegotiationOptions {
-  std::string title = "HELICARM";          ///< ours: other called titles are rejected
-  std::vector<std::string> peers;          ///< calling titles that are let in; empty: any
-  std::uint32_t most_pdu_bytes = 1 << 17;  ///< that we take
+  std::string title = "HELICARM";          ///< own AE title: other called titles are rejected
+  std::vector<std::string> peers;          ///< accepted calling titles; empty: any
+  std::uint32_t most_pdu_bytes = 1 << 17;  ///< largest PDU accepted
 };
 
-/// The contexts' answers in the request's order, or why there is no association (PS3.8, 9.3.4). Taken are
-/// verification and the storage of X-rays (`is_xray_class`), in the transfer syntaxes that the reader knows.
+/// Answers to the contexts in the request's order, or the rejection (PS3.8, 9.3.4). Accepted are verification
+/// and X-ray storage classes (`is_xray_class`) in the transfer syntaxes that the reader supports.
 tl::expected<std::vector<ContextAnswer>, Rejection> negotiate(const AssociationRequest& request,
                                                               const NegotiationOptions& options);
 

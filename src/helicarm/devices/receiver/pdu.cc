@@ -56,7 +56,7 @@ std::string pdu(PduType type, std::string_view body) {
 
 std::string uid_of(std::string_view content, std::string_view what) {
   while (content.ends_with('\0') || content.ends_with(' ')) content.remove_suffix(1);
-  if (!is_uid(content)) throw BadInput(Reason::bad_value, fmt::format("{}: is no valid UID", what));
+  if (!is_uid(content)) throw BadInput(Reason::bad_value, fmt::format("{}: is not a valid UID", what));
   return std::string(content);
 }
 
@@ -64,7 +64,7 @@ std::string title_of(std::string_view field, std::string_view what) {
   while (field.ends_with(' ') || field.ends_with('\0')) field.remove_suffix(1);
   while (field.starts_with(' ')) field.remove_prefix(1);
   if (!is_title(field))
-    throw BadInput(Reason::bad_value, fmt::format("{}: is no valid application entity title", what));
+    throw BadInput(Reason::bad_value, fmt::format("{}: is not a valid application entity title", what));
   return std::string(field);
 }
 

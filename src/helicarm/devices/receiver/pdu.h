@@ -8,7 +8,7 @@
 
 #include "helicarm/core/failure.h"
 
-/// The protocol data units of DICOM's upper layer (PS3.8, 9.3), read without trusting any length in them.
+/// Protocol data units of the DICOM upper layer (PS3.8, 9.3); every length is checked.
 namespace helicarm::dicom {
 
 enum class PduType : std::uint8_t {
@@ -23,18 +23,18 @@ enum class PduType : std::uint8_t {
 
 inline constexpr std::size_t pdu_header_bytes = 6;
 
-/// Names this program, as PS3.7, D.3.3.2 wants it.
+/// Identifies this implementation (PS3.7, D.3.3.2).
 inline constexpr std::string_view implementation_uid = "2.25.91283404923874650913245760233914825573";
 
 struct PduHeader {
-  std::uint8_t type;  ///< may be none of PduType
+  std::uint8_t type;  ///< can be a value outside PduType
   std::uint32_t length;
 };
 
-/// `bytes` are the first six.
+/// `bytes` are the first six of a PDU.
 PduHeader read_pdu_header(std::string_view bytes);
 
-/// What the peer wants to send, and in which of its encodings.
+/// A proposed SOP class with its transfer syntaxes.
 struct PresentationContext {
   std::uint8_t id;  ///< odd
   std::string abstract_syntax;
@@ -47,11 +47,11 @@ struct AssociationRequest {
   std::string calling;
   std::string application_context;
   std::vector<PresentationContext> contexts;
-  std::uint32_t most_pdu_bytes = 0;  ///< that the peer takes; 0: any
+  std::uint32_t most_pdu_bytes = 0;  ///< largest PDU the peer accepts; 0: any
 };
 
-/// The body of A-ASSOCIATE-RQ. Refuses (truncated, bad_value) items that end beyond it, titles and UIDs of
-/// other characters, contexts that are even, given twice or more than 128.
+/// Body of A-ASSOCIATE-RQ. Refuses (truncated, bad_value) items that exceed it, invalid titles and UIDs,
+/// context numbers that are even or duplicate, and more than 128 contexts.
 Expected<AssociationRequest> read_association_request(std::string_view body);
 
 enum class ContextResult : std::uint8_t {
@@ -75,7 +75,7 @@ struct Rejection {
 
 enum class AbortReason : std::uint8_t { unspecified = 0, unknown_pdu = 1, unexpected_pdu = 2, bad_value = 6 };
 
-/// Whole PDUs with their headers.
+/// Complete PDUs with headers.
 std::string associate_accept(const AssociationRequest& request, const std::vector<ContextAnswer>& contexts,
                              std::uint32_t most_pdu_bytes);
 std::string associate_reject(const Rejection& rejection);
@@ -92,10 +92,10 @@ struct Fragment {
   std::string_view bytes;
 };
 
-/// The body of P-DATA-TF.
+/// Body of P-DATA-TF.
 Expected<std::vector<Fragment>> read_fragments(std::string_view body);
 
-/// 1 to 64 characters: numbers without signs, joined by points.
+/// 1 to 64 characters: numbers without signs, separated by points.
 bool is_uid(std::string_view text);
 
 /// 1 to 16 printable characters without a backslash, not all blank.

@@ -22,7 +22,7 @@ TEST(AssociationRequest, ReportsTitlesContextsAndLargestPdu) {
   EXPECT_THAT(request.contexts[1].transfer_syntaxes, testing::ElementsAre(explicit_syntax));
 }
 
-TEST(AssociationRequest, EveryCutIsTruncatedOrLeavesSomethingOut) {
+TEST(AssociationRequest, EveryTruncationIsTruncatedOrOmitsAnItem) {
   const std::string whole = peer::Request().body();
   const auto uncut = read_association_request(whole).value();
   for (std::size_t length = 0; length < whole.size(); ++length) {
@@ -54,13 +54,13 @@ TEST(AssociationRequest, ThreeHundredContextsAreRefused) {
   EXPECT_FALSE(read_association_request(request.body()));
 }
 
-TEST(AssociationRequest, TitleOfControlCharactersIsRefused) {
+TEST(AssociationRequest, TitleWithControlCharactersIsRefused) {
   peer::Request request;
   request.calling = peer::padded("A\nB");
   EXPECT_EQ(read_association_request(request.body()).error().reason, Reason::bad_value);
 }
 
-TEST(AssociationRequest, ChangedBytesNeverCrash) {
+TEST(AssociationRequest, MutationsNeverCrash) {
   const std::string whole = peer::Request().body();
   RandomStream random(1, 1);
   for (int trial = 0; trial < 20000; ++trial) {
@@ -92,7 +92,7 @@ TEST(Fragments, SeveralInOnePduAreReported) {
   EXPECT_TRUE(fragments[1].last && fragments[1].command);
 }
 
-TEST(Uid, IsNumbersAndPoints) {
+TEST(Uid, UidIsNumbersAndPoints) {
   EXPECT_TRUE(is_uid("1.2.840"));
   for (const char* bad : {"", ".", "..", "1..2", "1.", ".1", "../../tmp/x", "1.2a"})
     EXPECT_FALSE(is_uid(bad)) << bad;
@@ -103,7 +103,7 @@ AssociationRequest request(const peer::Request& request) {
   return read_association_request(request.body()).value();
 }
 
-TEST(Negotiation, TakesEchoAndXrays) {
+TEST(Negotiation, AcceptsEchoAndXrays) {
   const auto answers = negotiate(request({}), {}).value();
   EXPECT_EQ(answers[0].result, ContextResult::accepted);
   EXPECT_EQ(answers[1].result, ContextResult::accepted);

@@ -18,7 +18,7 @@ inline constexpr const char* xa_class = "1.2.840.10008.5.1.4.1.1.12.1";
 inline constexpr const char* verification_class = "1.2.840.10008.1.1";
 inline constexpr const char* explicit_syntax = "1.2.840.10008.1.2.1";
 
-/// For tests: what a peer sends, byte by byte, so that any of it can be wrong.
+/// For tests: a peer's bytes, any of which can be invalid.
 namespace peer {
 
 inline std::string item(int type, const std::string& content) {
@@ -95,7 +95,7 @@ inline std::string command(int field, const std::string& sop_class, const std::s
          (data ? command_element(0x1000, sop_instance) : "");
 }
 
-/// The data set of a file that the builder made.
+/// Data set of a file made by the builder.
 inline std::string data_set(const DicomBuilder& builder) {
   const std::string file = builder.bytes();
   const std::size_t meta_size = static_cast<unsigned char>(file[140]);
@@ -113,7 +113,7 @@ inline std::string release() { return pdu(5, std::string(4, '\0')); }
 
 }  // namespace peer
 
-/// For tests: a plain TCP client.
+/// For tests: a TCP client without protocol logic.
 class RawClient {
  public:
   explicit RawClient(std::uint16_t port) : socket_(*context_) {
@@ -124,7 +124,7 @@ class RawClient {
     asio::error_code gone;
     asio::write(socket_, asio::buffer(bytes), gone);
   }
-  /// The next PDU's type and body; type 0 when the peer has closed.
+  /// Type and body of the next PDU; type 0 if the peer has closed.
   std::pair<int, std::string> receive() {
     asio::error_code error;
     std::string header(6, '\0');

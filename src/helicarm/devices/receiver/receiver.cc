@@ -17,10 +17,10 @@ namespace {
 
 using asio::ip::tcp;
 
-// Checking and writing an image takes one of them for some milliseconds.
-constexpr std::size_t crew = 4;
-// Without descriptors, say: trying again at once would take all of a processor.
-constexpr std::chrono::milliseconds breath{100};
+// Checking and storing an image occupies a thread for some milliseconds.
+constexpr std::size_t thread_count = 4;
+// Without file descriptors an immediate retry would use a whole core.
+constexpr std::chrono::milliseconds retry_delay{100};
 
 asio::ssl::context tls_context(const TlsFiles& files) {
   asio::ssl::context context(asio::ssl::context::tls_server);
@@ -47,7 +47,7 @@ asio::ssl::context tls_context(const TlsFiles& files) {
 struct DicomReceiver::Engine {
   ReceiverShared shared;
   std::optional<asio::ssl::context> tls;
-  asio::thread_pool pool{crew};
+  asio::thread_pool pool{thread_count};
   tcp::acceptor acceptor{pool};
 
   Engine(const ReceiverOptions& options, Inbox& inbox, ReceiverHooks hooks)
@@ -62,7 +62,7 @@ struct DicomReceiver::Engine {
     const ReceiverOptions& options = shared.options;
     const auto address = asio::ip::make_address(options.address, error);
     if (error)
-      throw BadInput(Reason::bad_value, fmt::format("address {}: is no IP address", options.address));
+      throw BadInput(Reason::bad_value, fmt::format("address {}: is not an IP address", options.address));
     if (options.tls) tls = tls_context(*options.tls);
     const tcp::endpoint endpoint(address, options.port);
     acceptor.open(endpoint.protocol());
@@ -91,7 +91,7 @@ struct DicomReceiver::Engine {
       ++shared.counters.accept_failures;
       if (std::exchange(well, false))
         shared.hooks.cut({Reason::not_connected, "connections cannot be accepted: " + error.message()});
-      timer.expires_after(breath);
+      timer.expires_after(retry_delay);
       co_await timer.async_wait(asio::use_awaitable);
     }
   }

@@ -14,7 +14,7 @@
 
 namespace helicarm {
 
-/// PEM files. Peers must show a certificate that one of `authorities` has signed.
+/// PEM files. Peers must present a certificate signed by one of `authorities`.
 struct TlsFiles {
   std::filesystem::path certificate;
   std::filesystem::path key;
@@ -22,57 +22,57 @@ struct TlsFiles {
 };
 
 struct ReceiverOptions {
-  std::string address = "127.0.0.1";  ///< another one opens the receiver to the network
-  std::uint16_t port = 11112;         ///< 0: any that is free
+  std::string address = "127.0.0.1";  ///< another address opens the receiver to the network
+  std::uint16_t port = 11112;         ///< 0: any free port
   dicom::NegotiationOptions negotiation;
   std::optional<TlsFiles> tls;
-  unsigned most_associations = 32;  ///< at once; more are rejected as transient
+  unsigned most_associations = 32;  ///< concurrent; more are rejected as transient
   unsigned most_of_address = 16;    ///< of these, from one address
-  double spared_s = 2;  ///< an association without an image for so long makes room for another one
-  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< of one image
-  std::size_t most_bytes = std::size_t{512} << 20;         ///< of all that are on the way
+  double spared_s = 2;              ///< an association can be replaced after this time without an image
+  std::size_t most_object_bytes = std::size_t{128} << 20;  ///< per image
+  std::size_t most_bytes = std::size_t{512} << 20;         ///< total of images being received
   double request_limit_s = 10;                             ///< from connection to association
-  double idle_limit_s = 30;                                ///< for each PDU
+  double idle_limit_s = 30;                                ///< per PDU
   double echo_limit_s = 120;                               ///< for an association without an image
-  double object_limit_s = 120;                             ///< from a message's first byte to its last
+  double object_limit_s = 120;                             ///< from a message's first to its last byte
 };
 
-/// What happened since the start.
+/// Counters since the start.
 struct ReceiverCounters {
   std::atomic<std::uint64_t> connections{0};
   std::atomic<std::uint64_t> associations{0};
-  std::atomic<std::uint64_t> rejected{0};         ///< associations
-  std::atomic<std::uint64_t> aborted{0};          ///< by the peer, or by us over a breach of the protocol
-  std::atomic<std::uint64_t> timed_out{0};        ///< stalled or imageless peers that were dropped
-  std::atomic<std::uint64_t> evicted{0};          ///< those that made room for another
-  std::atomic<std::uint64_t> turned_away{0};      ///< connections for which there was no room
-  std::atomic<std::uint64_t> accept_failures{0};  ///< out of descriptors, say
+  std::atomic<std::uint64_t> rejected{0};     ///< associations
+  std::atomic<std::uint64_t> aborted{0};      ///< by the peer, or by the receiver after a protocol violation
+  std::atomic<std::uint64_t> timed_out{0};    ///< inactive peers that were disconnected
+  std::atomic<std::uint64_t> evicted{0};      ///< replaced by another peer
+  std::atomic<std::uint64_t> turned_away{0};  ///< connections above the limit
+  std::atomic<std::uint64_t> accept_failures{0};  ///< e.g. no file descriptors
   std::atomic<std::uint64_t> echoed{0};
   std::atomic<std::uint64_t> stored{0};
   std::atomic<std::uint64_t> repeated{0};
   std::atomic<std::uint64_t> refused{0};         ///< images
-  std::atomic<std::size_t> bytes_on_the_way{0};  ///< now, of images that are not whole yet
+  std::atomic<std::size_t> bytes_on_the_way{0};  ///< present total of images being received
 };
 
-/// Called from the receiver's threads. No message holds patient data.
+/// Called on the receiver's threads. No message contains patient data.
 struct ReceiverHooks {
   std::function<void(const Arrival&)> arrived = [](const Arrival&) {};
-  /// An image, or an association.
+  /// A refused image or association.
   std::function<void(const Failure&)> refused = [](const Failure&) {};
-  /// An image that did not come whole, or a connection that ended otherwise than by a release: `truncated`,
-  /// `bad_value` for a breach of the protocol, `not_connected`, `interrupted` when the receiver ends. At most
-  /// 20 a second where no image was on the way.
+  /// An incomplete image, or a connection that ended without a release: `truncated`, `bad_value` for a
+  /// protocol violation, `not_connected`, `interrupted` when the receiver ends. At most 20 per second if no
+  /// image was being received.
   std::function<void(const Failure&)> cut = [](const Failure&) {};
 };
 
-/// Service class provider for C-STORE and C-ECHO. An image is acknowledged once it is safely in the inbox,
-/// else its status says why not. No peer can hold up another.
+/// Service class provider for C-STORE and C-ECHO. An image is acknowledged after it is stored in the inbox;
+/// otherwise its status states the cause. Peers cannot block each other.
 class DicomReceiver {
  public:
-  /// Listens when it returns. Refuses port_taken, and bad_value for an address or TLS files that are none.
+  /// Listens on return. Refuses port_taken, and bad_value for an invalid address or TLS files.
   static Expected<std::unique_ptr<DicomReceiver>> open(const ReceiverOptions& options, Inbox& inbox,
                                                        ReceiverHooks hooks = {});
-  /// Closes all connections; an image that is being written is finished first.
+  /// Closes all connections; an image that is being stored is completed first.
   ~DicomReceiver();
 
   std::uint16_t port() const;

@@ -20,7 +20,7 @@ std::string other_half(const std::string& patient = "CANARY^NAME") {
   return peer::pdu(data, peer::fragment(3, 2, set.substr(set.size() / 2)));
 }
 
-TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsShutNoOneOut) {
+TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsBlockNoPeer) {
   options_.request_limit_s = 3600;
   open();
   std::vector<RawClient> crowd;
@@ -31,7 +31,7 @@ TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsShutNoOneOut) {
   EXPECT_TRUE(eventually([&] { return receiver_->counters().evicted >= 400; }));
 }
 
-TEST_F(ReceiverCrowd, AssociationsThatOnlyEchoMakeRoomForAnImage) {
+TEST_F(ReceiverCrowd, AssociationsThatOnlyEchoAreReplacedForAnImage) {
   options_.most_of_address = 2;
   options_.spared_s = 0;
   open();
@@ -46,10 +46,10 @@ TEST_F(ReceiverCrowd, AssociationsThatOnlyEchoMakeRoomForAnImage) {
   EXPECT_EQ(first.receive_type(), closed);
   second.send(peer::echo());
   EXPECT_EQ(second.receive_status(), 0);
-  EXPECT_EQ(line_with("makes room").reason, Reason::not_connected);
+  EXPECT_EQ(line_with("replaced by another").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverCrowd, AssociationWithAnImageOnTheWayKeepsItsPlace) {
+TEST_F(ReceiverCrowd, AssociationReceivingAnImageIsKept) {
   options_.most_of_address = 1;
   options_.spared_s = 0;
   open();
@@ -77,7 +77,7 @@ TEST_F(ReceiverCrowd, AssociationThatOnlyEchoesIsEnded) {
   EXPECT_EQ(line_with("no image for too long").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
+TEST_F(ReceiverCrowd, WithoutDescriptorsItWaitsAndRecovers) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer opens a pipe to probe the memory of an object";
 #endif
@@ -92,7 +92,7 @@ TEST_F(ReceiverCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
   waiting.connect({asio::ip::address_v4::loopback(), receiver_->port()});
   EXPECT_TRUE(eventually([&] { return receiver_->counters().accept_failures > 0; }));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  EXPECT_LT(receiver_->counters().accept_failures, 10u);  // one each 100 ms, fewer on a busy machine
+  EXPECT_LT(receiver_->counters().accept_failures, 10u);  // one per 100 ms, fewer on a loaded machine
   ::setrlimit(RLIMIT_NOFILE, &usual);
   asio::write(waiting, asio::buffer(peer::Request().bytes()));
   char type = 0;
@@ -101,7 +101,7 @@ TEST_F(ReceiverCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
   EXPECT_EQ(line_with("cannot be accepted").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverCrowd, EveryImageThatWasCutIsReported) {
+TEST_F(ReceiverCrowd, EveryIncompleteImageIsReported) {
   const auto cut = [&](auto&& how, const std::string& words) {
     RawClient client = associated();
     client.send(peer::echo() + half_an_image());
@@ -109,7 +109,8 @@ TEST_F(ReceiverCrowd, EveryImageThatWasCutIsReported) {
     how(client);
     const Failure line = line_with(words);
     EXPECT_EQ(line.reason, Reason::truncated) << words;
-    EXPECT_NE(line.message.find("\"C_ARM\" (127.0.0.1): image cut after"), std::string::npos) << line.message;
+    EXPECT_NE(line.message.find("\"C_ARM\" (127.0.0.1): image truncated after"), std::string::npos)
+        << line.message;
     EXPECT_EQ(line.message.find("CANARY"), std::string::npos);
   };
   cut([](RawClient& client) { client.send(peer::pdu(aborted, std::string(4, '\0'))); },
@@ -132,15 +133,15 @@ TEST_F(ReceiverCrowd, EveryImageThatWasCutIsReported) {
   EXPECT_EQ(line_with("takes too long").reason, Reason::truncated);
 }
 
-TEST_F(ReceiverCrowd, ImageThatTheReceiversEndCutsIsReported) {
+TEST_F(ReceiverCrowd, ImageTruncatedByTheReceiversEndIsReported) {
   RawClient client = associated();
   client.send(half_an_image());
   ASSERT_TRUE(eventually([&] { return receiver_->counters().bytes_on_the_way > 0; }));
   receiver_.reset();
-  EXPECT_EQ(line_with("the receiver ends").reason, Reason::truncated);
+  EXPECT_EQ(line_with("the receiver is closing").reason, Reason::truncated);
 }
 
-TEST_F(ReceiverCrowd, ReleasedAssociationsAndWordlessConnectionsAreNotReported) {
+TEST_F(ReceiverCrowd, ReleasedAssociationsAndEmptyConnectionsAreNotReported) {
   client().close();
   RawClient polite = associated();
   polite.send(peer::release());
@@ -151,7 +152,7 @@ TEST_F(ReceiverCrowd, ReleasedAssociationsAndWordlessConnectionsAreNotReported) 
   EXPECT_TRUE(lines().empty());
 }
 
-TEST_F(ReceiverCrowd, FloodOfStrangersFillsNoLog) {
+TEST_F(ReceiverCrowd, FloodOfConnectionsDoesNotFillTheLog) {
   constexpr int strangers = 300;
   const auto begin = std::chrono::steady_clock::now();
   for (int i = 0; i < strangers; ++i) EXPECT_EQ(answer_to("GET / HTTP/1.1\r\n\r\n"), aborted);

@@ -15,10 +15,10 @@
 
 namespace helicarm {
 
-/// For tests: the types of a receiver's answers.
+/// For tests: PDU types of a receiver's answers.
 inline constexpr int accepted = 2, rejected = 3, data = 4, released = 6, aborted = 7, closed = 0;
 
-/// For tests: a receiver on any free port, with an inbox of its own.
+/// For tests: a receiver on a free port with its own inbox.
 class ReceiverAtWork : public testing::Test {
  protected:
   void SetUp() override {
@@ -42,7 +42,7 @@ class ReceiverAtWork : public testing::Test {
     EXPECT_EQ(client.receive_type(), accepted);
     return client;
   }
-  /// What the receiver answers to these bytes: the type of its PDU.
+  /// PDU type of the receiver's answer to these bytes.
   int answer_to(const std::string& bytes) const {
     RawClient client(receiver_->port());
     client.send(bytes);
@@ -59,12 +59,12 @@ class ReceiverAtWork : public testing::Test {
     EXPECT_EQ(client.receive_status(), 0);
   }
 
-  /// What was refused and what was cut, as a log has it.
+  /// Messages of refused and incomplete images, as logged.
   std::vector<Failure> lines() const {
     const std::lock_guard lock(mutex_);
     return lines_;
   }
-  /// Waits for the first line that holds this; an empty message where none comes within half a minute.
+  /// Waits for the first message that contains `words`; empty if none comes within 30 s.
   Failure line_with(const std::string& words) const {
     for (int i = 0; i < 3000; ++i) {
       for (const Failure& line : lines())

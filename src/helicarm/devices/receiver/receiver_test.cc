@@ -50,7 +50,7 @@ TEST_F(Receiver, ImageInManySmallFragmentsIsTheSame) {
   EXPECT_TRUE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
-TEST_F(Receiver, RetransmissionIsAcknowledgedAndKeptOnce) {
+TEST_F(Receiver, RetransmissionIsAcknowledgedAndStoredOnce) {
   RawClient client = associated();
   for (int i = 0; i < 2; ++i) {
     client.send(peer::store(DicomBuilder()));
@@ -59,7 +59,7 @@ TEST_F(Receiver, RetransmissionIsAcknowledgedAndKeptOnce) {
   EXPECT_EQ(receiver_->counters().repeated, 1u);
 }
 
-TEST_F(Receiver, ReportsTheHookOfEachImage) {
+TEST_F(Receiver, CallsTheHookForEachImage) {
   std::vector<Arrival> arrivals;
   std::vector<Failure> failures;
   receiver_ = DicomReceiver::open(options_, *inbox_,
@@ -76,7 +76,7 @@ TEST_F(Receiver, ReportsTheHookOfEachImage) {
   EXPECT_EQ(arrivals[0].path.filename(), "2.25.17.dcm");
 }
 
-TEST_F(Receiver, BadImageIsRefusedWithAStatusAndTheAssociationGoesOn) {
+TEST_F(Receiver, BadImageIsRefusedWithAStatusAndTheAssociationContinues) {
   RawClient client = associated();
   client.send(peer::store(DicomBuilder().word(0x00280010, 65535)));
   EXPECT_EQ(client.receive_status(), 0xC000);
@@ -84,13 +84,13 @@ TEST_F(Receiver, BadImageIsRefusedWithAStatusAndTheAssociationGoesOn) {
   EXPECT_EQ(client.receive_status(), 0);
 }
 
-TEST_F(Receiver, UidsOfCommandAndDataThatDifferAreRefused) {
+TEST_F(Receiver, DifferingUidsOfCommandAndDataAreRefused) {
   RawClient client = associated();
   client.send(peer::store(DicomBuilder(), "2.25.18"));
   EXPECT_EQ(client.receive_status(), 0xA900);
 }
 
-TEST_F(Receiver, ClassThatWasNotAgreedOnIsRefused) {
+TEST_F(Receiver, ClassThatWasNotNegotiatedIsRefused) {
   RawClient client = associated();
   client.send(peer::store(DicomBuilder(), "2.25.17", "1.2.840.10008.5.1.4.1.1.2"));
   EXPECT_EQ(client.receive_status(), 0x0122);
@@ -103,7 +103,7 @@ TEST_F(Receiver, UnknownOperationIsRefused) {
 }
 
 TEST_F(Receiver, FullDiskIsOutOfResources) {
-  // No file may grow, root's neither.
+  // No file may grow, not even root's.
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit usual;
   ::getrlimit(RLIMIT_FSIZE, &usual);
@@ -117,7 +117,7 @@ TEST_F(Receiver, FullDiskIsOutOfResources) {
   EXPECT_EQ(client.receive_status(), 0);
 }
 
-TEST_F(Receiver, InboxDeletedInOperationIsAnErrorAndNotMadeAnew) {
+TEST_F(Receiver, InboxDeletedInOperationIsAnErrorAndNotRecreated) {
   RawClient client = associated();
   fs::remove_all(folder_);
   client.send(peer::store(DicomBuilder()));
@@ -135,7 +135,7 @@ TEST_F(Receiver, WrongTitlesAreRejected) {
   EXPECT_EQ(answer_to(peer::Request().bytes()), rejected);
 }
 
-TEST_F(Receiver, StrangersToTheProtocolAreSentAway) {
+TEST_F(Receiver, OtherProtocolsAreAborted) {
   EXPECT_EQ(answer_to("GET / HTTP/1.1\r\nHost: here\r\n\r\n"), aborted);
   EXPECT_EQ(answer_to(std::string("\x16\3\1\2\0\1\0\1\xfc\3\3", 11)), aborted);  // TLS
   EXPECT_EQ(answer_to(peer::pdu(0x99, "abcd")), aborted);
@@ -146,7 +146,7 @@ TEST_F(Receiver, StrangersToTheProtocolAreSentAway) {
   expect_alive();
 }
 
-TEST_F(Receiver, BreachesWithinAnAssociationAbortIt) {
+TEST_F(Receiver, ProtocolViolationsAbortTheAssociation) {
   EXPECT_EQ(answer_in_association(peer::Request().bytes()), aborted);
   EXPECT_EQ(answer_in_association(std::string("\4\0\x7F\xFF\xFF\xFF", 6)), aborted);
   EXPECT_EQ(answer_in_association(peer::pdu(data, std::string("\0\0\0\x40\1\3", 6))), aborted);
@@ -156,7 +156,7 @@ TEST_F(Receiver, BreachesWithinAnAssociationAbortIt) {
   expect_alive();
 }
 
-TEST_F(Receiver, AbortInMidImageLeavesNothing) {
+TEST_F(Receiver, AbortDuringAnImageLeavesNothing) {
   RawClient client = associated();
   client.send(peer::pdu(data, peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17"))));
   client.send(peer::pdu(data, peer::fragment(3, 0, peer::data_set(DicomBuilder()).substr(0, 100))));
@@ -165,7 +165,7 @@ TEST_F(Receiver, AbortInMidImageLeavesNothing) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
-TEST_F(Receiver, ImageBeyondTheLimitAbortsTheAssociation) {
+TEST_F(Receiver, ImageAboveTheLimitAbortsTheAssociation) {
   options_.most_object_bytes = 100;
   open();
   RawClient client = associated();
@@ -174,7 +174,7 @@ TEST_F(Receiver, ImageBeyondTheLimitAbortsTheAssociation) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
 
-TEST_F(Receiver, LargestPduOfNoughtIsUnlimitedAndOfOneByteIsRejected) {
+TEST_F(Receiver, LargestPduOfZeroIsUnlimitedAndOfOneByteIsRejected) {
   peer::Request request;
   request.most_pdu_bytes = 0;
   RawClient unlimited(receiver_->port());
@@ -186,7 +186,7 @@ TEST_F(Receiver, LargestPduOfNoughtIsUnlimitedAndOfOneByteIsRejected) {
   EXPECT_EQ(answer_to(request.bytes()), rejected);
 }
 
-TEST_F(Receiver, StalledPeersHoldUpNoOneAndAreDropped) {
+TEST_F(Receiver, StalledPeersBlockNoOtherAndAreDisconnected) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
   RawClient silent = client(), half = client(), idle = associated();
@@ -198,7 +198,7 @@ TEST_F(Receiver, StalledPeersHoldUpNoOneAndAreDropped) {
   expect_alive();
 }
 
-TEST_F(Receiver, PeerThatSendsAByteAtATimeIsDropped) {
+TEST_F(Receiver, PeerThatSendsByteByByteIsDisconnected) {
   options_.request_limit_s = options_.idle_limit_s = 0.3;
   open();
   RawClient request = client(), image = associated();
@@ -214,7 +214,7 @@ TEST_F(Receiver, PeerThatSendsAByteAtATimeIsDropped) {
   expect_alive();
 }
 
-TEST_F(Receiver, TwoHundredPeersAtOnceAreServedUpToTheLimitAndTheOthersSentAway) {
+TEST_F(Receiver, TwoHundredPeersAreServedUpToTheLimitAndTheOthersRejected) {
   options_.spared_s = 3600;
   open();
   std::vector<RawClient> peers;
@@ -232,7 +232,7 @@ TEST_F(Receiver, TwoHundredPeersAtOnceAreServedUpToTheLimitAndTheOthersSentAway)
   expect_alive();
 }
 
-TEST_F(Receiver, FloodOfEchoesIsAnsweredAndHoldsUpNoOne) {
+TEST_F(Receiver, FloodOfEchoesIsAnsweredAndBlocksNoPeer) {
   constexpr int flood = 2000;
   RawClient flooding = associated();
   std::string echoes;
@@ -243,7 +243,7 @@ TEST_F(Receiver, FloodOfEchoesIsAnsweredAndHoldsUpNoOne) {
   EXPECT_EQ(receiver_->counters().echoed, flood + 1u);
 }
 
-TEST_F(Receiver, TooManyAssociationsAreRejectedForNow) {
+TEST_F(Receiver, AssociationsAboveTheLimitAreRejected) {
   options_.most_associations = 2;
   options_.spared_s = 3600;
   open();
@@ -260,7 +260,7 @@ TEST_F(Receiver, TooManyAssociationsAreRejectedForNow) {
   EXPECT_EQ(fourth.receive_type(), accepted);
 }
 
-TEST_F(Receiver, PortThatIsTakenIsReportedClearly) {
+TEST_F(Receiver, PortInUseIsReported) {
   ReceiverOptions same = options_;
   same.port = receiver_->port();
   const auto second = DicomReceiver::open(same, *inbox_);
@@ -269,7 +269,7 @@ TEST_F(Receiver, PortThatIsTakenIsReportedClearly) {
   EXPECT_NE(second.error().message.find(std::to_string(same.port)), std::string::npos);
 }
 
-TEST_F(Receiver, AddressAndTlsFilesThatAreNoneAreReportedClearly) {
+TEST_F(Receiver, InvalidAddressAndTlsFilesAreReported) {
   ReceiverOptions bad = options_;
   bad.address = "knee";
   EXPECT_EQ(DicomReceiver::open(bad, *inbox_).error().reason, Reason::bad_value);
@@ -278,7 +278,7 @@ TEST_F(Receiver, AddressAndTlsFilesThatAreNoneAreReportedClearly) {
   EXPECT_EQ(DicomReceiver::open(bad, *inbox_).error().reason, Reason::bad_value);
 }
 
-TEST_F(Receiver, ClosesAtOnceWithPeersConnected) {
+TEST_F(Receiver, ClosesImmediatelyWithPeersConnected) {
   RawClient idle = associated(), silent = client();
   receiver_.reset();
   EXPECT_EQ(idle.receive_type(), closed);

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A key and a certificate that it signed itself, which serves as its own authority.
+/// A key and a self-signed certificate, which is its own authority.
 TlsFiles self_signed(const fs::path& folder, const std::string& name) {
   const TlsFiles files{folder / (name + ".pem"), folder / (name + ".key"), folder / (name + ".pem")};
   EVP_PKEY* const key = EVP_EC_gen("P-256");
@@ -48,7 +48,7 @@ class ReceiverTls : public ReceiverAtWork {
     options_.tls = ours_ = self_signed(folder_, "ours");
     ReceiverAtWork::SetUp();
   }
-  /// The type of the answer to an association request by a client that shows this certificate, or none.
+  /// PDU type of the answer to an association request by a client with this certificate, or none.
   int answer_over_tls(const std::optional<TlsFiles>& shown) const {
     asio::ssl::context context(asio::ssl::context::tls_client);
     if (shown) {
@@ -70,7 +70,7 @@ class ReceiverTls : public ReceiverAtWork {
   TlsFiles ours_;
 };
 
-TEST_F(ReceiverTls, PeerWithACertificateOfTheAuthorityIsServed) {
+TEST_F(ReceiverTls, PeerWithACertificateOfTheAuthorityIsAccepted) {
   EXPECT_EQ(answer_over_tls(ours_), accepted);
 }
 
@@ -81,12 +81,12 @@ TEST_F(ReceiverTls, PeerWithoutACertificateIsRefusedAndReported) {
   EXPECT_EQ(line.message.find("127.0.0.1: connection ended: TLS handshake: "), 0u) << line.message;
 }
 
-TEST_F(ReceiverTls, StrangersCertificateIsRefusedAndReported) {
+TEST_F(ReceiverTls, CertificateOfAnotherAuthorityIsRefusedAndReported) {
   EXPECT_EQ(answer_over_tls(self_signed(folder_, "stranger")), closed);
   EXPECT_EQ(line_with("TLS handshake: certificate: ").reason, Reason::not_connected);
 }
 
-TEST_F(ReceiverTls, PlainTalkIsRefusedAndReported) {
+TEST_F(ReceiverTls, ConnectionWithoutTlsIsRefusedAndReported) {
   RawClient plain = client();
   plain.send(peer::Request().bytes());
   plain.receive_type();

@@ -24,17 +24,17 @@ using asio::use_awaitable;
 using asio::ip::tcp;
 using Clock = Admission::Clock;
 
-/// Until when a connection may live; who makes room for another is ended through it from any thread.
-struct Leash {
-  explicit Leash(const tcp::socket::executor_type& executor) : timer(executor) {}
+/// Deadline of a connection; a connection to be replaced is ended through it from any thread.
+struct Deadline {
+  explicit Deadline(const tcp::socket::executor_type& executor) : timer(executor) {}
 
   asio::steady_timer timer;
   Clock::time_point until = Clock::time_point::max();
   bool evicted = false;
 };
 
-std::function<void()> eviction(const std::shared_ptr<Leash>& leash) {
-  return [weak = std::weak_ptr(leash), executor = leash->timer.get_executor()] {
+std::function<void()> eviction(const std::shared_ptr<Deadline>& deadline) {
+  return [weak = std::weak_ptr(deadline), executor = deadline->timer.get_executor()] {
     asio::post(executor, [weak] {
       const auto held = weak.lock();
       if (!held) return;
@@ -44,11 +44,11 @@ std::function<void()> eviction(const std::shared_ptr<Leash>& leash) {
   };
 }
 
-/// Ends that no image is lost by come in floods: as many are told as a log can bear.
+/// Limits the log to failures without an image: they can come in floods.
 void notify(ReceiverShared& shared, Failure why) {
   const auto left_out = shared.lines.pass();
   if (!left_out) return;
-  if (*left_out > 0) why.message += fmt::format(" ({} lines left out)", *left_out);
+  if (*left_out > 0) why.message += fmt::format(" ({} lines omitted)", *left_out);
   shared.hooks.cut(why);
 }
 
@@ -60,16 +60,16 @@ constexpr bool is_tls = requires(Stream& stream) {
 template <class Stream>
 class Session {
  public:
-  Session(Stream stream, ReceiverShared& shared, std::shared_ptr<Leash> leash, std::string address,
+  Session(Stream stream, ReceiverShared& shared, std::shared_ptr<Deadline> deadline, std::string address,
           Admission::Id id)
       : stream_(std::move(stream)),
         shared_(shared),
-        leash_(std::move(leash)),
+        deadline_(std::move(deadline)),
         id_(id),
         association_(shared, std::move(address), id) {}
   ~Session() {
     shared_.admission.leave(id_);
-    if (!ended_) end({Reason::interrupted, "the receiver ends"});
+    if (!ended_) end({Reason::interrupted, "the receiver is closing"});
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -78,12 +78,12 @@ class Session {
     using namespace asio::experimental::awaitable_operators;
     const auto first = co_await (converse() || watch());
     if (first.index() == 0) co_return;
-    ++(leash_->evicted ? shared_.counters.evicted : shared_.counters.timed_out);
-    end({Reason::not_connected, leash_->evicted ? "makes room for another" : limit_});
+    ++(deadline_->evicted ? shared_.counters.evicted : shared_.counters.timed_out);
+    end({Reason::not_connected, deadline_->evicted ? "replaced by another peer" : limit_});
   }
 
  private:
-  /// Ends by itself in every case: `watch` is cancelled by its end only.
+  /// Always ends by itself: `watch` is cancelled only when it ends.
   awaitable<void> converse() {
     std::optional<Breach> breach;
     try {
@@ -103,7 +103,7 @@ class Session {
     } catch (const BadInput& refused) {
       break_off(refused.failure());
     } catch (const asio::system_error& error) {
-      // Cancelled by `watch`, which knows why; else the connection broke.
+      // Cancelled by `watch`, which knows the reason; else the connection failed.
       if (error.code() != asio::error::operation_aborted)
         break_off({Reason::not_connected, error.code().message()});
     } catch (const std::exception&) {
@@ -118,9 +118,10 @@ class Session {
   }
 
   awaitable<void> shake_hands() {
-    std::string distrust;
+    std::string certificate_error;
     stream_.set_verify_callback([&](bool good, asio::ssl::verify_context& context) {
-      if (!good) distrust = X509_verify_cert_error_string(X509_STORE_CTX_get_error(context.native_handle()));
+      if (!good)
+        certificate_error = X509_verify_cert_error_string(X509_STORE_CTX_get_error(context.native_handle()));
       return good;
     });
     asio::error_code error;
@@ -129,7 +130,8 @@ class Session {
     heard_ = true;
     if (error)
       throw BadInput(Reason::not_connected,
-                     "TLS handshake: " + (distrust.empty() ? error.message() : "certificate: " + distrust));
+                     "TLS handshake: " +
+                         (certificate_error.empty() ? error.message() : "certificate: " + certificate_error));
   }
 
   awaitable<std::string> take_pdu() {
@@ -151,7 +153,7 @@ class Session {
     co_return association_.take(type, body);
   }
 
-  /// The nearest of: silence, a message that takes too long, no image for too long.
+  /// The earliest of the limits for inactivity, message duration and time without an image.
   void limit_next_pdu() {
     if (!association_.associated()) return;
     const ReceiverOptions& options = shared_.options;
@@ -160,49 +162,49 @@ class Session {
     if (message_ != association_.message_on_the_way()) message_since_ = now;
     images_ = association_.images();
     message_ = association_.message_on_the_way();
-    allow(options.idle_limit_s, "silent for too long");
+    allow(options.idle_limit_s, "inactive for too long");
     if (message_ != 0)
       shorten(message_since_, options.object_limit_s, "message takes too long");
     else
       shorten(*image_since_, options.echo_limit_s, "no image for too long");
-    if (leash_->until < leash_->timer.expiry()) leash_->timer.cancel();  // `watch` looks again
+    if (deadline_->until < deadline_->timer.expiry()) deadline_->timer.cancel();  // `watch` re-evaluates it
   }
 
   static Clock::duration duration(double seconds) {
     return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
   }
   void allow(double seconds, const char* limit) {
-    leash_->until = Clock::now() + duration(seconds);
+    deadline_->until = Clock::now() + duration(seconds);
     limit_ = limit;
   }
   void shorten(Clock::time_point since, double seconds, const char* limit) {
-    if (since + duration(seconds) >= leash_->until) return;
-    leash_->until = since + duration(seconds);
+    if (since + duration(seconds) >= deadline_->until) return;
+    deadline_->until = since + duration(seconds);
     limit_ = limit;
   }
 
   awaitable<void> watch() {
-    while (!leash_->evicted && Clock::now() < leash_->until) {
-      leash_->timer.expires_at(leash_->until);
+    while (!deadline_->evicted && Clock::now() < deadline_->until) {
+      deadline_->timer.expires_at(deadline_->until);
       asio::error_code ignored;
-      co_await leash_->timer.async_wait(asio::redirect_error(use_awaitable, ignored));
+      co_await deadline_->timer.async_wait(asio::redirect_error(use_awaitable, ignored));
     }
   }
 
   void break_off(const Failure& why) {
     ++shared_.counters.aborted;
-    // Who connects and leaves without a word only looks whether the port is open.
+    // A connection without data only probes the port.
     if (heard_) end(why);
     ended_ = true;
   }
 
-  /// For the log: every image that was cut, and other ends as many as a log can bear.
+  /// For the log: every incomplete image, and other ends up to the line limit.
   void end(Failure why) {
     ended_ = true;
     const std::string peer = association_.peer();
     if (const auto bytes = association_.image_on_the_way())
-      return shared_.hooks.cut(
-          {Reason::truncated, fmt::format("{}: image cut after {} bytes: {}", peer, *bytes, why.message)});
+      return shared_.hooks.cut({Reason::truncated, fmt::format("{}: image truncated after {} bytes: {}", peer,
+                                                               *bytes, why.message)});
     why.message = fmt::format("{}: {} ended: {}", peer,
                               association_.associated() ? "association" : "connection", why.message);
     notify(shared_, std::move(why));
@@ -210,21 +212,21 @@ class Session {
 
   Stream stream_;
   ReceiverShared& shared_;
-  std::shared_ptr<Leash> leash_;
+  std::shared_ptr<Deadline> deadline_;
   const Admission::Id id_;
   Association association_;
-  bool heard_ = false;      ///< the peer has sent something
-  bool ended_ = false;      ///< and the log knows
-  const char* limit_ = "";  ///< which one the leash has
+  bool heard_ = false;      ///< the peer has sent data
+  bool ended_ = false;      ///< and was logged
+  const char* limit_ = "";  ///< the limit that set the deadline
   std::optional<Clock::time_point> image_since_;
   Clock::time_point message_since_;
   std::uint64_t images_ = 0, message_ = 0;
 };
 
 template <class Stream>
-awaitable<void> run_session(Stream stream, ReceiverShared& shared, std::shared_ptr<Leash> leash,
+awaitable<void> run_session(Stream stream, ReceiverShared& shared, std::shared_ptr<Deadline> deadline,
                             std::string address, Admission::Id id) {
-  Session session(std::move(stream), shared, std::move(leash), std::move(address), id);
+  Session session(std::move(stream), shared, std::move(deadline), std::move(address), id);
   co_await session.run();
 }
 
@@ -235,19 +237,19 @@ void serve(tcp::socket socket, asio::ssl::context* tls, ReceiverShared& shared) 
   const std::string address = socket.remote_endpoint(gone).address().to_string();
   if (gone) return;
   const auto executor = socket.get_executor();
-  const auto leash = std::make_shared<Leash>(executor);
-  const auto id = shared.admission.connect(address, eviction(leash), Clock::now());
+  const auto deadline = std::make_shared<Deadline>(executor);
+  const auto id = shared.admission.connect(address, eviction(deadline), Clock::now());
   if (!id) {
     ++shared.counters.turned_away;
-    return notify(shared, {Reason::not_connected, address + ": turned away: too many connections"});
+    return notify(shared, {Reason::not_connected, address + ": rejected: too many connections"});
   }
   if (tls)
     asio::co_spawn(
         executor,
-        run_session(asio::ssl::stream<tcp::socket>(std::move(socket), *tls), shared, leash, address, *id),
+        run_session(asio::ssl::stream<tcp::socket>(std::move(socket), *tls), shared, deadline, address, *id),
         asio::detached);
   else
-    asio::co_spawn(executor, run_session(std::move(socket), shared, leash, address, *id), asio::detached);
+    asio::co_spawn(executor, run_session(std::move(socket), shared, deadline, address, *id), asio::detached);
 }
 
 }  // namespace helicarm

@@ -8,8 +8,8 @@
 
 namespace helicarm {
 
-/// Lets a peer in, where there is room, and serves it on the socket's executor, which must be a strand, until
-/// it releases, aborts, breaks the protocol, stalls, or must make room for another.
+/// Admits a peer, if the limits allow, and serves it on the socket's executor, which must be a strand, until
+/// it releases, aborts, violates the protocol, times out, or is replaced.
 void serve(asio::ip::tcp::socket socket, asio::ssl::context* tls, ReceiverShared& shared);
 
 }  // namespace helicarm

@@ -14,14 +14,13 @@
 
 namespace helicarm {
 
-/// The files of a folder that have come to rest between two looks. Looks instead of waiting to be told, so
-/// that folders shared over a network do as well.
+/// Files of a folder that did not change between two polls. Polling works on network shares too.
 class FolderLook {
  public:
   explicit FolderLook(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-  /// Regular files, no links and none whose name begins with a point, each once for every time it was
-  /// written. Nothing while the folder is away.
+  /// Regular files, without links and hidden files, each once per modification. Empty while the folder is
+  /// missing.
   std::vector<std::filesystem::path> at_rest();
 
  private:
@@ -34,8 +33,8 @@ class FolderLook {
   std::map<std::filesystem::path, Trace> traces_;
 };
 
-/// Takes every image that comes into a folder to the inbox, until it is destroyed or has taken `most`. The
-/// folder is left as it is. Hooks are called from a thread of its own.
+/// Takes every image that appears in a folder to the inbox, until it is destroyed or has taken `most`. The
+/// folder is not modified. Hooks are called on its own thread.
 class WatchedFolder {
  public:
   static constexpr std::chrono::milliseconds usual_pause{500};

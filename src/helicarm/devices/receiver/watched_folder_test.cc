@@ -27,7 +27,7 @@ class FolderOnDisk : public testing::Test {
   fs::path folder_ = temporary_.path();
 };
 
-TEST_F(FolderOnDisk, FileIsTakenOnceItIsSeenUnchanged) {
+TEST_F(FolderOnDisk, FileIsTakenOnceUnchanged) {
   FolderLook look(folder_);
   put("a", "half");
   EXPECT_THAT(look.at_rest(), IsEmpty());
@@ -37,7 +37,7 @@ TEST_F(FolderOnDisk, FileIsTakenOnceItIsSeenUnchanged) {
   EXPECT_THAT(look.at_rest(), IsEmpty());
 }
 
-TEST_F(FolderOnDisk, FileWrittenAnewIsTakenAgain) {
+TEST_F(FolderOnDisk, ModifiedFileIsTakenAgain) {
   FolderLook look(folder_);
   put("a", "one");
   look.at_rest();
@@ -47,7 +47,7 @@ TEST_F(FolderOnDisk, FileWrittenAnewIsTakenAgain) {
   EXPECT_THAT(look.at_rest(), ElementsAre(folder_ / "a"));
 }
 
-TEST_F(FolderOnDisk, LinksFoldersAndHiddenFilesAreLeft) {
+TEST_F(FolderOnDisk, LinksFoldersAndHiddenFilesAreIgnored) {
   FolderLook look(folder_);
   put(".part", "x");
   fs::create_directory(folder_ / "sub");
@@ -56,7 +56,7 @@ TEST_F(FolderOnDisk, LinksFoldersAndHiddenFilesAreLeft) {
   EXPECT_THAT(look.at_rest(), IsEmpty());
 }
 
-TEST_F(FolderOnDisk, FolderThatIsAwayAndComesBackIsNoError) {
+TEST_F(FolderOnDisk, MissingFolderThatReturnsIsNotAnError) {
   FolderLook look(folder_ / "share");
   EXPECT_THAT(look.at_rest(), IsEmpty());
   fs::create_directory(folder_ / "share");
@@ -77,7 +77,7 @@ TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
   EXPECT_TRUE(fs::exists(folder_ / "share/knee"));
 }
 
-TEST_F(FolderOnDisk, NoMoreImagesAreTakenThanAskedFor) {
+TEST_F(FolderOnDisk, AtMostTheRequestedNumberOfImagesIsTaken) {
   const auto inbox = Inbox::open(folder_ / "inbox").value();
   fs::create_directory(folder_ / "share");
   put("share/one", DicomBuilder().bytes());
