@@ -35,8 +35,8 @@ TEST_F(Window, SilentTrackerIsShownUntilItSpeaksAgain) {
 
 TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
   window_->controller().set_virtual_freshness({});
-  ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); },
-                                         "the robot's states have stopped coming"));
+  ASSERT_NO_FATAL_FAILURE(
+      stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); }, "no robot state received"));
   ASSERT_TRUE(wait_for_phase(LinkPhase::disconnected));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_EQ(lamp("robot").light, Light::red);
@@ -87,7 +87,7 @@ TEST_F(Window, StopWorksBesideEveryDialog) {
     wait_idle();
     window_->findChild<SettingsDialog*>()->close();
   };
-  stop_in_motion(stop_beside_settings, "this program's user");
+  stop_in_motion(stop_beside_settings, "stopped by the user");
 }
 
 TEST_F(Window, CancelEndsTheWaitForAImage) {

@@ -99,7 +99,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
   ASSERT_NO_FATAL_FAILURE(
-      stop_in_motion([&] { QTest::keyClick(find("shootAP"), Qt::Key_Space); }, "this program's user"));
+      stop_in_motion([&] { QTest::keyClick(find("shootAP"), Qt::Key_Space); }, "stopped by the user"));
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
 }

@@ -13,7 +13,7 @@ namespace {
 constexpr double degree = std::numbers::pi / 180;
 constexpr double step_mm = 2;
 constexpr double step_rad = 0.5 * degree;
-/// A joint that turns further within one step jumps to another way of holding the tool.
+/// A joint that turns further within one step changes to another arm configuration.
 constexpr double jump_rad = 10 * degree;
 
 void require_within(double value, double low, double high, const std::string& what) {
@@ -31,7 +31,7 @@ void check_numbers(const RobotOrder& order, const RobotLimits& limits) {
   require_rigid(order.tool.flange_from_tcp, "order: flange_from_tcp");
   require_within(order.tool.payload_kg, 0, limits.heaviest_kg, "order: payload_kg");
   if (!order.start.allFinite()) throw BadInput(Reason::not_finite, "order: start is not finite");
-  if (order.waypoints.empty()) throw BadInput(Reason::bad_value, "order: there are no waypoints");
+  if (order.waypoints.empty()) throw BadInput(Reason::bad_value, "order: waypoints is empty");
   for (std::size_t i = 0; i < order.waypoints.size(); ++i) {
     const std::string where = fmt::format("order: waypoints[{}]: ", i);
     require_rigid(order.waypoints[i].base_from_tcp, where + "base_from_tcp");
@@ -64,22 +64,21 @@ void check_keep_outs(const RobotOrder& order, const RobotModel& model, const Joi
     for (int joint = 1; joint < 5; ++joint)
       deepest = std::max(deepest, depth(frames[joint].translation, limits.arm_radius_mm));
     if (deepest > 0)
-      throw BadInput(
-          {Reason::keep_out,
-           fmt::format("the path enters the region beyond keep-out plane {} by {:.1f} mm", i, deepest),
-           {},
-           {{"plane", static_cast<double>(i)}, {"depth_mm", deepest}}});
+      throw BadInput({Reason::keep_out,
+                      fmt::format("the path enters keep-out region {} by {:.1f} mm", i, deepest),
+                      {},
+                      {{"plane", static_cast<double>(i)}, {"depth_mm", deepest}}});
   }
 }
 
 void check_pose(const RobotOrder& order, const RobotModel& model, const Joints& joints,
                 const RobotLimits& limits) {
   if (((joints.cwiseAbs() - model.farthest).array() > 0).any())
-    throw BadInput(Reason::out_of_reach, "a joint would be turned beyond its end");
+    throw BadInput(Reason::out_of_reach, "a joint would exceed its limit");
   const double least = least_singular_value(model, joints);
   if (least < limits.least_singular_value)
     throw BadInput({Reason::singular_pose,
-                    fmt::format("the arm would come near a singular pose: least singular value {:.3g}, "
+                    fmt::format("the path passes close to a singular pose: smallest singular value {:.3g}, "
                                 "must be {:g}",
                                 least, limits.least_singular_value),
                     {},
@@ -87,14 +86,14 @@ void check_pose(const RobotOrder& order, const RobotModel& model, const Joints& 
   check_keep_outs(order, model, joints, limits);
 }
 
-/// Walks one straight piece and gives the joints at its end.
+/// Checks one straight segment and returns the joints at its end.
 Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, const Waypoint& to,
             const RobotLimits& limits) {
   const StraightPath path(base_from_flange(model, joints) * order.tool.flange_from_tcp, to.base_from_tcp);
   const RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
   const int steps =
       1 + static_cast<int>(std::min(1e5, std::max(path.shift_mm() / step_mm, path.turn() / step_rad)));
-  // The speed within a step is at most what the whole piece is run at.
+  // The speed within a step does not exceed the segment's nominal speed.
   const double step_s = path.length_mm() / steps / to.speed_mm_s;
   for (int i = 1; i <= steps; ++i) {
     const Joints next =
@@ -107,11 +106,12 @@ Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, con
                       {{"jump_deg", turned / degree}}});
     check_pose(order, model, next, limits);
     if (turned > limits.fastest_joint_rad_s * step_s && turned > 1e-9)
-      throw BadInput({Reason::bad_value,
-                      fmt::format("at this speed a joint would turn by {:.3f} rad/s, must be at most {:g}",
-                                  turned / step_s, limits.fastest_joint_rad_s),
-                      {},
-                      {{"joint_speed_rad_s", turned / step_s}, {"limit_rad_s", limits.fastest_joint_rad_s}}});
+      throw BadInput(
+          {Reason::bad_value,
+           fmt::format("a joint would turn at {:.3f} rad/s, limit {:g} rad/s: reduce the order's speed",
+                       turned / step_s, limits.fastest_joint_rad_s),
+           {},
+           {{"joint_speed_rad_s", turned / step_s}, {"limit_rad_s", limits.fastest_joint_rad_s}}});
     joints = next;
   }
   return joints;
@@ -130,10 +130,11 @@ Joints walk_all(const RobotOrder& order, Joints joints, const RobotLimits& limit
 
 void require_near(double value, double limit, const std::string& what) {
   if (!(value <= limit))
-    throw BadInput({Reason::robot_moved,
-                    fmt::format("{} by {:.2f}, must be within {:g}: plan again", what, value, limit),
-                    {},
-                    {{"difference", value}, {"limit", limit}}});
+    throw BadInput(
+        {Reason::robot_moved,
+         fmt::format("{}: difference {:.2f}, limit {:g}: plan the order again", what, value, limit),
+         {},
+         {{"difference", value}, {"limit", limit}}});
 }
 
 double angle_deg(const RigidTransform& a, const RigidTransform& b) {
@@ -147,7 +148,7 @@ Expected<Joints> check_path(const RobotOrder& order, const RobotLimits& limits) 
 }
 
 RobotOrder slowed_for_joints(RobotOrder order, const RobotLimits& limits) {
-  constexpr int most_tries = 8;  // each finds the next joint on the way
+  constexpr int most_tries = 8;  // each iteration finds the next limiting joint
   constexpr double margin = 0.9;
   for (int i = 0; i < most_tries; ++i) {
     const auto checked = check_path(order, limits);
@@ -166,16 +167,16 @@ Expected<void> check_order(const RobotOrder& order, const RobotState& present, c
     const RobotModel model = value_or_throw(robot_model(order.model));
     const RigidTransform& offset = order.tool.flange_from_tcp;
     require_near((present.flange_from_tcp.translation - offset.translation).norm(), limits.tool_mm,
-                 "the robot's TCP differs from the order's in mm");
+                 "TCP of robot and order, mm");
     require_near(angle_deg(present.flange_from_tcp, offset), limits.tool_deg,
-                 "the robot's TCP differs from the order's in degrees");
+                 "TCP of robot and order, degrees");
     require_near(std::abs(present.payload_kg - order.tool.payload_kg), limits.payload_kg,
-                 "the robot's payload differs from the order's in kg");
+                 "payload of robot and order, kg");
     const Eigen::Vector3d planned = base_from_flange(model, order.start) * offset.translation;
     const Eigen::Vector3d found = base_from_flange(model, present.joints) * offset.translation;
-    require_near((found - planned).norm(), limits.start_mm, "the tip has left its place at planning in mm");
+    require_near((found - planned).norm(), limits.start_mm, "tip position now and at planning, mm");
     require_near((present.joints - order.start).cwiseAbs().maxCoeff() / degree, limits.start_joint_deg,
-                 "a joint has left its place at planning in degrees");
+                 "joint angle now and at planning, degrees");
     walk_all(order, present.joints, limits);
   });
 }

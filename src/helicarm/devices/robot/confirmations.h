@@ -9,21 +9,21 @@
 
 namespace helicarm {
 
-/// Tokens by which a person allows one order, once, for a while. A token belongs to every digit of its order.
+/// Tokens that confirm one order, once, for a limited time. A token is bound to every digit of its order.
 class Confirmations {
  public:
   using Clock = std::chrono::steady_clock;
 
   explicit Confirmations(Clock::duration valid_for = std::chrono::minutes(2)) : valid_for_(valid_for) {}
 
-  /// To be called when a person has seen the order and agreed. 32 hexadecimal digits nobody can guess.
+  /// Call after a user has seen the order and agreed. Returns 32 random hexadecimal digits.
   std::string confirm(const RobotOrder& order, Clock::time_point now = Clock::now());
 
-  /// Uses the token up, whatever comes of it. Refuses `order_not_confirmed`.
+  /// Uses the token up, whether it succeeds or not. Refuses `order_not_confirmed`.
   Expected<void> redeem(const std::string& token, const RobotOrder& order,
                         Clock::time_point now = Clock::now());
 
-  /// After a stop nothing confirmed before holds.
+  /// After a stop no earlier confirmation is valid.
   void forget_all();
 
  private:

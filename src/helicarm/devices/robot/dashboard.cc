@@ -14,8 +14,8 @@ namespace {
 
 struct Exchange {
   std::string_view command;
-  std::string_view answer;        ///< its beginning
-  std::string_view or_else = {};  ///< another one
+  std::string_view answer;        ///< its prefix
+  std::string_view or_else = {};  ///< alternative prefix
 };
 
 // Universal Robots, "Dashboard Server", CB3 and e-Series.
@@ -34,7 +34,7 @@ constexpr std::array<Exchange, 10> exchanges = {{
 
 constexpr std::size_t longest_line = 1000;
 
-/// The next line; what follows it stays in `rest`.
+/// The next line; the remainder stays in `rest`.
 Expected<std::string> next_line(TimedSocket& socket, std::string& rest, std::chrono::milliseconds patience) {
   const auto until = std::chrono::steady_clock::now() + patience;
   for (;;) {
@@ -42,7 +42,7 @@ Expected<std::string> next_line(TimedSocket& socket, std::string& rest, std::chr
     if (!line) return tl::unexpected<Failure>(line.error());
     if (*line) return **std::move(line);
     const auto left = until - std::chrono::steady_clock::now();
-    if (left <= left.zero()) return fail(Reason::not_connected, "dashboard: no answer in time");
+    if (left <= left.zero()) return fail(Reason::not_connected, "dashboard: timeout");
     const auto bytes = socket.receive(left);
     if (!bytes) return bytes;
     rest += *bytes;

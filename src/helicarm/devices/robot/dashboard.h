@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// All that is ever said to a robot's dashboard: fixed words, none with text of a user's.
+/// All commands ever sent to a robot's dashboard: constants without user text.
 enum class DashboardCommand {
   robot_mode,
   safety_mode,
@@ -24,16 +24,16 @@ enum class DashboardCommand {
   brake_release,
 };
 
-/// Asks on a connection of its own and gives the answer's line. An answer that does not belong to the command
-/// is `bad_value` with the answer as message; silence is `not_connected`.
+/// Sends the command on its own connection and returns the answer's line. An answer that does not match the
+/// command is `bad_value` with the answer as message; no answer is `not_connected`.
 Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t port, DashboardCommand command,
                                     std::chrono::milliseconds patience = std::chrono::milliseconds(1000));
 
-/// The first whole line of what has come, taken off it, without control characters; nothing while it is not
-/// there. Over 1000 characters without an end are `bad_size`.
+/// Removes and returns the first complete line, without control characters; nothing if there is none. Over
+/// 1000 characters without a line end are `bad_size`.
 Expected<std::optional<std::string>> take_dashboard_line(std::string& received);
 
-/// The answer's line as it came, or `bad_value` where it does not belong to the command.
+/// The answer's line unchanged, or `bad_value` if it does not match the command.
 Expected<std::string> checked_answer(DashboardCommand command, std::string answer);
 
 }  // namespace helicarm

@@ -14,7 +14,7 @@ TEST(Dashboard, LinesAreTakenOneByOneWithoutControlCharacters) {
   EXPECT_EQ(received, "rest");
 }
 
-TEST(Dashboard, LineOfOverAThousandCharactersIsRefusedWhetherItEndsOrNot) {
+TEST(Dashboard, LineOfOverAThousandCharactersIsRefused) {
   for (const char* end : {"", "\n"}) {
     std::string received = std::string(1001, 'x') + end;
     EXPECT_EQ(take_dashboard_line(received).error().reason, Reason::bad_size);

@@ -37,15 +37,15 @@ Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const 
                       std::sqrt(std::max(0.0, seen->covariance.topLeftCorner<3, 3>().trace()))});
     const Miss& now = misses.back();
     if (2 * now.sigma_mm > corrections.tolerance_mm)
-      return refuse(Reason::uncertain, "the tracker does not measure it well enough", misses);
+      return refuse(Reason::uncertain, "the tracker's uncertainty exceeds the tolerance", misses);
     if (now.distance_mm <= corrections.tolerance_mm && now.turn_deg <= corrections.tolerance_deg)
       return misses;
     if (static_cast<int>(misses.size()) > corrections.most)
-      return refuse(Reason::off_target, "one more would be too many", misses);
+      return refuse(Reason::off_target, "iteration limit reached", misses);
     if (now.distance_mm > corrections.longest_mm || now.turn_deg > corrections.widest_deg)
-      return refuse(Reason::off_target, "the next one would be too large", misses);
+      return refuse(Reason::off_target, "the next correction exceeds its limit", misses);
     if (misses.size() > 1 && now.distance_mm > misses[misses.size() - 2].distance_mm + 2 * now.sigma_mm)
-      return refuse(Reason::off_target, "the last one made it worse", misses);
+      return refuse(Reason::off_target, "the last correction increased the error", misses);
     if (const auto moved = move(tcp_from_target); !moved) return tl::unexpected<Failure>(moved.error());
   }
 }

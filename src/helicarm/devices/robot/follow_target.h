@@ -8,29 +8,29 @@
 
 namespace helicarm {
 
-/// What the tracker sees of the tool and of where it should be, at one moment.
+/// Tracker measurement of the tool and its target at one moment.
 struct ToolMeasurement {
   RigidTransform tracker_from_tcp;
   RigidTransform tracker_from_target;
-  /// Of the target as seen from the tool: shift (mm), then turn (rad).
+  /// Covariance of the target's pose relative to the tool: translation (mm), then rotation (rad).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-/// How far the tool was off at one measurement.
+/// Error of the tool at one measurement.
 struct Miss {
   double distance_mm = 0;
   double turn_deg = 0;
-  double sigma_mm = 0;  ///< of the place, root of the covariance's trace
+  double sigma_mm = 0;  ///< of the position, root of the covariance's trace
 };
 
 using Measure = std::function<Expected<ToolMeasurement>()>;
-/// Moves the tool to a pose given in its present one.
+/// Moves the tool to a pose given relative to its present one.
 using MoveTool = std::function<Expected<void>(const RigidTransform& tcp_from_new)>;
 
-/// Measures, corrects and measures again until the tool is within the tolerance; gives every miss, the last
-/// one within. It needs not know where the tracker stands. Refuses before the move in question: `uncertain`
-/// where 2 sigma of the place exceed the tolerance, `off_target` where a move would be longer or wider than
-/// allowed, where one more would be too many, or where the last one made it worse.
+/// Measures and corrects until the tool is within the tolerance; returns every error, the last one within it.
+/// Does not need the tracker's pose. Refuses before moving: `uncertain` if 2 sigma of the position exceed the
+/// tolerance, `off_target` if a correction exceeds its limits, if the iteration limit is reached, or if the
+/// last correction increased the error.
 Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const Measure& measure,
                                           const MoveTool& move);
 

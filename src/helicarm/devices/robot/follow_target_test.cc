@@ -8,7 +8,7 @@
 namespace helicarm {
 namespace {
 
-/// A tool that goes only part of the way it is told, seen by a tracker with noise.
+/// A tool that moves only part of the commanded distance, measured by a noisy tracker.
 struct Scene {
   double part = 1;
   double noise_mm = 0;
@@ -38,7 +38,7 @@ struct Scene {
 constexpr Corrections usual{
     .most = 5, .longest_mm = 3, .widest_deg = 2, .tolerance_mm = 0.3, .tolerance_deg = 1};
 
-TEST(FollowTarget, EachMoveBringsItNearer) {
+TEST(FollowTarget, EachMoveReducesTheError) {
   Scene scene{.part = 0.7, .noise_mm = 0.03, .sigma_mm = 0.03};
   const auto misses = scene.follow(usual);
   ASSERT_TRUE(misses);
@@ -46,7 +46,7 @@ TEST(FollowTarget, EachMoveBringsItNearer) {
   EXPECT_LT(scene.tool.translation.norm(), 0.4);
 }
 
-TEST(FollowTarget, MoveThatWouldBeTooLargeIsNotMade) {
+TEST(FollowTarget, MoveAboveTheLimitIsNotMade) {
   Scene scene;
   scene.tool.translation.x() = 4;
   EXPECT_EQ(scene.follow(usual).error().reason, Reason::off_target);
@@ -57,7 +57,7 @@ TEST(FollowTarget, MoveThatWouldBeTooLargeIsNotMade) {
   EXPECT_EQ(scene.moves, 0);
 }
 
-TEST(FollowTarget, MoveThatMakesItWorseIsTheLast) {
+TEST(FollowTarget, MoveThatIncreasesTheErrorIsTheLast) {
   Scene scene{.part = -0.2};
   const auto misses = scene.follow(usual);
   ASSERT_FALSE(misses);
@@ -65,7 +65,7 @@ TEST(FollowTarget, MoveThatMakesItWorseIsTheLast) {
   EXPECT_EQ(scene.moves, 1);
 }
 
-TEST(FollowTarget, TooManyMovesAreRefusedWithTheFigures) {
+TEST(FollowTarget, IterationLimitIsRefusedWithTheFigures) {
   Scene scene{.part = 0.1};
   const auto misses = scene.follow(usual);
   ASSERT_FALSE(misses);

@@ -13,15 +13,15 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-/// +-360 degrees, the elbow +-180: beyond it the forearm meets the upper arm.
+/// +-360 degrees, the elbow +-180: beyond it the forearm collides with the upper arm.
 Joints joint_limits() {
   Joints limits = Joints::Constant(2 * pi);
   limits[2] = pi;
   return limits;
 }
 
-/// Rotation about z by `angle`, shifts along z by `d` and along the new x by `a`, rotation about it by a
-/// twist of given cosine and sine.
+/// Rotation about z by `angle`, translations along z by `d` and along the new x by `a`, rotation about it by
+/// a twist of given cosine and sine.
 RigidTransform link(double angle, double d, double a, double cos_twist, double sin_twist) {
   const double c = std::cos(angle), s = std::sin(angle);
   RigidTransform step;
@@ -33,7 +33,7 @@ RigidTransform link(double angle, double d, double a, double cos_twist, double s
 
 double wrapped(double angle) { return std::remainder(angle, 2 * pi); }
 
-/// The turn of `angle` within +-limit that lies nearest to `near`.
+/// The equivalent of `angle` within +-limit nearest to `near`.
 std::optional<double> nearest_turn(double angle, double near, double limit) {
   double turned = near + wrapped(angle - near);
   if (turned > limit) turned -= 2 * pi;
@@ -42,7 +42,7 @@ std::optional<double> nearest_turn(double angle, double near, double limit) {
   return turned;
 }
 
-/// The last five joints, with the base joint given: two ways of the wrist, two of the elbow.
+/// The last five joints for a given base joint: two wrist and two elbow configurations.
 void append_solutions(const RobotModel& model, const RigidTransform& base_from_flange, double base,
                       std::vector<Joints>& solutions) {
   const Eigen::Vector3d across(std::sin(base), -std::cos(base), 0);  // axis of joints 2, 3 and 4
@@ -83,7 +83,7 @@ RobotModel ur5e() { return {"UR5e", 162.5, -425, -392.2, 133.3, 99.7, 99.6, 500,
 Expected<RobotModel> robot_model(const std::string& name) {
   for (const RobotModel& model : {ur5(), ur5e()})
     if (model.name == name) return model;
-  return fail(Reason::bad_value, "robot is neither \"UR5\" nor \"UR5e\"");
+  return fail(Reason::bad_value, "robot: must be \"UR5\" or \"UR5e\"");
 }
 
 std::array<RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints) {
@@ -151,10 +151,11 @@ Expected<Joints> nearest_inverse(const RobotModel& model, const RigidTransform& 
   }
   if (best) return *best;
   const Eigen::Vector3d& place = base_from_flange.translation;
-  return fail(Reason::out_of_reach,
-              fmt::format("the {} cannot hold its flange at {:.1f}, {:.1f}, {:.1f} mm in this direction",
-                          model.name, place.x(), place.y(), place.z()),
-              {{"distance_mm", place.norm()}});
+  return fail(
+      Reason::out_of_reach,
+      fmt::format("the {} cannot reach the flange position {:.1f}, {:.1f}, {:.1f} mm in this orientation",
+                  model.name, place.x(), place.y(), place.z()),
+      {{"distance_mm", place.norm()}});
 }
 
 }  // namespace helicarm

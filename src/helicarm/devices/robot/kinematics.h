@@ -12,20 +12,20 @@
 
 namespace helicarm {
 
-/// One number per joint, base to wrist 3: rad, rad/s or rad/s^2.
+/// One value per joint, base to wrist 3: rad, rad/s or rad/s^2.
 using Joints = Eigen::Matrix<double, 6, 1>;
 
-/// A six-joint arm of Universal Robots. Lengths are Denavit and Hartenberg's d and a, mm; the twists are
-/// pi/2, 0, 0, pi/2, -pi/2, 0.
+/// A six-joint Universal Robots arm. Lengths are the Denavit-Hartenberg parameters d and a, mm; the twists
+/// are pi/2, 0, 0, pi/2, -pi/2, 0.
 struct RobotModel {
   std::string name;
   double d1, a2, a3, d4, d5, d6;
   double rate_hz;           ///< of the controller and of its states
-  Joints farthest = {};     ///< either way, rad
+  Joints farthest = {};     ///< in either direction, rad
   double fastest = 3.1416;  ///< every joint, rad/s
 };
 
-/// The nominal arms; a real one differs by its factory calibration, often by millimetres.
+/// Nominal arms; a real one differs by its factory calibration, often by millimetres.
 RobotModel ur5();
 RobotModel ur5e();
 
@@ -40,16 +40,15 @@ RigidTransform base_from_flange(const RobotModel& model, const Joints& joints);
 Eigen::Matrix<double, 6, 6> jacobian(const RobotModel& model, const Joints& joints,
                                      const Eigen::Vector3d& point_in_flange = Eigen::Vector3d::Zero());
 
-/// Least singular value of the flange's Jacobian with lengths in metres: 0 where the arm cannot move in some
-/// direction.
+/// Smallest singular value of the flange's Jacobian with lengths in metres: 0 in a singular pose.
 double least_singular_value(const RobotModel& model, const Joints& joints);
 
-/// Every way (up to 8) to hold the flange there, each joint in (-pi, pi]; empty out of reach. Where the wrist
-/// is stretched, wrist 3 is given as 0.
+/// All solutions (up to 8) for this flange pose, each joint in (-pi, pi]; empty out of reach. In a wrist
+/// singularity wrist 3 is 0.
 std::vector<Joints> inverse(const RobotModel& model, const RigidTransform& base_from_flange);
 
-/// That one of `inverse`, each joint turned by whole turns within its limits, whose greatest joint motion
-/// from `near` is least. Refuses `out_of_reach`.
+/// The solution of `inverse`, each joint shifted by whole turns within its limits, with the smallest maximum
+/// joint motion from `near`. Refuses `out_of_reach`.
 Expected<Joints> nearest_inverse(const RobotModel& model, const RigidTransform& base_from_flange,
                                  const Joints& near);
 

@@ -19,7 +19,7 @@ Joints random_joints(RandomStream& random) {
   return joints;
 }
 
-/// Product of four elementary motions per joint, written without regard to what the arm's twists are.
+/// Reference: product of four elementary motions per joint, for any twists.
 RigidTransform plain_product(const std::array<std::array<double, 3>, 6>& d_a_twist, const Joints& joints) {
   Eigen::Affine3d product = Eigen::Affine3d::Identity();
   for (int i = 0; i < 6; ++i) {
@@ -34,7 +34,7 @@ double difference(const RigidTransform& a, const RigidTransform& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
 }
 
-TEST(Kinematics, ForwardEqualsThePlainProduct) {
+TEST(Kinematics, ForwardAgreesWithTheElementaryProduct) {
   RandomStream random(1, 0);
   for (int trial = 0; trial < 100; ++trial) {
     const Joints joints = random_joints(random);
@@ -54,7 +54,7 @@ TEST(Kinematics, StretchedArmReachesAlongMinusX) {
   EXPECT_TRUE(flange.translation.isApprox(Eigen::Vector3d(-817.2, -133.3 - 99.6, 162.5 - 99.7), 1e-12));
 }
 
-TEST(Kinematics, EveryInverseHoldsThePoseAndOneIsTheWayItCame) {
+TEST(Kinematics, EveryInverseReachesThePoseAndOneIsTheOriginal) {
   RandomStream random(2, 0);
   int most = 0;
   for (const RobotModel& model : {ur5(), ur5e()})
@@ -74,7 +74,7 @@ TEST(Kinematics, EveryInverseHoldsThePoseAndOneIsTheWayItCame) {
   EXPECT_EQ(most, 8);
 }
 
-TEST(Kinematics, JacobianEqualsNumbers) {
+TEST(Kinematics, JacobianAgreesWithDifferences) {
   RandomStream random(3, 0);
   const Eigen::Vector3d tip(10, -20, 150);
   for (int trial = 0; trial < 20; ++trial) {
@@ -92,29 +92,29 @@ TEST(Kinematics, JacobianEqualsNumbers) {
   }
 }
 
-TEST(Kinematics, NearestTurnsByWholeTurnsWithinTheLimits) {
+TEST(Kinematics, NearestUsesWholeTurnsWithinTheLimits) {
   Joints joints;
   joints << 1.5 * pi, -1.2, 1.1, -1.4, -1.5, -1.6 * pi;
   const auto found = nearest_inverse(ur5(), base_from_flange(ur5(), joints), joints);
   ASSERT_TRUE(found);
   EXPECT_LT((*found - joints).norm(), 1e-9);
-  joints[2] = 1.2 * pi;  // an elbow that no arm has
+  joints[2] = 1.2 * pi;  // beyond the elbow's limit
   const auto other = nearest_inverse(ur5(), base_from_flange(ur5(), joints), joints);
   EXPECT_TRUE(!other || std::abs((*other)[2]) <= pi);
 }
 
-TEST(Kinematics, PlaceBeyondReachHasNoInverse) {
+TEST(Kinematics, PositionOutOfReachHasNoInverse) {
   RigidTransform far;
   far.translation = {1200, 0, 200};
   EXPECT_TRUE(inverse(ur5(), far).empty());
   EXPECT_EQ(nearest_inverse(ur5(), far, Joints::Zero()).error().reason, Reason::out_of_reach);
-  far.translation = {0, 0, 500};  // within the cylinder about the base that the wrist cannot enter
+  far.translation = {0, 0, 500};  // inside the cylinder about the base that the wrist cannot enter
   EXPECT_TRUE(inverse(ur5(), far).empty());
   far.translation.x() = std::nan("");
   EXPECT_TRUE(inverse(ur5(), far).empty());
 }
 
-TEST(Kinematics, SingularPosesShowAsSuch) {
+TEST(Kinematics, SingularPosesAreDetected) {
   Joints joints;
   joints << 0.3, -1.2, 1.4, -1.7, -1.5, 0.2;
   EXPECT_GT(least_singular_value(ur5(), joints), 0.05);

@@ -13,14 +13,15 @@ namespace {
 using Stops = LinkStateMachine::Stops;
 
 constexpr std::uint64_t sequences = 100000;
-constexpr std::uint64_t enough = 20000;  ///< to find a broken rule
+constexpr std::uint64_t enough = 20000;  ///< sequences needed to find a broken rule
 constexpr int most_plans = 6;
-/// A beat older than 80 ms moves nothing, so no motion outlives the last beat before a stop by more.
+/// A beat older than 80 ms allows no motion, so motion ends at most this long after the last beat before a
+/// stop.
 constexpr int beat_steps = 80 / step_ms;
-/// A program that does not look has no beats after 100 ms.
+/// The link sends no beats 100 ms after the program's last check.
 constexpr int program_steps = 100 / step_ms;
 
-/// One plan with its order; a new plan is another order.
+/// One plan with its order; a new plan has another order.
 const std::vector<RobotOrder>& orders() {
   static const std::vector<RobotOrder> made = [] {
     std::vector<RobotOrder> some(most_plans);
@@ -30,26 +31,26 @@ const std::vector<RobotOrder>& orders() {
   return made;
 }
 
-/// What may be broken, to see that the test finds it.
+/// Rules that can be broken, to verify that the test detects it.
 struct Rules {
   LinkTable table = link_table;
   ScriptRules script;
-  bool same_session = false;  ///< a program that starts again counts its orders from the same number
-  bool watch = true;          ///< the plan is looked at
+  bool same_session = false;  ///< a restarted program counts its orders from the same number
+  bool watch = true;          ///< the plan is checked
 };
 
 struct Sent {
   OrderNumber number;
-  int run;  ///< the call of `execute` that it belongs to
+  int run;  ///< the call of `execute` it belongs to
 };
 
-/// Knows only what people do and what happens to the plan, and says from this alone what may move.
+/// Specification: derives from user actions and plan changes alone what may move.
 class Reference {
  public:
   void confirmed(const std::string& token, std::size_t plan, int now) {
     tokens_[token] = {plan, now, ++events_, false};
   }
-  /// A call of `execute`; whether it may ever move is known then.
+  /// A call of `execute`; decides whether it may ever move.
   int executes(const std::string& token, std::size_t plan) {
     Run run{plan, {}, events_, "no such confirmation"};
     if (const auto found = tokens_.find(token); found != tokens_.end()) {
@@ -72,11 +73,11 @@ class Reference {
   int unlocking() { return ++events_; }
   void unlocked(int begun) { unlocked_ = unlocked_ || begun > last_stop_; }
   void sent(int run) {
-    if (!unlocked_) runs_.at(static_cast<std::size_t>(run)).refused = "nobody unlocked after the last stop";
+    if (!unlocked_) runs_.at(static_cast<std::size_t>(run)).refused = "not unlocked after the last stop";
   }
   void stale(std::size_t plan, int now) { stale_at_.at(plan) = std::min(stale_at_.at(plan), now); }
 
-  /// Why this motion must not be; empty if it may.
+  /// Why this motion is not allowed; empty if it is.
   std::string judge(const Sent& script, bool begins, const Heartbeat& registers, int now) {
     const Run& run = runs_.at(static_cast<std::size_t>(script.run));
     if (!run.refused.empty()) return run.refused;
@@ -117,7 +118,7 @@ struct Tally {
   int longest_steps = 0;  ///< from a stop to the last driven period, in undisturbed sequences
 };
 
-/// A person, the program with its link, the channels and the robot's controller; one random sequence.
+/// User, program with its link, channels and robot controller; one random sequence.
 class World {
  public:
   World(const Rules& rules, std::uint64_t trial, Tally& tally)
@@ -133,7 +134,7 @@ class World {
                          : Disturbance{.loss = 0.1, .twice = 0.3, .late = 0.5, .jitter = 5, .longest = 120};
   }
 
-  /// The first breach of a rule; empty if there is none.
+  /// The first violation; empty if there is none.
   std::string run() {
     ++tally_.sequences;
     const int end = 100 + static_cast<int>(random_.index(150));
@@ -167,7 +168,7 @@ class World {
     return {++sessions_, static_cast<std::int32_t>(random_.index(5))};
   }
 
-  // The robot.
+  // Robot.
 
   void start(const Sent& script) {
     if (protective_) return;
@@ -196,7 +197,7 @@ class World {
       tally_.longest_steps = std::max(tally_.longest_steps, now_ - stopped_at_);
   }
 
-  // The link and its connection.
+  // Link and its connection.
 
   void hear(const Told& told) {
     if (!connected_ || told.connection != connection_) return;
@@ -230,7 +231,7 @@ class World {
     tokens_.clear();
   }
 
-  // The person.
+  // User.
 
   void person() {
     if (!connected_ && now_ >= back_at_) {
@@ -262,7 +263,7 @@ class World {
       any_step(fresh_token_ ? 1 : 0.5);
     }
   }
-  /// The usual ones in their order, most of the time.
+  /// Mostly the usual steps in their order.
   void any_step(double which) {
     if (which < 0.3) {
       if (unlock_at_) return;
@@ -278,7 +279,7 @@ class World {
       execute();
     }
   }
-  /// As RobotLink::unlock, with its questions to the dashboard.
+  /// Like RobotLink::unlock, with its dashboard requests.
   void unlocking() {
     if (!unlock_at_) return;
     if (now_ == dashboard_at_) protective_ = false;
@@ -288,7 +289,7 @@ class World {
     if (machine_.unlock(unlock_since_, time())) reference_.unlocked(unlock_begun_);
   }
 
-  // The program: as RobotLink::execute, step by step.
+  // The program: like RobotLink::execute, step by step.
 
   enum class Step { none, ask, connect, send, supervise, measure };
   void execute() {
@@ -402,7 +403,7 @@ class World {
   Stops since_ = 0;
 };
 
-/// The first breach in so many sequences, with its number; empty if there is none.
+/// The first violation in `count` sequences, with its number; empty if there is none.
 std::string first_breach(const Rules& rules, std::uint64_t count, Tally& tally) {
   for (std::uint64_t trial = 0; trial < count; ++trial)
     if (const std::string breach = World(rules, trial, tally).run(); !breach.empty())
@@ -414,11 +415,11 @@ TEST(LinkModel, NothingMovesWithoutAConfirmationSinceTheLastStop) {
   Tally tally;
   EXPECT_EQ(first_breach({}, sequences, tally), "");
   EXPECT_EQ(tally.sequences, static_cast<long>(sequences));
-  // It is no proof unless much moves, much arrives and much is stopped in motion.
+  // Coverage: enough motions, arrivals and stops in motion.
   EXPECT_GT(tally.motions, tally.sequences / 2);
   EXPECT_GT(tally.completed, tally.sequences / 5);
   EXPECT_GT(tally.stops_in_motion, tally.sequences / 10);
-  // Undisturbed, a stop reaches the script with the next state and beat.
+  // Without disturbance a stop reaches the script with the next state and beat.
   EXPECT_LE(tally.longest_steps * step_ms, 16);
   RecordProperty("motions", static_cast<int>(tally.motions));
   RecordProperty("completed", static_cast<int>(tally.completed));
@@ -437,16 +438,16 @@ void expect_found(const std::string& what, const std::function<void(Rules&)>& br
   EXPECT_NE(first_breach(rules, enough, tally), "") << what;
 }
 
-TEST(LinkModel, EveryBrokenRuleOfTheTableIsFound) {
+TEST(LinkModel, EveryBrokenRuleOfTheTableIsDetected) {
   using enum LinkPhase;
   for (const LinkPhase phase : {disconnected, idle, LinkPhase::ready, starting, moving, stopped})
     for (const LinkEvent event : {LinkEvent::stop, LinkEvent::lost}) {
-      if (phase == disconnected && event == LinkEvent::lost) continue;  // it cannot be lost twice
+      if (phase == disconnected && event == LinkEvent::lost) continue;  // cannot be lost twice
       const std::string what = fmt::format("{}, {}", name(phase), event == LinkEvent::stop ? "stop" : "lost");
       expect_found(what + ": ignored", [&](Rules& rules) {
         rule(rules, phase, event) = {phase, LinkAction::none};
       });
-      // Sent, but without a beat yet: an order whose number was left to it still gets none.
+      // Sent, but without a beat yet: an order that kept its number still receives none.
       if (phase != starting)
         expect_found(what + ": not counted",
                      [&](Rules& rules) { rule(rules, phase, event).action = LinkAction::none; });
@@ -455,8 +456,8 @@ TEST(LinkModel, EveryBrokenRuleOfTheTableIsFound) {
                [](Rules& rules) { rule(rules, disconnected, LinkEvent::connected).to = LinkPhase::ready; });
 }
 
-TEST(LinkModel, EveryBrokenRuleOfTheScriptIsFound) {
-  // One of the two would do: each is compared with the script below.
+TEST(LinkModel, EveryBrokenRuleOfTheScriptIsDetected) {
+  // Each rule alone would suffice; both are compared with the script below.
   expect_found("number and stop beat",
                [](Rules& rules) { rules.script.number_during = rules.script.stop_beat = false; });
   expect_found("age", [](Rules& rules) { rules.script.age = false; });
@@ -465,8 +466,8 @@ TEST(LinkModel, EveryBrokenRuleOfTheScriptIsFound) {
   expect_found("watch", [](Rules& rules) { rules.watch = false; });
 }
 
-/// The model's script and the one that is sent agree in every period, whatever comes in the registers.
-TEST(LinkModel, ScriptModelIsTheScript) {
+/// The model's script and the real one agree in every period for any register values.
+TEST(LinkModel, ScriptModelAgreesWithTheScript) {
   RobotOrder order{"down", ur5().name, drill(), resting_joints(), {}, {}, {}};
   RigidTransform aside = resting_state().base_from_tcp;
   aside.translation.y() += 2;

@@ -9,25 +9,25 @@
 
 namespace helicarm {
 
-/// Of the simulated time, which is counted in steps.
+/// Simulated time in steps; a UR5 has periods of 8 ms.
 inline constexpr int step_ms = 4, steps_per_period = 2;  // a UR5 has periods of 8 ms
 
-/// The rules of the script, each of which a test may break.
+/// The script's rules, each of which a test can break.
 struct ScriptRules {
-  bool number_before = true;  ///< it waits until its number is in the registers
+  bool number_before = true;  ///< waits until its number is in the registers
   bool number_during = true;
-  bool once = true;  ///< it ends at once when it has begun before
+  bool once = true;  ///< ends immediately if it has begun before
   bool stop_beat = true;
-  bool age = true;                        ///< of a beat
+  bool age = true;                        ///< a beat's age is checked
   int patience = 10, longest_wait = 125;  ///< ticks
 };
 
-/// What script.cc writes in URScript, as plain code. A test compares the two.
+/// The script of script.cc as plain code. A test compares the two.
 class ScriptModel {
  public:
   ScriptModel(OrderNumber number, const ScriptRules& rules) : number_(number), rules_(rules) {}
 
-  /// One period. `rests`: its moves are over, or its braking is.
+  /// One period. `rests`: its moves have ended, or its braking has.
   void step(const Heartbeat& in, ScriptReport& out, bool rests) {
     if (!come_) return come(in, out);
     if (braking_) {
@@ -61,7 +61,7 @@ class ScriptModel {
   }
   OrderNumber number() const { return number_; }
   bool drives() const { return moving_; }
-  bool begins() const { return begins_; }  ///< its motion, in this period
+  bool begins() const { return begins_; }  ///< its motion begins in this period
   bool braking() const { return braking_ && !ended_; }
   bool ended() const { return ended_; }
 
@@ -83,7 +83,7 @@ class ScriptModel {
   bool come_ = false, moving_ = false, begins_ = false, braking_ = false, ended_ = false;
 };
 
-/// How bad the channels are in one sequence.
+/// Channel quality in one sequence.
 struct Disturbance {
   double loss = 0, twice = 0, late = 0;  ///< probabilities
   int jitter = 1, longest = 1;           ///< delays in steps: usual, and of late messages

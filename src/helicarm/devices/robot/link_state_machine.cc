@@ -11,7 +11,7 @@ namespace {
 using enum LinkPhase;
 using enum LinkAction;
 
-/// The robot's clock may leap so far between two states before it counts as another clock.
+/// Larger jumps of the robot's clock between two states are treated as another clock.
 constexpr double clock_leap_s = 1;
 
 Failure robot_stopped(std::string message) { return {Reason::robot_stopped, std::move(message)}; }
@@ -71,10 +71,10 @@ Heartbeat LinkStateMachine::heard(const RobotState& state, Time now) {
   } else if (state_) {
     const double passed_s = state.time_s - state_->time_s;
     if (passed_s < 0 || passed_s > clock_leap_s)
-      stop({Reason::stale_state, fmt::format("the robot's clock leapt by {:.3f} s", passed_s)});
+      stop({Reason::stale_state, fmt::format("the robot's clock jumped by {:.3f} s", passed_s)});
   }
   if (const auto why = why_stopped(state)) {
-    // A stop that lasts is one stop: otherwise nobody could unlock a protective stop.
+    // A lasting stop counts once; otherwise a protective stop could not be unlocked.
     if (!robot_stopped_ || phase_ != stopped) stop(*why);
     confirmations_.forget_all();
     robot_stopped_ = true;
@@ -99,7 +99,7 @@ void LinkStateMachine::lost(const Failure& why) {
   robot_stopped_ = false;
 }
 
-/// The first reason stays: what follows is its consequence.
+/// The first reason is kept: later ones are consequences.
 void LinkStateMachine::stop(const Failure& why) {
   if (phase_ != stopped) why_ = why;
   apply(LinkEvent::stop);
@@ -113,7 +113,7 @@ Failure LinkStateMachine::stop_order(Stops since, const Failure& why) {
 
 Failure LinkStateMachine::stopped_since() const {
   return why_.value_or(
-      robot_stopped("it was stopped meanwhile, and unlocked since: confirm the order again"));
+      robot_stopped("the robot was stopped and unlocked since the confirmation: confirm the order again"));
 }
 
 Expected<LinkStateMachine::Stops> LinkStateMachine::redeem(const std::string& token, const RobotOrder& order,
@@ -126,7 +126,7 @@ Expected<LinkStateMachine::Stops> LinkStateMachine::redeem(const std::string& to
 Expected<void> LinkStateMachine::unlock(Stops since, Time now) {
   if (since != stops_) return tl::unexpected<Failure>(stopped_since());
   if (!state_ || age_s(now) > times_.stale_s)
-    return fail(Reason::stale_state, "the robot's state is not known");
+    return fail(Reason::stale_state, "the robot's state is unknown");
   if (const auto why = why_stopped(*state_)) return tl::unexpected<Failure>(*why);
   if (!apply(LinkEvent::unlock)) return fail(Reason::robot_locked, "an order is being carried out");
   why_.reset();
@@ -138,15 +138,15 @@ Expected<void> LinkStateMachine::ready(Stops since, Time now) const {
     return fail(Reason::not_connected, "there is no connection" + (why_ ? ": " + why_->message : ""));
   if (since != stops_) return tl::unexpected<Failure>(stopped_since());
   if (phase_ != LinkPhase::ready)
-    return fail(Reason::robot_locked, fmt::format("the robot is {}{}", name(phase_),
-                                                  why_ ? ": " + why_->message : ": nobody has unlocked it"));
+    return fail(Reason::robot_locked,
+                fmt::format("the robot is {}{}", name(phase_), why_ ? ": " + why_->message : ": unlock it"));
   if (age_s(now) > times_.stale_s) return fail(Reason::stale_state, "the robot's last state is too old");
   return {};
 }
 
 Expected<OrderNumber> LinkStateMachine::begin(Stops since, double foreseen_s, Time now) {
   if (auto may = ready(since, now); !may) return tl::unexpected<Failure>(may.error());
-  if (!apply(LinkEvent::order)) return fail(Reason::robot_locked, "no order may be sent now");
+  if (!apply(LinkEvent::order)) return fail(Reason::robot_locked, "no order is allowed now");
   looked_ = begun_ = now;
   begun_s_ = state_->time_s;
   foreseen_s_ = foreseen_s + times_.start_s;
@@ -167,12 +167,12 @@ Expected<bool> LinkStateMachine::look(Stops since, Time now) {
 
 Expected<bool> LinkStateMachine::judge(Time now) const {
   if (age_s(now) > times_.stale_s)
-    return fail(Reason::stale_state, "the robot's states have stopped coming: where it is now is unknown",
+    return fail(Reason::stale_state, "no robot state received: its position is unknown",
                 {{"age_s", age_s(now)}});
   const ScriptReport& script = state_->script;
   if (phase_ == starting) {
     if (now - begun_ > duration_of(times_.start_s))
-      return tl::unexpected<Failure>(robot_stopped("the robot did not begin the order"));
+      return tl::unexpected<Failure>(robot_stopped("the robot did not start the order"));
     return false;
   }
   const bool plays = state_->runtime == RuntimeState::playing;
@@ -180,7 +180,7 @@ Expected<bool> LinkStateMachine::judge(Time now) const {
     return tl::unexpected<Failure>(robot_stopped("the robot runs another order's program"));
   if (script.stage == ScriptStage::done && !plays) return true;
   if (script.stage == ScriptStage::stopped)
-    return tl::unexpected<Failure>(robot_stopped("the robot heard no heartbeat and stopped by itself"));
+    return tl::unexpected<Failure>(robot_stopped("the robot received no heartbeat and stopped"));
   if (!plays) return tl::unexpected<Failure>(robot_stopped("the robot's program ended early"));
   if (state_->time_s - begun_s_ > foreseen_s_)
     return fail(Reason::off_target, "the robot did not reach its target in time",

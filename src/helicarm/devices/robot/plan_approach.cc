@@ -7,7 +7,7 @@
 namespace helicarm {
 namespace {
 
-/// The turn that brings the z axis of `from` onto `axis` by the shortest way.
+/// Shortest rotation of the z axis of `from` onto `axis`.
 Eigen::Matrix3d aligned(const Eigen::Matrix3d& from, const Eigen::Vector3d& axis) {
   return Eigen::Quaterniond::FromTwoVectors(from.col(2), axis).toRotationMatrix() * from;
 }

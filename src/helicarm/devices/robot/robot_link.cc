@@ -17,11 +17,11 @@ using Milliseconds = std::chrono::milliseconds;
 
 constexpr double correction_mm_s = 10;
 constexpr double correction_mm_s2 = 100;
-/// The supervision looks every 20 ms. When it comes so late, the machine was held up as a whole.
+/// Supervision runs every 20 ms; a longer interval means that the whole machine was stalled.
 constexpr Milliseconds held_up{50};
-/// Then states and poses that wait in their sockets are read first.
+/// After a stall, waiting states and poses are read from the sockets first.
 constexpr Milliseconds catch_up{20};
-/// Within these the kernel has taken a script over: it fits into the buffer of a new socket.
+/// Time in which the kernel accepts a script: it fits into the buffer of a new socket.
 constexpr Milliseconds handing_over{50};
 
 std::chrono::steady_clock::duration duration_of(double s) {
@@ -64,8 +64,8 @@ RobotLink::RobotLink(RobotConfig config)
 
 RobotLink::~RobotLink() = default;
 
-/// To be called under the guard. The socket stays open while its order may move, as a robot may throw away a
-/// script whose sender leaves at once; closing it withdraws a script that the robot has not read yet.
+/// Call under the guard. The socket stays open while its order may move, because a robot may discard a script
+/// whose sender disconnects; closing it withdraws a script not yet read.
 void RobotLink::changed() {
   if (!machine_.permits()) script_socket_.reset();
   news_.notify_all();
@@ -79,17 +79,19 @@ RobotLinkStatus RobotLink::status() const {
   if (!state) return status;
   const double mismatch = kinematic_mismatch_mm(config_.model, *state);
   if (mismatch > config_.mismatch_mm)
-    status.warnings.push_back({Reason::off_target,
-                               fmt::format("the arm is {:.2f} mm off the {}'s drawing: go by the tracker",
-                                           mismatch, config_.model.name),
-                               {},
-                               {{"mismatch_mm", mismatch}}});
+    status.warnings.push_back(
+        {Reason::off_target,
+         fmt::format("the arm differs by {:.2f} mm from the nominal {}: use corrections by the tracker",
+                     mismatch, config_.model.name),
+         {},
+         {{"mismatch_mm", mismatch}}});
   const auto& v = version_;
   if (v.major == 5 && std::pair(v.minor, v.bugfix) < std::pair(25u, 1u))
     status.warnings.push_back(
         {Reason::unsupported,
-         fmt::format("PolyScope {}.{}.{} lets others run commands on the robot (mended in 5.25.1)", v.major,
-                     v.minor, v.bugfix)});
+         fmt::format(
+             "PolyScope {}.{}.{} allows others to run commands on the robot: update to 5.25.1 or later",
+             v.major, v.minor, v.bugfix)});
   return status;
 }
 
@@ -98,21 +100,22 @@ Expected<RobotState> RobotLink::wait_connected(Clock::duration patience) const {
   news_.wait_for(lock, patience, [&] { return machine_.state().has_value(); });
   if (machine_.state()) return *machine_.state();
   return tl::unexpected<Failure>(
-      machine_.why().value_or(Failure{Reason::not_connected, "the robot does not answer"}));
+      machine_.why().value_or(Failure{Reason::not_connected, "the robot does not respond"}));
 }
 
 Expected<void> RobotLink::refuse_local_mode() const {
   const auto remote =
       ask_dashboard(config_.address, config_.dashboard_port, DashboardCommand::remote_control);
-  if (remote && *remote == "false") return fail(Reason::robot_locked, "the robot is in local mode");
-  // A CB3 has no such mode and does not understand the question.
+  if (remote && *remote == "false")
+    return fail(Reason::robot_locked, "the robot is in local mode: switch it to remote control");
+  // A CB3 has no remote mode and rejects the query.
   if (!remote && remote.error().reason != Reason::bad_value) return tl::unexpected<Failure>(remote.error());
   return {};
 }
 
 Expected<void> RobotLink::unlock(const std::string& who) {
   if (who.empty() || who.size() > 100 || holds_control_character(who))
-    return fail(Reason::bad_value, "who unlocks the robot must be said");
+    return fail(Reason::bad_value, "the name of the user who unlocks the robot is missing");
   const Stops since = [&] {
     const std::lock_guard lock(guard_);
     return machine_.stops();
@@ -134,7 +137,7 @@ Expected<void> RobotLink::unlock(const std::string& who) {
 
 void RobotLink::stop() {
   const std::lock_guard lock(guard_);
-  machine_.stop({Reason::robot_stopped, "stopped by this program's user"});
+  machine_.stop({Reason::robot_stopped, "stopped by the user"});
   changed();
 }
 
@@ -150,7 +153,7 @@ Expected<RobotState> RobotLink::run(const RobotOrder& order, Stops since, const 
   return supervise(since, watch);
 }
 
-/// The checks, the permission and the sending are one critical section: no stop falls between them.
+/// Check, permission and sending are one critical section, so that no stop occurs in between.
 Expected<void> RobotLink::send(const RobotOrder& order, Stops since) {
   auto socket = TimedSocket::connect(config_.address, config_.script_port, Milliseconds(1000));
   if (!socket) return tl::unexpected<Failure>(socket.error());
@@ -201,7 +204,7 @@ Expected<void> RobotLink::correct(const RobotOrder& order, Stops since, const Ri
 Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const std::string& token,
                                                const Measure& measure, const Watch& watch) {
   const std::unique_lock one_at_a_time(executing_, std::try_to_lock);
-  if (!one_at_a_time) return fail(Reason::robot_locked, "another order is being carried out");
+  if (!one_at_a_time) return fail(Reason::robot_locked, "another order is in execution");
   const auto since = [&] {
     const std::lock_guard lock(guard_);
     return machine_.redeem(token, order, Clock::now());
@@ -211,7 +214,7 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
     return fail(Reason::bad_value,
                 "the order is for a " + order.model + ", the robot is a " + config_.model.name);
   if (order.corrections.most > 0 && !measure)
-    return fail(Reason::bad_value, "an order with corrections needs a tracker that measures");
+    return fail(Reason::bad_value, "an order with corrections requires a tracker");
   const Watch watched = watch ? watch : [] { return Expected<void>(); };
   const auto ended = run(order, *since, watched);
   if (!ended) return tl::unexpected<Failure>(ended.error());

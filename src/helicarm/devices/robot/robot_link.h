@@ -23,57 +23,57 @@ struct RobotConfig {
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
-  double stale_s = 0.1;            ///< a state older than this is no state
-  double program_silence_s = 0.1;  ///< the heartbeat ends so long after this program last looked
-  double lost_s = 1;               ///< without an answer or a state for so long, it is connected anew
-  double start_s = 2;              ///< limit for a script to begin
-  double mismatch_mm = 0.5;        ///< of the arm's kinematics, from which on it is told
+  double stale_s = 0.1;            ///< a state older than this is not used
+  double program_silence_s = 0.1;  ///< beats end this long after the program's last check
+  double lost_s = 1;               ///< reconnect after this time without an answer or a state
+  double start_s = 2;              ///< time limit for a script to begin
+  double mismatch_mm = 0.5;        ///< kinematic mismatch above which a warning is given
   RobotLimits limits = {};
 };
 
-/// Whether a motion may go on. Asked before the script is sent and then with each state.
+/// Whether a motion may continue. Called before the script is sent and then with each state.
 using Watch = std::function<Expected<void>()>;
 
 struct RobotLinkStatus {
   LinkPhase phase = LinkPhase::disconnected;
-  std::optional<Failure> why;  ///< of the last stop or end of the connection
+  std::optional<Failure> why;  ///< of the last stop or disconnection
   std::optional<RobotState> state;
   double age_s = 0;  ///< of the state
   ControllerVersion version;
   std::vector<Warning> warnings;
 };
 
-/// A robot over its three ports, and the lock on its motion: sockets and threads around a `LinkStateMachine`,
-/// which decides. Nothing moves but by `execute`; whatever stops the robot, or ends the connection, is
-/// latched and undone by `unlock` alone. All members may be called from any thread.
+/// A robot on its three ports, and the lock on its motion: sockets and threads around a `LinkStateMachine`,
+/// which decides. Only `execute` causes motion; any stop or disconnection is latched and reset by `unlock`
+/// only. All members are thread-safe.
 class RobotLink {
  public:
   explicit RobotLink(RobotConfig config);
   ~RobotLink();
 
   RobotLinkStatus status() const;
-  /// Waits until it is connected and has a state; the reason why not after this time.
+  /// Waits for a connection and a state; fails with the reason after `patience`.
   Expected<RobotState> wait_connected(std::chrono::steady_clock::duration patience) const;
-  /// Where the robot had its tool lately.
+  /// Recent tool poses.
   const ToolTrack& track() const { return track_; }
 
-  /// A person has looked at the robot and allows motion. Releases a protective stop, which the robot itself
-  /// allows 5 s after it; refuses while the robot says that it may not move (`robot_stopped`), in local mode
+  /// The user has inspected the robot and allows motion. Releases a protective stop, which the robot permits
+  /// 5 s after it; refuses if the robot's state does not allow motion (`robot_stopped`), in local mode
   /// (`robot_locked`), without a connection, or after a stop during the call.
   Expected<void> unlock(const std::string& who);
 
-  /// A token for this order, for the person who has seen its preview.
+  /// Token for this order, for the user who has seen its preview.
   std::string confirm(const RobotOrder& order);
 
-  /// Carries a confirmed order out and returns when the tool is where it should be. With corrections it then
-  /// follows the target by `measure`, and gives every miss; without, by the robot's own pose. Refuses,
-  /// without any motion, as `check_order`, `order_not_confirmed` and `robot_locked`. What goes wrong on the
-  /// way, or `watch` has against it, stops the robot and is latched. A stop ends it for good, also when the
-  /// robot is unlocked before this returns.
+  /// Executes a confirmed order and returns when the tool is at its target. With corrections it then follows
+  /// the target by `measure` and returns every error; without, by the robot's own pose. Refuses, without
+  /// motion, as `check_order`, `order_not_confirmed` and `robot_locked`. A failure during motion, or of
+  /// `watch`, stops the robot and is latched. A stop ends the call for good, even if the robot is unlocked
+  /// before it returns.
   Expected<std::vector<Miss>> execute(const RobotOrder& order, const std::string& token,
                                       const Measure& measure = {}, const Watch& watch = {});
 
-  /// Stops the robot at once, from any thread.
+  /// Stops the robot immediately; thread-safe.
   void stop();
 
  private:
@@ -92,12 +92,12 @@ class RobotLink {
   RobotConfig config_;
   ToolTrack track_;
   std::mutex executing_;
-  mutable std::mutex guard_;  ///< of all that follows
+  mutable std::mutex guard_;  ///< guards all members below
   mutable std::condition_variable news_;
   LinkStateMachine machine_;
   ControllerVersion version_;
   std::optional<TimedSocket> script_socket_;
-  RtdeClient client_;  ///< last: its thread uses all the others
+  RtdeClient client_;  ///< last: its thread uses all others
 };
 
 }  // namespace helicarm

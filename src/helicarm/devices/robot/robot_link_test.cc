@@ -25,7 +25,7 @@ VirtualUrOptions any_ports(bool lockstep = true) {
   return options;
 }
 
-/// With patience for a slow machine: in lockstep the robot's time waits for us.
+/// Long limits for a loaded machine: in lockstep the robot's time waits for the test.
 RobotConfig config_for(const VirtualUr& robot) {
   RobotConfig config;
   config.rtde_port = robot.rtde_port();
@@ -35,7 +35,7 @@ RobotConfig config_for(const VirtualUr& robot) {
   return config;
 }
 
-/// So slow along the axis that there is time for anything to go wrong.
+/// Slow along the axis, so that faults can occur during the motion.
 RobotOrder slow_order() {
   static const RobotOrder order = [] {
     ApproachOptions options;
@@ -56,7 +56,7 @@ struct Drill {
     return config;
   }
 
-  /// Starts the slow order and brings the fault while the arm moves; gives what became of the order.
+  /// Starts the slow order and causes the fault while the arm moves; returns the order's failure.
   Failure fault_on_the_way(const std::function<void()>& bring) {
     EXPECT_TRUE(link.unlock("tester"));
     const RobotOrder order = slow_order();
@@ -71,14 +71,14 @@ struct Drill {
     return result ? Failure{Reason::usage, "it was carried out"} : result.error();
   }
 
-  /// Time on the robot's clock from now until it rests, nobody beating.
+  /// Time on the robot's clock until it rests, without beats.
   double silent_stop_s() {
     const double now_s = robot->truth().state.time_s;
     robot->advance(0.5);
     return robot->truth().rest_since_s.value_or(1e9) - now_s;
   }
 
-  /// Lets time pass on the robot's clock, until the link knows.
+  /// Advances the robot's clock until the link has received it.
   void pass(double seconds) {
     robot->advance(seconds);
     const double now_s = robot->truth().state.time_s;
@@ -90,13 +90,13 @@ struct Drill {
     const RobotOrder order = slow_order();
     const auto refused = link.execute(order, link.confirm(order));
     ASSERT_FALSE(refused);
-    // While it is stopped each state makes all tokens void.
+    // While the robot is stopped each state invalidates all tokens.
     EXPECT_THAT(refused.error().reason,
                 testing::AnyOf(Reason::robot_locked, Reason::not_connected, Reason::order_not_confirmed));
     EXPECT_FALSE(robot->truth().moving);
   }
 
-  /// How long it still moved on its own clock, from this time on, while the link keeps talking to it.
+  /// How long it still moved on its own clock from this time, while the link keeps sending.
   double stop_s_from(double begun_s) {
     for (int i = 0; i < 2000 && robot->truth().moving; ++i) std::this_thread::sleep_for(1ms);
     return robot->truth().rest_since_s.value_or(1e9) - begun_s;
@@ -107,7 +107,7 @@ struct Drill {
   Watch watch;
 };
 
-TEST(RobotDrill, ConfirmedOrderIsCarriedOutOnce) {
+TEST(RobotDrill, ConfirmedOrderIsExecutedOnce) {
   Drill drill;
   EXPECT_EQ(drill.link.status().phase, LinkPhase::idle);
   const RobotOrder order = planned();
@@ -128,7 +128,7 @@ TEST(RobotDrill, ConfirmedOrderIsCarriedOutOnce) {
   EXPECT_EQ(drill.link.execute(order, drill.link.confirm(order)).error().reason, Reason::robot_moved);
 }
 
-TEST(RobotDrill, EveryStopIsLatchedUntilAPersonUnlocks) {
+TEST(RobotDrill, EveryStopIsLatchedUntilUnlocked) {
   for (const auto& [fault, text] :
        {std::pair{RobotFault::safeguard_stop, "SAFEGUARD_STOP"},
         std::pair{RobotFault::violation, "VIOLATION"}, std::pair{RobotFault::brake_not_released, "IDLE"},
@@ -153,7 +153,7 @@ TEST(RobotDrill, EveryStopIsLatchedUntilAPersonUnlocks) {
   }
 }
 
-TEST(RobotDrill, EmergencyStopNeedsPowerBrakesAndAPerson) {
+TEST(RobotDrill, EmergencyStopNeedsPowerBrakesAndUnlock) {
   Drill drill;
   const Failure failure = drill.fault_on_the_way([&] { drill.robot->set(RobotFault::emergency_stop); });
   EXPECT_EQ(failure.reason, Reason::robot_stopped);
@@ -171,7 +171,7 @@ TEST(RobotDrill, EmergencyStopNeedsPowerBrakesAndAPerson) {
 
 TEST(RobotDrill, ProtectiveStopIsReleasedByUnlockAfterFiveSeconds) {
   Drill drill;
-  // No heartbeat is answered while the stream is frozen: the robot's clock stands.
+  // No heartbeat is answered while the stream is frozen: the robot's clock does not advance.
   EXPECT_EQ(drill
                 .fault_on_the_way([&] {
                   drill.robot->set(RobotFault::protective_stop);
@@ -182,7 +182,7 @@ TEST(RobotDrill, ProtectiveStopIsReleasedByUnlockAfterFiveSeconds) {
             Reason::robot_stopped);
   drill.robot->advance(5.1);
   drill.robot->set(RobotFault::frozen_states, false);
-  drill.pass(0.1);  // the leap of the robot's clock is a stop of its own
+  drill.pass(0.1);  // the jump of the robot's clock is a stop of its own
   EXPECT_TRUE(drill.link.unlock("tester")) << drill.link.unlock("tester").error().message;
 }
 
@@ -207,7 +207,7 @@ TEST(RobotDrill, CutCableStopsTheRobotByItself) {
   EXPECT_TRUE(drill.link.unlock("tester"));
 }
 
-TEST(RobotDrill, BrokenStreamsStopTheRobotAndEndTheConnection) {
+TEST(RobotDrill, InterruptedStreamsStopTheRobotAndEndTheConnection) {
   for (const auto& [fault, reason] : {std::pair{RobotFault::frozen_states, Reason::stale_state},
                                       std::pair{RobotFault::half_packet, Reason::stale_state},
                                       std::pair{RobotFault::huge_packet, Reason::bad_size},
@@ -222,7 +222,7 @@ TEST(RobotDrill, BrokenStreamsStopTheRobotAndEndTheConnection) {
   }
 }
 
-TEST(RobotDrill, ClockThatLeapsIsAnotherController) {
+TEST(RobotDrill, ClockJumpIsAnotherController) {
   Drill drill;
   EXPECT_EQ(drill.fault_on_the_way([&] { drill.robot->set(RobotFault::clock_jump); }).reason,
             Reason::stale_state);
@@ -233,7 +233,7 @@ TEST(RobotDrill, StopByTheProgramStopsTheRobot) {
   Drill drill;
   double told_s = 0;
   const Failure failure = drill.fault_on_the_way([&] {
-    drill.robot->set(RobotFault::frozen_states);  // the robot's clock stands until it has been told
+    drill.robot->set(RobotFault::frozen_states);  // its clock halts until it receives the stop
     told_s = drill.robot->truth().state.time_s;
     drill.link.stop();
     drill.robot->set(RobotFault::frozen_states, false);
@@ -243,13 +243,13 @@ TEST(RobotDrill, StopByTheProgramStopsTheRobot) {
   EXPECT_FALSE(drill.robot->truth().moving);
 }
 
-TEST(RobotDrill, TrackerLostOnTheWayStopsTheRobotAndIsLatched) {
+TEST(RobotDrill, TrackerLostDuringMotionStopsTheRobotAndIsLatched) {
   Drill drill;
   std::atomic<bool> seen{true};
   drill.watch = [&]() -> Expected<void> {
     if (seen) return {};
-    drill.robot->set(RobotFault::frozen_states);  // the robot's clock stands until it has been told
-    return fail(Reason::stale_pose, "the tool is not seen");
+    drill.robot->set(RobotFault::frozen_states);  // its clock halts until it receives the stop
+    return fail(Reason::stale_pose, "the tool is not visible");
   };
   const Failure failure = drill.fault_on_the_way([&] { seen = false; });
   EXPECT_EQ(failure.reason, Reason::stale_pose);
@@ -260,18 +260,18 @@ TEST(RobotDrill, TrackerLostOnTheWayStopsTheRobotAndIsLatched) {
   drill.expect_locked();
 }
 
-TEST(RobotDrill, NothingMovesWhileTheTrackerSeesNothing) {
+TEST(RobotDrill, NothingMovesWithoutTracking) {
   Drill drill;
   ASSERT_TRUE(drill.link.unlock("tester"));
   const RobotOrder order = planned();
   const auto refused = drill.link.execute(order, drill.link.confirm(order), {}, [] {
-    return Expected<void>(fail(Reason::no_pose, "the tool was never seen"));
+    return Expected<void>(fail(Reason::no_pose, "the tool was never visible"));
   });
   EXPECT_EQ(refused.error().reason, Reason::no_pose);
   EXPECT_FALSE(drill.robot->truth().rest_since_s);
 }
 
-TEST(RobotDrill, ArmMovedByHandOrOtherToolIsPlannedAnew) {
+TEST(RobotDrill, ArmMovedByHandOrOtherToolRequiresANewPlan) {
   Drill drill;
   ASSERT_TRUE(drill.link.unlock("tester"));
   const RobotOrder order = planned();
@@ -285,7 +285,7 @@ TEST(RobotDrill, ArmMovedByHandOrOtherToolIsPlannedAnew) {
   EXPECT_FALSE(drill.robot->truth().moving);
 }
 
-TEST(RobotDrill, LocalModeAndClosedBrakesRefuse) {
+TEST(RobotDrill, LocalModeAndClosedBrakesAreRefused) {
   Drill drill;
   ASSERT_TRUE(drill.link.unlock("tester"));
   const RobotOrder order = planned();
@@ -299,7 +299,7 @@ TEST(RobotDrill, LocalModeAndClosedBrakesRefuse) {
   drill.expect_locked();
 }
 
-TEST(RobotDrill, SecondProgramCannotCommand) {
+TEST(RobotDrill, SecondProgramIsRefused) {
   Drill drill;
   RobotLink second(config_for(*drill.robot));
   for (int i = 0; i < 1000 && !second.status().why; ++i) std::this_thread::sleep_for(10ms);
@@ -309,7 +309,7 @@ TEST(RobotDrill, SecondProgramCannotCommand) {
   EXPECT_EQ(drill.link.status().phase, LinkPhase::idle);
 }
 
-TEST(RobotLink, RobotThatIsNotThereOrSpeaksOtherwiseIsReported) {
+TEST(RobotLink, RobotThatIsAbsentOrUsesAnotherProtocolIsReported) {
   for (const auto& [fault, reason] : {std::pair{RobotFault::wrong_version, Reason::not_connected},
                                       std::pair{RobotFault::unknown_output, Reason::unsupported},
                                       std::pair{RobotFault::input_in_use, Reason::robot_locked}}) {
@@ -330,7 +330,7 @@ TEST(RobotLink, RobotThatIsNotThereOrSpeaksOtherwiseIsReported) {
   EXPECT_EQ(link.unlock("tester").error().reason, Reason::not_connected);
 }
 
-TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotAsDrawn) {
+TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotNominal) {
   VirtualUrOptions options = any_ports();
   options.arm.a2 -= 1;
   options.arm.d5 += 1;
@@ -343,7 +343,7 @@ TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotAsDrawn) {
       .most = 4, .longest_mm = 3, .widest_deg = 2, .tolerance_mm = 0.05, .tolerance_deg = 0.05};
   const RobotOrder order = planned(approach);
   const RigidTransform target = order.waypoints.back().base_from_tcp;
-  // The tracker stands anywhere, and the robot is never told where.
+  // The tracker's pose is arbitrary and unknown to the robot.
   const RigidTransform tracker_from_base{
       Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {900, -300, 1500}};
   const auto misses = link.execute(order, link.confirm(order), [&]() -> Expected<ToolMeasurement> {
@@ -365,7 +365,7 @@ TEST(RobotLink, ToolThatStaysOffTargetIsStopped) {
   approach.corrections.most = 3;
   const RobotOrder order = planned(approach);
   const auto misses = link.execute(order, link.confirm(order), []() -> Expected<ToolMeasurement> {
-    return ToolMeasurement{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};  // whatever the arm does
+    return ToolMeasurement{{}, {Eigen::Matrix3d::Identity(), {0, 0, 2}}};  // independent of the arm
   });
   ASSERT_FALSE(misses);
   EXPECT_EQ(misses.error().reason, Reason::off_target);
@@ -373,7 +373,7 @@ TEST(RobotLink, ToolThatStaysOffTargetIsStopped) {
   EXPECT_EQ(link.status().phase, LinkPhase::stopped);
 }
 
-TEST(RobotLink, FactoryCalibrationIsWarnedOf) {
+TEST(RobotLink, FactoryCalibrationIsAWarning) {
   VirtualUrOptions options = any_ports();
   options.controller.a2 -= 1;
   options.arm = options.controller;

@@ -15,15 +15,15 @@ namespace {
 constexpr const char* order_format = "helicarm-order/1";
 constexpr double in_degrees = 180 / std::numbers::pi;
 
-/// Numbers of any finite size: `check_order` knows the limits and says why.
+/// Any finite number: `check_order` applies the limits with a reason.
 constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
 
-/// As it is written, to the last digit: what a person confirmed must not change by being read.
+/// Bit-exact: reading must not change what the user confirmed.
 RigidTransform pose_of(JsonReader& reader, const char* key) {
   const Eigen::Matrix4d given = matrix_from(reader, key, any);
   const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
   if (!((corrected.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
-    reader.refuse(Reason::bad_value, key, "must be a rotation and a shift to nine digits");
+    reader.refuse(Reason::bad_value, key, "must be a rotation and a translation to nine digits");
   return exact_pose(given);
 }
 

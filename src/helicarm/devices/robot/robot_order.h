@@ -9,44 +9,44 @@
 
 namespace helicarm {
 
-/// What the robot carries, as our configuration has it.
+/// The configured tool.
 struct RobotTool {
-  RigidTransform flange_from_tcp;  ///< origin at the tip, z along the tool and out of the tip
-  double payload_kg = 0;           ///< of everything at the flange
+  RigidTransform flange_from_tcp;  ///< origin at the tip, z along the tool, out of the tip
+  double payload_kg = 0;           ///< total at the flange
 };
 
-/// The tip goes there in a straight line while it turns at an even rate.
+/// The tip moves there in a straight line with a uniform rotation.
 struct Waypoint {
   RigidTransform base_from_tcp;
   double speed_mm_s = 0;
   double acceleration_mm_s2 = 0;
 };
 
-/// Where neither arm nor tool may be: the side of a plane into which `normal` does not point.
+/// Forbidden half-space for arm and tool: the side of the plane opposite to `normal`.
 struct KeepOut {
   Eigen::Vector3d point_in_base;  ///< mm
   Eigen::Vector3d normal;         ///< unit
 };
 
 Json to_json(const KeepOut& keep_out);
-/// Coordinates in this range; a normal that is not of unit length is bad_value. Throws as JsonReader.
+/// Coordinates in this range; a normal without unit length is bad_value. Throws as JsonReader.
 KeepOut keep_out_from(JsonReader& reader, Range range);
 
-/// How the loop over the tracker may shift the tool about the last waypoint, and when it is near enough.
+/// Limits and tolerances of corrections by the tracker at the last waypoint.
 struct Corrections {
-  int most = 0;             ///< moves; 0: go there once, by the robot's own measure
-  double longest_mm = 3;    ///< one move of the tip
-  double widest_deg = 2;    ///< one turn
-  double tolerance_mm = 1;  ///< of the tip, by the tracker (or by the robot, if there are none)
+  int most = 0;             ///< largest number of corrections; 0: none, the robot's own pose decides
+  double longest_mm = 3;    ///< largest translation of one correction
+  double widest_deg = 2;    ///< largest rotation of one correction
+  double tolerance_mm = 1;  ///< of the tip, by the tracker (or by the robot without corrections)
   double tolerance_deg = 1;
 };
 
-/// A motion as data: nothing moves by it. It is checked, looked at, confirmed, and then carried out once.
+/// A motion as data. It is checked, previewed, confirmed, and then executed once.
 struct RobotOrder {
   std::string name;
-  std::string model;  ///< as `robot_model` knows it
+  std::string model;  ///< a name of `robot_model`
   RobotTool tool;
-  Joints start = Joints::Zero();  ///< where the arm stood when it was planned, rad
+  Joints start = Joints::Zero();  ///< joints at planning, rad
   std::vector<Waypoint> waypoints;
   std::vector<KeepOut> keep_outs;
   Corrections corrections;
@@ -54,7 +54,7 @@ struct RobotOrder {
 
 Json to_json(const RobotOrder& order);
 
-/// Fails as JsonReader; a pose that is not rigid or a normal that is not of unit length is bad_value.
+/// Fails as JsonReader; a pose that is not rigid or a normal without unit length is bad_value.
 Expected<RobotOrder> robot_order_from(const Json& json, const std::string& origin);
 
 }  // namespace helicarm

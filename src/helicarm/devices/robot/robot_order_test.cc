@@ -16,7 +16,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(PlanApproach, TipTravelsAlongTheAxis) {
+TEST(PlanApproach, TipMovesAlongTheAxis) {
   const RobotOrder order = planned();
   ASSERT_EQ(order.waypoints.size(), 2u);
   const Eigen::Vector3d direction = (knee_tunnel().end_in_base - knee_tunnel().start_in_base).normalized();
@@ -43,7 +43,7 @@ TEST(PlanApproach, TunnelOutOfReachOrWithoutLengthIsRefused) {
             Reason::bad_value);
 }
 
-TEST(RobotOrder, JsonGivesTheSameOrderBack) {
+TEST(RobotOrder, JsonRoundTripKeepsTheOrder) {
   ApproachOptions options;
   options.keep_outs = {table()};
   options.corrections.most = 4;
@@ -53,7 +53,7 @@ TEST(RobotOrder, JsonGivesTheSameOrderBack) {
   EXPECT_EQ(to_json(*again).dump(), to_json(order).dump());
 }
 
-TEST(RobotOrder, JsonThatIsNoOrderIsRefused) {
+TEST(RobotOrder, InvalidJsonIsRefused) {
   const auto with = [](const std::function<void(Json&)>& change) {
     Json json = to_json(planned());
     change(json);
@@ -73,7 +73,7 @@ Reason refused(const std::function<void(RobotOrder&)>& change) {
   return checked ? Reason::usage : checked.error().reason;
 }
 
-TEST(CheckOrder, NumbersBeyondTheLimitsAreRefusedNotTrimmed) {
+TEST(CheckOrder, NumbersBeyondTheLimitsAreRefusedNotClipped) {
   for (const double speed : {5000.0, 250.1, 0.0, -10.0, 1e-6, 1e300})
     EXPECT_EQ(refused([=](RobotOrder& order) { order.waypoints[0].speed_mm_s = speed; }), Reason::bad_value);
   for (const double acceleration : {1e12, 1201.0, 0.0, -1.0})
@@ -97,7 +97,7 @@ TEST(CheckOrder, WaypointOutOfReachIsRefused) {
             Reason::out_of_reach);
 }
 
-TEST(CheckOrder, PathThroughASingularPoseIsRefusedThoughItsEndsAreFine) {
+TEST(CheckOrder, PathThroughASingularPoseIsRefused) {
   RobotOrder order = planned();
   order.start[4] = 0.6;
   Joints stretched = order.start, other_side = order.start;
@@ -111,7 +111,7 @@ TEST(CheckOrder, PathThroughASingularPoseIsRefusedThoughItsEndsAreFine) {
   EXPECT_EQ(checked.error().reason, Reason::singular_pose) << checked.error().message;
 }
 
-TEST(CheckOrder, SpeedThatAJointCannotStopFromInTimeIsRefused) {
+TEST(CheckOrder, SpeedAboveAJointLimitIsRefused) {
   RobotOrder order = planned();
   order.waypoints.resize(1);
   order.waypoints[0].base_from_tcp = base_from_flange(ur5(), order.start) * drill().flange_from_tcp;
@@ -127,7 +127,7 @@ TEST(CheckOrder, SpeedThatAJointCannotStopFromInTimeIsRefused) {
   EXPECT_LT(slowed.waypoints[0].speed_mm_s, order.waypoints[0].speed_mm_s);
 }
 
-TEST(CheckOrder, OrderThatIsSlowEnoughIsNotSlowedDown) {
+TEST(CheckOrder, SlowOrderIsNotSlowedDown) {
   EXPECT_EQ(slowed_for_joints(planned()).waypoints[0].speed_mm_s, planned().waypoints[0].speed_mm_s);
 }
 
@@ -143,14 +143,14 @@ TEST(CheckOrder, PathIntoAKeepOutRegionIsRefused) {
   EXPECT_GT(checked.error().figures.at("depth_mm"), 0);
 }
 
-TEST(CheckOrder, ArmMovedByHandSincePlanningIsPlannedAnew) {
+TEST(CheckOrder, ArmMovedSincePlanningIsRefused) {
   RobotState state = resting_state();
   state.joints[0] += 0.001;
   EXPECT_TRUE(check_order(planned(), state));
-  state.joints[0] += 0.006;  // some 4 mm at the tip
+  state.joints[0] += 0.006;  // about 4 mm at the tip
   EXPECT_EQ(check_order(planned(), state).error().reason, Reason::robot_moved);
   state = resting_state();
-  state.joints[5] += 0.05;  // the tip stays
+  state.joints[5] += 0.05;  // the tip does not move
   EXPECT_EQ(check_order(planned(), state).error().reason, Reason::robot_moved);
 }
 
@@ -163,7 +163,7 @@ TEST(CheckOrder, OtherToolOrPayloadIsRefused) {
   EXPECT_EQ(check_order(planned(), state).error().reason, Reason::robot_moved);
 }
 
-TEST(CheckOrder, RobotThatMayNotMoveIsRefused) {
+TEST(CheckOrder, RobotThatCannotMoveIsRefused) {
   RobotState state = resting_state();
   state.safety_mode = SafetyMode::protective_stop;
   EXPECT_EQ(check_order(planned(), state).error().reason, Reason::robot_stopped);
@@ -172,7 +172,7 @@ TEST(CheckOrder, RobotThatMayNotMoveIsRefused) {
   EXPECT_EQ(check_order(planned(), state).error().reason, Reason::robot_stopped);
 }
 
-TEST(CheckOrder, FactoryCalibrationShowsAsMismatch) {
+TEST(CheckOrder, FactoryCalibrationIsAMismatch) {
   RobotState state = resting_state();
   EXPECT_LT(kinematic_mismatch_mm(ur5(), state), 1e-9);
   RobotModel calibrated = ur5();
@@ -180,7 +180,7 @@ TEST(CheckOrder, FactoryCalibrationShowsAsMismatch) {
   EXPECT_NEAR(kinematic_mismatch_mm(calibrated, state), 1, 1e-6);
 }
 
-TEST(Confirmations, TokenServesItsOrderOnceAndForAWhile) {
+TEST(Confirmations, TokenIsValidOnceForItsOrderAndALimitedTime) {
   Confirmations controller(std::chrono::seconds(60));
   const RobotOrder order = planned();
   const auto now = Confirmations::Clock::now();

@@ -13,8 +13,7 @@ namespace {
 
 constexpr double degrees = 180 / 3.14159265358979323846;
 
-/// Bits of the safety status that stand for a stop of some kind: 2 to 11 but 3, recovery, which the mode
-/// says.
+/// Stop bits of the safety status: 2 to 11 except 3 (recovery), which the mode reports.
 constexpr std::uint32_t stop_bits = 0b1111'1111'0100;
 
 }  // namespace
@@ -58,10 +57,11 @@ std::optional<Failure> why_stopped(const RobotState& state) {
     return because(fmt::format("the robot's safety status has bits {:#x} of a stop", state.safety_bits),
                    {{"safety_bits", state.safety_bits}});
   if (state.robot_mode != RobotMode::running)
-    return because(fmt::format("the robot's mode is {}: its power or brakes hold it", name(state.robot_mode)),
+    return because(fmt::format("the robot's mode is {}: switch on its power and release the brakes",
+                               name(state.robot_mode)),
                    {{"robot_mode", static_cast<double>(state.robot_mode)}});
   if (!(state.speed_scaling > 0))
-    return because("the robot's speed slider stands at zero", {{"speed_scaling", state.speed_scaling}});
+    return because("the robot's speed slider is at zero", {{"speed_scaling", state.speed_scaling}});
   return std::nullopt;
 }
 

@@ -44,7 +44,7 @@ enum class SafetyMode : std::int32_t {
 
 enum class RuntimeState : std::uint32_t { stopping, stopped, playing, pausing, paused, resuming };
 
-/// What the robot says of itself at one moment of its own clock.
+/// The robot's reported state at one moment of its own clock.
 struct RobotState {
   double time_s = 0;  ///< since the controller started
   Joints joints = Joints::Zero();
@@ -57,11 +57,11 @@ struct RobotState {
   std::uint32_t safety_bits = 1;
   RuntimeState runtime = RuntimeState::stopped;
   double speed_scaling = 1;
-  ScriptReport script;  ///< of the script that came last
+  ScriptReport script;  ///< of the latest script
 };
 
-/// Why this robot must not move (`robot_stopped`): its mode, a stop, an emergency stop, an open brake, a
-/// speed slider at zero. Nothing where it may.
+/// Why this robot must not move (`robot_stopped`): its mode, a stop, an emergency stop, brakes, a speed
+/// slider at zero. Nothing if it may.
 std::optional<Failure> why_stopped(const RobotState& state);
 
 std::string_view name(RobotMode mode);
@@ -69,7 +69,7 @@ std::string_view name(SafetyMode mode);
 
 Json to_json(const RobotState& state);
 
-/// The robot's own writing of a pose: metres and a rotation vector. Nothing else here is in metres.
+/// The robot's pose format: metres and a rotation vector. All other lengths here are in mm.
 inline constexpr double mm_per_m = 1000;
 using UrPose = Eigen::Matrix<double, 6, 1>;
 UrPose ur_pose(const RigidTransform& transform);

@@ -15,9 +15,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// A link to a robot in lockstep, whose clock stands while its states are frozen.
+/// A link to a robot in lockstep, whose clock does not advance while its states are frozen.
 struct StopDrill {
-  /// The limit for a script to begin goes by the time of day: long, for a machine that is busy.
+  /// The limit for a script to begin is in wall time: long, for a loaded machine.
   explicit StopDrill(double start_s = 60, bool lockstep = true)
       : robot(VirtualUr::start(options(lockstep)).value()), link(config(*robot, start_s)) {
     EXPECT_TRUE(link.wait_connected(10s));
@@ -49,8 +49,8 @@ struct StopDrill {
 
   using Done = std::future<Expected<std::vector<Miss>>>;
 
-  /// Sends the order; the script waits in the controller, whose clock stands, and will start after these
-  /// times.
+  /// Sends the order; the script waits in the controller, whose clock does not advance, and starts after
+  /// these times.
   Done send_to_waiting(const RobotOrder& order, std::vector<double> delays_s) {
     robot->delay_scripts(std::move(delays_s));
     robot->set(RobotFault::frozen_states);
@@ -92,9 +92,9 @@ TEST(StoppedOrder, ScriptThatStartsLateMovesNothing) {
     }
 }
 
-/// Stops a motion at its fastest. It goes on for the period in which the robot hears of it, and for its
-/// braking.
-TEST(StoppedOrder, MovesNoFurtherThanItsBrakingNeeds) {
+/// Stops a motion at its highest speed. It continues for the period in which the robot receives the stop, and
+/// for its braking.
+TEST(StoppedOrder, MovesNoFurtherThanItsBrakingDistance) {
   for (const auto& [acceleration, fastest_after_s, speed_mm_s] :
        {std::tuple{250.0, 0.6, 150.0}, std::tuple{1200.0, 0.3, 250.0}}) {
     StopDrill drill;
@@ -122,8 +122,8 @@ TEST(StoppedOrder, MovesNoFurtherThanItsBrakingNeeds) {
   }
 }
 
-/// By the time of day: a busy machine holds a stop up, so only that it rests is asked.
-TEST(StoppedOrder, RestsOnTheRealClockToo) {
+/// In wall time a loaded machine delays a stop, so only the final rest is tested.
+TEST(StoppedOrder, RestsInWallTimeToo) {
   for (const double acceleration : {250.0, 1200.0}) {
     StopDrill drill(60, false);
     const RobotOrder order = order_with(acceleration);
@@ -147,7 +147,7 @@ TEST(StoppedOrder, RestsOnTheRealClockToo) {
   }
 }
 
-TEST(StoppedOrder, IsNotFedByTheOrderConfirmedAfterwards) {
+TEST(StoppedOrder, IsNotKeptAliveByALaterOrder) {
   StopDrill drill(1);
   const Eigen::Vector3d rested = drill.tip();
   drill.stop_while_script_waits(order_with(1200), {0.5, 0.8});
@@ -159,7 +159,7 @@ TEST(StoppedOrder, IsNotFedByTheOrderConfirmedAfterwards) {
   EXPECT_EQ((drill.tip() - rested).norm(), 0);
 }
 
-TEST(StoppedOrder, ScriptThatComesTwiceRunsOnce) {
+TEST(StoppedOrder, ScriptReceivedTwiceRunsOnce) {
   StopDrill drill;
   drill.robot->delay_scripts({0, 20});
   const RobotOrder order = order_with(250);
@@ -176,7 +176,7 @@ TEST(StoppedOrder, ScriptThatComesTwiceRunsOnce) {
   EXPECT_EQ((drill.tip() - rested).norm(), 0);
 }
 
-TEST(StoppedOrder, ScriptThatComesAgainDuringItsMotionEndsIt) {
+TEST(StoppedOrder, ScriptReceivedAgainDuringItsMotionEndsIt) {
   StopDrill drill;
   drill.robot->delay_scripts({0, 0.5});
   const RobotOrder order = order_with(250);
@@ -204,7 +204,7 @@ TEST(StoppedOrder, StopDuringUnlockIsNotLost) {
   EXPECT_TRUE(drill.link.unlock("tester"));
 }
 
-TEST(StoppedOrder, UnlockDoesNotLetItGoOnBeforeItsScript) {
+TEST(StoppedOrder, UnlockDoesNotResumeItBeforeItsScript) {
   StopDrill drill;
   const RobotOrder order = order_with(250);
   bool stopped = false;
@@ -219,7 +219,7 @@ TEST(StoppedOrder, UnlockDoesNotLetItGoOnBeforeItsScript) {
   EXPECT_EQ(drill.link.status().phase, LinkPhase::ready);
 }
 
-TEST(StoppedOrder, UnlockDoesNotLetItsCorrectionsGoOn) {
+TEST(StoppedOrder, UnlockDoesNotResumeItsCorrections) {
   StopDrill drill;
   RobotOrder order = order_with(250);
   order.corrections.most = 3;
@@ -236,11 +236,11 @@ TEST(StoppedOrder, UnlockDoesNotLetItsCorrectionsGoOn) {
   EXPECT_EQ((drill.tip() - rested).norm(), 0);
 }
 
-TEST(StoppedOrder, CallsOfManyThreadsEndWithTheLastStop) {
+TEST(StoppedOrder, ConcurrentCallsEndWithTheLastStop) {
   StopDrill drill;
   drill.robot->delay_scripts({0.016, 0.2});
   RobotOrder order = order_with(1200);
-  order.waypoints[0].base_from_tcp.translation.y() -= 99;  // 1 mm: there, and there again
+  order.waypoints[0].base_from_tcp.translation.y() -= 99;  // 1 mm back and forth
   std::atomic<int> stops{0};
   std::atomic<bool> over{false};
   std::jthread person([&] {

@@ -15,15 +15,15 @@ Clock::duration seconds(double s) {
   return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
 }
 
-/// How long a wait lasts before it looks whether it should end.
-constexpr auto glance = std::chrono::milliseconds(20);
+/// Interval at which a wait checks for its end.
+constexpr auto poll_interval = std::chrono::milliseconds(20);
 
-/// A connection that gives whole messages.
+/// A connection that returns whole messages.
 struct Line {
   TimedSocket socket;
   RtdeStream stream = {};
 
-  /// Nothing if none came in this time.
+  /// Empty if none arrives in this time.
   Expected<std::optional<RtdeMessage>> receive(Clock::duration patience) {
     auto message = stream.next();
     if (!message || *message) return message;
@@ -33,15 +33,15 @@ struct Line {
     return stream.next();
   }
 
-  /// The answer of this kind; texts and whatever else a robot says in between are passed over.
+  /// The answer of this kind; text and other messages in between are skipped.
   RtdeMessage ask(const std::string& request, RtdeKind kind, Clock::duration patience,
                   const std::stop_token& stop) {
     value_or_throw(socket.send(request, patience));
     for (const auto until = Clock::now() + patience; Clock::now() < until && !stop.stop_requested();)
-      if (auto message = value_or_throw(receive(glance)); message && message->kind == kind)
+      if (auto message = value_or_throw(receive(poll_interval)); message && message->kind == kind)
         return *std::move(message);
     throw BadInput(Reason::not_connected,
-                   std::string("RTDE: no answer to the request of kind ") + static_cast<char>(kind));
+                   std::string("RTDE: timeout of the request of kind ") + static_cast<char>(kind));
   }
 };
 
@@ -77,7 +77,7 @@ Expected<void> RtdeClient::serve(const std::stop_token& stop) {
       return value_or_throw(read_granted(line.ask(request, kind, patience, stop), kind));
     };
     if (!granted(request_version(), RtdeKind::version))
-      throw BadInput(Reason::not_connected, "RTDE: this controller does not speak version 2");
+      throw BadInput(Reason::not_connected, "RTDE: the controller does not support version 2");
     const auto version = value_or_throw(read_controller_version(
         line.ask(request_controller_version(), RtdeKind::controller_version, patience, stop)));
     const auto states = value_or_throw(
@@ -88,19 +88,19 @@ Expected<void> RtdeClient::serve(const std::stop_token& stop) {
       heartbeats = value_or_throw(read_recipe(line.ask(request_inputs(), RtdeKind::inputs, patience, stop),
                                               heartbeat_names, heartbeat_types));
     if (!granted(request_start(), RtdeKind::start))
-      throw BadInput(Reason::not_connected, "RTDE: this controller does not start");
+      throw BadInput(Reason::not_connected, "RTDE: the controller does not start the data stream");
     listener_.connected(version);
 
     auto heard = Clock::now();
     while (!stop.stop_requested()) {
-      const auto message = value_or_throw(line.receive(glance));
+      const auto message = value_or_throw(line.receive(poll_interval));
       if (message && message->kind == RtdeKind::data) {
         const Heartbeat heartbeat = listener_.state(value_or_throw(read_state(*message, states)));
         heard = Clock::now();
         if (options_.commands)
           value_or_throw(line.socket.send(heartbeat_message(heartbeats, heartbeat), patience));
       } else if (Clock::now() - heard > seconds(options_.silence_s)) {
-        throw BadInput(Reason::stale_state, "RTDE: the robot's states have stopped coming");
+        throw BadInput(Reason::stale_state, "RTDE: no robot state received in time");
       }
     }
   });

@@ -14,22 +14,21 @@ struct RtdeOptions {
   std::string address = "127.0.0.1";
   std::uint16_t port = 30004;
   double rate_hz = 125;
-  bool commands = true;        ///< take the heartbeat's registers, which one program alone can have
-  double handshake_s = 1;      ///< patience with each answer
-  double silence_s = 1;        ///< without a state for so long, the connection is given up
-  double longest_retry_s = 2;  ///< first tries again after 0.1 s, then ever later
+  bool commands = true;        ///< write the heartbeat's registers, which only one program can do
+  double handshake_s = 1;      ///< timeout of each answer
+  double silence_s = 1;        ///< without a state for this time the connection is closed
+  double longest_retry_s = 2;  ///< longest pause between attempts; the first is 0.1 s
 };
 
-/// What the client tells, on its own thread: each state as it comes, which it answers with the heartbeat it
-/// is given, and each end of a connection with the reason. After an end it connects anew, with the whole
-/// handshake.
+/// Callbacks on the client's thread: each state, answered with the returned heartbeat, and each end of a
+/// connection with its reason. After an end the client reconnects with the whole handshake.
 struct RtdeListener {
   std::function<void(const ControllerVersion&)> connected;
   std::function<Heartbeat(const RobotState&)> state;
   std::function<void(const Failure&)> lost;
 };
 
-/// A lasting connection to a robot's RTDE.
+/// A persistent connection to a robot's RTDE port.
 class RtdeClient {
  public:
   RtdeClient(RtdeOptions options, RtdeListener listener);

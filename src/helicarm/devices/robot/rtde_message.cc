@@ -28,7 +28,7 @@ std::vector<std::string> split(std::string_view text) {
 
 void expect_kind(const RtdeMessage& message, RtdeKind kind) {
   if (message.kind != kind)
-    throw BadInput(Reason::bad_value, fmt::format("RTDE: message of kind {} where {} was due",
+    throw BadInput(Reason::bad_value, fmt::format("RTDE: message of kind {}, expected {}",
                                                   static_cast<int>(message.kind), static_cast<int>(kind)));
 }
 
@@ -74,7 +74,7 @@ const std::vector<std::string> state_names = {"timestamp",
 const std::vector<std::string> state_types = {"DOUBLE", "VECTOR6D", "VECTOR6D", "VECTOR6D", "VECTOR6D",
                                               "DOUBLE", "INT32",    "INT32",    "UINT32",   "UINT32",
                                               "DOUBLE", "INT32",    "INT32",    "INT32",    "INT32"};
-// 24 to 47 are for RTDE's clients.
+// 24 to 47 are reserved for RTDE clients.
 const std::vector<std::string> heartbeat_names = {"input_int_register_24", "input_int_register_25",
                                                   "input_int_register_26"};
 const std::vector<std::string> heartbeat_types = {"INT32", "INT32", "INT32"};
@@ -92,8 +92,8 @@ Expected<std::optional<RtdeMessage>> RtdeStream::next() {
   BigEndianReader reader(bytes_);
   const std::size_t size = reader.take<std::uint16_t>();
   if (size < header_size || size > largest_message)
-    return fail(Reason::bad_size, fmt::format("RTDE: a message says it has {} bytes, must have {} to {}",
-                                              size, header_size, largest_message));
+    return fail(Reason::bad_size, fmt::format("RTDE: a message has {} bytes, must have {} to {}", size,
+                                              header_size, largest_message));
   if (bytes_.size() < size) return std::nullopt;
   const auto kind = static_cast<RtdeKind>(reader.take<std::uint8_t>());
   RtdeMessage message{kind, std::string(reader.take(size - header_size))};
@@ -129,9 +129,10 @@ Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<s
                      fmt::format("RTDE: {} types for {} names", given.size(), types.size()));
     for (std::size_t i = 0; i < types.size(); ++i) {
       if (given[i] == "IN_USE")
-        throw BadInput(Reason::robot_locked, names[i] + " is in use: another program commands this robot");
+        throw BadInput(Reason::robot_locked,
+                       names[i] + " is in use by another program: disconnect it from the robot");
       if (given[i] == "NOT_FOUND")
-        throw BadInput(Reason::unsupported, "this controller does not know " + names[i]);
+        throw BadInput(Reason::unsupported, "the controller does not support " + names[i]);
       if (given[i] != types[i])
         throw BadInput(Reason::unsupported, fmt::format("{} has type {}, must be {}", names[i],
                                                         without_control_characters(given[i]), types[i]));
@@ -176,7 +177,7 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
     expect_kind(message, RtdeKind::data);
     BigEndianReader reader(message.content);
     if (reader.take<std::uint8_t>() != recipe)
-      throw BadInput(Reason::bad_value, "RTDE: data of another recipe");
+      throw BadInput(Reason::bad_value, "RTDE: data of an unknown recipe");
     RobotState state;
     state.time_s = reader.take<double>();
     state.joints = take_six(reader);
@@ -195,7 +196,7 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
     expect_end(reader);
     state.base_from_tcp = transform_from(tcp);
     state.flange_from_tcp = transform_from(offset);
-    // Finite metres may be infinite millimetres, and a rotation vector too long for its norm.
+    // Finite metres can overflow in millimetres, and a rotation vector in its norm.
     const bool finite = std::isfinite(state.time_s) && state.joints.allFinite() &&
                         state.joint_speeds.allFinite() && state.base_from_tcp.matrix().allFinite() &&
                         state.flange_from_tcp.matrix().allFinite() && std::isfinite(state.payload_kg) &&

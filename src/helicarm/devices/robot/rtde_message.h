@@ -29,22 +29,22 @@ struct RtdeMessage {
   std::string content;
 };
 
-/// The message as sent: size (two bytes, of the whole), kind, content.
+/// The encoded message: size (two bytes, of the whole), kind, content.
 std::string to_bytes(const RtdeMessage& message);
 
-/// Cuts a stream into messages.
+/// Splits a byte stream into messages.
 class RtdeStream {
  public:
   void append(std::string_view bytes) { bytes_ += bytes; }
-  /// Nothing while it is not yet there as a whole. A size under 3 or over 4096 (ours have 500) is bad_size:
-  /// the stream is then of no more use.
+  /// Nothing while the message is incomplete. A size under 3 or over 4096 (own messages have 500) is
+  /// bad_size: the stream is then unusable.
   Expected<std::optional<RtdeMessage>> next();
 
  private:
   std::string bytes_;
 };
 
-/// Names and types of what the robot is asked to send, and of the registers it is given: the heartbeat.
+/// Names and types of the requested outputs and of the heartbeat's input registers.
 extern const std::vector<std::string> state_names;
 extern const std::vector<std::string> state_types;
 extern const std::vector<std::string> heartbeat_names;
@@ -57,12 +57,12 @@ std::string request_inputs();
 std::string request_start();
 std::string heartbeat_message(std::uint8_t recipe, const Heartbeat& heartbeat);
 
-/// The recipe's number. A type other than the one wanted is refused: NOT_FOUND as `unsupported`, IN_USE as
-/// `robot_locked` (another program commands), both with the name of what is missing.
+/// The recipe's number. A type other than the expected one is refused: NOT_FOUND as `unsupported`, IN_USE as
+/// `robot_locked` (another program commands the robot), each with the variable's name.
 Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<std::string>& names,
                                    const std::vector<std::string>& types);
 
-/// Whether version, start or pause was granted; another kind or length is bad_value.
+/// Whether version, start or pause was accepted; another kind or length is bad_value.
 Expected<bool> read_granted(const RtdeMessage& reply, RtdeKind kind);
 
 struct ControllerVersion {
@@ -70,13 +70,13 @@ struct ControllerVersion {
 };
 Expected<ControllerVersion> read_controller_version(const RtdeMessage& reply);
 
-/// A text message of the robot, for the log: without control characters.
+/// The robot's text message for the log, without control characters.
 Expected<std::string> read_text(const RtdeMessage& message);
 
 /// Refuses another recipe, another length, or numbers that are not finite.
 Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe);
 
-/// As a robot sends it: those of `state_names` that were asked for, in their order.
+/// Encoded as a robot does: the requested subset of `state_names`, in their order.
 RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
                           const std::vector<std::string>& names = state_names);
 

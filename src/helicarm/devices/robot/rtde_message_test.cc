@@ -33,7 +33,7 @@ Expected<std::optional<RtdeMessage>> first_of(const std::string& bytes) {
   return stream.next();
 }
 
-TEST(RtdeMessage, RequestsHaveTheGuidesBytes) {
+TEST(RtdeMessage, RequestsMatchTheGuidesBytes) {
   EXPECT_EQ(request_version(), "\x00\x05\x56\x00\x02"s);
   EXPECT_EQ(request_controller_version(), "\x00\x03\x76"s);
   EXPECT_EQ(request_start(), "\x00\x03\x53"s);
@@ -67,12 +67,12 @@ TEST(RtdeMessage, StreamCutAnywhereGivesTheSameMessages) {
   }
 }
 
-TEST(RtdeMessage, SizeThatCannotBeIsRefused) {
+TEST(RtdeMessage, InvalidSizeIsRefused) {
   for (const std::string& bytes : {"\0\0U"s, "\0\2U"s, "\xff\xffU"s})
     EXPECT_EQ(first_of(bytes).error().reason, Reason::bad_size);
 }
 
-TEST(RtdeMessage, StateIsReadAsItWasWritten) {
+TEST(RtdeMessage, StateRoundTrips) {
   const RobotState given = some_state();
   const auto read = read_state(state_message(7, given), 7);
   ASSERT_TRUE(read);
@@ -108,7 +108,7 @@ TEST(RtdeMessage, StateWhosePoseOverflowsIsNotFinite) {
   }
 }
 
-TEST(RtdeMessage, RecipeSaysWhatIsMissing) {
+TEST(RtdeMessage, RecipeNamesWhatIsMissing) {
   const auto reply = [](const std::string& types) { return RtdeMessage{RtdeKind::inputs, "\2" + types}; };
   const auto read = [&](const std::string& types) {
     return read_recipe(reply(types), {heartbeat_names[0]}, {heartbeat_types[0]});
@@ -121,12 +121,12 @@ TEST(RtdeMessage, RecipeSaysWhatIsMissing) {
   EXPECT_THAT(read("NOT_FOUND").error().message, testing::HasSubstr(heartbeat_names[0]));
 }
 
-TEST(RtdeMessage, TextOfTheRobotCannotMoveTheCursor) {
+TEST(RtdeMessage, RobotTextHasNoControlCharacters) {
   EXPECT_EQ(*read_text({RtdeKind::text, "\5\x1b[2Jx\0\1"s}), "?[2Jx");
   EXPECT_EQ(read_text({RtdeKind::text, "\x09 abc"s}).error().reason, Reason::truncated);
 }
 
-TEST(RobotState, ModeThatNoOneKnowsHasANameToo) {
+TEST(RobotState, UnknownModeHasANameToo) {
   for (const std::int32_t mode :
        {std::numeric_limits<std::int32_t>::min(), -2, 99, std::numeric_limits<std::int32_t>::max()}) {
     EXPECT_EQ(name(static_cast<RobotMode>(mode)), "UNKNOWN");

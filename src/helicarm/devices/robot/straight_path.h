@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// The way of a movel: the tip in a straight line, the turn in proportion.
+/// Path of a movel: the tip in a straight line, the rotation in proportion.
 class StraightPath {
  public:
   StraightPath(const RigidTransform& from, const RigidTransform& to)
@@ -18,11 +18,11 @@ class StraightPath {
 
   double shift_mm() const { return shift_.norm(); }
   double turn() const { return turn_.norm(); }  ///< rad
-  /// What speed and acceleration refer to, mm: the shift, or the turn as of a point 200 mm off the tip, if
-  /// that is longer.
+  /// Length that speed and acceleration refer to, mm: the translation, or the arc of the rotation at a radius
+  /// of 200 mm, if longer.
   double length_mm() const { return std::max(shift_mm(), 200 * turn()); }
 
-  /// `part` from 0 to 1.
+  /// `part` is 0 to 1.
   RigidTransform at(double part) const {
     return {from_.rotation * rotation_from_vector(part * turn_), from_.translation + part * shift_};
   }
@@ -33,7 +33,7 @@ class StraightPath {
   Eigen::Vector3d turn_;
 };
 
-/// Time to cover a length from rest to rest, s.
+/// Time for a length from rest to rest, s.
 inline double duration_s(double length_mm, double speed_mm_s, double acceleration_mm_s2) {
   const double ramp_mm = speed_mm_s * speed_mm_s / acceleration_mm_s2;
   if (length_mm < ramp_mm) return 2 * std::sqrt(length_mm / acceleration_mm_s2);

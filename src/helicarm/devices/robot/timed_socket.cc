@@ -14,7 +14,7 @@ struct TimedSocket::Parts {
   asio::ip::tcp::socket socket{io};
   std::string peer;
 
-  /// Runs until the started operation has ended or the time is over, then takes it back.
+  /// Runs until the started operation has ended or the time is over, then cancels it.
   void run_for(Duration patience) {
     io.restart();
     io.run_for(patience);
@@ -25,7 +25,7 @@ struct TimedSocket::Parts {
   tl::unexpected<Failure> failed(const std::string& what, const std::error_code& error) const {
     const bool late = error == asio::error::operation_aborted || error == asio::error::would_block;
     return fail(Reason::not_connected,
-                fmt::format("{}: {}: {}", peer, what, late ? "no answer in time" : error.message()));
+                fmt::format("{}: {}: {}", peer, what, late ? "timeout" : error.message()));
   }
 };
 
@@ -41,7 +41,7 @@ Expected<TimedSocket> TimedSocket::connect(const std::string& address, std::uint
   std::error_code error;
   const auto ip = asio::ip::make_address(address == "localhost" ? "127.0.0.1" : address, error);
   if (error)
-    return fail(Reason::bad_value, "\"" + address + "\" is no address of a robot, such as 192.168.0.2");
+    return fail(Reason::bad_value, "\"" + address + "\" is not a robot address; use one such as 192.168.0.2");
   error = asio::error::would_block;
   parts->socket.async_connect({ip, port}, [&](const std::error_code& ended) { error = ended; });
   parts->run_for(patience);

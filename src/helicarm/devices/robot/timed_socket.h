@@ -11,19 +11,19 @@
 
 namespace helicarm {
 
-/// A TCP connection of which every step ends in time. All fail with `not_connected`.
+/// A TCP connection with a timeout for every operation. All fail with `not_connected`.
 class TimedSocket {
  public:
   using Duration = std::chrono::steady_clock::duration;
 
-  /// `address` is a number, as 192.168.0.2 or ::1, or "localhost": names are not looked up.
+  /// `address` is numeric, such as 192.168.0.2 or ::1, or "localhost": no name lookup.
   static Expected<TimedSocket> connect(const std::string& address, std::uint16_t port, Duration patience);
   TimedSocket(TimedSocket&&) noexcept;
   TimedSocket& operator=(TimedSocket&&) noexcept;
   ~TimedSocket();
 
   Expected<void> send(std::string_view bytes, Duration patience);
-  /// What has come; empty if nothing came in this time.
+  /// Received bytes; empty if none arrive in this time.
   Expected<std::string> receive(Duration patience);
 
  private:

@@ -6,7 +6,7 @@
 namespace helicarm {
 namespace {
 
-/// More than the 0.1 s that a pose may be old, and enough states to meet one that was not held up.
+/// Longer than a pose's maximum age of 0.1 s, and enough states to include one without delay.
 constexpr double kept_s = 2;
 constexpr double clock_leap_s = 1;
 

@@ -10,27 +10,27 @@
 
 namespace helicarm {
 
-/// Where the robot's own kinematics have the tool.
+/// Tool pose by the robot's own kinematics.
 struct TimedToolPose {
-  double time_s = 0;  ///< of this machine's monotonic clock
+  double time_s = 0;  ///< on this machine's monotonic clock
   RigidTransform base_from_tcp;
 };
 
-/// The tool's poses of the last two seconds by the robot's states. The robot's clock is brought to this
-/// machine's by the least delay seen in that time, so that a state held up in the network is not dated late.
-/// All members may be called from any thread, also from the watch of an order.
+/// The tool's poses of the last two seconds from the robot's states. The robot's clock is mapped to this
+/// machine's by the smallest delay in that time, so that a delayed state keeps its true time. All members are
+/// thread-safe and may be called from the watch of an order.
 class ToolTrack {
  public:
-  /// A robot clock that goes back, or leaps by over a second, begins a new track.
+  /// A robot clock that goes back, or jumps by over a second, begins a new track.
   void take(double robot_s, const RigidTransform& base_from_tcp, double arrival_s);
-  /// The connection is lost: what follows may be another clock.
+  /// The connection is lost: later states can have another clock.
   void forget();
   std::vector<TimedToolPose> between(double from_s, double to_s) const;
 
  private:
   struct Entry {
     double robot_s;
-    double delay_s;  ///< arrival less the robot's clock
+    double delay_s;  ///< arrival minus the robot's clock
     RigidTransform base_from_tcp;
   };
   mutable std::mutex mutex_;

@@ -8,7 +8,7 @@ namespace {
 
 RigidTransform at(double x) { return {Eigen::Matrix3d::Identity(), {x, 0, 0}}; }
 
-TEST(ToolTrack, StateThatWasHeldUpIsDatedByTheRobotsClock) {
+TEST(ToolTrack, DelayedStateIsDatedByTheRobotsClock) {
   ToolTrack track;
   for (int i = 0; i < 10; ++i) track.take(5 + 0.008 * i, at(i), 100.001 + 0.008 * i);
   track.take(5.08, at(10), 100.2);
@@ -18,7 +18,7 @@ TEST(ToolTrack, StateThatWasHeldUpIsDatedByTheRobotsClock) {
   EXPECT_NEAR(poses.front().time_s, 100.081, 1e-9);
 }
 
-TEST(ToolTrack, AnotherClockBeginsAnew) {
+TEST(ToolTrack, AnotherClockBeginsANewTrack) {
   for (const double leap_s : {-3.0, 7.0}) {
     ToolTrack track;
     track.take(5, at(1), 100);
@@ -29,7 +29,7 @@ TEST(ToolTrack, AnotherClockBeginsAnew) {
   }
 }
 
-TEST(ToolTrack, KeepsTwoSecondsAndNothingOfALostConnection) {
+TEST(ToolTrack, KeepsTwoSecondsAndNothingAfterADisconnection) {
   ToolTrack track;
   for (int i = 0; i < 1000; ++i) track.take(0.008 * i, at(i), 0.008 * i);
   EXPECT_EQ(track.between(0, 1000).size(), 251u);

@@ -13,7 +13,7 @@ namespace helicarm {
 namespace {
 
 constexpr std::size_t longest_script = 65536;
-constexpr int longest_expression = 200;  ///< parts, so that nesting is bounded too
+constexpr int longest_expression = 200;  ///< operands and operators; also bounds nesting
 
 std::string_view trimmed(std::string_view text) {
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.front()))) text.remove_prefix(1);
@@ -24,7 +24,7 @@ std::string_view trimmed(std::string_view text) {
 bool starts_word(char c) { return std::isalpha(static_cast<unsigned char>(c)) || c == '_'; }
 bool continues_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
 
-/// The word at the front, taken off.
+/// Removes and returns the first word.
 std::string take_word(std::string_view& text) {
   std::size_t size = 0;
   if (!text.empty() && starts_word(text[0]))
@@ -34,7 +34,7 @@ std::string take_word(std::string_view& text) {
   return word;
 }
 
-/// A call as the script writes it.
+/// A call in the script.
 struct Call {
   std::string name;
   std::vector<UrValue> arguments;
@@ -73,7 +73,7 @@ class Expression {
     if (!taken(mark)) refuse();
   }
   static double number(const UrValue& value) {
-    if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due, not a list");
+    if (value.size() != 1) throw BadInput(Reason::bad_value, "expected a number, not a list");
     return value[0];
   }
   bool taken_word(std::string_view word) {
@@ -195,7 +195,7 @@ class Expression {
 
 bool is_motion(std::string_view name) { return name == "movel" || name == "movej" || name == "stopj"; }
 
-/// "while EXPRESSION:" and its like: what stands between word and colon.
+/// "while EXPRESSION:" and similar: the text between word and colon.
 std::string head_of(std::string_view line, std::string_view word) {
   line = trimmed(line.substr(word.size()));
   if (line.empty() || line.back() != ':') throw BadInput(Reason::bad_value, "a colon is missing");
@@ -205,7 +205,7 @@ std::string head_of(std::string_view line, std::string_view word) {
 /// "name()" of def, thread and run.
 std::string name_of(std::string_view text) {
   const std::string name = take_word(text);
-  if (name.empty() || text != "()") throw BadInput(Reason::bad_value, "a name with () is due");
+  if (name.empty() || text != "()") throw BadInput(Reason::bad_value, "expected a name with ()");
   return name;
 }
 
@@ -252,7 +252,7 @@ class UrScript::Reader {
     } else if (word == "end" && after.empty()) {
       close();
     } else if (word == "thread") {
-      if (open_.size() != 1) throw BadInput(Reason::unsupported, "a thread within a block");
+      if (open_.size() != 1) throw BadInput(Reason::unsupported, "a thread inside a block is not supported");
       const std::string name = name_of(head_of(line, word));
       open_.push_back({word, name, 0});
       script_.codes_[name];
@@ -302,7 +302,7 @@ class UrScript::Reader {
     } else if (!global && value.starts_with("(")) {
       add(Kind::call, name, std::string(line));
     } else {
-      throw BadInput(Reason::unsupported, "statement is not understood");
+      throw BadInput(Reason::unsupported, "unknown statement");
     }
   }
 
@@ -333,7 +333,7 @@ bool UrScript::run(Thread& thread, UrScriptHost& host) {
   for (int commands = 0; thread.at < code.size(); ++commands) {
     const Command& command = code[thread.at++];
     try {
-      if (commands == 1000) throw BadInput(Reason::bad_value, "runs on without a pause");
+      if (commands == 1000) throw BadInput(Reason::bad_value, "1000 commands without a pause");
       Expression expression(command.expression, variables_, host);
       switch (command.kind) {
         case Kind::assign:

@@ -11,10 +11,10 @@
 
 namespace helicarm {
 
-/// A value of the little URScript: a number (one element; True is 1), a list or a pose.
+/// A value of the URScript subset: a number (one element; True is 1), a list or a pose.
 using UrValue = std::vector<double>;
 
-/// What a script's commands act upon.
+/// Interface for a script's commands.
 class UrScriptHost {
  public:
   virtual ~UrScriptHost() = default;
@@ -22,20 +22,20 @@ class UrScriptHost {
   /// A command that starts a motion and lasts until it ends: movel, movej, stopj. Throws BadInput.
   virtual void start_motion(const std::string& command, const std::vector<UrValue>& arguments,
                             const std::map<std::string, double>& named) = 0;
-  /// Any other command or function, which takes no time. Throws BadInput for one it does not know.
+  /// Any other command or function, without duration. Throws BadInput for an unknown one.
   virtual UrValue call(const std::string& name, const std::vector<UrValue>& arguments) = 0;
 };
 
-/// Runs the part of URScript that our own scripts use: one program with threads, while, if and else,
+/// Interpreter for the URScript subset that our scripts use: one program with threads, while, if and else,
 /// assignments, run, kill, halt, sync, numbers, comparisons, and, or, not, lists and calls. For the virtual
 /// robot.
 class UrScript {
  public:
-  /// Refuses `unsupported` and `bad_value` with the line.
+  /// Refuses `unsupported` and `bad_value` with the line number.
   static Expected<UrScript> parse(std::string_view text);
 
-  /// One period of the controller. False when the program has ended; a failure is a runtime error, as is a
-  /// thread that does not pause within 1000 commands.
+  /// One controller period. False when the program has ended; a failure is a runtime error, as is a thread
+  /// that does not pause within 1000 commands.
   Expected<bool> step(UrScriptHost& host);
 
  private:
@@ -43,7 +43,7 @@ class UrScript {
   enum class Kind { assign, run, kill, halt, call, branch_unless, jump };
   struct Command {
     Kind kind;
-    std::string name;        ///< variable, or thread's handle
+    std::string name;        ///< variable, or the thread's handle
     std::string expression;  ///< or the thread's name
     std::size_t target = 0;
     int line = 0;
@@ -57,7 +57,7 @@ class UrScript {
     bool ended = false;
   };
 
-  /// False when the program halts.
+  /// False if the program halts.
   bool run(Thread& thread, UrScriptHost& host);
   void kill(const std::string& handle);
 

@@ -6,8 +6,8 @@
 namespace helicarm {
 namespace {
 
-/// Writes down what it is told; a motion lasts until `moving_` is taken back.
-struct Notebook : UrScriptHost {
+/// Records calls; a motion lasts until `moving_` is reset.
+struct CallRecorder : UrScriptHost {
   bool moving() const override { return moving_; }
   void start_motion(const std::string& command, const std::vector<UrValue>&,
                     const std::map<std::string, double>& named) override {
@@ -30,8 +30,8 @@ struct Notebook : UrScriptHost {
 Reason refused(const std::string& text) {
   auto script = UrScript::parse(text);
   if (!script) return script.error().reason;
-  Notebook notebook;
-  const auto step = script->step(notebook);
+  CallRecorder recorder;
+  const auto step = script->step(recorder);
   return step ? Reason::usage : step.error().reason;
 }
 
@@ -40,20 +40,20 @@ TEST(UrScript, ArithmeticAndBranches) {
       "def f():\n  x = 2 * (1 + 3) - -1\n  if x == 9:\n    note([x, x - 1, 0.5])\n  else:\n    note(0)\n  "
       "end\nend\n");
   ASSERT_TRUE(script) << script.error().message;
-  Notebook notebook;
-  EXPECT_FALSE(*script->step(notebook));
-  EXPECT_EQ(notebook.note, (UrValue{9, 8, 0.5}));
+  CallRecorder recorder;
+  EXPECT_FALSE(*script->step(recorder));
+  EXPECT_EQ(recorder.note, (UrValue{9, 8, 0.5}));
 }
 
-TEST(UrScript, AndBindsCloserThanOrAndNotClosest) {
+TEST(UrScript, AndBindsTighterThanOrAndNotTightest) {
   auto script = UrScript::parse(
       "def f():\n  no = False\n  note([1 == 1 or no and no, not no and 2 > 1, not (1 == 1 or no), no or not "
       "1 < 2])\n"
       "  order = 3\n  android = 4\n  note([order + android, 0])\nend\n");
   ASSERT_TRUE(script) << script.error().message;
-  Notebook notebook;
-  EXPECT_FALSE(*script->step(notebook));
-  EXPECT_EQ(notebook.notes, (std::vector<UrValue>{{1, 1, 0, 0}, {7, 0}}));
+  CallRecorder recorder;
+  EXPECT_FALSE(*script->step(recorder));
+  EXPECT_EQ(recorder.notes, (std::vector<UrValue>{{1, 1, 0, 0}, {7, 0}}));
 }
 
 TEST(UrScript, ThreadMovesWhileTheProgramWatches) {
@@ -61,19 +61,19 @@ TEST(UrScript, ThreadMovesWhileTheProgramWatches) {
       "def f():\n  thread move():\n    movel(p[0,0,0,0,0,0], a=1, v=0.25)\n    note(7)\n  end\n"
       "  mover = run move()\n  while input() == 0:\n    sync()\n  end\n  kill mover\n  stopj(4)\nend\n");
   ASSERT_TRUE(script) << script.error().message;
-  Notebook notebook;
-  for (int i = 0; i < 5; ++i) EXPECT_TRUE(*script->step(notebook));
-  EXPECT_EQ(notebook.log, "movel ");
-  EXPECT_EQ(notebook.speed, 0.25);
-  notebook.input = 1;
-  EXPECT_TRUE(*script->step(notebook));
-  EXPECT_EQ(notebook.log, "movel stopj ");
-  notebook.moving_ = false;
-  EXPECT_FALSE(*script->step(notebook));
-  EXPECT_TRUE(notebook.note.empty());
+  CallRecorder recorder;
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(*script->step(recorder));
+  EXPECT_EQ(recorder.log, "movel ");
+  EXPECT_EQ(recorder.speed, 0.25);
+  recorder.input = 1;
+  EXPECT_TRUE(*script->step(recorder));
+  EXPECT_EQ(recorder.log, "movel stopj ");
+  recorder.moving_ = false;
+  EXPECT_FALSE(*script->step(recorder));
+  EXPECT_TRUE(recorder.note.empty());
 }
 
-TEST(UrScript, WhatItDoesNotKnowIsRefused) {
+TEST(UrScript, UnknownStatementsAreRefused) {
   EXPECT_EQ(refused("movej([0])\n"), Reason::bad_value);
   EXPECT_EQ(refused("def f():\n  note(1)\n"), Reason::truncated);
   EXPECT_EQ(refused("def f():\nend\nnote(1)\n"), Reason::bad_value);

@@ -67,7 +67,7 @@ Expected<void> VirtualArm::step(double period_s, double scaling) {
   const double fastest = speeds.cwiseAbs().maxCoeff();
   if (!next || fastest > model_.fastest) {
     path_ = nullptr;
-    return next ? fail(Reason::robot_stopped, fmt::format("a joint would turn by {:.2f} rad/s", fastest))
+    return next ? fail(Reason::robot_stopped, fmt::format("a joint would turn at {:.2f} rad/s", fastest))
                 : tl::unexpected<Failure>(next.error());
   }
   speeds_ = speeds;

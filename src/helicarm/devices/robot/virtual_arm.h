@@ -9,22 +9,22 @@
 
 namespace helicarm {
 
-/// The joints of a virtual arm: they follow a path with a trapezoidal speed, or brake.
+/// Joints of a virtual arm: they follow a path with a trapezoidal speed profile, or brake.
 class VirtualArm {
  public:
   VirtualArm(const RobotModel& model, const Joints& joints) : model_(model), joints_(joints) {}
 
-  /// The tip in a straight line; refuses as `nearest_inverse` where it ends out of reach.
+  /// Straight line of the tip; refuses as `nearest_inverse` if its end is out of reach.
   Expected<void> move_linear(const RigidTransform& base_from_tcp, const RigidTransform& flange_from_tcp,
                              double speed_mm_s, double acceleration_mm_s2);
-  /// All joints in proportion; speeds are those of the joint that turns furthest.
+  /// All joints in proportion; speeds are those of the joint with the longest motion.
   void move_joints(const Joints& target, double speed_rad_s, double acceleration_rad_s2);
-  /// All joints come to rest in the same time.
+  /// All joints come to rest at the same time.
   void brake(double deceleration_rad_s2);
-  /// One period. `scaling` is the speed slider's place, 0 to 1. A failure is what a protective stop would
-  /// follow: a joint faster than its limit, or a path that leaves the reach; the arm then stays where it is.
+  /// One period. `scaling` is the speed slider's value, 0 to 1. A failure corresponds to a protective stop: a
+  /// joint above its speed limit, or a path out of reach; the arm then does not move.
   Expected<void> step(double period_s, double scaling);
-  /// As if somebody had pushed it.
+  /// External displacement of the joints.
   void push(const Joints& by) { joints_ += by; }
 
   bool moving() const { return path_ != nullptr || braking_rad_s2_.has_value(); }

@@ -18,20 +18,20 @@ constexpr std::array<std::string_view, 20> fault_names = {
 // UR5 user manual 5.3: braking begins within 24 ms and ends within 500 ms from full speed.
 constexpr double brake_delay_s = 0.024;
 constexpr double safety_stop_rad_s2 = 3.1416 / (0.5 - brake_delay_s);
-// A protective stop cannot be unlocked sooner.
+// Earliest release of a protective stop.
 constexpr double unlock_after_s = 5;
-// At a program's end the controller halts the arm with its default.
+// Deceleration when a program ends: the controller's default.
 constexpr double end_rad_s2 = 10;
-/// Of a script that starts late: longer than a heartbeat may be silent, shorter than its sender waits for it.
+/// Delay of a late script: longer than the heartbeat limit, shorter than its sender's timeout.
 constexpr double late_script_s = 0.3;
 
 UrPose six(const UrValue& value) {
-  if (value.size() != 6) throw BadInput(Reason::bad_value, "six numbers are due");
+  if (value.size() != 6) throw BadInput(Reason::bad_value, "expected six numbers");
   return Eigen::Map<const UrPose>(value.data());
 }
 
 double one(const UrValue& value) {
-  if (value.size() != 1) throw BadInput(Reason::bad_value, "a number is due");
+  if (value.size() != 1) throw BadInput(Reason::bad_value, "expected a number");
   return value[0];
 }
 
@@ -128,7 +128,7 @@ void VirtualController::set(RobotFault fault, bool on) {
     faults_.erase(fault);
     if (fault == RobotFault::late_script || fault == RobotFault::script_twice) script_delays_s_ = {0};
     if (fault == RobotFault::emergency_stop && safety_ == SafetyMode::robot_emergency_stop) {
-      safety_ = SafetyMode::normal;  // the button is out again, but the arm has no power
+      safety_ = SafetyMode::normal;  // the button is released, but the arm has no power
       mode_ = RobotMode::power_off;
     }
     if (fault == RobotFault::safeguard_stop && safety_ == SafetyMode::safeguard_stop)
@@ -223,7 +223,7 @@ std::string VirtualController::dashboard(std::string_view command) {
 
 void VirtualController::start_motion(const std::string& command, const std::vector<UrValue>& arguments,
                                      const std::map<std::string, double>& named) {
-  if (arguments.size() != 1) throw BadInput(Reason::bad_value, command + ": one place is due");
+  if (arguments.size() != 1) throw BadInput(Reason::bad_value, command + ": expected one pose");
   if (command == "stopj") return arm_.brake(std::clamp(one(arguments[0]), 0.1, 40.0));
   if (command == "movej")
     return arm_.move_joints(six(arguments[0]), named_or(named, "v", 1.05), named_or(named, "a", 1.4));

@@ -15,7 +15,7 @@
 
 namespace helicarm {
 
-/// What can go wrong with a virtual robot, by name.
+/// Faults of a virtual robot, by name.
 enum class RobotFault {
   emergency_stop,
   protective_stop,
@@ -35,19 +35,19 @@ enum class RobotFault {
   unknown_output,
   input_in_use,
   not_finite,
-  late_script,   ///< each script starts 0.3 s after it came
-  script_twice,  ///< at once, and again 0.3 s later
+  late_script,   ///< each script starts 0.3 s after its arrival
+  script_twice,  ///< immediately, and again 0.3 s later
 };
 
-/// Its name as in the list above, e.g. "cut_cable"; bad_value lists them all.
+/// Fault by its name in the list above, e.g. "cut_cable"; bad_value lists them all.
 Expected<RobotFault> robot_fault(const std::string& name);
-/// Of all faults, for a person.
+/// Names of all faults, for messages.
 std::string robot_fault_names();
 
-/// A virtual robot without its network: modes, stops, the script that runs, the arm. Moves only by `step`.
+/// A virtual robot without its network: modes, stops, the running script, the arm. Advances only by `step`.
 class VirtualController : public UrScriptHost {
  public:
-  /// `model` is what the controller believes of the arm.
+  /// `model` is the controller's model of the arm.
   VirtualController(const RobotModel& model, const RobotTool& tool, const Joints& joints);
 
   void step();
@@ -55,20 +55,20 @@ class VirtualController : public UrScriptHost {
   /// At this time of its own clock.
   void set_at(RobotFault fault, double time_s) { coming_faults_.emplace(time_s, fault); }
   bool has(RobotFault fault) const { return faults_.contains(fault); }
-  /// Starts a program, ending the one that runs, after each of the delays; not heard in local mode.
+  /// Starts a program, ending the running one, after each of the delays; ignored in local mode.
   void run_script(const std::string& text);
-  /// From now on a script starts so long after it came, s: late, several times, or with no delay in the list
-  /// never.
+  /// From now on each script starts these times after its arrival, s: late, several times, or never if the
+  /// list is empty.
   void delay_scripts(std::vector<double> delays_s) { script_delays_s_ = std::move(delays_s); }
   std::size_t waiting_scripts() const { return waiting_scripts_.size(); }
-  /// The answer to one command of the dashboard, without its end of line.
+  /// Answer to one dashboard command, without line end.
   std::string dashboard(std::string_view command);
   void set_heartbeat(const Heartbeat& heartbeat) { heartbeat_ = heartbeat; }
 
   RobotState state() const;
   double time_s() const { return time_s_; }
   bool moving() const override { return arm_.moving(); }
-  /// When the arm last came to rest, s; nothing while it moves or before it ever did.
+  /// When the arm last came to rest, s; nothing while it moves or if it never moved.
   std::optional<double> rest_since_s() const { return rest_since_s_; }
   const std::string& script_error() const { return script_error_; }
 
@@ -88,7 +88,7 @@ class VirtualController : public UrScriptHost {
   std::optional<UrScript> script_;
   std::string script_error_;
   std::vector<double> script_delays_s_ = {0};
-  std::multimap<double, std::string> waiting_scripts_;  ///< by the time when they start, s
+  std::multimap<double, std::string> waiting_scripts_;  ///< by start time, s
   RobotMode mode_ = RobotMode::running;
   SafetyMode safety_ = SafetyMode::normal;
   double time_s_ = 0;

@@ -15,13 +15,13 @@ VirtualController robot(const RobotModel& model = ur5()) { return {model, drill(
 
 constexpr OrderNumber number{7, 1};
 
-/// As the link would answer the controller's state.
+/// Answers the controller's state like the link.
 void beat(VirtualController& controller) {
   const ScriptReport script = controller.state().script;
   controller.set_heartbeat({script.order == number && script.tick > 0 ? script.tick : stop_beat, number});
 }
 
-/// Runs the script with a heartbeat until it ends or `until` says so; gives the time passed.
+/// Runs the script with a heartbeat until it ends or `until` is true; returns the elapsed time.
 double run_until(
     VirtualController& controller, const std::function<bool()>& until = [] { return false; }) {
   const double start_s = controller.time_s();
@@ -37,7 +37,7 @@ void rest(VirtualController& controller) {
   for (int i = 0; i < 1000 && controller.moving(); ++i) controller.step();
 }
 
-TEST(Script, HoldsNumbersOnly) {
+TEST(Script, ContainsNumbersOnly) {
   RobotOrder order = planned();
   order.name = "knee\")\nmovej([0, 0, 0, 0, 0, 0])\n";
   EXPECT_EQ(script_of(order, ur5(), number), script_of(planned(), ur5(), number));
@@ -45,7 +45,7 @@ TEST(Script, HoldsNumbersOnly) {
   EXPECT_THAT(script_of(order, ur5e(), number), testing::HasSubstr("tick - heard < 40\n"));
 }
 
-TEST(VirtualController, OrderBringsTheTipToItsEndInTheTimeForeseen) {
+TEST(VirtualController, OrderBringsTheTipToItsEndInTheExpectedTime) {
   for (const RobotModel& model : {ur5(), ur5e()}) {
     VirtualController controller = robot(model);
     const RigidTransform here = controller.state().base_from_tcp;
@@ -63,7 +63,7 @@ TEST(VirtualController, OrderBringsTheTipToItsEndInTheTimeForeseen) {
   }
 }
 
-TEST(VirtualController, SilenceStopsTheFastestOrderWithin200Milliseconds) {
+TEST(VirtualController, MissingHeartbeatStopsTheFastestOrderWithin200Milliseconds) {
   for (const RobotModel& model : {ur5(), ur5e()}) {
     double longest_s = 0;
     for (int moment = 5; moment < 50; moment += 6) {
@@ -91,7 +91,7 @@ TEST(VirtualController, SilenceStopsTheFastestOrderWithin200Milliseconds) {
   }
 }
 
-TEST(VirtualController, EmergencyStopBrakesAndNeedsPowerAndBrakesAfterwards) {
+TEST(VirtualController, EmergencyStopBrakesAndNeedsPowerAndBrakeRelease) {
   VirtualController controller = robot();
   controller.run_script(script_of(planned(), ur5(), number));
   run_until(controller, [&] { return controller.time_s() > 1; });
@@ -130,7 +130,7 @@ TEST(VirtualController, MotionBeyondTheJointsIsAProtectiveStop) {
   EXPECT_EQ(other.state().joints, resting_joints());
 }
 
-TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
+TEST(VirtualController, UnknownScriptOrLocalModeMovesNothing) {
   VirtualController controller = robot();
   controller.run_script("def f():\n  os_command(1)\nend\n");
   controller.step();
@@ -142,7 +142,7 @@ TEST(VirtualController, ScriptOfUnknownWordsOrInLocalModeMovesNothing) {
   EXPECT_FALSE(controller.moving());
 }
 
-TEST(VirtualController, RegisterTakesNoNumberBeyondItsBits) {
+TEST(VirtualController, RegisterRefusesNumbersBeyondItsBits) {
   for (const char* too_large : {"1e300", "-3e9", "2147483648"}) {
     VirtualController controller = robot();
     controller.run_script(std::string("def f():\n  write_output_integer_register(0, ") + too_large +

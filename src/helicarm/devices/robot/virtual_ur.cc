@@ -20,8 +20,8 @@ namespace {
 
 using asio::ip::tcp;
 
-// Without descriptors, say: trying again at once would take all of a processor.
-constexpr std::chrono::milliseconds breath{100};
+// Without file descriptors an immediate retry would use a whole core.
+constexpr std::chrono::milliseconds retry_delay{100};
 constexpr std::uint8_t state_recipe = 1, heartbeat_recipe = 2;
 constexpr std::string_view empty_robot_state("\0\0\0\5\x10", 5);
 
@@ -51,7 +51,7 @@ class VirtualUr::Server {
          {options_.script_port, &Server::hear_script}}};
     std::error_code error;
     const auto ip = asio::ip::make_address(options_.address, error);
-    if (error) return fail(Reason::bad_value, "\"" + options_.address + "\" is no address");
+    if (error) return fail(Reason::bad_value, "\"" + options_.address + "\" is not an address");
     for (std::size_t i = 0; i < wanted.size(); ++i) {
       tcp::acceptor& acceptor = acceptors_[i];
       const tcp::endpoint here(ip, wanted[i].first);
@@ -70,7 +70,7 @@ class VirtualUr::Server {
 
   std::uint16_t port(std::size_t i) const { return acceptors_[i].local_endpoint().port(); }
 
-  /// On the server's own thread, and waits for it.
+  /// Runs on the server's own thread and waits for it.
   template <class Work>
   auto there(Work work) {
     std::packaged_task<std::invoke_result_t<Work>()> task(std::move(work));
@@ -126,8 +126,8 @@ class VirtualUr::Server {
         return accept(port, handle);
       }
       ++counters_.accept_failures;
-      breaths_[port].expires_after(breath);
-      breaths_[port].async_wait([this, port, handle](const std::error_code& stopped) {
+      retry_timers_[port].expires_after(retry_delay);
+      retry_timers_[port].async_wait([this, port, handle](const std::error_code& stopped) {
         if (!stopped) accept(port, handle);
       });
     });
@@ -149,19 +149,19 @@ class VirtualUr::Server {
     read(client, handle);
   }
 
-  /// Of a full port the oldest client that does not command is ended.
+  /// On a full port the oldest client that does not command is disconnected.
   void make_room(std::size_t port) {
     std::erase_if(clients_, [](const auto& one) { return !one->socket.is_open(); });
     if (std::ranges::count(clients_, port, &VirtualUrClient::port) < most_clients_of_port) return;
     const auto oldest = std::ranges::find_if(
         clients_, [port](const auto& one) { return one->port == port && !one->commands; });
-    (*oldest)->cut("makes room for another");
+    (*oldest)->cut("replaced by another client");
     clients_.erase(oldest);
   }
 
   void note(const std::string& line) {
     if (const auto left_out = lines_.pass())
-      options_.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines left out)", line, *left_out));
+      options_.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines omitted)", line, *left_out));
   }
 
   template <class Handle>
@@ -180,7 +180,7 @@ class VirtualUr::Server {
                                    });
   }
 
-  /// A machine that was held up holds the robot's clock up too: it would miss beats that nobody could send.
+  /// A stalled machine stalls the robot's clock too: otherwise it would miss beats that could not be sent.
   void tick(std::chrono::steady_clock::time_point due) {
     timer_.expires_at(due);
     timer_.async_wait([this, due](const std::error_code& error) {
@@ -204,7 +204,7 @@ class VirtualUr::Server {
   void answer_dashboard(const std::shared_ptr<VirtualUrClient>& client, const std::string& line) {
     constexpr std::size_t most_held = 1000;
     if (dashboard_held_ && held_questions_.size() >= most_held)
-      client->cut("over 1000 questions while the dashboard is held");
+      client->cut("over 1000 commands while the dashboard is held");
     else if (dashboard_held_)
       held_questions_.emplace_back(client, line);
     else if (client->socket.is_open())
@@ -308,7 +308,7 @@ class VirtualUr::Server {
       client->send(bytes);
       ++client->unanswered;
     }
-    // The rest of a packet cut in two never comes.
+    // The rest of a truncated packet never arrives.
     if (controller_.has(RobotFault::half_packet)) controller_.set(RobotFault::frozen_states, true);
   }
 
@@ -317,8 +317,8 @@ class VirtualUr::Server {
   asio::io_context io_;
   std::array<tcp::acceptor, 3> acceptors_{tcp::acceptor(io_), tcp::acceptor(io_), tcp::acceptor(io_)};
   asio::steady_timer timer_{io_};
-  std::array<asio::steady_timer, 3> breaths_{asio::steady_timer(io_), asio::steady_timer(io_),
-                                             asio::steady_timer(io_)};
+  std::array<asio::steady_timer, 3> retry_timers_{asio::steady_timer(io_), asio::steady_timer(io_),
+                                                  asio::steady_timer(io_)};
   std::list<std::shared_ptr<VirtualUrClient>> clients_;
   VirtualUrCounters counters_;
   LineLimit lines_{20};

@@ -11,49 +11,49 @@
 
 namespace helicarm {
 
-/// Ports 0 take any free one.
+/// Ports 0 use any free one.
 struct VirtualUrOptions {
-  RobotModel controller = ur5();  ///< what the controller believes of its arm
-  RobotModel arm = ur5();         ///< what the arm is
+  RobotModel controller = ur5();  ///< the controller's model of its arm
+  RobotModel arm = ur5();         ///< the true arm
   RobotTool tool = {};
   Joints joints = (Joints() << 0, -1.6, -1.6, -1.5, 1.6, 0).finished();
   std::string address = "127.0.0.1";
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
-  /// The clock goes on by one period with each heartbeat's message and by `advance`, not with the time of
-  /// day: what happens then depends on no machine's speed.
+  /// The clock advances by one period per heartbeat message and by `advance`, not with wall time: results do
+  /// not depend on the machine's speed.
   bool lockstep = false;
-  /// A line for a log on each client that was cut off, at most 20 a second; on the robot's thread.
+  /// Log line for each disconnected client, at most 20 per second; called on the robot's thread.
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
 };
 
-/// Clients of each port at once; then the oldest that does not command makes room.
+/// Clients per port; beyond, the oldest that does not command is disconnected.
 inline constexpr int most_clients_of_port = 16;
 
 struct VirtualUrCounters {
-  std::size_t clients = 0;  ///< now
+  std::size_t clients = 0;  ///< present
   std::uint64_t connections = 0;
-  std::uint64_t cut = 0;              ///< clients that did not read, sent too much or made room for another
-  std::uint64_t accept_failures = 0;  ///< out of descriptors, say
+  std::uint64_t cut = 0;              ///< disconnected clients: did not read, sent too much or were replaced
+  std::uint64_t accept_failures = 0;  ///< e.g. no file descriptors
 };
 
-/// What only the virtual robot knows.
+/// Ground truth of the virtual robot.
 struct VirtualTruth {
-  RobotState state;              ///< as the controller has it
+  RobotState state;              ///< the controller's
   RigidTransform base_from_tip;  ///< of the true arm
   bool moving = false;
   std::optional<double> rest_since_s;  ///< on the robot's clock
   std::string script_error;
-  std::size_t waiting_scripts = 0;    ///< have come, but do not start yet
-  std::size_t waiting_questions = 0;  ///< at the dashboard, while it is held
+  std::size_t waiting_scripts = 0;    ///< received, not yet started
+  std::size_t waiting_questions = 0;  ///< dashboard commands while it is held
 };
 
-/// A UR5 or UR5e on this machine: RTDE, dashboard and secondary port, and an arm that moves. It runs on a
-/// thread of its own and ends at once.
+/// A UR5 or UR5e on this machine: RTDE, dashboard and secondary port, and a moving arm, on its own thread.
+/// Stops immediately.
 class VirtualUr {
  public:
-  /// Refuses an address that is not this machine's (bad_value) and a port in use (`port_taken`).
+  /// Refuses an address that is not local (bad_value) and a port in use (`port_taken`).
   static Expected<std::unique_ptr<VirtualUr>> start(const VirtualUrOptions& options);
   ~VirtualUr();
 
@@ -62,15 +62,15 @@ class VirtualUr {
   std::uint16_t script_port() const;
 
   void set(RobotFault fault, bool on = true);
-  /// On the robot's clock: what happens does not depend on any machine's speed.
+  /// On the robot's clock, independent of the machine's speed.
   void set_at(RobotFault fault, double time_s);
-  /// As if somebody had asked at the dashboard.
+  /// A dashboard command.
   std::string dashboard(const std::string& command);
   /// As `VirtualController::delay_scripts`.
   void delay_scripts(std::vector<double> delays_s);
-  /// While it is held the dashboard answers nothing; then it answers all that was asked.
+  /// While held the dashboard does not answer; then it answers all pending commands.
   void hold_dashboard(bool on);
-  /// In lockstep: lets this much time pass on the robot's clock, whether anybody beats or not.
+  /// In lockstep: advances the robot's clock, with or without beats.
   void advance(double seconds);
   VirtualTruth truth();
   VirtualUrCounters counters();

@@ -15,7 +15,7 @@
 
 namespace helicarm {
 
-/// One client of one of the virtual robot's ports, on the thread of its socket.
+/// A client of one of the virtual robot's ports, on its socket's thread.
 struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
   static constexpr std::size_t longest_backlog = 1 << 20;
 
@@ -33,11 +33,11 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
     if (waiting.size() > longest_backlog) return cut("does not read");
     if (sending.empty()) send_waiting();
   }
-  /// Closes over what the client did, or did not do.
+  /// Closes the connection because of the client's behaviour.
   void cut(const std::string& why) {
     if (!socket.is_open()) return;
     close();
-    told(fmt::format("{}: cut off: {}", name, why));
+    told(fmt::format("{}: disconnected: {}", name, why));
   }
   void close() {
     std::error_code ignored;
@@ -49,15 +49,15 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
 
   asio::ip::tcp::socket socket;
   const std::size_t port;  ///< 0 RTDE, 1 dashboard, 2 script
-  std::string name;        ///< of its address
+  std::string name;        ///< its address
   std::array<char, 4096> buffer{};
   std::string waiting, sending;
-  std::string text;  ///< dashboard and script: what has come
+  std::string text;  ///< dashboard and script: received text
   RtdeStream stream;
-  std::vector<std::string> names;  ///< RTDE: what it asked for
+  std::vector<std::string> names;  ///< RTDE: requested variables
   bool started = false;
   bool commands = false;
-  int unanswered = 0;  ///< states that it has not answered, in lockstep
+  int unanswered = 0;  ///< unanswered states, in lockstep
 
  private:
   void send_waiting() {

@@ -17,7 +17,7 @@ namespace {
 
 using asio::ip::tcp;
 
-/// A virtual robot, what it notes, and clients that do what they like.
+/// A virtual robot, its log, and clients without protocol limits.
 class VirtualUrCrowd : public testing::Test {
  protected:
   VirtualUrCrowd() {
@@ -61,20 +61,20 @@ class VirtualUrCrowd : public testing::Test {
   std::unique_ptr<VirtualUr> robot_;
 };
 
-TEST_F(VirtualUrCrowd, ClientThatDoesNotReadItsStatesIsCutOff) {
+TEST_F(VirtualUrCrowd, ClientThatDoesNotReadItsStatesIsDisconnected) {
   tcp::socket sleeper = connected(robot_->rtde_port());
   std::string fields = "actual_q";
   for (int i = 1; i < 400; ++i) fields += ",actual_q";
   asio::write(sleeper,
               asio::buffer(to_bytes({RtdeKind::outputs, std::string(8, '\0') + fields}) + request_start()));
-  // 19 kB each: what the system holds for the socket comes first.
+  // 19 kB each: the socket buffers fill first.
   for (int i = 0; i < 1000 && robot_->counters().cut == 0; ++i) robot_->advance(0.04);
   EXPECT_EQ(robot_->counters().cut, 1u);
   EXPECT_TRUE(noted("does not read"));
   EXPECT_TRUE(is_closed(sleeper));
 }
 
-TEST_F(VirtualUrCrowd, ClientThatDoesNotReadItsAnswersIsCutOff) {
+TEST_F(VirtualUrCrowd, ClientThatDoesNotReadItsAnswersIsDisconnected) {
   tcp::socket sleeper = connected(robot_->dashboard_port());
   sleeper.non_blocking(true);
   std::string questions;
@@ -86,7 +86,7 @@ TEST_F(VirtualUrCrowd, ClientThatDoesNotReadItsAnswersIsCutOff) {
   }));
 }
 
-TEST_F(VirtualUrCrowd, OldestClientOfAFullPortMakesRoom) {
+TEST_F(VirtualUrCrowd, OldestClientOfAFullPortIsReplaced) {
   for (const std::uint16_t port : {robot_->rtde_port(), robot_->dashboard_port(), robot_->script_port()}) {
     const std::uint64_t cut = robot_->counters().cut;
     std::vector<tcp::socket> clients;
@@ -94,10 +94,10 @@ TEST_F(VirtualUrCrowd, OldestClientOfAFullPortMakesRoom) {
     EXPECT_TRUE(eventually([&] { return robot_->counters().cut == cut + 3; }));
     for (int i = 0; i < 3; ++i) EXPECT_TRUE(is_closed(clients[static_cast<std::size_t>(i)]));
   }
-  EXPECT_TRUE(noted("makes room"));
+  EXPECT_TRUE(noted("replaced by another"));
 }
 
-TEST_F(VirtualUrCrowd, ClientThatCommandsNeverMakesRoom) {
+TEST_F(VirtualUrCrowd, CommandingClientIsNeverReplaced) {
   tcp::socket commands = connected(robot_->rtde_port());
   asio::write(commands, asio::buffer(request_inputs()));
   char answer[8];
@@ -113,7 +113,7 @@ TEST_F(VirtualUrCrowd, ClientThatCommandsNeverMakesRoom) {
             std::string::npos);
 }
 
-TEST_F(VirtualUrCrowd, ClientsThatComeAndGoLeaveNothing) {
+TEST_F(VirtualUrCrowd, ReconnectingClientsLeaveNothing) {
   for (int i = 0; i < 40; ++i) {
     connected(robot_->rtde_port());
     connected(robot_->script_port());
@@ -122,7 +122,7 @@ TEST_F(VirtualUrCrowd, ClientsThatComeAndGoLeaveNothing) {
   EXPECT_TRUE(eventually([&] { return robot_->counters().clients == 0; }));
 }
 
-TEST_F(VirtualUrCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
+TEST_F(VirtualUrCrowd, WithoutDescriptorsItWaitsAndRecovers) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the sanitizer opens a pipe to probe the memory of an object";
 #endif
@@ -136,7 +136,7 @@ TEST_F(VirtualUrCrowd, OutOfDescriptorsItWaitsAndServesAgain) {
   waiting.connect({asio::ip::address_v4::loopback(), robot_->dashboard_port()});
   EXPECT_TRUE(eventually([&] { return robot_->counters().accept_failures > 0; }));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
-  EXPECT_LT(robot_->counters().accept_failures, 10u);  // one each 100 ms, fewer on a busy machine
+  EXPECT_LT(robot_->counters().accept_failures, 10u);  // one per 100 ms, fewer on a loaded machine
   ::setrlimit(RLIMIT_NOFILE, &usual);
   char greeting = 0;
   asio::read(waiting, asio::buffer(&greeting, 1));

@@ -24,7 +24,7 @@ std::unique_ptr<VirtualUr> robot_on_any_port() {
   return VirtualUr::start(options).value();
 }
 
-/// A program that speaks RTDE byte by byte.
+/// An RTDE client that works byte by byte.
 struct RawClient {
   TimedSocket socket;
   RtdeStream stream = {};
@@ -54,7 +54,7 @@ struct RawClient {
   }
 };
 
-TEST(VirtualUr, ProcessThatDiesOnTheWayLeavesARobotThatStops) {
+TEST(VirtualUr, KilledProcessLeavesARobotThatStops) {
   const auto robot = robot_on_any_port();
   double alive_s = 0;
   {
@@ -77,7 +77,7 @@ TEST(VirtualUr, ProcessThatDiesOnTheWayLeavesARobotThatStops) {
   EXPECT_EQ(robot->truth().state.script.stage, ScriptStage::stopped);
 }
 
-TEST(VirtualUr, NonsenseClosesTheConnectionAndMovesNothing) {
+TEST(VirtualUr, InvalidDataClosesTheConnectionAndMovesNothing) {
   const auto robot = robot_on_any_port();
   for (const std::string& bytes :
        {"\0\0\0"s, "\xff\xff\xff\xff"s, "\0\3\x56"s, "\0\4\x4f\1"s, "GET / HTTP/1.1\r\n"s}) {
@@ -90,7 +90,7 @@ TEST(VirtualUr, NonsenseClosesTheConnectionAndMovesNothing) {
   EXPECT_FALSE(robot->truth().moving);
 }
 
-TEST(VirtualUr, FieldsAskedForComeInTheirOrderAndUnknownOnesAreNotFound) {
+TEST(VirtualUr, RequestedFieldsAreInOrderAndUnknownOnesAreNotFound) {
   const auto robot = robot_on_any_port();
   RawClient client(*robot);
   const std::string hz(8, '\0');
@@ -102,7 +102,7 @@ TEST(VirtualUr, FieldsAskedForComeInTheirOrderAndUnknownOnesAreNotFound) {
   EXPECT_EQ(client.ask(to_bytes({RtdeKind::inputs, "wish"})).content, "\2NOT_FOUND,NOT_FOUND,NOT_FOUND");
 }
 
-TEST(VirtualUr, PortThatIsTakenIsReported) {
+TEST(VirtualUr, PortInUseIsReported) {
   const auto robot = robot_on_any_port();
   VirtualUrOptions options;
   options.rtde_port = robot->rtde_port();
@@ -116,7 +116,7 @@ TEST(VirtualUr, PortThatIsTakenIsReported) {
   EXPECT_EQ(VirtualUr::start(options).error().reason, Reason::bad_value);
 }
 
-TEST(VirtualUr, ClockGoesWithTheTimeOfDayUnlessInLockstep) {
+TEST(VirtualUr, ClockFollowsWallTimeUnlessInLockstep) {
   VirtualUrOptions options;
   options.rtde_port = options.dashboard_port = options.script_port = 0;
   options.controller = options.arm = ur5e();
