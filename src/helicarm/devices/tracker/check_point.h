@@ -6,20 +6,21 @@
 
 namespace helicarm {
 
-/// A point of the bone, touched with the pointer after the marker was fixed and again from time to time.
+/// A point of the bone, touched with the pointer after fixing the marker and again at intervals.
 struct CheckPoint {
-  Eigen::Vector3d point_in_bone;  ///< mm, as touched first
-  double limit_mm = 1;            ///< beyond, the marker has been bumped: touching repeats to a few tenths
+  Eigen::Vector3d point_in_bone;  ///< mm, as first touched
+  double limit_mm = 1;  ///< beyond it the marker has moved; touching repeats to a few tenths of a mm
 };
 
-/// How far the tip is from where the bone's marker has the point, mm. Refuses `residual_too_large` over the
-/// limit.
+/// Distance of the tip from the point's position by the bone's marker, mm. Refuses `residual_too_large` above
+/// the limit.
 inline Expected<double> check_point_off_mm(const CheckPoint& check, const RigidTransform& tracker_from_bone,
                                            const Eigen::Vector3d& tip_in_tracker) {
   const double off = (tracker_from_bone * check.point_in_bone - tip_in_tracker).norm();
   if (off <= check.limit_mm) return off;
   return fail(Reason::residual_too_large,
-              "the check point is not where the bone's marker has it: the marker moved",
+              "the check point's position differs from the recorded one: the bone's marker moved; start a "
+              "new operation",
               {{"off_mm", off}, {"limit_mm", check.limit_mm}});
 }
 

@@ -11,12 +11,12 @@ namespace {
 const CheckPoint check{{10, 20, 30}};
 const RigidTransform tracker_from_bone{rotation_from_vector({0.3, 1, -0.2}), {100, 0, 900}};
 
-TEST(CheckPoint, MarkerThatHeldIsWithinTheLimit) {
+TEST(CheckPoint, UnmovedMarkerIsWithinTheLimit) {
   const Eigen::Vector3d touched = tracker_from_bone * check.point_in_bone + Eigen::Vector3d(0.3, 0, 0);
   EXPECT_NEAR(check_point_off_mm(check, tracker_from_bone, touched).value(), 0.3, 1e-9);
 }
 
-TEST(CheckPoint, MarkerThatWasBumpedIsRefused) {
+TEST(CheckPoint, MovedMarkerIsRefused) {
   const Eigen::Vector3d touched = tracker_from_bone * check.point_in_bone;
   const RigidTransform bumped =
       tracker_from_bone * RigidTransform{rotation_from_vector({0, 0.05, 0}), {0, 0, 0}};

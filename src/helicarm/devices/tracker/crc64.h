@@ -11,7 +11,7 @@ namespace crc64_detail {
 
 using Tables = std::array<std::array<std::uint64_t, 256>, 8>;
 
-/// tables[k][b]: the remainder of byte b followed by k zero bytes. The polynomial is that of ECMA-182.
+/// tables[k][b]: remainder of byte b followed by k zero bytes, for the ECMA-182 polynomial.
 constexpr Tables make_tables() {
   Tables tables{};
   for (std::uint64_t byte = 0; byte < 256; ++byte) {
@@ -31,8 +31,8 @@ inline constexpr Tables tables = make_tables();
 
 }  // namespace crc64_detail
 
-/// The check sum of an OpenIGTLink body: ECMA-182, from 0, not reflected. Eight bytes at a time, as images
-/// are long.
+/// Checksum of an OpenIGTLink body: ECMA-182, initial value 0, not reflected. Eight bytes at a time for long
+/// images.
 inline std::uint64_t crc64(std::string_view bytes) {
   using crc64_detail::tables;
   std::uint64_t crc = 0;

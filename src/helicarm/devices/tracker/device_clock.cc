@@ -8,7 +8,7 @@
 namespace helicarm {
 namespace {
 
-/// Keeps times apart that a change of the least delay would make equal.
+/// Keeps times distinct that a change of the smallest delay would make equal.
 constexpr double least_step_s = 1e-6;
 
 }  // namespace

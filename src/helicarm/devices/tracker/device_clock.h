@@ -8,7 +8,7 @@
 
 namespace helicarm {
 
-/// Why a pose is not believed.
+/// Why a pose is rejected.
 enum class PoseFault {
   hidden,
   not_finite,
@@ -30,26 +30,26 @@ enum class PoseFault {
 std::string_view code(PoseFault fault);
 
 struct DeviceClockOptions {
-  double jump_s = 0.5;    ///< a stamp that differs by more from what the arrival lets expect is a jump
-  double settle_s = 1;    ///< so long the stamps must agree with each other before a new time base is taken
-  double drift = 100e-6;  ///< of the device's clock against ours: twice the 50 ppm of a poor quartz
+  double jump_s = 0.5;    ///< a stamp that differs by more from the one expected at its arrival is a jump
+  double settle_s = 1;    ///< a new time base is accepted after stamps were consistent for this time
+  double drift = 100e-6;  ///< of the device's clock relative to ours: twice the 50 ppm of a poor quartz
 };
 
-/// Brings one tool's time stamps to this machine's monotonic clock, by the least delay seen.
+/// Maps one tool's time stamps to this machine's monotonic clock by the smallest observed delay.
 class DeviceClock {
  public:
   explicit DeviceClock(const DeviceClockOptions& options = {}) : options_(options) {}
 
-  /// The time of a measurement, strictly increasing. `device_s` 0 means none is given: the arrival serves.
+  /// Time of a measurement, strictly increasing. `device_s` 0 means no stamp: the arrival time is used.
   /// Refuses with time_equal, time_back, time_jump or late.
   tl::expected<double, PoseFault> local(double device_s, double arrival_s);
 
-  /// A new connection may have another time base.
+  /// Call for a new connection: the time base may differ.
   void forget() { base_.reset(), rival_.reset(); }
 
  private:
   struct Base {
-    double offset;    ///< ours minus the device's
+    double offset;    ///< local minus device time
     double device_s;  ///< newest
     double since;     ///< arrival of the first
     double arrival_s;
@@ -58,7 +58,7 @@ class DeviceClock {
 
   DeviceClockOptions options_;
   std::optional<Base> base_;
-  std::optional<Base> rival_;  ///< what the stamps say since they jumped
+  std::optional<Base> rival_;  ///< time base of the stamps since a jump
   std::optional<double> last_;
 };
 

@@ -14,10 +14,10 @@
 namespace helicarm {
 namespace {
 
-/// Of Gaussian errors in space one in 20,000 lies five median lengths (7.7 sigma per axis) off.
+/// For Gaussian errors in 3-D, 1 in 20,000 is beyond five median lengths (7.7 sigma per axis).
 constexpr double outlier_medians = 5;
 constexpr double max_outlier_share = 0.25;
-/// Below so many samples the scatter's 21 numbers are too poorly known: its two means serve.
+/// With fewer samples the scatter's 21 elements are too uncertain: its two means are used.
 constexpr int samples_for_full_scatter = 25;
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -28,7 +28,7 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
-/// The sample pose least far, in sum, from the others: a start that outliers do not move.
+/// The sample pose with the smallest sum of distances to the others: a start robust to outliers.
 RigidTransform median_pose(const std::vector<RigidTransform>& poses) {
   RigidTransform median;
   for (int axis = 0; axis < 3; ++axis) {
@@ -48,7 +48,7 @@ RigidTransform median_pose(const std::vector<RigidTransform>& poses) {
   return median;
 }
 
-/// Place and rotation vector of a pose about another.
+/// Position and rotation vector of a pose relative to another.
 Vector6 deviation(const RigidTransform& pose, const RigidTransform& from) {
   Vector6 d;
   d.head<3>() = pose.translation - from.translation;
@@ -64,7 +64,7 @@ std::vector<Vector6> near_ones(const std::vector<RigidTransform>& poses, const R
     lengths.push_back(deviations.back().head<3>().norm());
     angles.push_back(deviations.back().tail<3>().norm());
   }
-  // Rounding of the wire (32 bits) must not make outliers of poses that are otherwise the same.
+  // Rounding to 32 bits must not make outliers of otherwise equal poses.
   const double longest = outlier_medians * median_of(lengths) + 1e-3;
   const double widest = outlier_medians * median_of(angles) + 1e-5;
   std::erase_if(deviations, [&](const Vector6& d) {
@@ -88,7 +88,7 @@ PoseCovariance scatter_of(const std::vector<Vector6>& deviations, const Vector6&
 
 Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double time_s,
                                      const ExposurePoseOptions& options) {
-  if (samples.empty()) return fail(Reason::no_pose, "no pose is known");
+  if (samples.empty()) return fail(Reason::no_pose, "no pose received");
   constexpr double never = std::numeric_limits<double>::infinity();
   double before = never, after = never;
   std::vector<RigidTransform> poses;
@@ -108,7 +108,8 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
                 figures);
   if (static_cast<int>(poses.size()) < std::max(2, options.min_samples))
     return fail(Reason::stale_pose,
-                fmt::format("{} poses about this time, at least {}", poses.size(), options.min_samples),
+                fmt::format("{} poses within the window, at least {} are required", poses.size(),
+                            options.min_samples),
                 figures);
 
   const RigidTransform median = median_pose(poses);

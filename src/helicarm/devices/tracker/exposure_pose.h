@@ -9,27 +9,26 @@
 namespace helicarm {
 
 struct ExposurePoseOptions {
-  double window_s = 0.25;  ///< half width about the time asked for: ten poses at 20 Hz
-  double max_gap_s = 0.1;  ///< the nearest poses before and after must be no further off
+  double window_s = 0.25;  ///< half width around the requested time: ten poses at 20 Hz
+  double max_gap_s = 0.1;  ///< largest distance to the nearest pose before and after
   int min_samples = 3;
-  double max_spread_mm = 0.5;  ///< rms about the mean: trackers jitter by less than 0.1 mm
+  double max_spread_mm = 0.5;  ///< rms about the mean: trackers have below 0.1 mm of jitter
   double max_spread_deg = 0.5;
 };
 
 struct ExposurePose {
   RigidTransform tracker_from_tool;
-  /// Of the mean, from the samples' scatter, as if their errors were independent.
+  /// of the mean, from the samples' scatter, assuming independent errors
   PoseCovariance covariance;
-  int samples = 0;   ///< that serve
-  int outliers = 0;  ///< that were thrown out
+  int samples = 0;   ///< samples used
+  int outliers = 0;  ///< samples rejected
   double spread_mm = 0;
   double spread_deg = 0;
 };
 
-/// The pose at `time_s` (this machine's monotonic clock) as the mean of the samples about it that lie near
-/// their median. Refuses with figures: no sample at all (`no_pose`); none on one side, a gap, or too few
-/// (`stale_pose`: nothing is extrapolated); scatter over the limit or over a quarter outliers
-/// (`pose_spread`).
+/// The pose at `time_s` (this machine's monotonic clock): mean of the samples around it that lie near their
+/// median. Refuses with figures: no sample (`no_pose`); none on one side, a gap, or too few (`stale_pose`: no
+/// extrapolation); scatter above the limit or more than a quarter outliers (`pose_spread`).
 Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double time_s,
                                      const ExposurePoseOptions& options = {});
 

@@ -18,7 +18,7 @@ Eigen::Vector3d noise(RandomStream& random, double sigma) {
   return sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
 }
 
-/// 40 poses a second from 9 s to 11 s.
+/// 40 poses per second from 9 s to 11 s.
 std::vector<PoseSample> at_rest(std::uint64_t trial = 0, double sigma_mm = 0.1, double sigma_rad = 0.001) {
   RandomStream random(21, 0, trial);
   std::vector<PoseSample> samples;
@@ -39,7 +39,7 @@ Reason reason_of(const std::vector<PoseSample>& samples, double time_s = 10) {
   return pose ? Reason::usage : pose.error().reason;
 }
 
-TEST(ExposurePose, MeanIsNearerTheTruthThanASample) {
+TEST(ExposurePose, MeanIsMoreAccurateThanASample) {
   const auto pose = exposure_pose(at_rest(), 10);
   ASSERT_TRUE(pose);
   EXPECT_EQ(pose->samples, 21);
@@ -47,7 +47,7 @@ TEST(ExposurePose, MeanIsNearerTheTruthThanASample) {
   EXPECT_NEAR(pose->spread_mm, 0.1 * std::sqrt(3), 0.04);
 }
 
-TEST(ExposurePose, CovarianceReportsTheError) {
+TEST(ExposurePose, CovarianceAgreesWithTheError) {
   double square_mm = 0, square_rad = 0, said_mm = 0, said_rad = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const auto pose = exposure_pose(at_rest(trial), 10);
@@ -62,7 +62,7 @@ TEST(ExposurePose, CovarianceReportsTheError) {
   EXPECT_NEAR(square_rad / said_rad, 1, 0.12);
 }
 
-TEST(ExposurePose, OutliersDoNotMoveIt) {
+TEST(ExposurePose, OutliersHaveNoEffect) {
   auto samples = at_rest();
   for (const std::size_t i : {38u, 42u}) {
     samples[i].tracker_from_tool.translation.x() += 50;
@@ -82,7 +82,7 @@ TEST(ExposurePose, NothingIsExtrapolated) {
   EXPECT_EQ(reason_of(at_rest(), 60), Reason::stale_pose);
 }
 
-TEST(ExposurePose, GapAboutTheTimeIsRefused) {
+TEST(ExposurePose, GapAroundTheTimeIsRefused) {
   auto samples = at_rest();
   std::erase_if(samples, [](const PoseSample& s) { return s.time_s > 9.85 && s.time_s < 10.15; });
   EXPECT_EQ(reason_of(samples), Reason::stale_pose);
@@ -90,7 +90,7 @@ TEST(ExposurePose, GapAboutTheTimeIsRefused) {
   EXPECT_EQ(reason_of(samples), Reason::stale_pose);
 }
 
-TEST(ExposurePose, TooFewAreRefused) {
+TEST(ExposurePose, TooFewPosesAreRefused) {
   auto samples = at_rest();
   std::erase_if(samples,
                 [](const PoseSample& s) { return std::abs(s.time_s - 10) > 0.03 || s.time_s == 10; });
@@ -112,13 +112,13 @@ TEST(ExposurePose, JitterOverTheLimitIsRefused) {
   EXPECT_EQ(reason_of(at_rest(0, 0.1, 0.02)), Reason::pose_spread);
 }
 
-TEST(ExposurePose, TwoPlacesByTurnsAreRefused) {
+TEST(ExposurePose, TwoAlternatingPositionsAreRefused) {
   auto samples = at_rest();
   for (std::size_t i = 0; i < samples.size(); i += 2) samples[i].tracker_from_tool.translation.z() += 5;
   EXPECT_EQ(reason_of(samples), Reason::pose_spread);
 }
 
-TEST(ExposurePose, SamePoseOverAndOverHasNoOutliers) {
+TEST(ExposurePose, IdenticalPosesHaveNoOutliers) {
   auto samples = at_rest(0, 0, 0);
   samples[40].tracker_from_tool.translation.x() += 1e-5;
   const auto pose = exposure_pose(samples, 10);
@@ -126,7 +126,7 @@ TEST(ExposurePose, SamePoseOverAndOverHasNoOutliers) {
   EXPECT_EQ(pose->outliers, 0);
 }
 
-TEST(PoseBuffer, KeepsTheNewest) {
+TEST(PoseBuffer, KeepsTheNewestPoses) {
   PoseBuffer buffer(5);
   EXPECT_FALSE(buffer.latest());
   EXPECT_TRUE(buffer.between(0, 100).empty());

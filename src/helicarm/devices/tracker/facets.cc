@@ -13,7 +13,7 @@
 namespace helicarm {
 namespace {
 
-/// 99.9 % of chi-square, Wilson and Hilferty's approximation.
+/// 99.9 % quantile of chi-square, Wilson and Hilferty's approximation.
 double chi2_limit(double dof) {
   constexpr double normal_at_999 = 3.0902323061678132;
   const double w = 2 / (9 * dof);
@@ -36,7 +36,7 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
     if (facet == facets.end())
       throw BadInput(Reason::bad_value, fmt::format("the calibrator has no facet \"{}\"", pose.name));
     if (std::ranges::count(seen, pose.name, &FacetPose::name) > 1)
-      throw BadInput(Reason::name_clash, fmt::format("facet \"{}\" is seen twice", pose.name));
+      throw BadInput(Reason::name_clash, fmt::format("facet \"{}\" is given twice", pose.name));
     PoseCovariance covariance = pose.covariance;
     covariance.diagonal().head<3>().array() += options.body_mm * options.body_mm;
     covariance.diagonal().tail<3>().array() += body_rad * body_rad;
@@ -82,7 +82,7 @@ bool agrees(const FusedPose& fused) {
   return fused.used.size() < 2 || fused.chi2 <= chi2_limit(6 * static_cast<double>(fused.used.size() - 1));
 }
 
-/// The best fusion that leaves one facet out.
+/// The best fusion without one of the facets.
 FusedPose fuse_without_one(const std::vector<SeenFacet>& seen) {
   std::optional<FusedPose> best;
   for (std::size_t out = 0; out < seen.size(); ++out) {
@@ -100,17 +100,18 @@ FusedPose fuse_without_one(const std::vector<SeenFacet>& seen) {
 Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const FacetPose> seen,
                                 const FacetsOptions& options) {
   return guarded([&] {
-    if (seen.empty()) throw BadInput(Reason::no_pose, "none of the calibrator's facets is seen");
+    if (seen.empty()) throw BadInput(Reason::no_pose, "no facet of the calibrator is visible");
     const std::vector<SeenFacet> matched = match(facets, seen, options);
     const FusedPose all = fuse(matched);
     if (agrees(all)) return all;
     if (matched.size() > 2)
       if (const FusedPose fewer = fuse_without_one(matched); agrees(fewer)) return fewer;
-    throw BadInput({Reason::residual_too_large,
-                    fmt::format("{} facets of the calibrator disagree: chi2 {:.4g}, limit {:.4g}",
-                                seen.size(), all.chi2, chi2_limit(6 * static_cast<double>(seen.size() - 1))),
-                    {},
-                    {{"chi2", all.chi2}, {"facets", static_cast<double>(seen.size())}}});
+    throw BadInput(
+        {Reason::residual_too_large,
+         fmt::format("poses of {} facets of the calibrator are inconsistent: chi2 {:.4g}, limit {:.4g}",
+                     seen.size(), all.chi2, chi2_limit(6 * static_cast<double>(seen.size() - 1))),
+         {},
+         {{"chi2", all.chi2}, {"facets", static_cast<double>(seen.size())}}});
   });
 }
 

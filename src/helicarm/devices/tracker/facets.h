@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// A tracked pattern on one side of the calibrator.
+/// A tracked marker pattern on one side of the calibrator.
 struct Facet {
   std::string name;
   RigidTransform calibrator_from_facet;
@@ -23,8 +23,8 @@ struct FacetPose {
 };
 
 struct FacetsOptions {
-  double body_mm = 0.05;   ///< how exactly a facet sits on the body, per axis: a printed part's tolerance
-  double body_deg = 0.05;  ///< the same over a facet of 60 mm
+  double body_mm = 0.05;   ///< position tolerance of a facet on the body per axis: a printed part's
+  double body_deg = 0.05;  ///< rotation tolerance, for a facet of 60 mm
 };
 
 struct FusedPose {
@@ -35,10 +35,10 @@ struct FusedPose {
   double chi2 = 0;  ///< 6 (used - 1) degrees of freedom
 };
 
-/// The calibrator's pose from those of its facets that are seen, by weighted least squares; one is enough.
-/// Where they disagree (99.9 %), one of three or more may be thrown out. Refuses: none seen (`no_pose`), a
-/// disagreement that does not say which is wrong (`residual_too_large`), an unknown name (`bad_value`), a
-/// name twice (`name_clash`).
+/// The calibrator's pose from those of its visible facets, by weighted least squares; one is enough. If they
+/// are inconsistent (99.9 %), one of three or more can be rejected. Refuses: none visible (`no_pose`), an
+/// inconsistency without a unique outlier (`residual_too_large`), an unknown name (`bad_value`), a duplicate
+/// name (`name_clash`).
 Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const FacetPose> seen,
                                 const FacetsOptions& options = {});
 

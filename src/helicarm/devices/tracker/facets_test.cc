@@ -49,7 +49,7 @@ Eigen::Matrix<double, 6, 1> error_of(const FusedPose& fused) {
   return error;
 }
 
-TEST(Facets, AnyOneIsEnough) {
+TEST(Facets, AnyOneIsSufficient) {
   RandomStream random(1, 0);
   for (const Facet& facet : four_facets()) {
     const auto fused = fuse_facets(four_facets(), std::vector{seen(facet, random, 0)});
@@ -59,7 +59,7 @@ TEST(Facets, AnyOneIsEnough) {
   }
 }
 
-TEST(Facets, CovarianceHoldsTheTruth) {
+TEST(Facets, CovarianceContainsTheTruth) {
   constexpr double chi2_6_at_95 = 12.5916;
   for (const std::size_t count : {1u, 2u, 4u}) {
     int inside = 0;
@@ -76,7 +76,7 @@ TEST(Facets, CovarianceHoldsTheTruth) {
   }
 }
 
-TEST(Facets, MoreOfThemTellThePlaceBetter) {
+TEST(Facets, MoreFacetsReduceTheError) {
   RandomStream random(3, 0);
   std::vector<FacetPose> poses;
   double last = 1e9;
@@ -88,7 +88,7 @@ TEST(Facets, MoreOfThemTellThePlaceBetter) {
   }
 }
 
-TEST(Facets, OneThatDisagreesIsThrownOut) {
+TEST(Facets, InconsistentFacetIsRejected) {
   RandomStream random(4, 0);
   std::vector<FacetPose> poses;
   for (const Facet& facet : four_facets()) poses.push_back(seen(facet, random));
@@ -99,7 +99,7 @@ TEST(Facets, OneThatDisagreesIsThrownOut) {
   EXPECT_EQ(fused->used.size(), 3u);
 }
 
-TEST(Facets, TwoThatDisagreeAreRefused) {
+TEST(Facets, TwoInconsistentFacetsAreRefused) {
   RandomStream random(5, 0);
   std::vector poses{seen(four_facets()[0], random), seen(four_facets()[1], random)};
   poses[1].tracker_from_facet.translation.x() += 2;
@@ -114,7 +114,7 @@ TEST(Facets, SwappedNamesAreRefused) {
   EXPECT_EQ(fuse_facets(four_facets(), poses).error().reason, Reason::residual_too_large);
 }
 
-TEST(Facets, NoneUnknownOrTwiceIsRefused) {
+TEST(Facets, NoUnknownOrDuplicateFacetIsAccepted) {
   RandomStream random(7, 0);
   const FacetPose pose = seen(four_facets()[0], random);
   FacetPose stranger = pose;

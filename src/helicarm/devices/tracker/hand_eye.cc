@@ -21,13 +21,13 @@ using Residual = Eigen::Matrix<double, 6, 1>;
 
 constexpr double deg_per_rad = 180 / std::numbers::pi;
 
-/// A in the flange, B in the marker: AX = XB.
+/// A of the flange, B of the marker: AX = XB.
 struct Motion {
   RigidTransform a;
   RigidTransform b;
 };
 
-/// Each pose against the next one and against the one half the list away.
+/// Each pose relative to the next one and to the one half the list away.
 std::vector<Motion> motions_of(std::span<const HandEyePair> pairs) {
   std::vector<Motion> motions;
   const std::size_t count = pairs.size();
@@ -38,7 +38,7 @@ std::vector<Motion> motions_of(std::span<const HandEyePair> pairs) {
   return motions;
 }
 
-/// Rms turn about the second main axis of the turns, deg: 0 where all axes are parallel.
+/// Rms rotation about the second principal axis of the rotations, deg: 0 if all axes are parallel.
 double second_turn_deg(const std::vector<Motion>& motions) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Motion& motion : motions) {
@@ -49,7 +49,7 @@ double second_turn_deg(const std::vector<Motion>& motions) {
 }
 
 RigidTransform start_of_x(const std::vector<Motion>& motions) {
-  // Near half a turn the rotation vector may point either way.
+  // Near 180 degrees the direction of the rotation vector is ambiguous.
   constexpr double widest_turn = 170 / deg_per_rad;
   Eigen::Matrix3d together = Eigen::Matrix3d::Zero();
   for (const Motion& motion : motions) {
@@ -90,7 +90,8 @@ Residual residual_of(const HandEyePair& pair, const HandEye& at) {
   return residual;
 }
 
-/// Of the predicted marker's place and rotation by X's place and rotation, then Y's.
+/// Derivatives of the predicted marker's position and rotation with respect to position and rotation of X,
+/// then Y.
 Eigen::Matrix<double, 6, 12> jacobian_of(const HandEyePair& pair, const HandEye& at) {
   const Eigen::Matrix3d tracker_from_flange = at.tracker_from_base.rotation * pair.base_from_flange.rotation;
   const Eigen::Vector3d lever =
@@ -151,7 +152,7 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   result.flange_from_marker = start_of_x(motions);
   result.tracker_from_base = start_of_y(pairs, result.flange_from_marker);
   const bool known_noise = options.sigma_mm > 0 && options.sigma_deg > 0;
-  double sigma_mm = known_noise ? options.sigma_mm : 0.2;  // a start: what trackers have
+  double sigma_mm = known_noise ? options.sigma_mm : 0.2;  // initial value: typical of trackers
   double sigma_rad = (known_noise ? options.sigma_deg : 0.1) / deg_per_rad;
   const double count = static_cast<double>(pairs.size());
   for (int round = 0; round < (known_noise ? 1 : noise_rounds); ++round) {
@@ -171,9 +172,10 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   if (result.rms_mm > options.max_rms_mm || result.rms_deg > options.max_rms_deg)
     return fail(
         Reason::residual_too_large,
-        fmt::format("robot and tracker disagree by {:.3g} mm and {:.3g} degrees rms, limits {:g} mm and {:g} "
-                    "degrees",
-                    result.rms_mm, result.rms_deg, options.max_rms_mm, options.max_rms_deg),
+        fmt::format(
+            "robot and tracker poses differ by {:.3g} mm and {:.3g} degrees rms, limits {:g} mm and {:g} "
+            "degrees",
+            result.rms_mm, result.rms_deg, options.max_rms_mm, options.max_rms_deg),
         {{"rms_mm", result.rms_mm}, {"rms_deg", result.rms_deg}});
   return result;
 }

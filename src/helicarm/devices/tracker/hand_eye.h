@@ -8,36 +8,36 @@
 
 namespace helicarm {
 
-/// What robot and tracker say at one moment, the robot at rest.
+/// Poses by robot and tracker at one moment, the robot at rest.
 struct HandEyePair {
   RigidTransform base_from_flange;
   RigidTransform tracker_from_marker;
 };
 
 struct HandEyeOptions {
-  /// The tracker's noise per axis about the marker's origin; both 0: judged by the residuals. The robot is
-  /// taken as exact.
+  /// The tracker's noise per axis about the marker's origin; both 0: estimated from the residuals. The robot
+  /// is taken as exact.
   double sigma_mm = 0;
   double sigma_deg = 0;
-  double min_turn_deg = 10;  ///< rms turn about the second of the turns' main axes
-  double max_rms_mm = 2;     ///< uncalibrated arms are off by millimetres; more is a wrong pairing
+  double min_turn_deg = 10;  ///< rms rotation about the second principal axis of the rotations
+  double max_rms_mm = 2;  ///< uncalibrated arms deviate by millimetres; more indicates wrongly paired poses
   double max_rms_deg = 1;
 };
 
 struct HandEye {
   RigidTransform flange_from_marker;  ///< X of AX = XB
   RigidTransform tracker_from_base;
-  /// Of flange_from_marker (along the flange's axes), then tracker_from_base (along the tracker's), each as
-  /// PoseCovariance.
+  /// Of flange_from_marker (along the flange's axes), then tracker_from_base (along the tracker's axes), each
+  /// as PoseCovariance.
   Eigen::Matrix<double, 12, 12> covariance;
-  double rms_mm = 0;   ///< of the marker's place
+  double rms_mm = 0;   ///< of the marker's position
   double rms_deg = 0;  ///< of its rotation
   double turn_deg = 0;
 };
 
-/// Where the marker sits on the robot and the robot in the tracker, from poses of both: the relative motions
-/// give a start (Park and Martin 1994), Gauss-Newton on tracker_from_base base_from_flange flange_from_marker
-/// = tracker_from_marker the rest. Refuses with figures: fewer than three pairs, or turns about parallel axes
+/// Marker pose on the robot and robot pose in the tracker, from paired poses: initial values by the relative
+/// motions (Park and Martin 1994), then Gauss-Newton on tracker_from_base base_from_flange flange_from_marker
+/// = tracker_from_marker. Refuses with figures: fewer than three pairs, or rotations about parallel axes
 /// (`poses_too_alike`); `residual_too_large`.
 Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const HandEyeOptions& options = {});
 

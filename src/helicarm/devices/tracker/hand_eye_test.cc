@@ -54,7 +54,7 @@ TEST(HandEye, ExactPosesGiveTheExactTransforms) {
   }
 }
 
-TEST(HandEye, CovarianceHoldsTheTruth) {
+TEST(HandEye, CovarianceContainsTheTruth) {
   constexpr double chi2_12_at_95 = 21.0261;
   constexpr double chi2_6_at_95 = 12.5916;
   constexpr int trials = 2000;
@@ -72,7 +72,7 @@ TEST(HandEye, CovarianceHoldsTheTruth) {
   EXPECT_NEAR(marker_inside / static_cast<double>(trials), 0.95, 0.02);
 }
 
-TEST(HandEye, NoiseIsJudgedByTheResiduals) {
+TEST(HandEye, NoiseIsEstimatedFromTheResiduals) {
   const auto known = calibrate_hand_eye(measured(60, 0.2, 0.1), {0.2, 0.1});
   const auto judged = calibrate_hand_eye(measured(60, 0.2, 0.1));
   ASSERT_TRUE(known && judged);
@@ -91,7 +91,7 @@ TEST(HandEye, ParallelAxesAreRefused) {
   EXPECT_EQ(calibrate_hand_eye(measured(20, 0.1, 0.1, 0, {0, 0, 0})).error().reason, Reason::poses_too_alike);
 }
 
-TEST(HandEye, WrongPairingIsRefused) {
+TEST(HandEye, WronglyPairedPosesAreRefused) {
   auto pairs = measured(12, 0.1, 0.05);
   std::swap(pairs[3].tracker_from_marker, pairs[8].tracker_from_marker);
   EXPECT_EQ(calibrate_hand_eye(pairs).error().reason, Reason::residual_too_large);

@@ -34,7 +34,7 @@ struct IgtlClient::Impl {
   void connected(asio::ip::tcp::socket socket);
   void ended(const std::string& why);
   void watch_silence();
-  /// Replaces what the timer was to do before.
+  /// Replaces the timer's pending action.
   void after(double seconds, std::function<void()> action);
 
   const IgtlClientOptions options;
@@ -48,7 +48,7 @@ struct IgtlClient::Impl {
   std::shared_ptr<asio::ip::tcp::socket> dialling;
   double pause_s;
 
-  mutable std::mutex mutex;  ///< of what follows
+  mutable std::mutex mutex;  ///< guards the members below
   TrackerLinkStatus status;  ///< counters: of earlier connections, and of attempts
   std::shared_ptr<IgtlConnection> connection;
   std::jthread thread;
@@ -106,7 +106,7 @@ void IgtlClient::Impl::watch_silence() {
       const std::lock_guard lock(mutex);
       ++status.counters["silences"];
     }
-    connection->close("nothing comes");
+    connection->close("no data");
   });
 }
 

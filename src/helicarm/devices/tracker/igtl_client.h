@@ -16,12 +16,12 @@ namespace helicarm {
 struct IgtlClientOptions {
   std::string address = "127.0.0.1";  ///< numeric
   std::uint16_t port = 18944;
-  bool ask_for_tracking = false;  ///< send STT_TDATA on each new connection; many servers send unasked
-  int interval_ms = 0;            ///< to ask for; 0: as fast as the device is
+  bool ask_for_tracking = false;  ///< send STT_TDATA on each new connection; many servers need no request
+  int interval_ms = 0;            ///< requested interval; 0: as fast as the device
   double first_pause_s = 0.1;     ///< before the second attempt to connect; doubled with each one
   double last_pause_s = 5;
-  double connect_s = 2;  ///< after so long an attempt is given up
-  double silence_s = 5;  ///< a connection on which nothing comes is made anew; 0: never
+  double connect_s = 2;  ///< timeout of an attempt
+  double silence_s = 5;  ///< reconnect after this time without data; 0: never
 };
 
 enum class LinkState { connecting, connected, waiting };
@@ -29,19 +29,19 @@ std::string_view code(LinkState state);
 
 struct TrackerLinkStatus {
   LinkState state = LinkState::connecting;
-  std::string trouble;  ///< why the last connection ended or failed; empty where none did
+  std::string trouble;  ///< why the last connection ended or failed; empty if none did
   /// "attempts", "connections", "silences" and, over all connections, those of IgtlConnection
   Counters counters;
 };
 
-/// The pause before the next attempt to connect.
+/// Pause before the next attempt to connect.
 inline double next_pause(double pause_s, const IgtlClientOptions& options) {
   return std::min(2 * pause_s, options.last_pause_s);
 }
 
-/// Keeps a connection to an OpenIGTLink server on a thread of its own, and makes it anew whenever it ends or
-/// goes silent. The pause between attempts starts anew only when a message has come: a server that accepts
-/// and hangs up is not stormed.
+/// Maintains a connection to an OpenIGTLink server on its own thread and reconnects when it ends or becomes
+/// silent. The pause between attempts is reset only after a message, so that a server that accepts and
+/// disconnects is not flooded.
 class IgtlClient {
  public:
   using OnMessage = std::function<void(const IgtlMessage&, double arrival_s)>;
@@ -52,8 +52,8 @@ class IgtlClient {
                                                      std::function<void()> on_connect = {});
   ~IgtlClient();
 
-  TrackerLinkStatus status() const;  ///< from any thread
-  /// From any thread; lost while there is no connection.
+  TrackerLinkStatus status() const;  ///< thread-safe
+  /// Thread-safe; dropped while there is no connection.
   void send(const IgtlMessage& message);
   /// Returns at once, with the thread ended.
   void stop();

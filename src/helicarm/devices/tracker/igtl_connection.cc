@@ -12,7 +12,8 @@ Expected<asio::ip::tcp::endpoint> endpoint_of(const std::string& address, std::u
   asio::error_code error;
   const auto parsed = asio::ip::make_address(address == "localhost" ? "127.0.0.1" : address, error);
   if (error)
-    return fail(Reason::bad_value, fmt::format("\"{}\" is no numeric address such as 127.0.0.1", address));
+    return fail(Reason::bad_value,
+                fmt::format("\"{}\" is not a numeric address; use one such as 127.0.0.1", address));
   return asio::ip::tcp::endpoint(parsed, port);
 }
 
@@ -22,7 +23,7 @@ void add_counters(Counters& to, const Counters& more) {
 
 namespace {
 
-/// A peer that went without a word, as by a pulled cable, is given up after half a minute.
+/// TCP keep-alive: a peer that vanished, e.g. by a pulled cable, is detected after 30 s.
 void expect_signs_of_life(asio::ip::tcp::socket& socket) {
   using Idle = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPIDLE>;
   using Interval = asio::detail::socket_option::integer<IPPROTO_TCP, TCP_KEEPINTVL>;

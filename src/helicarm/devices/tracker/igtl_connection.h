@@ -16,21 +16,22 @@
 
 namespace helicarm {
 
-/// What a connection may hold for a peer.
+/// Limits of a connection's buffers.
 struct ConnectionLimits {
-  std::size_t messages = 256;  ///< to send; the oldest are dropped beyond
+  std::size_t messages = 256;  ///< send queue; beyond, the oldest are dropped
   std::size_t bytes = std::size_t{64} << 20;
-  double stall_s = 5;                                  ///< a peer that takes nothing for so long is cut off
-  std::uint64_t body_bytes = std::uint64_t{64} << 20;  ///< of a message that comes
+  double stall_s = 5;  ///< a peer that reads nothing for this time is disconnected
+  std::uint64_t body_bytes = std::uint64_t{64} << 20;  ///< of an incoming message
 };
 
-/// A numeric address; names are not looked up, as that may hang for seconds. "localhost" is 127.0.0.1.
+/// A numeric address; names are not looked up, because a lookup can block for seconds. "localhost" is
+/// 127.0.0.1.
 Expected<asio::ip::tcp::endpoint> endpoint_of(const std::string& address, std::uint16_t port);
 
 void add_counters(Counters& to, const Counters& more);
 
-/// One connected socket with its stream and its queue. Everything is called and calls back on the thread of
-/// the socket's io_context, but for counters().
+/// One connected socket with its stream and its queue. All calls and callbacks are on the thread of the
+/// socket's io_context, except counters().
 class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
  public:
   struct Handlers {
@@ -44,15 +45,15 @@ class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
   void start(Handlers handlers);
   void send(std::shared_ptr<const std::string> bytes);
   void close(const std::string& why);
-  /// Closes over what the peer did, or did not do; counted as "cut".
+  /// Closes the connection because of the peer's behaviour; counted as "cut".
   void cut(const std::string& why);
   bool was_cut() const { return cut_; }
 
-  /// When the newest bytes came, or the connection began; monotonic_seconds().
+  /// Time of the newest data, or of the connection's start; monotonic_seconds().
   double heard_s() const { return heard_s_; }
-  /// When the peer last sent or took anything.
+  /// When the peer last sent or read data.
   double active_s() const { return std::max(heard_s_, taken_s_); }
-  /// Those of the stream, "bytes", "sent" and "dropped" messages, "cut" connections. From any thread.
+  /// Counters of the stream, "bytes", "sent" and "dropped" messages, "cut" connections. Thread-safe.
   Counters counters() const;
 
  private:

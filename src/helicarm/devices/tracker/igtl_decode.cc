@@ -18,7 +18,7 @@ constexpr std::size_t tool_size = 70;
 constexpr std::size_t quaternion_tool_size = 50;
 constexpr std::size_t point_size = 136;
 
-/// The text of a field as far as it may be shown or looked up.
+/// Text of a field, limited to characters that can be shown or looked up.
 std::string take_text(BigEndianReader& in, std::size_t width) {
   return without_control_characters(std::string(in.take_name(width)));
 }
@@ -42,7 +42,7 @@ std::array<std::uint16_t, 3> take_sizes(BigEndianReader& in) {
   return sizes;
 }
 
-/// How many elements of one size the rest holds.
+/// Number of elements of one size in the rest.
 std::size_t element_count(const BigEndianReader& in, std::size_t element, std::string_view type) {
   if (in.left() % element != 0)
     throw BadInput(Reason::bad_size,
@@ -122,7 +122,7 @@ IgtlImage take_image(BigEndianReader& in) {
       throw BadInput(Reason::bad_size,
                      fmt::format("IMAGE: part of {} at {} in a volume of {}", image.part_size[axis],
                                  image.part_offset[axis], image.size[axis]));
-    // Three sizes of 16 bits and at most 255 * 8 bytes: never over 2^59.
+    // Three 16-bit sizes and at most 255 * 8 bytes: below 2^59.
     expected *= image.part_size[axis];
   }
   if (expected != in.left())
@@ -186,7 +186,7 @@ std::map<std::string, std::string> take_metadata(std::string_view head, std::str
     throw BadInput(Reason::bad_size, fmt::format("metadata: {} entries in {} bytes", count, entries.left()));
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t key_size = entries.take<std::uint16_t>();
-    entries.take(2);  // the encoding: keys that matter here are ASCII
+    entries.take(2);  // the encoding: relevant keys are ASCII
     const std::size_t value_size = entries.take<std::uint32_t>();
     std::string key(texts.take(key_size));
     if (!metadata.emplace(std::move(key), texts.take(value_size)).second)
@@ -202,7 +202,7 @@ IgtlMessage take_message(const IgtlHeader& header, std::string_view body) {
     throw BadInput(Reason::truncated,
                    fmt::format("body of {} bytes, {} announced", body.size(), header.body_size));
   if (crc64(body) != header.crc)
-    throw BadInput({Reason::bad_value, header.type + ": the check sum is wrong", {}, {{"crc", 1}}});
+    throw BadInput({Reason::bad_value, header.type + ": wrong checksum", {}, {{"crc", 1}}});
   IgtlMessage message{header.device, header.stamp, {}, header.version};
   BigEndianReader in(body);
   if (header.version == 2) {
@@ -212,7 +212,7 @@ IgtlMessage take_message(const IgtlHeader& header, std::string_view body) {
     message.id = in.take<std::uint32_t>();
     if (head_size < extended_header_size)
       throw BadInput(Reason::bad_size, fmt::format("extended header of {} bytes", head_size));
-    in.take(head_size - extended_header_size);  // of a later revision
+    in.take(head_size - extended_header_size);  // fields of a later revision
     if (entries_size + texts_size > in.left())
       throw BadInput(Reason::truncated,
                      fmt::format("{} bytes of metadata in {}", entries_size + texts_size, in.left()));
@@ -222,10 +222,10 @@ IgtlMessage take_message(const IgtlHeader& header, std::string_view body) {
     in = content;
   }
   message.content = take_content(in, header.type);
-  // Requests are empty by the protocol, but some peers fill them.
+  // Requests are empty by the protocol, but some peers send content.
   const bool request = header.type.starts_with("GET_") || header.type.starts_with("STP_");
   if (in.left() != 0 && !request)
-    throw BadInput(Reason::bad_size, fmt::format("{}: {} bytes too many", header.type, in.left()));
+    throw BadInput(Reason::bad_size, fmt::format("{}: {} bytes too long", header.type, in.left()));
   return message;
 }
 
@@ -248,7 +248,7 @@ Expected<IgtlHeader> decode_header(std::string_view bytes) {
     header.body_size = in.take<std::uint64_t>();
     header.crc = in.take<std::uint64_t>();
     if (header.version == 0 || !is_type_name(header.type))
-      throw BadInput(Reason::bad_value, "these bytes begin no OpenIGTLink message");
+      throw BadInput(Reason::bad_value, "not an OpenIGTLink header");
     if (header.body_size > body_limit(header.type))
       throw BadInput({Reason::bad_size,
                       fmt::format("{}: body of {} bytes, limit {}", header.type, header.body_size,

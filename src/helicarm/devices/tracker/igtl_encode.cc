@@ -9,9 +9,9 @@
 namespace helicarm {
 namespace {
 
-constexpr std::uint16_t ascii = 3;  // the MIB number of the metadata's encoding
+constexpr std::uint16_t ascii = 3;  // MIB number of the metadata's encoding
 
-/// A length that its field can hold.
+/// A length that fits its field.
 template <class Field>
 Field length(std::size_t size) {
   if (size > std::numeric_limits<Field>::max()) throw std::invalid_argument("text too long for OpenIGTLink");

@@ -15,8 +15,8 @@
 
 namespace helicarm {
 
-// Contents as OpenIGTLink sends them, unchecked but for their lengths: whether a matrix is a pose is for the
-// gate to say. Lengths in mm.
+// OpenIGTLink content, unchecked except for lengths: PoseGate decides whether a matrix is a pose. Lengths in
+// mm.
 
 struct IgtlTransform {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
@@ -27,7 +27,7 @@ struct IgtlTool {
   std::uint8_t type = 1;  ///< 1 tracker, 2 6D, 3 3D, 4 5D
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
 };
-/// TDATA: the tools seen at one moment; hidden ones are absent.
+/// TDATA: the tools visible at one moment; hidden ones are absent.
 struct IgtlTracking {
   std::vector<IgtlTool> tools;
 };
@@ -36,7 +36,7 @@ struct IgtlQuaternionTool {
   std::string name;
   std::uint8_t type = 1;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector4d quaternion{0, 0, 0, 1};  ///< x y z w, as sent: perhaps not of unit length
+  Eigen::Vector4d quaternion{0, 0, 0, 1};  ///< x y z w, as sent: not necessarily of unit length
 };
 /// QTDATA
 struct IgtlQuaternions {
@@ -45,7 +45,7 @@ struct IgtlQuaternions {
 
 struct IgtlPosition {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector4d quaternion{0, 0, 0, 1};  ///< x y z w; no rotation where none is sent
+  Eigen::Vector4d quaternion{0, 0, 0, 1};  ///< x y z w; identity if none is sent
 };
 
 struct IgtlStatus {
@@ -61,11 +61,11 @@ struct IgtlImage {
   std::uint8_t endian = 2;       ///< of the pixels: 1 big, 2 little
   std::uint8_t coordinates = 1;  ///< 1 RAS, 2 LPS
   std::array<std::uint16_t, 3> size{};
-  /// Columns: the three axes, each as long as a pixel, and the centre.
+  /// Columns: the three axes, each of the length of a pixel, and the centre.
   Eigen::Matrix<double, 3, 4> axes_and_centre = Eigen::Matrix<double, 3, 4>::Identity();
   std::array<std::uint16_t, 3> part_offset{};
   std::array<std::uint16_t, 3> part_size{};
-  std::string pixels;  ///< of the part, in the byte order above
+  std::string pixels;  ///< of the sub-volume, in the byte order above
 };
 
 struct IgtlPoint {
@@ -87,7 +87,7 @@ struct IgtlString {
 
 /// STT_TDATA and STT_QTDATA
 struct IgtlStart {
-  std::string what;  ///< the type asked for, e.g. TDATA
+  std::string what;  ///< requested type, e.g. TDATA
   std::int32_t interval_ms = 0;
   std::string coordinates = {};
 };
@@ -99,13 +99,13 @@ struct IgtlStop {
 struct IgtlGet {
   std::string what;
 };
-/// RTS_*: the answer to STT_*, STP_* or GET_*
+/// RTS_*: answer to STT_*, STP_* or GET_*
 struct IgtlReply {
   std::string what;
-  std::uint8_t status = 0;  ///< 0 is well
+  std::uint8_t status = 0;  ///< 0 is OK
 };
 
-/// A type that this program does not know, as it came.
+/// A type that is not supported, as received.
 struct IgtlUnknown {
   std::string type;
   std::string content;
@@ -117,7 +117,7 @@ using IgtlContent =
 
 struct IgtlMessage {
   std::string device;
-  std::uint64_t stamp = 0;  ///< seconds since 1970 in the upper 32 bits, their fraction below; 0: none
+  std::uint64_t stamp = 0;  ///< seconds since 1970 in the upper 32 bits, fraction below; 0: none
   IgtlContent content;
   std::uint16_t version = 1;  ///< of the header; 2 has an identifier and metadata
   std::uint32_t id = 0;
@@ -135,33 +135,33 @@ struct IgtlHeader {
 };
 
 double seconds_from_stamp(std::uint64_t stamp);
-/// Rounded to 2^-32 s; what lies before 1970, or is no number, gives 0.
+/// Rounded to 2^-32 s; times before 1970 and NaN give 0.
 std::uint64_t stamp_from_seconds(double seconds);
 
-/// The longest body taken: 64 MiB of IMAGE (a volume; an X-ray is 2 MiB), 1 MiB of anything else (over 7,000
-/// points).
+/// Largest accepted body: 64 MiB for IMAGE (a volume; an X-ray image is 2 MiB), 1 MiB for other types (over
+/// 7,000 points).
 std::uint64_t body_limit(std::string_view type);
 
-/// The first 58 bytes of a message. `truncated`; `bad_value` where the type is no name or the version is 0,
-/// so that these bytes begin no message; `bad_size` for a body over its limit.
+/// The first 58 bytes of a message. `truncated`; `bad_value` if the type is not a name or the version is 0,
+/// i.e. this is not a header; `bad_size` for a body above its limit.
 Expected<IgtlHeader> decode_header(std::string_view bytes);
 
-/// `body` must be all of header.body_size bytes. `unsupported` for a version over 2, `bad_value` for a wrong
-/// CRC (figure "crc") or content at odds with itself, `truncated` and `bad_size` where lengths do not fit.
+/// `body` must have header.body_size bytes. `unsupported` for a version over 2, `bad_value` for a wrong CRC
+/// (figure "crc") or inconsistent content, `truncated` and `bad_size` for inconsistent lengths.
 Expected<IgtlMessage> decode(const IgtlHeader& header, std::string_view body);
 
-/// Header and body. Names are cut to their fields, matrices rounded to 32 bits. Throws std::invalid_argument
-/// for what does not fit a message: text of STRING or keys over 65,535 bytes.
+/// Header and body. Names are truncated to their fields, matrices rounded to 32 bits. Throws
+/// std::invalid_argument for content that does not fit: text of STRING or keys over 65,535 bytes.
 std::string encode(const IgtlMessage& message);
 
-/// As the header names it, e.g. "TDATA", "STT_TDATA".
+/// Type in the header, e.g. "TDATA", "STT_TDATA".
 std::string type_of(const IgtlContent& content);
 
 /// Bytes of one pixel's component; 0 for a type that does not exist.
 std::size_t scalar_bytes(std::uint8_t scalar_type);
 
-/// Rotation and position as a matrix. A quaternion within 1e-3 of unit length is made so (devices round);
-/// any other scales the rotation, for the gate to see.
+/// Rotation and position as a matrix. A quaternion within 1e-3 of unit length is normalised (devices round);
+/// any other scales the rotation, so that PoseGate rejects it.
 Eigen::Matrix4d matrix_from(const Eigen::Vector3d& position, const Eigen::Vector4d& quaternion);
 
 }  // namespace helicarm

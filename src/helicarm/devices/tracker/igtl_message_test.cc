@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-/// The library's own sample TRANSFORM body (protocol 1), which is no rotation.
+/// The library's sample TRANSFORM body (protocol 1), which is not a rotation.
 constexpr std::string_view sample_body_hex =
     "BF7473CD3E4959E6BE63DD98BE4959E63E12491B3F7852D63E63DD983F7852D6BDC830AE42383660419BC46742383660";
 
@@ -29,7 +29,7 @@ Expected<IgtlMessage> decode_whole(std::string_view bytes) {
   return decode(*header, bytes.substr(IgtlHeader::size));
 }
 
-/// A message with this body and a right check sum.
+/// A message with this body and a correct checksum.
 std::string framed(std::string_view type, std::string_view body, std::uint16_t version = 1) {
   return BigEndianWriter()
       .put(version)
@@ -54,7 +54,7 @@ TEST(Crc64, HasTheKnownCheckValues) {
   EXPECT_EQ(crc64(""), 0u);
 }
 
-TEST(IgtlMessage, KnownBytesAreReadAndWritten) {
+TEST(IgtlMessage, KnownBytesAreDecodedAndEncoded) {
   const std::string bytes = framed("TRANSFORM", from_hex(sample_body_hex));
   const auto message = decode_whole(bytes);
   ASSERT_TRUE(message);
@@ -66,7 +66,7 @@ TEST(IgtlMessage, KnownBytesAreReadAndWritten) {
   EXPECT_EQ(encode(*message), bytes);
 }
 
-TEST(IgtlMessage, EveryKindComesBack) {
+TEST(IgtlMessage, EveryKindRoundTrips) {
   for (const std::uint16_t version : {1, 2})
     for (IgtlMessage message : sample_messages()) {
       message.version = version;
@@ -85,7 +85,7 @@ TEST(IgtlMessage, EveryKindComesBack) {
     }
 }
 
-TEST(IgtlMessage, ExtendedHeaderLiesBeforeAndMetadataBehindTheContent) {
+TEST(IgtlMessage, ExtendedHeaderPrecedesAndMetadataFollowTheContent) {
   const std::string body = BigEndianWriter()
                                .put(std::uint16_t{12})
                                .put(std::uint16_t{10})
@@ -104,7 +104,7 @@ TEST(IgtlMessage, ExtendedHeaderLiesBeforeAndMetadataBehindTheContent) {
   EXPECT_EQ(message->metadata.at("ke"), "OK");
 }
 
-TEST(IgtlMessage, NameThatFillsItsFieldEndsWithTheField) {
+TEST(IgtlMessage, NameThatFillsItsFieldHasNoNul) {
   const IgtlTool tool{"twenty characters xx"};
   IgtlMessage message{"another name of 20 c", 0, IgtlTracking{{tool, tool}}};
   const auto back = decode_whole(encode(message));
@@ -113,7 +113,7 @@ TEST(IgtlMessage, NameThatFillsItsFieldEndsWithTheField) {
   EXPECT_EQ(std::get<IgtlTracking>(back->content).tools[1].name, tool.name);
 }
 
-TEST(IgtlMessage, WrongCheckSumIsDistinguished) {
+TEST(IgtlMessage, WrongChecksumIsReported) {
   std::string bytes = encode(sample_messages()[0]);
   bytes.back() ^= 1;
   const auto message = decode_whole(bytes);
@@ -121,7 +121,7 @@ TEST(IgtlMessage, WrongCheckSumIsDistinguished) {
   EXPECT_TRUE(message.error().figures.contains("crc"));
 }
 
-TEST(IgtlMessage, LengthsAreNotAccepted) {
+TEST(IgtlMessage, InconsistentLengthsAreRefused) {
   EXPECT_EQ(reason_of(framed("TRANSFORM", std::string(47, '\0'))), Reason::truncated);
   EXPECT_EQ(reason_of(framed("TRANSFORM", std::string(49, '\0'))), Reason::bad_size);
   EXPECT_EQ(reason_of(framed("TRANSFORM", "")), Reason::truncated);
@@ -156,7 +156,7 @@ TEST(IgtlMessage, MetadataBeyondTheBodyAreRefused) {
             Reason::truncated);
 }
 
-TEST(IgtlMessage, ImageWhoseSizesLieIsRefused) {
+TEST(IgtlMessage, ImageWithInconsistentSizesIsRefused) {
   IgtlMessage message{"picture", 0, IgtlImage{}};
   auto& image = std::get<IgtlImage>(message.content);
   image.size = image.part_size = {65535, 65535, 65535};
@@ -170,7 +170,7 @@ TEST(IgtlMessage, ImageWhoseSizesLieIsRefused) {
   EXPECT_EQ(reason_of(encode(message)), Reason::bad_size);
 }
 
-TEST(IgtlMessage, MutatedMessagesAreReadOrRefusedButNeverOverread) {
+TEST(IgtlMessage, MutationsAreDecodedOrRefusedWithoutOverread) {
   RandomStream random(41, 0);
   const auto samples = sample_messages();
   int read = 0, refused = 0;
@@ -203,7 +203,7 @@ TEST(IgtlMessage, QuaternionIsNormalisedWithinRounding) {
   EXPECT_TRUE((matrix_from({0, 0, 0}, Eigen::Vector4d::Zero()).topLeftCorner<3, 3>().isZero()));
 }
 
-TEST(IgtlMessage, TimeStampCountsBinaryFractionsOfSeconds) {
+TEST(IgtlMessage, TimeStampIsABinaryFractionOfSeconds) {
   EXPECT_EQ(seconds_from_stamp(0x0000000180000000u), 1.5);
   EXPECT_EQ(stamp_from_seconds(1.5), 0x0000000180000000u);
   EXPECT_NEAR(seconds_from_stamp(stamp_from_seconds(1.8e9 + 0.123456)), 1.8e9 + 0.123456, 3e-7);

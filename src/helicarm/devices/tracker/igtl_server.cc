@@ -23,7 +23,7 @@ std::shared_ptr<const std::string> encoded(const IgtlMessage& message) {
 }  // namespace
 
 struct IgtlServer::Impl {
-  /// Whether a client wants one kind of tracking, and when next.
+  /// Whether a client requested one kind of tracking, and when the next message is due.
   struct Subscription {
     bool wanted = false;
     double interval_s = 0;
@@ -31,7 +31,7 @@ struct IgtlServer::Impl {
 
     bool take(double now_s) {
       if (!wanted) return false;
-      // A source of the very rate asked for must not lose every other pose to its own jitter.
+      // Tolerance for jitter: a source at exactly the requested rate must not lose every other pose.
       if (now_s < due_s - 0.1 * interval_s) return false;
       due_s = std::max(due_s, now_s - interval_s) + interval_s;
       return true;
@@ -41,8 +41,8 @@ struct IgtlServer::Impl {
   struct Client {
     std::shared_ptr<IgtlConnection> connection;
     std::string address;
-    bool leaves = false;  ///< closed, and about to be taken off the list; of the server's thread
-    std::map<std::string, Subscription> tracking;  ///< by TDATA and QTDATA
+    bool leaves = false;  ///< closed, and about to be removed from the list; used on the server's thread only
+    std::map<std::string, Subscription> tracking;  ///< TDATA and QTDATA
   };
 
   Impl(const IgtlServerOptions& given, OnMessage message) : options(given), on_message(std::move(message)) {}
@@ -61,13 +61,13 @@ struct IgtlServer::Impl {
   const OnMessage on_message;
   asio::io_context io{1};
   asio::ip::tcp::acceptor acceptor{io};
-  asio::steady_timer breath{io};
+  asio::steady_timer retry_timer{io};
   std::list<Client> clients;
   std::atomic<std::size_t> unsent = 0;
   LineLimit lines{20};
   std::uint16_t port = 0;
 
-  mutable std::mutex mutex;  ///< of the clients' list and the totals
+  mutable std::mutex mutex;  ///< guards the clients' list and the totals
   Counters totals;
   std::jthread thread;
 };
@@ -94,9 +94,9 @@ void IgtlServer::Impl::accept() {
       welcome(std::move(socket));
       return accept();
     }
-    // Out of file descriptors, say: try again when some are free.
-    breath.expires_after(std::chrono::milliseconds(100));
-    breath.async_wait([this](asio::error_code stopped) {
+    // Without file descriptors: retry when some are free.
+    retry_timer.expires_after(std::chrono::milliseconds(100));
+    retry_timer.async_wait([this](asio::error_code stopped) {
       if (!stopped) accept();
     });
   });
@@ -104,11 +104,10 @@ void IgtlServer::Impl::accept() {
 
 void IgtlServer::Impl::note(const std::string& line) {
   if (const auto left_out = lines.pass())
-    options.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines left out)", line, *left_out));
+    options.on_notice(*left_out == 0 ? line : fmt::format("{} ({} lines omitted)", line, *left_out));
 }
 
-/// Whether there is room for one more; where there is none, the client that has sent and taken nothing for
-/// longest is ended.
+/// Whether there is room for another client; if not, the client idle for longest is disconnected.
 bool IgtlServer::Impl::make_room() {
   const auto staying = std::ranges::count(clients, false, &Client::leaves);
   if (static_cast<std::size_t>(staying) < options.max_clients) return true;
@@ -120,7 +119,7 @@ bool IgtlServer::Impl::make_room() {
       longest = it;
   const bool found = longest != clients.end();
   count(found ? "evicted" : "refused");
-  if (found) longest->connection->cut("makes room for another client");
+  if (found) longest->connection->cut("replaced by another client");
   return found;
 }
 
@@ -131,8 +130,8 @@ void IgtlServer::Impl::count(const char* what) {
 
 void IgtlServer::Impl::leave(std::list<Client>::iterator client, const std::string& why) {
   client->leaves = true;
-  if (client->connection->was_cut()) note(fmt::format("client {}: cut off: {}", client->address, why));
-  // The list is walked when a connection closes while it is sent to.
+  if (client->connection->was_cut()) note(fmt::format("client {}: disconnected: {}", client->address, why));
+  // Posted: a connection can close while the list is iterated to send.
   asio::post(io, [this, client] {
     const std::lock_guard lock(mutex);
     add_counters(totals, client->connection->counters());
@@ -146,7 +145,7 @@ void IgtlServer::Impl::welcome(asio::ip::tcp::socket socket) {
   if (gone) return;
   const std::string address = fmt::format("{}:{}", peer.address().to_string(), peer.port());
   if (!make_room())
-    return note(fmt::format("client {}: turned away: {} clients are here", address, options.max_clients));
+    return note(fmt::format("client {}: rejected: {} clients are connected", address, options.max_clients));
   count("connections");
   const ConnectionLimits limits{options.queue_messages, options.queue_bytes, options.stall_s,
                                 options.body_bytes};

@@ -13,17 +13,17 @@
 namespace helicarm {
 
 struct IgtlServerOptions {
-  std::string address = "127.0.0.1";  ///< numeric; the protocol has neither password nor secrecy
-  std::uint16_t port = 0;             ///< 0: any that is free
-  /// Of a full server the one makes room that has sent and taken nothing for longest, and for `stall_s`.
+  std::string address = "127.0.0.1";  ///< numeric; the protocol has neither authentication nor encryption
+  std::uint16_t port = 0;             ///< 0: any free port
+  /// On a full server the client idle for longest, and for at least `stall_s`, is replaced.
   std::size_t max_clients = 32;
-  std::size_t queue_messages = 256;                ///< held for a slow client; the oldest are dropped beyond
+  std::size_t queue_messages = 256;                ///< queue of a slow client; beyond, the oldest are dropped
   std::size_t queue_bytes = std::size_t{8} << 20;  ///< likewise
-  double stall_s = 5;                              ///< a client that takes nothing for so long is cut off
-  std::uint64_t body_bytes = std::uint64_t{1} << 20;  ///< of a client's message; it is cut off beyond
-  std::size_t unsent_messages = 1024;  ///< that wait for the server's thread; the newest are dropped beyond
-  bool tracking_on_request = true;     ///< TDATA and QTDATA go only to clients that sent STT_
-  /// A line for a log on each client that was cut off or turned away, at most 20 a second.
+  double stall_s = 5;  ///< a client that reads nothing for this time is disconnected
+  std::uint64_t body_bytes = std::uint64_t{1} << 20;  ///< of a client's message; beyond, it is disconnected
+  std::size_t unsent_messages = 1024;  ///< queue to the server's thread; beyond, the newest are dropped
+  bool tracking_on_request = true;     ///< send TDATA and QTDATA only to clients that sent STT_
+  /// Log line for each client that was disconnected or rejected, at most 20 per second.
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
 };
 
@@ -34,23 +34,23 @@ struct IgtlServerStatus {
   Counters counters;
 };
 
-/// An OpenIGTLink server on a thread of its own. It answers STT_, STP_ and GET_STATUS by itself; no client
-/// can hold up another.
+/// An OpenIGTLink server on its own thread. It answers STT_, STP_ and GET_STATUS itself; clients cannot block
+/// each other.
 class IgtlServer {
  public:
   using OnMessage = std::function<void(const IgtlMessage&)>;
 
-  /// Listens when it returns. Fails with `bad_value` (address) and `port_taken`. `on_message` and
-  /// `on_notice` are called on the server's thread; they must not call stop().
+  /// Listens on return. Fails with `bad_value` (address) and `port_taken`. `on_message` and `on_notice` are
+  /// called on the server's thread; they must not call stop().
   static Expected<std::unique_ptr<IgtlServer>> start(const IgtlServerOptions& options,
                                                      OnMessage on_message = {});
   ~IgtlServer();
 
   std::uint16_t port() const;
-  /// To all clients, tracking no faster than each asked for. From any thread.
+  /// To all clients, tracking at most at the rate each requested. Thread-safe.
   void send(const IgtlMessage& message);
-  IgtlServerStatus status() const;  ///< from any thread
-  /// Returns at once, with the thread ended and the port free; what is queued is not sent.
+  IgtlServerStatus status() const;  ///< thread-safe
+  /// Returns at once, with the thread ended and the port free; queued messages are not sent.
   void stop();
 
  private:

@@ -18,7 +18,7 @@ namespace {
 
 using asio::ip::tcp;
 
-/// Waits for another thread's deed; gives up after a time in which only a broken program does not do it.
+/// Waits for a condition on another thread, with a timeout far above the expected time.
 template <class Condition>
 bool eventually(Condition condition) {
   const double since = monotonic_seconds();
@@ -36,7 +36,7 @@ std::uint64_t count_of(const Counters& counters, const std::string& name) {
 
 std::unique_ptr<IgtlServer> a_server(IgtlServerOptions options = {}) { return *IgtlServer::start(options); }
 
-/// A client that keeps what comes.
+/// A client that stores received messages.
 struct Listener {
   explicit Listener(std::uint16_t port, IgtlClientOptions options = {}) {
     options.port = port;
@@ -62,7 +62,7 @@ struct Listener {
   std::unique_ptr<IgtlClient> client;
 };
 
-/// A peer that does what it likes on the socket.
+/// A peer that sends raw bytes.
 struct RawPeer {
   asio::io_context io;
   tcp::acceptor acceptor{io, {asio::ip::address_v4::loopback(), 0}};
@@ -102,7 +102,7 @@ TEST(IgtlSockets, EveryKindOfMessageArrives) {
   EXPECT_EQ(listener.bytes, expected);
 }
 
-TEST(IgtlSockets, TrackingIsSentToThoseWhoAsk) {
+TEST(IgtlSockets, TrackingIsSentToSubscribers) {
   const auto server = a_server();
   IgtlClientOptions asking;
   asking.ask_for_tracking = true;
@@ -129,7 +129,7 @@ TEST(IgtlSockets, StatusIsAnswered) {
   EXPECT_EQ(listener.last_device(), "tracker");
 }
 
-TEST(IgtlSockets, PortThatIsTakenIsReportedAndFreeAgainAfterStop) {
+TEST(IgtlSockets, PortInUseIsReportedAndFreeAgainAfterStop) {
   const auto server = a_server();
   IgtlServerOptions same;
   same.port = server->port();
@@ -164,7 +164,7 @@ TEST(IgtlSockets, StopsInEveryState) {
   EXPECT_FALSE(waiting.client->status().trouble.empty());
 }
 
-TEST(IgtlSockets, ServerThatRestartsWithOtherNamesIsFoundAgain) {
+TEST(IgtlSockets, RestartedServerWithOtherNamesIsFoundAgain) {
   auto server = a_server();
   IgtlServerOptions same;
   same.port = server->port();
@@ -178,7 +178,7 @@ TEST(IgtlSockets, ServerThatRestartsWithOtherNamesIsFoundAgain) {
     server = a_server(same);
   }
   EXPECT_GE(count_of(listener.client->status().counters, "connections"), 3u);
-  // It is counted once it has been taken.
+  // Counted after processing.
   EXPECT_TRUE(eventually([&] { return count_of(listener.client->status().counters, "messages") == 3; }));
 }
 
@@ -190,7 +190,7 @@ TEST(IgtlSockets, PausesGrowUntilAMessageComes) {
   EXPECT_EQ(pauses, (std::vector<double>{0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5, 5}));
 }
 
-TEST(IgtlSockets, ServerThatDisconnectsIsTriedAgain) {
+TEST(IgtlSockets, ServerThatDisconnectsIsRetried) {
   RawPeer peer;
   Listener listener(peer.port());
   for (int i = 0; i < 4; ++i) {
@@ -202,7 +202,7 @@ TEST(IgtlSockets, ServerThatDisconnectsIsTriedAgain) {
   ASSERT_TRUE(eventually([&] { return listener.count == 1; }));
 }
 
-TEST(IgtlSockets, SilentServerIsLeft) {
+TEST(IgtlSockets, SilentServerIsDisconnected) {
   RawPeer peer;
   IgtlClientOptions options;
   options.silence_s = 0.05;
@@ -213,7 +213,7 @@ TEST(IgtlSockets, SilentServerIsLeft) {
   EXPECT_GE(count_of(listener.client->status().counters, "silences"), 1u);
 }
 
-TEST(IgtlSockets, SegmentsOfOneByteAndHalvesOfMessagesAreJoined) {
+TEST(IgtlSockets, FragmentedMessagesAreJoined) {
   RawPeer peer;
   Listener listener(peer.port());
   peer.accept();
@@ -231,7 +231,7 @@ TEST(IgtlSockets, SegmentsOfOneByteAndHalvesOfMessagesAreJoined) {
   EXPECT_EQ(listener.bytes, expected + whole);
 }
 
-TEST(IgtlSockets, NonsenseEndsTheConnectionAndNotTheClient) {
+TEST(IgtlSockets, InvalidDataEndsTheConnectionAndNotTheClient) {
   RawPeer peer;
   Listener listener(peer.port());
   std::string huge = encode({"x", 0, IgtlTransform{}});
@@ -248,7 +248,7 @@ TEST(IgtlSockets, NonsenseEndsTheConnectionAndNotTheClient) {
   ASSERT_TRUE(eventually([&] { return listener.last_device() == "sound"; }));
 }
 
-TEST(IgtlSockets, SpoiledMessageAmongGoodOnesIsCounted) {
+TEST(IgtlSockets, DamagedMessageBetweenValidOnesIsCounted) {
   RawPeer peer;
   Listener listener(peer.port());
   peer.accept();
@@ -259,7 +259,7 @@ TEST(IgtlSockets, SpoiledMessageAmongGoodOnesIsCounted) {
   ASSERT_TRUE(eventually([&] { return count_of(listener.client->status().counters, "wrong_crc") == 1; }));
 }
 
-TEST(IgtlSockets, FloodIsTakenWhole) {
+TEST(IgtlSockets, FloodIsReceivedCompletely) {
   RawPeer peer;
   PoseBoard board;
   IgtlClientOptions options;
@@ -282,7 +282,7 @@ TEST(IgtlSockets, FloodIsTakenWhole) {
   EXPECT_EQ(board.tools(monotonic_seconds())[0].accepted, static_cast<unsigned>(flood));
 }
 
-TEST(IgtlSockets, ServerSurvivesAStormOfConnections) {
+TEST(IgtlSockets, ServerSurvivesManyConnections) {
   const auto server = a_server();
   for (int i = 0; i < 200; ++i) {
     RawPeer peer;
@@ -291,7 +291,7 @@ TEST(IgtlSockets, ServerSurvivesAStormOfConnections) {
     if (i % 3 == 1) peer.write(encode(sample_messages()[0]).substr(0, 70));
   }
   Listener listener(server->port());
-  // Some of the storm may still wait to be accepted: the listener's turn comes after.
+  // Some connections may still wait to be accepted: the listener comes after them.
   ASSERT_TRUE(eventually([&] {
     server->send({"still here", 0, IgtlTransform{}});
     return listener.last_device() == "still here";
@@ -299,7 +299,7 @@ TEST(IgtlSockets, ServerSurvivesAStormOfConnections) {
   EXPECT_TRUE(all_connected(*server, 1));
 }
 
-TEST(IgtlSockets, ClientsOverTheLimitAreTurnedAway) {
+TEST(IgtlSockets, ClientsAboveTheLimitAreRejected) {
   IgtlServerOptions options;
   options.max_clients = 2;
   options.stall_s = 3600;
@@ -313,7 +313,7 @@ TEST(IgtlSockets, ClientsOverTheLimitAreTurnedAway) {
   EXPECT_EQ(count_of(server->status().counters, "refused"), 1u);
 }
 
-TEST(IgtlSockets, ClientThatDoesNotReadHoldsUpNoOne) {
+TEST(IgtlSockets, ClientThatDoesNotReadBlocksNoOther) {
   IgtlServerOptions options;
   options.queue_messages = 4;
   const auto server = a_server(options);
@@ -333,7 +333,7 @@ TEST(IgtlSockets, ClientThatDoesNotReadHoldsUpNoOne) {
   EXPECT_LT(sent, 1000);
 }
 
-TEST(IgtlSockets, ClientThatTakesNothingIsCutOff) {
+TEST(IgtlSockets, StalledClientIsDisconnected) {
   IgtlServerOptions options;
   options.stall_s = 0.05;
   const auto server = a_server(options);
@@ -347,7 +347,7 @@ TEST(IgtlSockets, ClientThatTakesNothingIsCutOff) {
   }));
 }
 
-TEST(IgtlSockets, ClientThatIsCutOffIsCountedAndNoted) {
+TEST(IgtlSockets, DisconnectedClientIsCountedAndLogged) {
   IgtlServerOptions options;
   options.stall_s = 0.05;
   std::atomic<int> notes = 0;
@@ -367,7 +367,7 @@ TEST(IgtlSockets, ClientThatIsCutOffIsCountedAndNoted) {
   EXPECT_EQ(count_of(server->status().counters, "cut"), 1u);
 }
 
-TEST(IgtlSockets, BytesHeldForAClientAreBounded) {
+TEST(IgtlSockets, BytesQueuedForAClientAreBounded) {
   IgtlServerOptions options;
   options.queue_bytes = 1000000;
   options.stall_s = 3600;
@@ -377,7 +377,7 @@ TEST(IgtlSockets, BytesHeldForAClientAreBounded) {
   ASSERT_TRUE(all_connected(*server, 1));
   const IgtlMessage large{"large", 0, IgtlUnknown{"LARGE", std::string(400000, 'x')}};
   for (int i = 0; i < 100; ++i) server->send(large);
-  // 40 MB against what the system's sockets hold, one million bytes on their way and one that wait.
+  // 40 MB exceed the socket buffers, one million bytes being sent and one million queued.
   EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "dropped") > 50; }));
 }
 
@@ -386,13 +386,13 @@ TEST(IgtlSockets, MessageOverTheServersLimitEndsTheConnection) {
   RawPeer peer;
   peer.dial(server->port());
   std::string header = encode({"x", 0, IgtlImage{}}).substr(0, IgtlHeader::size);
-  header[45] = 16;  // a body of over 1 MiB
+  header[45] = 16;  // body of over 1 MiB
   peer.write(header);
   EXPECT_TRUE(peer.is_disconnected());
   EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "cut") == 1; }));
 }
 
-TEST(IgtlSockets, WhatAServerThatIsHeldUpCannotSendIsDropped) {
+TEST(IgtlSockets, MessagesAStalledServerCannotSendAreDropped) {
   IgtlServerOptions options;
   options.unsent_messages = 10;
   std::atomic<bool> held = false, free = false;
@@ -410,7 +410,7 @@ TEST(IgtlSockets, WhatAServerThatIsHeldUpCannotSendIsDropped) {
   EXPECT_TRUE(eventually([&] { return count_of(server->status().counters, "sent") == 10; }));
 }
 
-TEST(IgtlSockets, ClientIdleForLongestMakesRoomOnAFullServer) {
+TEST(IgtlSockets, ClientIdleForLongestIsReplacedOnAFullServer) {
   IgtlServerOptions options;
   options.max_clients = 2;
   options.stall_s = 0.05;

@@ -24,7 +24,7 @@ Expected<void> IgtlStream::feed(std::string_view bytes, const Sink& sink) {
   return {};
 }
 
-/// Delivers every message that is all there, and says how many bytes are done with.
+/// Delivers every complete message; returns the number of bytes consumed.
 Expected<std::size_t> IgtlStream::consume(std::string_view bytes, const Sink& sink) {
   std::size_t used = 0;
   while (true) {
@@ -59,7 +59,7 @@ Expected<void> IgtlStream::deliver(std::string_view body, const Sink& sink) {
   if (failure.figures.contains("crc")) {
     ++counters_["wrong_crc"];
     if (++wrong_crcs_ == max_wrong_crcs)
-      return fail(Reason::bad_value, fmt::format("{} wrong check sums in a row", max_wrong_crcs));
+      return fail(Reason::bad_value, fmt::format("{} consecutive wrong checksums", max_wrong_crcs));
   } else {
     ++counters_[failure.reason == Reason::unsupported ? "unsupported_version" : "malformed"];
   }

@@ -12,28 +12,28 @@
 
 namespace helicarm {
 
-/// Cuts a connection's bytes, however they are segmented, into messages. A message that is unsound within
+/// Splits a connection's bytes into messages, independent of segmentation. A message that is invalid within
 /// its announced length is dropped and counted: "messages", "wrong_crc", "unsupported_version", "malformed";
 /// "unknown_type" counts among the messages.
 class IgtlStream {
  public:
   using Sink = std::function<void(IgtlMessage&&)>;
 
-  /// Of bodies, where it is less than `body_limit` of their type.
+  /// Limit of bodies, if below `body_limit` of their type.
   explicit IgtlStream(std::uint64_t most_body_bytes = std::uint64_t{64} << 20)
       : most_body_bytes_(most_body_bytes) {}
 
-  /// Fails when the place of the next message is lost, so that the connection must be closed: what follows
-  /// is no header, a body over its limit, or `max_wrong_crcs` wrong check sums in a row.
+  /// Fails when message boundaries are lost and the connection must be closed: an invalid header, a body
+  /// above its limit, or `max_wrong_crcs` consecutive wrong checksums.
   Expected<void> feed(std::string_view bytes, const Sink& sink);
 
   const Counters& counters() const { return counters_; }
-  /// Bytes held back until the rest of their message comes.
+  /// Bytes of an incomplete message.
   std::size_t held() const { return held_.size(); }
-  /// Memory that this takes: of a large message it is given back when that is done with.
+  /// Memory in use; that of a large message is released afterwards.
   std::size_t memory() const { return held_.capacity(); }
 
-  /// One flipped bit spoils one message; so many spoil the stream.
+  /// One bit error damages one message; this many indicate a lost stream.
   static constexpr int max_wrong_crcs = 5;
 
  private:

@@ -24,7 +24,7 @@ struct Collector {
   }
 };
 
-TEST(IgtlStream, SegmentsDoNotMatter) {
+TEST(IgtlStream, ResultIsIndependentOfSegmentation) {
   const std::string bytes = all_samples();
   RandomStream random(5, 0);
   for (const std::uint32_t longest : {1u, 2u, 57u, 59u, 400u, 100000u}) {
@@ -40,7 +40,7 @@ TEST(IgtlStream, SegmentsDoNotMatter) {
   }
 }
 
-TEST(IgtlStream, HalfAMessageWaits) {
+TEST(IgtlStream, IncompleteMessageWaits) {
   Collector collector;
   const std::string bytes = encode(sample_messages()[0]);
   ASSERT_TRUE(collector.feed(bytes.substr(0, 80)));
@@ -49,14 +49,14 @@ TEST(IgtlStream, HalfAMessageWaits) {
   EXPECT_EQ(collector.again, bytes);
 }
 
-TEST(IgtlStream, AnnouncedLengthTakesNoMemory) {
+TEST(IgtlStream, AnnouncedLengthAllocatesNoMemory) {
   Collector collector;
   IgtlMessage image{"i", 0, IgtlUnknown{"IMAGE", std::string(1 << 20, 'x')}};
   ASSERT_TRUE(collector.feed(encode(image).substr(0, 100)));
   EXPECT_LT(collector.stream.held(), 100u);
 }
 
-TEST(IgtlStream, MemoryOfALargeMessageIsGivenBack) {
+TEST(IgtlStream, MemoryOfALargeMessageIsReleased) {
   Collector collector;
   const std::string large = encode({"i", 0, IgtlUnknown{"LARGE", std::string(1 << 20, 'x')}});
   for (std::size_t at = 0; at < large.size(); at += 1000)
@@ -65,7 +65,7 @@ TEST(IgtlStream, MemoryOfALargeMessageIsGivenBack) {
   EXPECT_LT(collector.stream.memory(), std::size_t{1} << 17);
 }
 
-TEST(IgtlStream, BodyOverItsOwnLimitEndsTheStream) {
+TEST(IgtlStream, BodyAboveItsLimitEndsTheStream) {
   IgtlStream stream(100);
   const auto ignore = [](IgtlMessage&&) {};
   EXPECT_TRUE(stream.feed(encode({"i", 0, IgtlUnknown{"LARGE", std::string(100, 'x')}}), ignore));
@@ -73,7 +73,7 @@ TEST(IgtlStream, BodyOverItsOwnLimitEndsTheStream) {
             Reason::bad_size);
 }
 
-TEST(IgtlStream, SpoiledMessageIsDroppedAndTheNextOneRead) {
+TEST(IgtlStream, DamagedMessageIsDroppedAndTheNextOneRead) {
   const std::string sound = encode(sample_messages()[0]);
   std::string spoiled = sound, newer = sound;
   spoiled[70] ^= 4;
@@ -84,7 +84,7 @@ TEST(IgtlStream, SpoiledMessageIsDroppedAndTheNextOneRead) {
             (Counters{{"messages", 3}, {"wrong_crc", 1}, {"unsupported_version", 1}, {"unknown_type", 1}}));
 }
 
-TEST(IgtlStream, WrongCheckSumsInARowEndTheStream) {
+TEST(IgtlStream, ConsecutiveWrongChecksumsEndTheStream) {
   std::string spoiled = encode(sample_messages()[0]);
   spoiled[70] ^= 4;
   Collector collector;
@@ -92,14 +92,14 @@ TEST(IgtlStream, WrongCheckSumsInARowEndTheStream) {
   EXPECT_FALSE(collector.feed(spoiled));
 }
 
-TEST(IgtlStream, NonsenseEndsTheStream) {
+TEST(IgtlStream, InvalidHeaderEndsTheStream) {
   EXPECT_EQ(Collector().feed(std::string(58, '\0')).error().reason, Reason::bad_value);
   std::string huge = encode(sample_messages()[0]);
   huge[42] = '\x80';
   EXPECT_EQ(Collector().feed(huge).error().reason, Reason::bad_size);
 }
 
-TEST(IgtlStream, AnyBytesAreTakenOrRefused) {
+TEST(IgtlStream, AnyBytesAreAcceptedOrRefused) {
   RandomStream random(6, 0);
   const std::string sound = all_samples();
   for (int trial = 0; trial < 2000; ++trial) {

@@ -15,11 +15,12 @@ namespace helicarm {
 namespace {
 
 constexpr int min_pivot_poses = 4;
-/// Of Gaussian errors in space the median is 1.5 sigma: five times that is 7.7.
+/// For Gaussian errors in 3-D the median is 1.5 sigma: five times that is 7.7 sigma.
 constexpr double pivot_outlier_medians = 5;
 constexpr double max_pivot_outlier_share = 0.25;
 
-/// The least rms turn of a direction fixed in the tool, rad: what tells the tip's place along it.
+/// Smallest rms rotation of a direction fixed in the tool, rad: it determines the tip's position along that
+/// direction.
 double least_turn(const std::vector<RigidTransform>& poses) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
   for (const RigidTransform& pose : poses) mean += pose.rotation / static_cast<double>(poses.size());
@@ -38,7 +39,7 @@ Eigen::Vector3d miss(const RigidTransform& pose, const PivotFit& fit) {
   return pose * fit.tip_and_pivot.head<3>() - fit.tip_and_pivot.tail<3>();
 }
 
-/// The rotation's noise moves the tip across its lever, which is known after a first round.
+/// The rotation noise moves the tip across its lever, which is known after a first iteration.
 PivotFit fit_pivot(const std::vector<RigidTransform>& poses, double sigma_mm, double sigma_rad) {
   constexpr int rounds = 3;
   PivotFit fit;
@@ -120,7 +121,7 @@ Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> track
       result.outliers > max_pivot_outlier_share * static_cast<double>(tracker_from_tool.size()))
     return fail(
         Reason::residual_too_large,
-        fmt::format("the tip misses its pivot by {:.3g} mm rms, limit {:g} mm, with {} outliers of {}",
+        fmt::format("distance of the tip from its pivot {:.3g} mm rms, limit {:g} mm, with {} outliers of {}",
                     result.rms_mm, options.max_rms_mm, result.outliers, tracker_from_tool.size()),
         {{"rms_mm", result.rms_mm}, {"outliers", static_cast<double>(result.outliers)}});
   return result;

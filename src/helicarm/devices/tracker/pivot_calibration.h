@@ -9,11 +9,11 @@
 namespace helicarm {
 
 struct PivotOptions {
-  /// The tracker's noise per axis about the marker's origin; both 0: judged by the residuals, as if all of it
-  /// were translation.
+  /// The tracker's noise per axis about the marker's origin; both 0: estimated from the residuals, as if all
+  /// of it were translation.
   double sigma_mm = 0;
   double sigma_deg = 0;
-  double min_turn_deg = 10;  ///< rms turn across the tip's least turned direction
+  double min_turn_deg = 10;  ///< rms rotation across the least rotated direction
   double max_rms_mm = 1;
 };
 
@@ -27,9 +27,9 @@ struct PivotCalibration {
   int outliers = 0;
 };
 
-/// The tip of a pointer that was turned about its resting tip: R p + t = q for all poses, by weighted least
-/// squares. Refuses with figures: fewer than four poses, or too little turn (`poses_too_alike`); rms over the
-/// limit or over a quarter outliers (`residual_too_large`: the tip slipped).
+/// Tip of a pointer pivoted about its resting tip: R p + t = q for all poses, by weighted least squares.
+/// Refuses with figures: fewer than four poses, or too little rotation (`poses_too_alike`); rms above the
+/// limit or more than a quarter outliers (`residual_too_large`: the tip slipped).
 Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> tracker_from_tool,
                                            const PivotOptions& options = {});
 

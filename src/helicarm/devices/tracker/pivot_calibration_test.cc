@@ -67,20 +67,20 @@ TEST(PivotCalibration, ExactPosesGiveTheExactTip) {
   EXPECT_EQ(fitted->used, 60);
 }
 
-TEST(PivotCalibration, CovarianceOfKnownNoiseHoldsTheTruth) {
+TEST(PivotCalibration, CovarianceOfKnownNoiseContainsTheTruth) {
   Pointer pointer;
   pointer.sigma_mm = 0.2;
   pointer.sigma_deg = 0.1;
   EXPECT_NEAR(coverage(pointer, {0.2, 0.1}), 0.95, 0.02);
 }
 
-TEST(PivotCalibration, CovarianceOfNoiseJudgedByTheResidualsHoldsTheTruth) {
+TEST(PivotCalibration, CovarianceOfEstimatedNoiseContainsTheTruth) {
   Pointer pointer;
   pointer.sigma_mm = 0.2;
   EXPECT_NEAR(coverage(pointer, {}), 0.95, 0.02);
 }
 
-TEST(PivotCalibration, SlipsAreThrownOut) {
+TEST(PivotCalibration, SlipsAreRejected) {
   Pointer pointer;
   pointer.sigma_mm = 0.1;
   auto poses = turned(pointer);
@@ -91,16 +91,16 @@ TEST(PivotCalibration, SlipsAreThrownOut) {
   EXPECT_LT((fitted->tip_in_tool - tip).norm(), 0.2);
 }
 
-TEST(PivotCalibration, TipThatWandersIsRefused) {
+TEST(PivotCalibration, MovingTipIsRefused) {
   Pointer pointer;
   pointer.sigma_mm = 2;
   EXPECT_EQ(calibrate_pivot(turned(pointer)).error().reason, Reason::residual_too_large);
 }
 
-TEST(PivotCalibration, TooLittleTurnIsRefused) {
+TEST(PivotCalibration, TooLittleRotationIsRefused) {
   const auto reason = [](const Pointer& pointer) { return calibrate_pivot(turned(pointer)).error().reason; };
   EXPECT_EQ(reason({.poses = 60, .tilt_deg = 3}), Reason::poses_too_alike);
-  EXPECT_EQ(reason({.poses = 60, .tilt_deg = 0}), Reason::poses_too_alike);  // spin about one axis only
+  EXPECT_EQ(reason({.poses = 60, .tilt_deg = 0}), Reason::poses_too_alike);  // rotation about one axis only
   EXPECT_EQ(reason({.poses = 3}), Reason::poses_too_alike);
   EXPECT_EQ(reason({.poses = 0}), Reason::poses_too_alike);
 }

@@ -81,7 +81,7 @@ void PoseBoard::forget_time() {
 Expected<const PoseBoard::Tool*> PoseBoard::known(const std::string& name) const {
   const auto found = tools_.find(name);
   if (found == tools_.end() || found->second.buffer.size() == 0)
-    return fail(Reason::no_pose, fmt::format("no pose of \"{}\" has come", name));
+    return fail(Reason::no_pose, fmt::format("no pose of \"{}\" received", name));
   return &found->second;
 }
 
@@ -119,7 +119,7 @@ Expected<ExposurePose> PoseBoard::at(const std::string& name, double time_s,
   const double reach = std::max(options.window_s, options.max_gap_s);
   std::vector<PoseSample> samples = between(name, time_s - reach, time_s + reach);
   if (samples.empty()) {
-    // So that the refusal says how old the newest one is.
+    // Reports the age of the newest pose in the refusal.
     const auto newest = latest(name, time_s, 0);
     if (!newest) return tl::unexpected(newest.error());
     samples.push_back(*newest);

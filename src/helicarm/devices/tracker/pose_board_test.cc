@@ -13,14 +13,14 @@ Eigen::Matrix4d pose_at(double x, double turn = 0) {
   return RigidTransform{rotation_from_vector({0.2, 0.1, turn}), {x, 0, 800}}.matrix();
 }
 
-/// A pose a little different each time, as a tracker gives.
+/// A pose with small changes, like a tracker's.
 Eigen::Matrix4d alive(double x, double time_s) { return pose_at(x + 1e-3 * std::sin(1000 * time_s)); }
 
 IgtlMessage stamped(IgtlContent content, double time_s, std::string device = "tracker") {
   return {std::move(device), stamp_from_seconds(1.7e9 + time_s), std::move(content)};
 }
 
-TEST(PoseBoard, EveryKindOfPoseIsTaken) {
+TEST(PoseBoard, EveryKindOfPoseIsAccepted) {
   PoseBoard board;
   board.take(stamped(IgtlTransform{pose_at(1)}, 1, "femur"), 1);
   board.take(stamped(IgtlTracking{{{"tibia", 1, pose_at(2)}, {"tool", 1, pose_at(3)}}}, 1), 1);
@@ -31,7 +31,7 @@ TEST(PoseBoard, EveryKindOfPoseIsTaken) {
     EXPECT_NEAR(board.latest(tool, 1.05)->tracker_from_tool.translation.x(), x++, 1e-6) << tool;
 }
 
-TEST(PoseBoard, OldPoseIsNeverGiven) {
+TEST(PoseBoard, OldPoseIsNeverReturned) {
   PoseBoard board;
   EXPECT_EQ(board.latest("tool", 1).error().reason, Reason::no_pose);
   board.take(stamped(IgtlTransform{pose_at(1)}, 1, "tool"), 1);
@@ -56,7 +56,7 @@ TEST(PoseBoard, ToolLostWhileDrillingIsStaleWithinATenthOfASecond) {
   }
 }
 
-TEST(PoseBoard, NameGivenTwiceIsAcceptedForNeither) {
+TEST(PoseBoard, DuplicateNameIsRejected) {
   PoseBoard board;
   board.take(stamped(IgtlTracking{{{"a", 1, pose_at(1)}, {"b", 1, pose_at(2)}, {"a", 1, pose_at(3)}}}, 1), 1);
   EXPECT_FALSE(board.latest("a", 1));
@@ -87,7 +87,7 @@ TEST(PoseBoard, SwappedToolsAreRejectedAndCounted) {
   EXPECT_EQ(board.latest("femur", 0.975).error().reason, Reason::stale_pose);
 }
 
-TEST(PoseBoard, FloodOfNamesIsBounded) {
+TEST(PoseBoard, NumberOfNamesIsBounded) {
   PoseBoard board;
   for (int i = 0; i < 1000; ++i)
     board.take(stamped(IgtlTransform{pose_at(1)}, 1, fmt::format("tool {}", i)), 1);
@@ -95,7 +95,7 @@ TEST(PoseBoard, FloodOfNamesIsBounded) {
   EXPECT_EQ(board.names_refused(), 1000u - 64u);
 }
 
-TEST(PoseBoard, MessageOfAsManyToolsAsItHoldsIsBounded) {
+TEST(PoseBoard, MessageOfManyToolsIsBounded) {
   constexpr int most = 14979;  // of 70 bytes in 1 MiB
   IgtlTracking tracking;
   for (int i = 0; i < most; ++i) tracking.tools.push_back({fmt::format("tool {}", i), 1, pose_at(1)});
@@ -114,7 +114,7 @@ TEST(PoseBoard, RestartedDeviceWithAnEarlierClockIsAcceptedAtOnce) {
   EXPECT_TRUE(board.tools(11)[0].rejected.empty());
 }
 
-TEST(PoseBoard, PoseOfAnExposureComesFromBothSidesOfIt) {
+TEST(PoseBoard, PoseOfAnAcquisitionUsesBothSides) {
   PoseBoard board;
   for (int i = 0; i < 80; ++i)
     board.take(stamped(IgtlTransform{alive(1, i / 40.0)}, i / 40.0, "tool"), i / 40.0);
@@ -125,7 +125,7 @@ TEST(PoseBoard, PoseOfAnExposureComesFromBothSidesOfIt) {
   EXPECT_NEAR(board.tools(1.98)[0].rate_hz, 40, 1);
 }
 
-TEST(PoseBoard, DevicesStatusIsKept) {
+TEST(PoseBoard, DeviceStatusIsKept) {
   PoseBoard board;
   EXPECT_FALSE(board.status());
   board.take(stamped(IgtlStatus{18, 0, "Temperature", "too warm"}, 1), 1);

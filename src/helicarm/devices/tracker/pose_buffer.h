@@ -9,18 +9,18 @@
 
 namespace helicarm {
 
-/// The newest poses of one tool, in the order of their times.
+/// The newest poses of one tool, ordered by time.
 class PoseBuffer {
  public:
   /// 4,096 poses: a minute at 60 Hz, four seconds at 1,000 Hz.
   explicit PoseBuffer(std::size_t capacity = 4096) : capacity_(capacity) {}
 
-  /// `time_s` must be later than that of the pose before, else std::invalid_argument is thrown.
+  /// `time_s` must be later than that of the previous pose, else throws std::invalid_argument.
   void push(const PoseSample& sample);
 
   std::size_t size() const { return samples_.size(); }
   std::optional<PoseSample> latest() const;
-  /// In both ends.
+  /// Both ends included.
   std::vector<PoseSample> between(double from_s, double to_s) const;
 
  private:

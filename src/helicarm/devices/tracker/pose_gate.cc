@@ -8,7 +8,7 @@
 namespace helicarm {
 namespace {
 
-constexpr double rigid_tolerance = 1e-3;  // NDI's and MicronTracker's drivers round to some 1e-4
+constexpr double rigid_tolerance = 1e-3;  // drivers of NDI and MicronTracker round to about 1e-4
 constexpr double degrees = 180 / std::numbers::pi;
 
 double off_identity(const Eigen::Matrix3d& gram) { return (gram - Eigen::Matrix3d::Identity()).norm(); }
@@ -71,7 +71,7 @@ bool PoseGate::within_reach(const RigidTransform& from, const RigidTransform& to
 bool PoseGate::jumped(const PoseSample& sample) {
   if (!last_) return false;
   const RigidTransform& pose = sample.tracker_from_tool;
-  // Time in which only poses elsewhere came brings the new place no nearer.
+  // Time without poses at the old position does not bring the new one within the limit.
   const double dt = sample.time_s - (rival_ ? rival_ : last_)->time_s;
   if (within_reach(last_->tracker_from_tool, pose, dt)) {
     rival_.reset();

@@ -12,17 +12,17 @@
 namespace helicarm {
 
 struct PoseGateOptions {
-  double farthest_mm = 3000;  ///< optical trackers see 2.4 to 3 m
-  double frozen_s = 0.5;      ///< noise changes the last bits of every pose: the same ones for longer are old
-  double jump_mm = 5;         ///< a pose may be off the last by this ...
-  double jump_mm_per_s = 500;  ///< ... and what a hand does in the time between
+  double farthest_mm = 3000;  ///< range of optical trackers: 2.4 to 3 m
+  double frozen_s = 0.5;  ///< noise changes the last bits of every pose: identical ones for longer are stale
+  double jump_mm = 5;     ///< largest distance from the last pose ...
+  double jump_mm_per_s = 500;  ///< ... plus a hand's motion in the time between
   double jump_deg = 5;
   double jump_deg_per_s = 180;
-  double settle_s = 0.5;  ///< so long poses after a jump must agree with each other to be believed again
+  double settle_s = 0.5;  ///< poses after a jump are accepted when they were consistent for this time
   DeviceClockOptions clock;
 };
 
-/// A pose as it came. `device_s` is 0 where no time is given.
+/// A pose as received. `device_s` is 0 if no time is given.
 struct RawPose {
   Eigen::Matrix4d matrix;
   double device_s = 0;
@@ -30,18 +30,18 @@ struct RawPose {
   bool visible = true;
 };
 
-/// Judges one tool's poses as they come. Rounding (|R'R - I| <= 1e-3) is corrected; the identity, which
-/// drivers send for a hidden marker, is never a pose.
+/// Checks one tool's poses. Rounding (|R'R - I| <= 1e-3) is corrected; the identity, which drivers send for a
+/// hidden marker, is never accepted as a pose.
 class PoseGate {
  public:
   explicit PoseGate(const PoseGateOptions& options = {}) : options_(options), clock_(options.clock) {}
 
   tl::expected<PoseSample, PoseFault> pass(const RawPose& raw);
 
-  /// To be called when the connection is new.
+  /// Call for a new connection.
   void forget_time() { clock_.forget(); }
 
-  /// Where it is seen since a jump, once three poses agree; nothing where it is where it was.
+  /// Position since a jump, once three poses are consistent; nothing without a jump.
   std::optional<PoseSample> elsewhere() const {
     constexpr int enough = 3;
     return rival_poses_ >= enough ? rival_ : std::nullopt;
@@ -58,15 +58,15 @@ class PoseGate {
 
   PoseGateOptions options_;
   DeviceClock clock_;
-  std::optional<RawPose> unchanged_;  ///< the first of the poses that are the same to the bit
+  std::optional<RawPose> unchanged_;  ///< the first of the bit-identical poses
   std::optional<PoseSample> last_;
   std::optional<PoseSample> rival_;  ///< newest of those since a jump
   double rival_since_ = 0;
-  int rival_poses_ = 0;  ///< since then
+  int rival_poses_ = 0;  ///< number of those
   Counters rejected_;
 };
 
-/// What is wrong with a matrix by itself, or the rigid motion that it is.
+/// The rigid motion of a matrix, or its fault.
 tl::expected<RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix, double farthest_mm);
 
 }  // namespace helicarm

@@ -11,7 +11,7 @@
 namespace helicarm {
 namespace {
 
-/// A marker at rest, seen 50 times a second with the jitter of a tracker.
+/// A marker at rest, measured at 50 Hz with the jitter of a tracker.
 class Scene {
  public:
   Eigen::Matrix4d jittered() {
@@ -22,14 +22,14 @@ class Scene {
                           place + noise()}
         .matrix();
   }
-  /// Passes the next pose, as stamped by the device.
+  /// Passes the next pose, stamped by the device.
   std::string next(const std::optional<Eigen::Matrix4d>& matrix = {}, bool visible = true) {
     now += 0.02;
     const auto passed = gate.pass({matrix ? *matrix : jittered(), now + device_ahead, now + delay, visible});
     if (passed) last = *passed;
     return passed ? "passed" : std::string(code(passed.error()));
   }
-  /// The faults of so many poses in a row.
+  /// Number of rejected poses among the next `count`.
   int rejected_of(int count) {
     int rejected = 0;
     for (int i = 0; i < count; ++i) rejected += next() != "passed";
@@ -47,7 +47,7 @@ class Scene {
   RandomStream random_{11, 0};
 };
 
-TEST(PoseGate, PosesOfAMarkerAtRestPass) {
+TEST(PoseGate, PosesOfAMarkerAtRestAreAccepted) {
   Scene scene;
   EXPECT_EQ(scene.rejected_of(500), 0);
   EXPECT_TRUE(scene.gate.rejected().empty());
@@ -61,7 +61,7 @@ TEST(PoseGate, RoundingIsCorrected) {
   EXPECT_LT((pose->rotation.transpose() * pose->rotation - Eigen::Matrix3d::Identity()).norm(), 1e-14);
 }
 
-TEST(PoseGate, WhatIsNoPoseIsCalledByItsName) {
+TEST(PoseGate, InvalidPoseIsReportedByItsFault) {
   Scene scene;
   const auto changed = [&](auto change) {
     Eigen::Matrix4d matrix = scene.jittered();
@@ -93,7 +93,7 @@ TEST(PoseGate, FrozenPoseIsRejectedUntilItChanges) {
   EXPECT_EQ(scene.next(), "passed");
 }
 
-TEST(PoseGate, SinglePoseFarOffIsRejected) {
+TEST(PoseGate, SingleOutlierIsRejected) {
   Scene scene;
   scene.rejected_of(10);
   Eigen::Matrix4d off = scene.jittered(), turned = scene.jittered();
@@ -105,7 +105,7 @@ TEST(PoseGate, SinglePoseFarOffIsRejected) {
   EXPECT_EQ(scene.rejected_of(100), 0);
 }
 
-TEST(PoseGate, NewPlaceIsAcceptedWhenItLasts) {
+TEST(PoseGate, NewPositionIsAcceptedWhenItPersists) {
   for (const double distance : {30.0, 200.0}) {
     Scene scene;
     scene.rejected_of(10);
@@ -116,7 +116,7 @@ TEST(PoseGate, NewPlaceIsAcceptedWhenItLasts) {
   }
 }
 
-TEST(PoseGate, ThirdPoseAtANewPlaceReportsOfItBeforeItIsAccepted) {
+TEST(PoseGate, ThirdPoseAtANewPositionIsReportedBeforeItIsAccepted) {
   Scene scene;
   scene.rejected_of(10);
   scene.place.x() += 40;
@@ -130,7 +130,7 @@ TEST(PoseGate, ThirdPoseAtANewPlaceReportsOfItBeforeItIsAccepted) {
   EXPECT_FALSE(scene.gate.elsewhere());
 }
 
-TEST(PoseGate, HandsMovePasses) {
+TEST(PoseGate, HandMotionIsAccepted) {
   Scene scene;
   for (int i = 0; i < 200; ++i) {
     scene.place.x() += 8;  // 0.4 m/s
@@ -138,7 +138,7 @@ TEST(PoseGate, HandsMovePasses) {
   }
 }
 
-TEST(DeviceClock, TimeIsThatOfTheMeasurementOnOurClock) {
+TEST(DeviceClock, TimeIsThatOfTheMeasurementOnTheLocalClock) {
   Scene scene;
   RandomStream random(3, 0);
   for (int i = 0; i < 300; ++i) {
@@ -158,7 +158,7 @@ TEST(DeviceClock, EqualAndBackwardStampsAreRejected) {
   EXPECT_TRUE(clock.local(100.1, 1.2));
 }
 
-TEST(DeviceClock, OneStampAnHourOffIsRejected) {
+TEST(DeviceClock, SingleStampAnHourOffIsRejected) {
   DeviceClock clock;
   EXPECT_TRUE(clock.local(10000, 1));
   EXPECT_EQ(clock.local(13600, 1.02).error(), PoseFault::time_jump);
@@ -167,7 +167,7 @@ TEST(DeviceClock, OneStampAnHourOffIsRejected) {
   EXPECT_TRUE(clock.local(10000.08, 1.08));
 }
 
-TEST(DeviceClock, NewTimeBaseIsTakenWhenItLastsASecond) {
+TEST(DeviceClock, NewTimeBaseIsAcceptedWhenItPersistsForASecond) {
   for (const double step : {3600.0, -3600.0}) {
     Scene scene;
     EXPECT_EQ(scene.rejected_of(50), 0);
@@ -177,11 +177,11 @@ TEST(DeviceClock, NewTimeBaseIsTakenWhenItLastsASecond) {
   }
 }
 
-TEST(DeviceClock, StalledNetworkGivesLatePosesNoNewTimeBase) {
+TEST(DeviceClock, DelayedPosesGiveNoNewTimeBase) {
   DeviceClock clock;
   for (int i = 0; i < 50; ++i) ASSERT_TRUE(clock.local(100 + 0.02 * i, 1 + 0.02 * i));
   for (int i = 50; i < 100; ++i) {
-    const auto time = clock.local(100 + 0.02 * i, 3);  // held up for up to a second, then all at once
+    const auto time = clock.local(100 + 0.02 * i, 3);  // delayed for up to a second, then all at once
     if (3 - (1 + 0.02 * i) > 0.51) {
       EXPECT_EQ(time.error(), PoseFault::late);
     }
@@ -189,7 +189,7 @@ TEST(DeviceClock, StalledNetworkGivesLatePosesNoNewTimeBase) {
   EXPECT_NEAR(*clock.local(102.02, 3.02), 3.02, 1e-3);
 }
 
-TEST(DeviceClock, WithoutStampsTheArrivalServes) {
+TEST(DeviceClock, WithoutStampsTheArrivalTimeIsUsed) {
   DeviceClock clock;
   EXPECT_EQ(clock.local(0, 5), 5);
   EXPECT_GT(*clock.local(0, 5), 5);

@@ -28,7 +28,7 @@ std::string_view trimmed(std::string_view text) {
   throw BadInput(Reason::bad_value, fmt::format("line {}: {}", line, problem));
 }
 
-/// The next word as a number, off the front of the text. "nan" is one: it is for the gate to refuse.
+/// Removes and returns the next word as a number. "nan" is accepted here: PoseGate rejects it.
 double take_number(std::string_view& text, std::size_t line) {
   text = trimmed(text);
   double value = 0;
@@ -39,7 +39,7 @@ double take_number(std::string_view& text, std::size_t line) {
   return value;
 }
 
-/// Differences of times must be of use as waiting times, which are counted in 64 bits of nanoseconds.
+/// Time differences are used as waiting times, which have 64 bits of nanoseconds.
 double take_time(std::string_view& text, std::size_t line) {
   constexpr double latest_s = 4e9;  // UTC until 2096
   const double time_s = take_number(text, line);
@@ -128,7 +128,7 @@ void put_frame(std::string& out, std::size_t number, const SequenceFrame& frame)
   for (const auto& [name, pose] : frame.poses) {
     if (!is_word(name))
       throw BadInput(Reason::bad_value,
-                     fmt::format("\"{}\" is no name for a transform: letters, digits and _ only",
+                     fmt::format("\"{}\" is not a valid transform name: use letters, digits and _",
                                  without_control_characters(name)));
     fmt::format_to(to, "Seq_Frame{:04}_{}Transform =", number, name);
     for (int row = 0; row < 4; ++row)

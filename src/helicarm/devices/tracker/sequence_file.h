@@ -12,10 +12,10 @@
 
 namespace helicarm {
 
-/// One tool at one moment, as recorded: perhaps no pose at all.
+/// One tool at one moment, as recorded: possibly not a pose.
 struct RecordedPose {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
-  bool visible = true;  ///< its status is OK; a file without status says nothing against it
+  bool visible = true;  ///< its status is OK, or the file has no status
 };
 
 struct SequenceFrame {
@@ -24,11 +24,11 @@ struct SequenceFrame {
 };
 
 /// Reads the poses of a MetaImage sequence file (.mha, .mhd): Seq_FrameNNNN_NAMETransform, ...Status and
-/// Timestamp; images in it are passed over. Fails with `missing_file`, `bad_size` (over 512 MiB),
-/// `truncated` (no ElementDataFile), `bad_value`.
+/// Timestamp; images in it are skipped. Fails with `missing_file`, `bad_size` (over 512 MiB), `truncated` (no
+/// ElementDataFile), `bad_value`.
 Expected<std::vector<SequenceFrame>> read_sequence(const std::filesystem::path& path);
 
-/// Fails with `cannot_write`, `bad_value` for a name that is no word.
+/// Fails with `cannot_write`, `bad_value` for an invalid name.
 Expected<void> write_sequence(const std::filesystem::path& path, const std::vector<SequenceFrame>& frames);
 
 }  // namespace helicarm

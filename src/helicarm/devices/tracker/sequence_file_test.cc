@@ -43,7 +43,7 @@ TEST_F(SequenceFile, PosesStatusAndTimeAreRead) {
   EXPECT_TRUE(std::isnan((*frames)[1].poses.at("ToolToTracker").matrix(0, 0)));
 }
 
-TEST_F(SequenceFile, WhatIsWrittenIsReadToTheBit) {
+TEST_F(SequenceFile, RoundTripIsBitExact) {
   std::vector<SequenceFrame> frames(12);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     frames[i].time_s = 0.1 * static_cast<double>(i);
@@ -64,7 +64,7 @@ TEST_F(SequenceFile, WhatIsWrittenIsReadToTheBit) {
   }
 }
 
-TEST_F(SequenceFile, BrokenFilesAreRefused) {
+TEST_F(SequenceFile, InvalidFilesAreRefused) {
   const auto reason = [&](const std::string& text) {
     const auto frames = read(text);
     EXPECT_FALSE(frames) << text;
@@ -80,21 +80,21 @@ TEST_F(SequenceFile, BrokenFilesAreRefused) {
   EXPECT_EQ(read_sequence(path_ / "absent").error().reason, Reason::missing_file);
 }
 
-TEST_F(SequenceFile, HeaderThatEndsInALongerKeyThanElementDataFileIsTruncated) {
+TEST_F(SequenceFile, LongerKeyThanElementDataFileIsTruncated) {
   EXPECT_EQ(read("ElementDataFileX=").error().reason, Reason::truncated);
   EXPECT_EQ(read("ElementDataFile").error().reason, Reason::truncated);
 }
 
 TEST_F(SequenceFile, ElementDataFileNeedsNoNewline) { EXPECT_TRUE(read("ElementDataFile=LOCAL")); }
 
-TEST_F(SequenceFile, TimeThatNoOneCanWaitForIsRefused) {
+TEST_F(SequenceFile, TimeOutOfRangeIsRefused) {
   for (const char* time : {"nan", "inf", "-inf", "1e300", "-5e9"})
     EXPECT_EQ(read(std::string("Seq_Frame0000_Timestamp = ") + time + "\n" + end_line).error().reason,
               Reason::bad_value)
         << time;
 }
 
-TEST_F(SequenceFile, NameThatWouldBreakTheHeaderIsRefused) {
+TEST_F(SequenceFile, InvalidNameIsRefused) {
   SequenceFrame frame;
   frame.poses["a = 1\nb"] = {};
   EXPECT_EQ(write_sequence(path_, {frame}).error().reason, Reason::bad_value);

@@ -11,7 +11,7 @@
 namespace helicarm {
 namespace {
 
-/// Between the last frame and the first one of the next round, and for a file of one frame: 20 Hz.
+/// Pause between the last frame and the first of the next repetition, and for a file of one frame: 20 Hz.
 constexpr double round_pause_s = 0.05;
 
 std::string as_word(std::string name) {
@@ -85,7 +85,7 @@ void replay(std::span<const SequenceFrame> frames, bool as_tracking,
   if (frames.empty()) return;
   std::mutex mutex;
   std::condition_variable_any wake;
-  // A recorded clock may have leapt back: a round must not end before it began.
+  // A recorded clock may have gone back: a repetition must not end before it began.
   const double latest_s = std::ranges::max_element(frames, {}, &SequenceFrame::time_s)->time_s;
   const double length = latest_s - frames.front().time_s + round_pause_s;
   const auto began = std::chrono::steady_clock::now();

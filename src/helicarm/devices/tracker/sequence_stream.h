@@ -12,19 +12,19 @@
 
 namespace helicarm {
 
-/// The poses of a message as they came, at the device's time or else at the arrival's; no poses where it has
-/// none. What a file cannot hold in a name becomes "_".
+/// The poses of a message as received, at the device's time or else at the arrival's; empty if it has none.
+/// Characters not allowed in a name become "_".
 SequenceFrame frame_of(const IgtlMessage& message, double arrival_s);
 
 /// A frame as one TDATA, or as a TRANSFORM for each tool; hidden tools are absent.
 std::vector<IgtlMessage> messages_of(const SequenceFrame& frame, bool as_tracking, double time_s);
 
-/// Frames as they come, up to so many poses: 4 million take about 1 GiB.
+/// Stores frames up to a number of poses: 4 million use about 1 GiB.
 class SequenceRecorder {
  public:
   explicit SequenceRecorder(std::size_t most_poses = 4'000'000) : most_poses_(most_poses) {}
 
-  /// Whether there was room for it; a frame without poses needs none.
+  /// Whether there was room; a frame without poses needs none.
   bool take(SequenceFrame frame);
   const std::vector<SequenceFrame>& frames() const { return frames_; }
   std::size_t most_poses() const { return most_poses_; }
@@ -40,11 +40,11 @@ struct GatedPoses {
   Counters rejected;  ///< by code of PoseFault
 };
 
-/// One tool's poses as a live PoseGate would have passed them.
+/// One tool's poses as a live PoseGate would have accepted them.
 GatedPoses gated_poses(std::span<const SequenceFrame> frames, const std::string& tool);
 
-/// Sends the frames over and over in their own rhythm, stamped as if they happened now, until stopped: at
-/// once. Frames must be in the order of their times.
+/// Sends the frames repeatedly with their recorded timing, stamped with the present time, until stopped;
+/// stops immediately. Frames must be ordered by time.
 void replay(std::span<const SequenceFrame> frames, bool as_tracking,
             const std::function<void(const IgtlMessage&)>& send, std::stop_token stop);
 

@@ -14,7 +14,7 @@ SequenceFrame frame_at(double time_s) {
   return frame;
 }
 
-TEST(SequenceStream, MessageBecomesAFrameAndBack) {
+TEST(SequenceStream, MessageToFrameRoundTrips) {
   const IgtlMessage message{"my tool", stamp_from_seconds(7.5), IgtlTransform{}};
   const SequenceFrame frame = frame_of(message, 3);
   EXPECT_EQ(frame.time_s, 7.5);
@@ -24,7 +24,7 @@ TEST(SequenceStream, MessageBecomesAFrameAndBack) {
   EXPECT_TRUE(frame_of({"x", 0, IgtlString{"text"}}, 3).poses.empty());
 }
 
-TEST(SequenceStream, RecorderTakesNoMorePosesThanItsLimit) {
+TEST(SequenceStream, RecorderStoresNoMorePosesThanItsLimit) {
   SequenceRecorder recorder(4);
   EXPECT_TRUE(recorder.take(frame_at(1)));
   EXPECT_TRUE(recorder.take({}));
@@ -40,7 +40,7 @@ TEST(SequenceStream, HiddenToolsAreAbsent) {
   EXPECT_EQ(std::get<IgtlTracking>(tracking[0].content).tools.size(), 1u);
 }
 
-TEST(SequenceStream, FramesGoRoundWithIncreasingStampsUntilStopped) {
+TEST(SequenceStream, FramesRepeatWithIncreasingStampsUntilStopped) {
   const std::vector<SequenceFrame> frames{frame_at(5), frame_at(5.002), frame_at(5.004)};
   std::stop_source stop;
   std::vector<IgtlMessage> sent;
@@ -56,7 +56,7 @@ TEST(SequenceStream, FramesGoRoundWithIncreasingStampsUntilStopped) {
   EXPECT_EQ(std::get<IgtlTransform>(sent[6].content).matrix(0, 3), 5);
 }
 
-TEST(SequenceStream, RoundOfAClockThatLeapsBackIsNotOverBeforeItBegan) {
+TEST(SequenceStream, RepetitionWithABackwardClockDoesNotEndEarly) {
   const std::vector<SequenceFrame> frames{frame_at(15), frame_at(5)};
   std::stop_source stop;
   std::vector<IgtlMessage> sent;
@@ -71,7 +71,7 @@ TEST(SequenceStream, RoundOfAClockThatLeapsBackIsNotOverBeforeItBegan) {
   EXPECT_GT(sent[2].stamp, sent[0].stamp);
 }
 
-TEST(SequenceStream, HiddenAndMissingPosesAreGatedOut) {
+TEST(SequenceStream, HiddenAndMissingPosesAreRejected) {
   const std::vector<SequenceFrame> frames{frame_at(5), frame_at(5.1), frame_at(5.1)};
   const GatedPoses femur = gated_poses(frames, "Femur");
   EXPECT_EQ(femur.tracker_from_tool.size(), 2u);
@@ -80,7 +80,7 @@ TEST(SequenceStream, HiddenAndMissingPosesAreGatedOut) {
   EXPECT_TRUE(gated_poses(frames, "Tool").tracker_from_tool.empty());
 }
 
-TEST(SequenceStream, NothingToReplayEndsAtOnce) { replay({}, false, {}, {}); }
+TEST(SequenceStream, NothingToReplayEndsImmediately) { replay({}, false, {}, {}); }
 
 }  // namespace
 }  // namespace helicarm
