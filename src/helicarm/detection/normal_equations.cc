@@ -9,8 +9,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int lanes = 8;
-using Simd = Eigen::Array<float, lanes, 1>;
+constexpr int simd_width = 8;
+using Simd = Eigen::Array<float, simd_width, 1>;
 
 // As many sums as fit the registers besides their operands.
 constexpr int tall = 4;
@@ -26,8 +26,8 @@ void add_tile(const Rows<tall>& left, const Rows<wide>& right, const float* weig
   Simd wide_sums[tall][wide];
   for (auto& row : wide_sums)
     for (Simd& sum : row) sum.setZero();
-  const Index whole = count / lanes * lanes;
-  for (Index i = 0; i < whole; i += lanes) {
+  const Index whole = count / simd_width * simd_width;
+  for (Index i = 0; i < whole; i += simd_width) {
     const Simd weight = load(weights + i);
     const Simd b[wide] = {load(right[0] + i), load(right[1] + i), load(right[2] + i)};
     for (int a = 0; a < tall; ++a) {

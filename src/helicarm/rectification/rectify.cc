@@ -72,8 +72,8 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
-DotLook sharpen(const XrayImage& xray_image, const NoiseCorrelation& noise, const std::vector<Dot>& all,
-                SeenLattice& seen) {
+DotLook refit_lattice_dots(const XrayImage& xray_image, const NoiseCorrelation& noise,
+                           const std::vector<Dot>& all, SeenLattice& seen) {
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
   const DotLook look = estimate_look(xray_image, noise, members);
@@ -109,8 +109,9 @@ void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& pl
 }
 
 /// Fits plate dots that the search missed at the positions predicted by the map.
-void rescue(const XrayImage& xray_image, const Plate& plate, const MapFit& fit, const DotLook& look,
-            const std::vector<Dot>& all, std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
+void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const MapFit& fit, const DotLook& look,
+                      const std::vector<Dot>& all, std::vector<Dot>& plate_dots,
+                      std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
   for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
@@ -199,7 +200,7 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
 
   const NoiseCorrelation noise = noise_correlation(xray_image);
   std::optional<DotLook> look;
-  if (options.method == Method::best) look = sharpen(xray_image, noise, attempt.all, attempt.seen);
+  if (options.method == Method::best) look = refit_lattice_dots(xray_image, noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -220,7 +221,7 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
   if (look && dots.size() < plate.dots_mm.size()) {
-    rescue(xray_image, plate, *fit, *look, attempt.all, dots, seen);
+    fit_missing_dots(xray_image, plate, *fit, *look, attempt.all, dots, seen);
     if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
   }
 

@@ -54,7 +54,7 @@ class Follower {
     return std::nullopt;
   }
 
-  bool knows(const std::string& tool) const {
+  bool has_tool(const std::string& tool) const {
     for (const ToolState& state : board_.tools(monotonic_seconds()))
       if (state.name == tool) return true;
     return false;
@@ -89,7 +89,7 @@ TEST_F(VirtualDevicesTest, OneFacetOfTheCalibratorIsVisibleAndReportsItsPose) {
   ASSERT_TRUE(follower.wait_for("femur", 20));
   int seen = 0;
   for (const TrackedFacet& facet : calibrator_facets()) {
-    if (!follower.knows(facet.name)) continue;
+    if (!follower.has_tool(facet.name)) continue;
     ++seen;
     const RigidTransform calibrator =
         *follower.wait_for(facet.name, 1) * facet.calibrator_from_facet.inverse();
@@ -104,7 +104,7 @@ TEST_F(VirtualDevicesTest, HiddenMarkerIsAbsent) {
   ASSERT_TRUE(virtual_or_->set_fault("hide:tibia", true));
   Follower follower(*virtual_or_);
   ASSERT_TRUE(follower.wait_for("femur", 20));
-  EXPECT_FALSE(follower.knows("tibia"));
+  EXPECT_FALSE(follower.has_tool("tibia"));
   ASSERT_TRUE(virtual_or_->set_fault("hide:tibia", false));
   EXPECT_TRUE(follower.wait_for("tibia", 1));
 }

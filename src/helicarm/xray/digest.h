@@ -13,16 +13,16 @@
 namespace helicarm {
 
 /// 128-bit fingerprint as 32 hexadecimal digits, to compare texts or images; not cryptographic. Four
-/// multiplicative lanes for memory-speed throughput.
+/// independent multiplicative streams for memory-speed throughput.
 inline std::string digest(std::string_view bytes) {
   constexpr std::array<std::uint64_t, 4> primes = {0x9E3779B185EBCA87, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9,
                                                    0xD6E8FEB86659FD93};
-  std::array<std::uint64_t, 4> lanes = primes;
+  std::array<std::uint64_t, 4> state = primes;
   const auto mix = [&](std::string_view block) {
     for (std::size_t i = 0; i < 4; ++i) {
       std::uint64_t word;
       std::memcpy(&word, block.data() + 8 * i, 8);
-      lanes[i] = std::rotl((lanes[i] ^ word) * primes[i], 29);
+      state[i] = std::rotl((state[i] ^ word) * primes[i], 29);
     }
   };
   std::size_t at = 0;
@@ -35,7 +35,7 @@ inline std::string digest(std::string_view bytes) {
     hash = (hash ^ hash >> 31) * primes[2];
     return hash ^ hash >> 29;
   };
-  return fmt::format("{:016x}{:016x}", finish(lanes[0], lanes[1]), finish(lanes[2], lanes[3] + lanes[0]));
+  return fmt::format("{:016x}{:016x}", finish(state[0], state[1]), finish(state[2], state[3] + state[0]));
 }
 
 }  // namespace helicarm

@@ -103,7 +103,7 @@ class Session {
     } catch (const BadInput& refused) {
       break_off(refused.failure());
     } catch (const asio::system_error& error) {
-      // Cancelled by `watch`, which knows the reason; else the connection failed.
+      // Cancelled by `watch`, which ends with the reason; else the connection failed.
       if (error.code() != asio::error::operation_aborted)
         break_off({Reason::not_connected, error.code().message()});
     } catch (const std::exception&) {

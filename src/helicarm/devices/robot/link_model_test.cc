@@ -139,7 +139,7 @@ class World {
     ++tally_.sequences;
     const int end = 100 + static_cast<int>(random_.index(150));
     for (now_ = 0; now_ < end && breach_.empty(); ++now_) {
-      states_.deliver(now_, [&](const Told& told) { hear(told); });
+      states_.deliver(now_, [&](const StateMessage& message) { hear(message); });
       beats_.deliver(now_, [&](const Heartbeat& beat) { registers_ = beat; });
       scripts_.deliver(now_, [&](const Sent& script) { start(script); });
       person();
@@ -151,7 +151,7 @@ class World {
   }
 
  private:
-  struct Told {
+  struct StateMessage {
     double time_s;
     ScriptReport script;
     bool plays, protective;
@@ -199,14 +199,14 @@ class World {
 
   // Link and its connection.
 
-  void hear(const Told& told) {
-    if (!connected_ || told.connection != connection_) return;
-    if (told.protective && !heard_protective_) note_stop();
-    heard_protective_ = told.protective;
-    state_.time_s = told.time_s;
-    state_.script = told.script;
-    state_.runtime = told.plays ? RuntimeState::playing : RuntimeState::stopped;
-    state_.safety_mode = told.protective ? SafetyMode::protective_stop : SafetyMode::normal;
+  void hear(const StateMessage& message) {
+    if (!connected_ || message.connection != connection_) return;
+    if (message.protective && !heard_protective_) note_stop();
+    heard_protective_ = message.protective;
+    state_.time_s = message.time_s;
+    state_.script = message.script;
+    state_.runtime = message.plays ? RuntimeState::playing : RuntimeState::stopped;
+    state_.safety_mode = message.protective ? SafetyMode::protective_stop : SafetyMode::normal;
     beats_.send(machine_.heard(state_, time()), now_, net_, random_);
   }
   void note_stop() {
@@ -370,7 +370,7 @@ class World {
   std::string breach_;
   bool quiet_ = false;
   Disturbance net_, script_net_;
-  Channel<Told> states_;
+  Channel<StateMessage> states_;
   Channel<Heartbeat> beats_;
   Channel<Sent> scripts_;
   int now_ = 0;

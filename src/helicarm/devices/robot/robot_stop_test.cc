@@ -104,15 +104,15 @@ TEST(StoppedOrder, MovesNoFurtherThanItsBrakingDistance) {
     drill.robot->set_at(RobotFault::frozen_states, told_s);
     drill.robot->set(RobotFault::frozen_states, false);
     while (drill.now_s() < told_s) std::this_thread::sleep_for(1ms);
-    const VirtualTruth told = drill.robot->truth();
+    const VirtualTruth at_stop = drill.robot->truth();
     drill.link.stop();
     drill.robot->set(RobotFault::frozen_states, false);
     EXPECT_EQ(done.get().error().reason, Reason::robot_stopped);
     drill.pass(1);
-    const double moved_mm = (drill.tip() - told.base_from_tip.translation).norm();
-    const double stop_s = drill.robot->truth().rest_since_s.value_or(1e9) - told.state.time_s;
+    const double moved_mm = (drill.tip() - at_stop.base_from_tip.translation).norm();
+    const double stop_s = drill.robot->truth().rest_since_s.value_or(1e9) - at_stop.state.time_s;
     const double period_s = 1 / ur5().rate_hz;
-    const double braking_s = told.state.joint_speeds.cwiseAbs().maxCoeff() / stop_rad_s2;
+    const double braking_s = at_stop.state.joint_speeds.cwiseAbs().maxCoeff() / stop_rad_s2;
     EXPECT_GT(braking_s, 0.02);
     EXPECT_LE(stop_s, braking_s + 3 * period_s);
     EXPECT_LE(moved_mm, speed_mm_s * (braking_s / 2 + 2.5 * period_s));
@@ -132,7 +132,7 @@ TEST(StoppedOrder, RestsInWallTimeToo) {
     const Eigen::Vector3d rested = resting_state().base_from_tcp.translation;
     while ((drill.tip() - rested).norm() < 40 && done.wait_for(1ms) != std::future_status::ready) {
     }
-    const VirtualTruth told = drill.robot->truth();
+    const VirtualTruth at_stop = drill.robot->truth();
     const auto told_at = std::chrono::steady_clock::now();
     drill.link.stop();
     while (drill.robot->truth().moving) std::this_thread::sleep_for(100us);
@@ -142,7 +142,7 @@ TEST(StoppedOrder, RestsInWallTimeToo) {
     drill.pass(0.2);
     EXPECT_EQ((drill.tip() - stopped_at).norm(), 0);
     RecordProperty(fmt::format("real_moved_um_{}", acceleration),
-                   static_cast<int>(1000 * (stopped_at - told.base_from_tip.translation).norm()));
+                   static_cast<int>(1000 * (stopped_at - at_stop.base_from_tip.translation).norm()));
     RecordProperty(fmt::format("real_stop_ms_{}", acceleration), static_cast<int>(took.count()));
   }
 }

@@ -21,7 +21,7 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
 
   VirtualUrClient(asio::ip::tcp::socket given, std::size_t of_port,
                   std::function<void(const std::string& line)> on_cut)
-      : socket(std::move(given)), port(of_port), told(std::move(on_cut)) {
+      : socket(std::move(given)), port(of_port), on_disconnect(std::move(on_cut)) {
     std::error_code gone;
     const auto peer = socket.remote_endpoint(gone);
     name = fmt::format("client {}:{}", peer.address().to_string(), peer.port());
@@ -37,7 +37,7 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
   void cut(const std::string& why) {
     if (!socket.is_open()) return;
     close();
-    told(fmt::format("{}: disconnected: {}", name, why));
+    on_disconnect(fmt::format("{}: disconnected: {}", name, why));
   }
   void close() {
     std::error_code ignored;
@@ -70,7 +70,7 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
                       });
   }
 
-  std::function<void(const std::string& line)> told;
+  std::function<void(const std::string& line)> on_disconnect;
 };
 
 }  // namespace helicarm

@@ -117,10 +117,10 @@ TEST(Facets, SwappedNamesAreRefused) {
 TEST(Facets, NoUnknownOrDuplicateFacetIsAccepted) {
   RandomStream random(7, 0);
   const FacetPose pose = seen(four_facets()[0], random);
-  FacetPose stranger = pose;
-  stranger.name = "stranger";
+  FacetPose unknown = pose;
+  unknown.name = "unknown";
   EXPECT_EQ(fuse_facets(four_facets(), {}).error().reason, Reason::no_pose);
-  EXPECT_EQ(fuse_facets(four_facets(), std::vector{stranger}).error().reason, Reason::bad_value);
+  EXPECT_EQ(fuse_facets(four_facets(), std::vector{unknown}).error().reason, Reason::bad_value);
   EXPECT_EQ(fuse_facets(four_facets(), std::vector{pose, pose}).error().reason, Reason::name_clash);
 }
 
