@@ -12,7 +12,7 @@ namespace helicarm::simulation {
 /// case.json (docs/formats.md); not for kind grid, which has no calibrator.
 Json case_json(const SimulatedCase& simulated);
 
-/// The DICOM image of one view, with the UIDs of its seed.
+/// The DICOM image of one view, with UIDs derived from its pixels.
 DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t view);
 
 /// Refuses (cannot_write) a folder with files other than an earlier simulation.
