@@ -233,7 +233,7 @@ std::size_t JsonReader::choice(const char* key, std::initializer_list<std::strin
   const std::string value = text(key);
   const auto found = std::find(names.begin(), names.end(), value);
   if (found == names.end())
-    refuse(Reason::bad_value, key, fmt::format("\"{}\" is none of: {}", value, fmt::join(names, ", ")));
+    refuse(Reason::bad_value, key, fmt::format("\"{}\" must be one of: {}", value, fmt::join(names, ", ")));
   return static_cast<std::size_t>(found - names.begin());
 }
 

@@ -100,7 +100,7 @@ void check_space(const Calibrator& calibrator, const DesignViews& views, const R
   add("imaged_lateral", "at least 6 balls in the lateral image", imaged(calibrator, views.lateral, options),
       Bound::at_least, 6.0, "balls");
   for (const double range_deg : {0.0, options.range_deg}) {
-    const std::string turned = range_deg > 0 ? fmt::format(", turned by up to {} degrees", range_deg) : "";
+    const std::string turned = range_deg > 0 ? fmt::format(", rotated by up to {} degrees", range_deg) : "";
     const std::string suffix = range_deg > 0 ? "_turned" : "";
     add("gap_ap" + suffix, "no balls overlap in the AP image" + turned,
         smallest_gap_mm(calibrator, views.ap, range_deg), Bound::at_least, 0.0, "mm");

@@ -79,9 +79,9 @@ Expected<void> check_views(const SimulationOptions& options) {
 
 Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
   if (options.size != 512 && options.size != 1024)
-    return fail(Reason::bad_value, fmt::format("size: {} is neither 512 nor 1024", options.size));
+    return fail(Reason::bad_value, fmt::format("size: {}, must be 512 or 1024", options.size));
   if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
-    return fail(Reason::bad_value, fmt::format("bits: {} is none of 8, 10, 12, 14 and 16", options.bits));
+    return fail(Reason::bad_value, fmt::format("bits: {}, must be 8, 10, 12, 14 or 16", options.bits));
   if (const auto checked = check_views(options); !checked) return checked;
   if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
@@ -90,7 +90,8 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
                      [&](const CalibratorBall& ball) { return ball.label == lost; }))
-      return fail(Reason::bad_value, fmt::format("lost ball \"{}\" is none of {}'s", lost, calibrator.name));
+      return fail(Reason::bad_value,
+                  fmt::format("lost ball \"{}\" is not a ball of {}", lost, calibrator.name));
   return {};
 }
 

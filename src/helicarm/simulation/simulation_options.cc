@@ -23,7 +23,8 @@ Expected<Value> value_of(const std::array<std::string_view, n>& words, std::stri
                          const char* what) {
   const auto found = std::find(words.begin(), words.end(), word);
   if (found == words.end())
-    return fail(Reason::usage, fmt::format("{}: \"{}\" is none of: {}", what, word, fmt::join(words, ", ")));
+    return fail(Reason::usage,
+                fmt::format("{}: \"{}\" must be one of: {}", what, word, fmt::join(words, ", ")));
   return static_cast<Value>(found - words.begin());
 }
 

@@ -169,7 +169,7 @@ class Walker {
       if (delimited && next.tag == item_end) return;
       if (next.tag >> 16 <= 2 || next.tag >> 16 == 0xFFFE)
         refuse(Reason::bad_value,
-               fmt::format("({:04X},{:04X}) does not belong here", next.tag >> 16, next.tag & 0xFFFF));
+               fmt::format("({:04X},{:04X}) is not allowed here", next.tag >> 16, next.tag & 0xFFFF));
       const std::size_t start = at_;
       body(next, end, explicit_vr, depth);
       if (depth == 0) keep(next, bytes_.substr(start, at_ - start));

@@ -128,7 +128,7 @@ Expected<void> LinkStateMachine::unlock(Stops since, Time now) {
   if (!state_ || age_s(now) > times_.stale_s)
     return fail(Reason::stale_state, "the robot's state is unknown");
   if (const auto why = why_stopped(*state_)) return tl::unexpected<Failure>(*why);
-  if (!apply(LinkEvent::unlock)) return fail(Reason::robot_locked, "an order is being carried out");
+  if (!apply(LinkEvent::unlock)) return fail(Reason::robot_locked, "an order is in execution");
   why_.reset();
   return {};
 }

@@ -144,7 +144,7 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   if (result.turn_deg < options.min_turn_deg || pairs.size() < min_pairs)
     return fail(
         Reason::poses_too_alike,
-        fmt::format("{} poses turn by {:.3g} degrees rms about a second axis, at least {} poses and {:g} "
+        fmt::format("{} poses rotate by {:.3g} degrees rms about a second axis, at least {} poses and {:g} "
                     "degrees",
                     pairs.size(), result.turn_deg, min_pairs, options.min_turn_deg),
         {{"poses", static_cast<double>(pairs.size())}, {"turn_deg", result.turn_deg}});

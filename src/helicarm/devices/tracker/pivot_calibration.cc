@@ -87,7 +87,7 @@ Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> track
   const auto too_alike = [&](double turn_deg) {
     return fail(
         Reason::poses_too_alike,
-        fmt::format("{} poses turn by {:.3g} degrees rms about their least turned direction, at least "
+        fmt::format("{} poses rotate by {:.3g} degrees rms about their least rotated direction, at least "
                     "{} poses and {:g} degrees",
                     poses.size(), turn_deg, min_pivot_poses, options.min_turn_deg),
         {{"poses", static_cast<double>(poses.size())}, {"turn_deg", turn_deg}});
