@@ -39,7 +39,7 @@ bool is_picked(const Json& picks, const std::string& name) {
       picks, [&](const Json& pick) { return pick.is_object() && pick.value("name", Json()) == Json(name); });
 }
 
-/// A built-in's name stays; a file is copied into the case.
+/// The name of a built-in is kept; a file is copied into the case.
 std::string brought_along(const std::string& name_or_file, const fs::path& folder) {
   const fs::path file(name_or_file);
   if (!fs::exists(file)) return name_or_file;

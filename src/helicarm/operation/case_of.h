@@ -7,20 +7,20 @@
 
 namespace helicarm {
 
-/// A view as case.json tells it.
+/// A view in the form of case.json.
 struct CaseImage {
   std::string name;
   std::filesystem::path image;
   Poses poses;
 };
 
-/// Makes `folder` a case of its own (docs/formats.md): images, calibrator, plate, case.json; tunnels whose
-/// ends nobody picked yet are left out. Refuses cannot_write, missing_file.
+/// Makes `folder` a self-contained case (docs/formats.md): images, calibrator, plate, case.json. Tunnels
+/// without picks for both ends are left out. Refuses cannot_write, missing_file.
 Expected<void> write_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
                                     const std::vector<CaseImage>& images, const Poses& now,
                                     const std::vector<ToolLine>& tool_lines);
 
-/// The digest is of the result without its timing: the same case gives the same one.
+/// The digest excludes the timing, so equal cases have equal digests.
 struct CaseRun {
   Result result;
   std::string digest;
@@ -28,7 +28,7 @@ struct CaseRun {
 /// Reads the case and runs it; writes nothing.
 Expected<CaseRun> recompute_case(const std::filesystem::path& folder, const OperationPlan& plan,
                                  CalibrationCache& cache);
-/// The same, and writes result.json and the report.
+/// As above, and writes result.json and the report.
 Expected<CaseRun> run_operation_case(const std::filesystem::path& folder, const OperationPlan& plan,
                                      CalibrationCache& cache);
 

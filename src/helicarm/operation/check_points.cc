@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether the bones' markers still are where they were at the first X-ray.
+// Whether the markers have moved on the bones since the first X-ray image.
 #include <algorithm>
 
 #include <fmt/format.h>
@@ -20,10 +20,10 @@ Expected<double> Operation::touch(const std::string& name) {
   return guarded([&]() -> double {
     const auto check = std::ranges::find(plan_.check_points, name, &PlannedCheck::name);
     if (check == plan_.check_points.end())
-      throw BadInput(Reason::bad_value, fmt::format("{}: is no check point of the plan", name));
+      throw BadInput(Reason::bad_value, fmt::format("{}: is not a check point of the plan", name));
     const auto first = touched_in_bone_.find(name);
     if (first == touched_in_bone_.end() && !views_.empty())
-      throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first picture", name));
+      throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first image", name));
     const PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
     const Eigen::Vector3d tip = value_or_throw(touched_in_bone(window, plan_.tracker, check->bone));
     record("touched", {{"check_point", name}, {"window", to_json(window)}, {"in_bone", json_list(tip)}});
@@ -37,8 +37,8 @@ Expected<double> Operation::touch(const std::string& name) {
     if (!off) {
       Failure moved = off.error();
       moved.message = fmt::format(
-          "{}: is {:.2f} mm from where the marker of the {} has it, limit {:g} mm: the marker "
-          "was bumped, or is another bone's; begin anew",
+          "{}: is {:.2f} mm from its position in the frame of the {} marker, limit {:g} mm: the marker moved "
+          "on the bone or was assigned to the wrong bone; begin a new operation",
           name, moved.figures.at("off_mm"), plan_.tracker.marker_of(check->bone), check->limit_mm);
       throw BadInput(std::move(moved));
     }

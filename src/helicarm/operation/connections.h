@@ -15,43 +15,42 @@
 
 namespace helicarm {
 
-/// An image and when it came (monotonic seconds).
+/// An image and its arrival time (monotonic seconds).
 struct DatedArrival {
   Arrival arrival;
   double time_s;
 };
 
-/// The C-arm as its receiver knows it: it calls when it has an image, and is not heard of in between.
+/// State of the C-arm's connection. A C-arm connects only to send an image.
 struct CArmStatus {
   std::optional<double> last_image_s;  ///< monotonic seconds
-  std::optional<Failure> refused;      ///< an image since then
-  bool broke_off = false;              ///< a connection since then was lost, or its request turned down
+  std::optional<Failure> refused;      ///< an image refused since then
+  bool broke_off = false;              ///< a connection since then was lost or its request rejected
 };
 
-/// How old what guides a robot may be, s. Only tests on a busy machine use other limits than these.
+/// Greatest age of the data that guide a robot, s. Only tests on a busy machine use other limits.
 struct FreshnessLimits {
-  double pose_s = 0.1;       ///< of tool and bones; a repeated pose is as old as when it first came
+  double pose_s = 0.1;       ///< of tool and bones; a repeated pose has the age of its first arrival
   double state_s = 0.1;      ///< of the robot
-  double heartbeat_s = 0.1;  ///< it ends so long after this program last looked
+  double heartbeat_s = 0.1;  ///< ends this long after the program's last poll
 };
 
-/// The three devices of a plan. Tracker and robot are connected to from the start, and again whenever they
-/// were away.
+/// The three devices of a plan. Tracker and robot are connected at the start and reconnected after a loss.
 class Connections {
  public:
-  /// Throws BadInput for a plan whose addresses are none.
+  /// Throws BadInput for invalid addresses.
   Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox, const FreshnessLimits& limits = {});
 
-  /// Takes images from now on. Refuses as DicomReceiver.
+  /// Starts receiving images. Refuses as DicomReceiver.
   Expected<void> listen(const ReceiverOptions& options);
   std::uint16_t receiver_port() const { return receiver_->port(); }
 
-  /// The oldest image that nobody took yet; nothing if none comes within this time.
+  /// The oldest image not yet taken; empty if none arrives within this time.
   std::optional<DatedArrival> next_image(double patience_s);
 
   const PoseBoard& board() const { return board_; }
   RobotLink& robot() { return robot_; }
-  /// Before `listen`: nothing came yet.
+  /// State before `listen`: no image received.
   CArmStatus c_arm() const;
 
  private:
@@ -62,7 +61,7 @@ class Connections {
   std::condition_variable news_;
   std::deque<DatedArrival> arrivals_;
   CArmStatus c_arm_;
-  std::uint64_t broken_before_ = 0;  ///< connections, when the last image came
+  std::uint64_t broken_before_ = 0;  ///< connections lost before the last image
   PoseBoard board_;
   RobotLink robot_;
   std::unique_ptr<IgtlClient> tracker_;

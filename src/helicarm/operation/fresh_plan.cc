@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders move the robot only while what they were planned on holds.
+// Orders move the robot only while the poses that they were planned on hold.
 #include <algorithm>
 
 #include "helicarm/operation/operation.h"
@@ -7,7 +7,7 @@
 namespace helicarm {
 namespace {
 
-/// Straight back along the tool's axis until it is as far as the stand-off; nothing where it is already.
+/// Retreat along the tool's axis to the stand-off distance; empty if the tool is already there.
 std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTransform& base_from_tcp) {
   Waypoint back = order.waypoints.front();
   const Eigen::Vector3d axis = base_from_tcp.rotation.col(2);
@@ -21,7 +21,7 @@ std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTr
 
 }  // namespace
 
-/// Before the robot is registered nothing tells where its tool should be.
+/// Before registration the tool's expected pose is unknown.
 Watch Operation::sees_tool() const {
   return [this]() -> Expected<void> {
     return board_.latest(plan_.tracker.tool, monotonic_seconds()).map([](const PoseSample&) {});
@@ -54,7 +54,7 @@ PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& win
 const Operation::Planned& Operation::planned(const RobotOrder& order) const {
   const auto found = planned_.find(order.name);
   if (found == planned_.end())
-    throw BadInput(Reason::usage, order.name + ": was not planned in this operation");
+    throw BadInput(Reason::usage, order.name + ": was not planned in this operation; plan it first");
   return found->second;
 }
 
@@ -66,8 +66,9 @@ Expected<void> Operation::check_plan(const RobotOrder& order) {
   return guarded([&] {
     const Planned& plan = planned(order);
     if (plan.order != to_text(to_json(order)))
-      throw BadInput(Reason::plan_stale,
-                     order.name + ": is not the last plan to this tunnel: confirm that, or plan again");
+      throw BadInput(
+          Reason::plan_stale,
+          order.name + ": is not the last plan to this tunnel: confirm the last one or plan again");
     if (plan.stale) throw BadInput(*plan.stale);
     const auto holds = plan.watch.holds(board_, robot_.track(), monotonic_seconds());
     if (!holds && holds.error().reason == Reason::plan_stale) {
@@ -82,7 +83,7 @@ Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& re
   return guarded([&] {
     notify_(Step::navigate, order.name + ": withdraw");
     const PlannedTunnel& tunnel = tunnel_named(order.name);
-    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "nothing is measured or registered yet");
+    if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
     const PoseWindow window = look("withdraw");
     const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
     const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));

@@ -6,7 +6,7 @@
 
 namespace helicarm {
 
-/// A robot beside a tracker and a marker in its hand, known exactly.
+/// A robot beside a tracker, with a marker on its tool and known transforms.
 inline HandEye exact_hand_eye() {
   HandEye hand_eye;
   hand_eye.flange_from_marker = {rotation_from_euler(0.2, -0.4, 0.7), {12, 70, 40}};

@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// Poses of the tool (base_from_tcp) about its present one for hand-eye calibration: turned to all sides
-/// about the tip, which moves a little too; the last one is where it began.
+/// Tool poses (base_from_tcp) for hand-eye calibration: rotations in several directions about the present
+/// pose, with small shifts of the tip; the last one is the initial pose.
 std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp);
 
-/// The move to one of them.
+/// The move to one of these poses.
 RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const RigidTransform& base_from_tcp);
 
 }  // namespace helicarm

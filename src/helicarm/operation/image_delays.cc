@@ -6,7 +6,7 @@
 namespace helicarm {
 namespace {
 
-/// Of two quartz clocks, as DeviceClock has it.
+/// Drift between two quartz clocks, as in DeviceClock.
 constexpr double drift = 1e-4;
 
 }  // namespace

@@ -8,21 +8,19 @@
 
 namespace helicarm {
 
-/// Beyond, an image is not dated by its arrival. Half a second of an exposure's window is left for the way
-/// of the quickest image.
+/// An image with a longer delay is not dated by its arrival. The acquisition window leaves 0.5 s for the
+/// transfer of the fastest image.
 inline constexpr double longest_held_s = 1;
 
-/// How long images lie in the C-arm before they are sent. Its clock and ours need not agree: the least
-/// difference of a session between arrival and acquisition is their offset and the quickest image's way,
-/// and what an image exceeds it by, it was held back. A session whose images were all held back alike
-/// shows nothing.
+/// Estimates how long images are delayed in the C-arm. The clocks need not be synchronised: the least
+/// difference between arrival and acquisition in a session is the clock offset plus the fastest transfer, and
+/// the excess of an image over it is its delay. A delay common to all images is not detected.
 class ImageDelays {
  public:
-  /// Of an image that came at this time (monotonic seconds).
+  /// Adds an image that arrived at this time (monotonic seconds).
   void learn(const AcquisitionTime& acquired, double arrival_s);
 
-  /// By how much it was later than the quickest image dated by the same elements, s. Nothing below the
-  /// clocks' drift.
+  /// Delay relative to the fastest image dated by the same DICOM elements, s. Zero below the clocks' drift.
   double held_s(const AcquisitionTime& acquired, double arrival_s) const;
 
  private:
@@ -30,7 +28,7 @@ class ImageDelays {
     double delay_s;
     double arrival_s;
   };
-  std::map<std::string, Least> least_;  ///< by the times' source
+  std::map<std::string, Least> least_;  ///< by source of the acquisition time
 };
 
 }  // namespace helicarm

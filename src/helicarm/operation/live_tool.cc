@@ -45,7 +45,7 @@ Expected<ToolOverlay> LiveTool::overlay(const PoseBoard& board, Bone bone) const
 
 Expected<ToolOverlay> LiveTool::overlay(const Poses& now, Bone bone) const {
   if (!now.tracker_from_tool || !now.tracker_from(bone))
-    return fail(Reason::no_pose, "the tool or the bone was not seen");
+    return fail(Reason::no_pose, "the marker of the tool or the bone is not visible");
   const RigidTransform bone_from_tracker = now.tracker_from(bone)->inverse();
   ToolOverlay overlay;
   if (!views_.empty()) {
@@ -70,7 +70,7 @@ Expected<TunnelAim> LiveTool::aim(const PoseBoard& board, const std::string& nam
   return guarded([&] {
     const auto tunnel = tunnels_.find(name);
     if (tunnel == tunnels_.end())
-      throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located", name));
+      throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located; check its picks", name));
     const auto& [bone, enter, leave] = tunnel->second;
     const Now now = newest(board, bone);
     const RigidTransform bone_from_tip =

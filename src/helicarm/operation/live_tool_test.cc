@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
 const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
 const RigidTransform tibia_then{rotation_from_euler(0.4, 0.2, 1), {60, -90, 870}};
-/// In the femur's marker: the drill comes in at `entry` and goes along z.
+/// In the femur marker's frame: the tunnel begins at `entry` and extends along z.
 const Vector3d entry(30, 5, -20);
 
 OperationPlan plan() {
@@ -53,10 +53,10 @@ IgtlMessage message(const RigidTransform& femur, const RigidTransform& tool, dou
           IgtlTracking{{{"femur", 1, femur.matrix()}, {"tool", 1, tool.matrix()}}}};
 }
 
-TEST(LiveTool, ReportsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
+TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
   const OperationPlan planned = plan();
   const LiveTool live(planned, measured(), {exposure()}, exact_hand_eye());
-  // The tip 3 mm beside the axis and 12 mm in, tilted by 0.2 rad, on a femur that has moved.
+  // The tip 3 mm beside the axis and 12 mm deep, tilted by 0.2 rad, on a femur that has moved.
   const RigidTransform femur_from_tip{rotation_from_vector(Vector3d(0.2, 0, 0)), entry + Vector3d(3, 0, 12)};
   const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), planned.robot.tool);
   PoseBoard board;
@@ -75,9 +75,9 @@ TEST(LiveTool, ReportsPlaceAngleAndDepthInTheTunnelAsTheBoneLiesNow) {
   EXPECT_LT((overlay.by_view.at("AP").tip - measured().views[0].calibrated->view.project(tip)).norm(), 0.01);
 }
 
-TEST(LiveTool, ReportsHowTheOtherBoneMovedAgainstThisOne) {
+TEST(LiveTool, ReportsMotionOfTheOtherBoneRelativeToThisOne) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
-  // Both go along with the femur; the tibia bends on its own besides.
+  // Both bones move together; the tibia also bends relative to the femur.
   const RigidTransform calibrator_then = *exposure().tracker_from_calibrator;
   const RigidTransform bent{rotation_from_vector(Vector3d(0, 0.1, 0)), Vector3d(2, -1, 4)};
   const RigidTransform leg_moved = femur_now * femur_then.inverse();
@@ -92,12 +92,12 @@ TEST(LiveTool, ReportsHowTheOtherBoneMovedAgainstThisOne) {
   EXPECT_EQ(live.overlay(now, Bone::tibia).error().reason, Reason::no_pose);
 }
 
-TEST(LiveTool, OfATunnelThatIsNotLocatedSaysSo) {
+TEST(LiveTool, TunnelThatIsNotLocatedIsRefused) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   EXPECT_EQ(live.aim(PoseBoard(), "tibia").error().reason, Reason::not_seen);
 }
 
-TEST(LiveTool, WithoutAPoseGivesNoPlace) {
+TEST(LiveTool, WithoutAPoseIsRefused) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   EXPECT_EQ(live.aim(PoseBoard(), "femur").error().reason, Reason::no_pose);
   EXPECT_EQ(live.overlay(PoseBoard(), Bone::femur).error().reason, Reason::no_pose);

@@ -18,10 +18,10 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The tip is drawn into the X-rays every so many mm.
+/// Spacing of the tip's drawn positions, mm.
 constexpr double preview_step_mm = 5;
 
-/// A path is planned by where the robot was registered.
+/// A path is planned with the robot base found at registration.
 Expected<void> refuse_moved_base(const HandEye& registered, const PlanBasis& basis, const RobotState& present,
                                  const PlanLimits& limits) {
   return check_motion(
@@ -48,7 +48,8 @@ Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const 
     operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
     if (operation->log_->history().records.size() > 1)
       throw BadInput(Reason::cannot_write,
-                     fmt::format("{}: holds another operation's record already", folder.string()));
+                     fmt::format("{}: already holds the record of another operation; choose an empty folder",
+                                 folder.string()));
     operation->record("plan", to_json(operation->plan_));
     return operation;
   });
@@ -107,7 +108,7 @@ Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines)
 Expected<void> Operation::measure() {
   return guarded([&] {
     if (const auto missing = views_to_come(); !missing.empty())
-      throw BadInput(Reason::usage, fmt::format("{}: its picture has not come", missing.front()));
+      throw BadInput(Reason::usage, fmt::format("{}: no image received; acquire this view", missing.front()));
     notify_(Step::measure, fmt::format("{} views", views_.size()));
     result_ = run({}, {});
   });
@@ -151,7 +152,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
 const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
   const auto tunnel = std::ranges::find(plan_.tunnels, name, &PlannedTunnel::name);
   if (tunnel == plan_.tunnels.end())
-    throw BadInput(Reason::bad_value, fmt::format("{}: is no tunnel of the plan", name));
+    throw BadInput(Reason::bad_value, fmt::format("{}: is not a tunnel of the plan", name));
   return *tunnel;
 }
 
@@ -159,10 +160,9 @@ Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
-      throw BadInput(Reason::usage,
-                     fmt::format("{}: this check point must be touched again first", missing.front()));
-    if (!result_) throw BadInput(Reason::usage, "nothing is measured yet");
-    if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered yet");
+      throw BadInput(Reason::usage, fmt::format("{}: touch this check point first", missing.front()));
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
     notify_(Step::plan, name);
     const PoseWindow window = look("plan");
     const Poses now = value_or_throw(poses_now(window, plan_.tracker));
@@ -205,7 +205,7 @@ std::vector<Poses> Operation::exposures() const {
 }
 
 Expected<LiveTool> Operation::live_tool() const {
-  if (!result_ || !hand_eye_) return fail(Reason::usage, "nothing is measured or registered yet");
+  if (!result_ || !hand_eye_) return fail(Reason::usage, "no measurement or no registration yet");
   return LiveTool(plan_, *result_, exposures(), *hand_eye_);
 }
 
@@ -270,7 +270,7 @@ TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
   const auto end = [&](const std::string& name) {
     const auto point = std::ranges::find(checked.points, name, &PointResult::name);
     if (point == checked.points.end() || !point->place || !point->place->in_tool)
-      throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool's frame", name));
+      throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
     return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, *hand_eye_, plan_.robot.tool);
   };
   TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};

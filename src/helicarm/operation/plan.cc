@@ -15,7 +15,7 @@ namespace {
 constexpr const char* plan_format = "helicarm-plan/1";
 constexpr Range millimetres{-100000, 100000};
 
-/// Made rigid where its digits are few; else as written, to the last bit, so that a record can be replayed.
+/// Orthonormalised if written with few digits; otherwise unchanged to the last bit, for replay.
 RigidTransform pose_from(JsonReader& reader, const char* key) {
   const Eigen::Matrix4d given = matrix_from(reader, key, millimetres);
   const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
@@ -23,7 +23,7 @@ RigidTransform pose_from(JsonReader& reader, const char* key) {
   return (corrected.matrix() - given).cwiseAbs().maxCoeff() > rounding ? corrected : exact_pose(given);
 }
 
-/// Within the limits that the list of fields gives to the key.
+/// Within the limits that plan_fields.h sets for the key.
 double planned_number(JsonReader& reader, const char* key) {
   return reader.number(key, field_named<OperationPlan>(plan_fields, key).range);
 }
@@ -34,10 +34,10 @@ std::uint16_t port_from(JsonReader& reader, const char* key) {
   return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
 }
 
-/// Views and tunnels give files their names.
+/// Files are named after views and tunnels.
 void check_file_name(const JsonReader& reader, const char* key, const std::string& name) {
   if (name.empty() || name.starts_with('.') || name.find_first_of("/\\") != std::string::npos)
-    reader.refuse(Reason::bad_value, key, "holds a name that cannot be a file's");
+    reader.refuse(Reason::bad_value, key, "contains a character that a file name cannot have");
 }
 
 void take_once(const JsonReader& reader, std::set<std::string>& names, const std::string& name) {
@@ -126,7 +126,7 @@ std::vector<std::string> views_from(JsonReader& reader) {
   std::vector<std::string> views;
   std::set<std::string> once;
   for (const Json& name : names) {
-    if (!name.is_string()) reader.refuse(Reason::bad_value, "views", "must hold names");
+    if (!name.is_string()) reader.refuse(Reason::bad_value, "views", "must contain names");
     views.push_back(name.get<std::string>());
     check_file_name(reader, "views", views.back());
     take_once(reader, once, views.back());

@@ -20,15 +20,15 @@ struct Pointer {
   Eigen::Vector3d tip_in_pointer;  ///< mm
 };
 
-/// A divot of a bone that is touched before the first X-ray and again before the robot moves: so a marker
-/// that was bumped, or taken for the other bone's, is noticed.
+/// A divot in a bone, touched before the first X-ray image and again before the robot moves: detects a
+/// displaced marker and exchanged markers.
 struct PlannedCheck {
   std::string name;
   Bone bone;
   double limit_mm;
 };
 
-/// Where the tracker's words come from, and what it calls things.
+/// Address of the tracker and its names for the markers.
 struct TrackerPlan {
   std::string address = "127.0.0.1";
   std::uint16_t port = 18944;
@@ -37,7 +37,7 @@ struct TrackerPlan {
   std::string tool = "tool";
   std::vector<Facet> facets;  ///< of the calibrator; a single marker is one facet
   std::optional<Pointer> pointer;
-  double sigma_mm = 0.12;  ///< of a reading, per axis: what no averaging over a second takes away
+  double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
   double sigma_deg = 0.05;
 
   const std::string& marker_of(Bone bone) const { return bone == Bone::femur ? femur : tibia; }
@@ -60,32 +60,32 @@ struct PlannedTunnel {
   Bone bone;
   std::string start;  ///< names of picks
   std::string end;
-  TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill comes in
+  TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill enters
 };
 
-/// Beyond these an order is not carried out, or stopped on its way: plan_stale.
+/// Limits beyond which an order is not carried out or is stopped (plan_stale).
 struct PlanLimits {
-  double distance_mm = 1;  ///< that bone, robot base or tool may have moved since planning
+  double distance_mm = 1;  ///< motion of bone, robot base or tool since planning
   double turn_deg = 1;
   double age_s = 60;  ///< from planning until the order is sent
 };
 
-/// All that an operation needs to know beforehand (plan.json, docs/formats.md).
+/// Settings of an operation (plan.json, docs/formats.md).
 struct OperationPlan {
-  std::string calibrator = "udcsc";  ///< a built-in's name or a file beside the plan
+  std::string calibrator = "udcsc";  ///< name of a built-in, or a file beside the plan
   std::optional<std::string> plate = "plate48";
-  std::vector<std::string> views{"AP", "LAT"};  ///< in the order of the acquisitions
+  std::vector<std::string> views{"AP", "LAT"};  ///< in order of acquisition
   TrackerPlan tracker;
   RobotPlan robot;
   std::vector<PlannedTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
-  Json picks = Json::array();  ///< as in case.json; may come later, once the images are seen
-  double max_error_mm = 2;     ///< at 95 %: the robot goes by no point that may be further off
+  Json picks = Json::array();  ///< as in case.json; may be set after the acquisition
+  double max_error_mm = 2;     ///< limit of a point's 95 % error for robot motion
   PlanLimits limits;
 };
 
-/// Strictly; fails as JsonReader, name_clash for two tunnels or facets of one name. Picks are checked when
-/// they become a case.
+/// Strict; fails as JsonReader, and with name_clash for two tunnels or facets of one name. Picks are checked
+/// when the case is written.
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
 Json to_json(const OperationPlan& plan);
 

@@ -16,7 +16,7 @@ OperationPlan plan() {
   return plan;
 }
 
-TEST(Plan, WhatIsWrittenIsRead) {
+TEST(Plan, WrittenPlanReadsBackEqual) {
   const Json json = to_json(plan());
   const auto read = plan_from(json, "plan.json");
   ASSERT_TRUE(read) << read.error().message;
@@ -38,13 +38,13 @@ TEST(Plan, TunnelOrFacetGivenTwiceIsRefused) {
   }
 }
 
-TEST(Plan, ViewThatIsAPathIsRefused) {
+TEST(Plan, ViewNameThatIsAPathIsRefused) {
   Json json = to_json(plan());
   json["views"] = {"AP", "../LAT"};
   EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::bad_value);
 }
 
-TEST(Plan, SpeedBeyondTheLimitIsRefusedNamingIt) {
+TEST(Plan, SpeedBeyondTheLimitIsRefusedWithItsKey) {
   Json json = to_json(plan());
   json["robot"]["approach"]["travel_mm_s"] = 5000;
   const auto read = plan_from(json, "plan.json");
@@ -69,7 +69,7 @@ TEST(Plan, LimitsOfAStalePlanMayBeLeftOutAndAreBounded) {
   }
 }
 
-TEST(Plan, FacetThatIsNoRigidMotionIsRefused) {
+TEST(Plan, FacetThatIsNotARigidMotionIsRefused) {
   Json json = to_json(plan());
   json["tracker"]["facets"][0]["calibrator_from_facet"][0][0] = 2;
   EXPECT_FALSE(plan_from(json, "plan.json"));

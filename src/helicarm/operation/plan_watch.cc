@@ -15,14 +15,14 @@ namespace {
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// The age at which poses and states are refused anywhere else.
+/// The limit of FreshnessLimits for poses and states.
 constexpr double recent_s = 0.1;
 constexpr std::size_t most_samples = 5;
-/// A turn counts like the motion of a point so far off, to find the nearest place of a path.
+/// Lever that converts a rotation to a distance when the nearest pose of a path is sought.
 constexpr double lever_mm = 200;
 constexpr double deg_per_rad = 180 / std::numbers::pi;
 
-/// Shift of the point (mm), then the turn (rad), both along the axes of the common frame.
+/// Displacement of the point (mm), then rotation vector (rad), both in the common frame.
 Vector6d step_of(const Vector3d& point, const RigidTransform& from, const RigidTransform& to) {
   Vector6d step;
   step.head<3>() = to * point - from * point;
@@ -46,14 +46,14 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
 std::vector<PoseSample> recent(const PoseBoard& board, const std::string& name, double now_s) {
   if (const auto elsewhere = board.elsewhere(name, now_s, recent_s)) return {*elsewhere};
   value_or_throw(board.latest(name, now_s, recent_s));
-  // A sample may come while this is asked.
+  // A sample may arrive after `now`.
   std::vector<PoseSample> samples =
       board.between(name, now_s - recent_s, std::numeric_limits<double>::infinity());
   if (samples.size() > most_samples) samples.erase(samples.begin(), samples.end() - most_samples);
   return samples;
 }
 
-/// The least step among those to the path's places and to what lies between two of them.
+/// Least step to the poses of the path, interpolated between neighbours.
 Vector6d least_of(const std::vector<Vector6d>& steps) {
   const auto scaled = [](Vector6d step) -> Vector6d {
     step.tail<3>() *= lever_mm;
@@ -125,14 +125,14 @@ Expected<Motion> PlanWatch::base_motion(const PoseBoard& board, const ToolTrack&
       if (!to_path.empty()) steps.push_back(least_of(to_path));
     }
     if (steps.empty())
-      throw BadInput(Reason::stale_state, "the robot's poses at the time of the tracker's are not known");
+      throw BadInput(Reason::stale_state, "no robot poses at the time of the tracker's poses");
     return size_of(median_of(steps));
   });
 }
 
 Expected<Motion> PlanWatch::travelled(const ToolTrack& track, double now_s) const {
   const auto poses = track.between(now_s - recent_s, std::numeric_limits<double>::infinity());
-  if (poses.empty()) return fail(Reason::stale_state, "the robot's last poses are not known");
+  if (poses.empty()) return fail(Reason::stale_state, "no recent robot poses");
   return motion_of(Vector3d::Zero(), basis_.base_from_tcp, poses.back().base_from_tcp);
 }
 

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using testing::HasSubstr;
 
 constexpr double rad = std::numbers::pi / 180;
-constexpr double period_s = 0.008;  ///< of a CB3's states
+constexpr double period_s = 0.008;  ///< state period of a CB3
 constexpr const char* base_or_tool = "robot base or tool moved";
 
 RigidTransform shift(double x, double y, double z) { return {Eigen::Matrix3d::Identity(), {x, y, z}}; }
@@ -30,16 +30,16 @@ RigidTransform turn_about(const Vector3d& point, const Vector3d& turn) {
   return {rotation, point - rotation * point};
 }
 
-/// What became of an order while something went wrong.
+/// Outcome of an order during a fault.
 struct Outcome {
   std::optional<Failure> stopped;
-  double rest_s = 0;        ///< from the moment that the true motion exceeded its limit until the arm rests
-  double astray_mm = 0;     ///< true motion when it rests
-  double travelled_mm = 0;  ///< by the tip since then
+  double rest_s = 0;        ///< from the true motion exceeding its limit until the arm rests
+  double error_mm = 0;      ///< true motion at rest
+  double travelled_mm = 0;  ///< path of the tip since then
 };
 
-/// Robot, tracker and bone on one virtual clock. Motions are along the tracker's axes, as functions of the
-/// time since the order began.
+/// Robot, tracker and bone on one virtual clock. Motions are along the tracker's axes, functions of the time
+/// since the order began.
 struct Scene {
   using Moves = std::function<RigidTransform(double)>;
 
@@ -50,7 +50,7 @@ struct Scene {
     tracker_from_femur = {rotation_from_euler(0.4, -0.3, 1.2), start + Vector3d(70, -60, 80)};
     for (const Vector3d& end : {tunnel.start_in_base, tunnel.end_in_base})
       points_in_femur.push_back(tracker_from_femur.inverse() * (hand_eye.tracker_from_base * end));
-    for (int i = 0; i < 100; ++i) step();  // the gate knows both markers
+    for (int i = 0; i < 100; ++i) step();  // the gate accepts both markers
   }
 
   PlanWatch watch() const {
@@ -91,7 +91,7 @@ struct Scene {
     track.take(time_s, robot.state().base_from_tcp, time_s + 0.001);
     if (time_s < next_sample_s) return;
     next_sample_s += tracker_period_s;
-    // A slip of the tool in its mount moves the marker as a motion of the base would.
+    // A slip of the tool in its mount moves the marker as a base motion would.
     const RigidTransform marker = base_moves * tool_moves * hand_eye.tracker_from_base *
                                   robot.state().base_from_tcp * drill().flange_from_tcp.inverse() *
                                   hand_eye.flange_from_marker;
@@ -102,7 +102,7 @@ struct Scene {
                time_s + delay_s);
   }
 
-  /// Until something is against it or it is done.
+  /// Until the order is stopped or done.
   Outcome carry_out(const RobotOrder& order, const Moves& femur, const Moves& base = {},
                     const Moves& tool = {}) {
     const PlanWatch plan = watch();
@@ -127,7 +127,7 @@ struct Scene {
       if (const auto holds = plan.in_place(board, track, time_s); !holds) outcome.stopped = holds.error();
     }
     outcome.rest_s = outcome.stopped ? time_s - astray_s.value_or(time_s) : 0;
-    outcome.astray_mm = moved_mm();
+    outcome.error_mm = moved_mm();
     outcome.travelled_mm =
         (base_moves.inverse() * tip().translation - base_moves.inverse() * tip_then).norm();
     return outcome;
@@ -155,7 +155,7 @@ struct Scene {
   std::optional<RigidTransform> taken_for_femur;
 };
 
-/// Once the tool is on its way along the axis.
+/// While the tool moves along the axis.
 constexpr double on_the_axis_s = 4;
 
 RigidTransform still(double) { return {}; }
@@ -165,17 +165,17 @@ Scene::Moves from(double begin_s, const Scene::Moves& moves) {
 }
 
 void expect_stop(const Outcome& outcome, const char* what, double longest_s) {
-  if (!outcome.stopped) FAIL() << "nothing stopped it";
+  if (!outcome.stopped) FAIL() << "the order was not stopped";
   EXPECT_EQ(outcome.stopped->reason, Reason::plan_stale) << outcome.stopped->message;
   EXPECT_THAT(outcome.stopped->message, HasSubstr(what));
   EXPECT_TRUE(outcome.stopped->figures.at("distance_mm") > 1 || outcome.stopped->figures.at("turn_deg") > 1);
   EXPECT_LT(outcome.rest_s, longest_s);
   testing::Test::RecordProperty("ms_to_rest", int(outcome.rest_s * 1000));
-  testing::Test::RecordProperty("moved_um", int(outcome.astray_mm * 1000));
+  testing::Test::RecordProperty("moved_um", int(outcome.error_mm * 1000));
   testing::Test::RecordProperty("tool_um", int(outcome.travelled_mm * 1000));
 }
 
-TEST(PlanWatch, OrderInARoomAtRestIsCarriedOutWhateverTheNoise) {
+TEST(PlanWatch, OrderWithoutMotionIsCarriedOutDespiteNoise) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     Scene scene(seed % 2 ? 60 : 20, seed);
     const Outcome outcome = scene.carry_out(planned(), still);
@@ -183,7 +183,7 @@ TEST(PlanWatch, OrderInARoomAtRestIsCarriedOutWhateverTheNoise) {
   }
 }
 
-TEST(PlanWatch, NoiseOfTenMinutesStaysFarFromTheLimit) {
+TEST(PlanWatch, TenMinutesOfNoiseStayBelowTheLimit) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   double most_mm = 0, most_deg = 0;
@@ -202,27 +202,27 @@ TEST(PlanWatch, NoiseOfTenMinutesStaysFarFromTheLimit) {
 }
 
 TEST(PlanWatch, CreepingBoneStopsTheRobot) {
-  // Fifteen times 2 mm, as somebody who shifts the leg.
+  // Fifteen steps of 2 mm, as when someone shifts the leg.
   const Outcome creep = Scene().carry_out(planned(), from(on_the_axis_s, [](double t) {
                                             return shift(2 * std::min(15.0, std::floor(6 * t)), 0, 0);
                                           }));
   expect_stop(creep, "femur moved", 0.2);
-  EXPECT_LT(creep.astray_mm, 5);
+  EXPECT_LT(creep.error_mm, 5);
 }
 
 TEST(PlanWatch, SlowDriftStopsTheRobotAtTheLimit) {
   const Outcome drift =
       Scene().carry_out(planned(), from(0.5, [](double t) { return shift(0, 0.5 * t, 0); }));
   expect_stop(drift, "femur moved", 0.5);
-  EXPECT_LT(drift.astray_mm, 1.3);
+  EXPECT_LT(drift.error_mm, 1.3);
 }
 
-TEST(PlanWatch, JumpOnTheWayToTheStandOffStopsTheRobotToo) {
+TEST(PlanWatch, JumpBeforeTheStandOffStopsTheRobot) {
   expect_stop(Scene().carry_out(planned(), from(0.8, [](double) { return shift(0, 0, 3); })), "femur moved",
               0.25);
 }
 
-TEST(PlanWatch, JumpOfTheBoneStopsTheRobotWheneverItComes) {
+TEST(PlanWatch, JumpOfTheBoneStopsTheRobotAtAnyTime) {
   Outcome worst;
   for (int i = 0; i < 6; ++i) {
     const Outcome jump =
@@ -235,7 +235,7 @@ TEST(PlanWatch, JumpOfTheBoneStopsTheRobotWheneverItComes) {
   expect_stop(worst, "femur moved", 0.2);
 }
 
-TEST(PlanWatch, BoneThatTurnsAboutTheTunnelStopsTheRobot) {
+TEST(PlanWatch, BoneThatRotatesAboutTheTunnelStopsTheRobot) {
   Scene scene;
   const Vector3d start = scene.tracker_from_femur * scene.points_in_femur.front();
   const Outcome turned = scene.carry_out(planned(), from(on_the_axis_s, [&](double t) {
@@ -262,7 +262,7 @@ TEST(PlanWatch, ToolThatSlipsInItsMountStopsTheRobot) {
   expect_stop(scene.carry_out(planned(), still, {}, from(on_the_axis_s, slips)), base_or_tool, 0.2);
 }
 
-TEST(PlanWatch, BaseMovedBeforeTheOrderIsSeenInEveryDirection) {
+TEST(PlanWatch, BaseMotionBeforeTheOrderIsDetectedInEveryDirection) {
   for (const Vector3d& way : {Vector3d(3, 0, 0), Vector3d(0, 3, 0), Vector3d(0, 0, 3)}) {
     Scene scene;
     const PlanWatch watch = scene.watch();
@@ -277,18 +277,18 @@ TEST(PlanWatch, BaseMovedBeforeTheOrderIsSeenInEveryDirection) {
   }
 }
 
-TEST(PlanWatch, BoneThatWasMovedWhileNoOneLookedIsSeen) {
+TEST(PlanWatch, BoneMotionDuringAnOcclusionIsDetected) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   scene.femur_moves = shift(40, 0, 0);
-  scene.pass(1);  // until the gate believes the new place
+  scene.pass(1);  // until the gate accepts the new position
   const auto holds = watch.holds(scene.board, scene.track, scene.time_s);
   ASSERT_FALSE(holds);
   EXPECT_EQ(holds.error().reason, Reason::plan_stale);
   EXPECT_NEAR(holds.error().figures.at("distance_mm"), 40, 0.5);
 }
 
-TEST(PlanWatch, CalibratorTakenForTheBoneIsSeen) {
+TEST(PlanWatch, CalibratorTakenForTheBoneIsDetected) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   scene.taken_for_femur = scene.tracker_from_femur * shift(150, -40, 20);
@@ -306,7 +306,7 @@ TEST(PlanWatch, JumpThatTheGateDoesNotAcceptYetStopsTheRobot) {
   EXPECT_NEAR(jump.stopped->figures.at("distance_mm"), 40, 1);
 }
 
-TEST(PlanWatch, OneOrTwoSamplesFarOffDoNotCount) {
+TEST(PlanWatch, OneOrTwoOutliersHaveNoEffect) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   for (int outliers = 1; outliers <= 2; ++outliers) {
@@ -320,7 +320,7 @@ TEST(PlanWatch, OneOrTwoSamplesFarOffDoNotCount) {
   }
 }
 
-TEST(PlanWatch, TrackerThatSpeaksLateDoesNotStopAFastTool) {
+TEST(PlanWatch, DelayedTrackerDoesNotStopAFastTool) {
   Scene scene;
   scene.delay_s = 0.06;
   ApproachOptions fast;
@@ -339,7 +339,7 @@ TEST(PlanWatch, PlanExpiresByItsAge) {
   EXPECT_NEAR(old.error().figures.at("age_s"), 60.1, 1e-9);
 }
 
-TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNothingHolds) {
+TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNoPlanHolds) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   EXPECT_EQ(watch.in_place(scene.board, scene.track, scene.time_s + 0.2).error().reason, Reason::stale_pose);
@@ -347,7 +347,7 @@ TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNothingHolds) {
   EXPECT_EQ(watch.in_place(scene.board, ToolTrack(), scene.time_s).error().reason, Reason::stale_state);
 }
 
-TEST(PlanWatch, ArmThatIsNotAsDrawnWidensTheBasesLimitsAsItTravels) {
+TEST(PlanWatch, KinematicErrorWidensTheBaseLimitsWithTravel) {
   const PlanLimits at_rest = widened({1, 1, 60}, {0, 0}), travelled = widened({1, 1, 60}, {200, 50});
   EXPECT_FALSE(check_motion("robot base or tool", {1.01, 0}, at_rest));
   EXPECT_TRUE(check_motion("robot base or tool", {1.99, 1.49}, travelled));

@@ -8,7 +8,7 @@
 #include "helicarm/guidance/poses.h"
 #include "helicarm/operation/tool_line.h"
 
-/// How the session's record writes values: to the last bit.
+/// Values as the session log stores them: exact to the last bit.
 namespace helicarm {
 
 Json to_json(const Poses& poses);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
 
-/// The first fields in which two values differ, for a person.
+/// Names of the first differing fields, for a message.
 std::string where(const Json& then, const Json& now) {
   constexpr std::size_t most = 4;
   const Json patch = Json::diff(then, now);
@@ -56,7 +56,9 @@ class Replay {
     report.differences.push_back(origin + ": " + how);
   }
   void compare(const Json& then, const Json& now, const std::string& origin, const char* what) {
-    if (then != now) differ(origin, fmt::format("the {} comes out otherwise{}", what, where(then, now)));
+    if (then != now)
+      differ(origin, fmt::format("the {} differs from the recorded value on recomputation{}", what,
+                                 where(then, now)));
   }
 
   void exposure(const SessionRecord& record, const std::string& origin) {
@@ -71,12 +73,12 @@ class Replay {
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto check = std::ranges::find(
         plan_.check_points, record.content.at("check_point").get<std::string>(), &PlannedCheck::name);
-    if (check == plan_.check_points.end()) return differ(origin, "its check point is none of the plan");
+    if (check == plan_.check_points.end()) return differ(origin, "its check point is not in the plan");
     const auto tip = touched_in_bone(window, plan_.tracker, check->bone);
     compare(record.content.at("in_bone"), tip ? json_list(*tip) : Json(), origin, "touched point");
   }
 
-  /// The case must be the one recorded, and its images those that came.
+  /// The case must equal the recorded one, and its images those received.
   void images(const SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
     if (record.content.contains("case")) {
@@ -94,7 +96,7 @@ class Replay {
       if (!file)
         differ(origin, file.error().message);
       else if (digest(*file) != recorded)
-        differ(origin, name + " is not the picture that came");
+        differ(origin, name + " is not the recorded image");
     }
   }
 
@@ -107,7 +109,7 @@ class Replay {
     if (record.content.at("digest") == run->digest) return;
     const auto then = read_json(inside / "result.json");
     differ(origin,
-           fmt::format("{}: the result comes out otherwise{}", folder,
+           fmt::format("{}: the result differs from the recorded one on recomputation{}", folder,
                        then ? where(without_timing(*then), without_timing(to_json(run->result))) : ""));
   }
 
@@ -140,7 +142,8 @@ Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& 
                          fmt::format("{}: stopped at record {}", session.string(), record.number));
         replay.take(record);
       } catch (const Json::exception&) {
-        throw BadInput(Reason::bad_value, fmt::format("record {}: lacks what its kind needs", record.number));
+        throw BadInput(Reason::bad_value,
+                       fmt::format("record {}: a field that its kind requires is missing", record.number));
       }
     return replay.report;
   });

@@ -14,12 +14,12 @@
 namespace helicarm {
 namespace {
 
-/// An image's way through the C-arm and a hospital's network.
+/// Transfer of an image through the C-arm and a hospital network.
 constexpr double longest_way_s = 1.5;
-constexpr double now_s = 0.75;  // told to end, nobody waits longer than a second
-/// The last samples of a window that ends now are still on their way.
+constexpr double now_s = 0.75;  // a stop request ends the wait within 1 s
+/// The last samples of a window that ends now arrive this late.
 constexpr double settle_s = 0.1;
-/// Nobody moves a leg and brings it back within so short a time.
+/// A leg is not moved and brought back within so short a time.
 constexpr double longest_gap_s = 0.25;
 
 constexpr Range any_time{0, 1e12};
@@ -39,8 +39,8 @@ PoseWindow window_about(const PoseBoard& board, const TrackerPlan& plan, double 
   return window;
 }
 
-/// What the tracker keeps in every reading, about the marker's own origin.
-PoseCovariance kept_by_tracker(const TrackerPlan& plan) {
+/// Tracker error that averaging does not reduce, about the marker's origin.
+PoseCovariance systematic_covariance(const TrackerPlan& plan) {
   const double turn = plan.sigma_deg * std::numbers::pi / 180;
   PoseCovariance covariance = PoseCovariance::Zero();
   covariance.diagonal().head<3>().setConstant(plan.sigma_mm * plan.sigma_mm);
@@ -54,7 +54,7 @@ Expected<std::optional<RigidTransform>> bone_if_seen(const Expected<SeenPose>& s
   return std::nullopt;
 }
 
-/// The longest time within the window that no sample tells of.
+/// The longest gap between samples within the window.
 double longest_gap(const PoseWindow& window, const std::vector<PoseSample>& samples) {
   double last = window.middle_s - window.half_s, gap = 0;
   for (const PoseSample& sample : samples)
@@ -89,7 +89,7 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
     const Json& tools = reader.raw("tools");
     if (!tools.is_object()) reader.refuse(Reason::bad_value, "tools", "must be an object");
     for (const auto& [tool, list] : tools.items()) {
-      if (!list.is_array()) reader.refuse(Reason::bad_value, "tools", "must hold lists");
+      if (!list.is_array()) reader.refuse(Reason::bad_value, "tools", "must contain lists");
       std::vector<PoseSample>& samples = window.samples[tool];
       for (const Json& entry : list) {
         JsonReader sample(entry, origin + ": " + tool);
@@ -117,23 +117,25 @@ PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan, const std
   std::unique_lock lock(alone);
   std::condition_variable_any().wait_for(lock, end, std::chrono::duration<double>(now_s + settle_s),
                                          [] { return false; });
-  if (end.stop_requested()) throw BadInput(Reason::interrupted, "told to end");
+  if (end.stop_requested()) throw BadInput(Reason::interrupted, "stopped by request");
   return window_about(board, plan, from + now_s / 2, now_s / 2);
 }
 
 Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, const std::string& tool) {
   const auto samples = window.samples.find(tool);
-  if (samples == window.samples.end()) return fail(Reason::no_pose, tool + ": the tracker never showed it");
+  if (samples == window.samples.end())
+    return fail(Reason::no_pose, tool + ": no pose from the tracker in this window");
   if (const double gap = longest_gap(window, samples->second);
       !samples->second.empty() && gap > longest_gap_s)
     return fail(Reason::stale_pose,
-                fmt::format("{}: was not seen for {:.3g} s, limit {:g} s", tool, gap, longest_gap_s),
+                fmt::format("{}: was not visible for {:.3g} s, limit {:g} s", tool, gap, longest_gap_s),
                 {{"gap_s", gap}});
   ExposurePoseOptions options;
   options.window_s = window.half_s;
   return exposure_pose(samples->second, window.middle_s, options)
       .map([&](const ExposurePose& pose) {
-        return SeenPose{pose.tracker_from_tool, pose.covariance, pose.covariance + kept_by_tracker(plan)};
+        return SeenPose{pose.tracker_from_tool, pose.covariance,
+                        pose.covariance + systematic_covariance(plan)};
       })
       .map_error([&](const Failure& failure) { return named(failure, tool); });
 }
@@ -180,7 +182,7 @@ Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
 
 Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan, Bone bone) {
   return guarded([&]() -> Eigen::Vector3d {
-    if (!plan.pointer) throw BadInput(Reason::bad_value, "the plan has no pointer");
+    if (!plan.pointer) throw BadInput(Reason::bad_value, "the plan has no pointer; add it to \"tracker\"");
     const auto see = [&](const std::string& tool) {
       return value_or_throw(see_tool(window, plan, tool)).tracker_from_marker;
     };

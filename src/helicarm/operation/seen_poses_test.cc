@@ -20,7 +20,7 @@ TrackerPlan plan() {
   return plan;
 }
 
-/// 31 samples about second 10, with a little noise.
+/// 31 samples about t = 10 s with a little noise.
 std::vector<PoseSample> samples_of(const RigidTransform& pose, std::uint32_t stream,
                                    const Eigen::Vector3d& drift = Eigen::Vector3d::Zero()) {
   RandomStream random(1, stream);
@@ -44,14 +44,14 @@ PoseWindow window() {
   return window;
 }
 
-TEST(SeenPoses, ToolsCovarianceHoldsWhatNoMeanTakesAway) {
+TEST(SeenPoses, ToolCovarianceIncludesSystematicError) {
   const SeenPose seen = see_tool(window(), plan(), "femur").value();
   EXPECT_LT((seen.tracker_from_marker.translation - at_rest.translation).norm(), 0.06);
   EXPECT_LT(seen.scatter(0, 0), 0.05 * 0.05 / 10);
   EXPECT_GT(seen.covariance(0, 0), 0.1 * 0.1);
 }
 
-TEST(SeenPoses, CalibratorIsSeenByItsFacets) {
+TEST(SeenPoses, CalibratorPoseIsFusedFromItsFacets) {
   const SeenPose seen = see_calibrator(window(), plan()).value();
   EXPECT_LT((seen.tracker_from_marker.translation - at_rest.translation).norm(), 0.15);
 }
@@ -64,13 +64,13 @@ TEST(SeenPoses, OneFacetIsEnough) {
   EXPECT_FALSE(see_calibrator(given, plan()));
 }
 
-TEST(SeenPoses, HiddenBoneIsAbsentFromTheExposure) {
+TEST(SeenPoses, OccludedBoneIsAbsentFromTheAcquisition) {
   const Poses poses = poses_of_exposure(window(), plan()).value();
   EXPECT_TRUE(poses.tracker_from_calibrator && poses.tracker_from_femur);
   EXPECT_FALSE(poses.tracker_from_tibia);
 }
 
-TEST(SeenPoses, BoneThatMovedDuringTheExposureIsRefused) {
+TEST(SeenPoses, BoneThatMovedDuringTheAcquisitionIsRefused) {
   PoseWindow given = window();
   given.samples["femur"] = samples_of(at_rest, 1, {4, 0, 0});
   const auto poses = poses_of_exposure(given, plan());
@@ -79,7 +79,7 @@ TEST(SeenPoses, BoneThatMovedDuringTheExposureIsRefused) {
   EXPECT_NE(poses.error().message.find("femur"), std::string::npos);
 }
 
-TEST(SeenPoses, NowNeedsEveryMarker) {
+TEST(SeenPoses, PresentPosesNeedEveryMarker) {
   EXPECT_FALSE(poses_now(window(), plan()));
   PoseWindow given = window();
   given.samples["tibia"] = samples_of(at_rest, 4);

@@ -11,14 +11,14 @@ namespace {
 using Eigen::Vector3d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// The second point of a tool's line lies so far behind its tip.
+/// Distance of the second point of a tool's line behind the tip.
 constexpr double line_mm = 100;
 
 Eigen::Matrix3d cross_matrix(const Vector3d& v) {
   return (Eigen::Matrix3d() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished();
 }
 
-/// What a pose's error (place, turn) does to something at `lever` from its origin.
+/// Effect of a pose's error (position, rotation) on a point at `lever` from the origin.
 Matrix6d carried(const Vector3d& lever) {
   Matrix6d effect = Matrix6d::Identity();
   effect.topRightCorner<3, 3>() = -cross_matrix(lever);
@@ -29,7 +29,7 @@ const RigidTransform& pose_of(const Poses& poses, Bone bone) {
   const auto& pose = poses.tracker_from(bone);
   if (!pose)
     throw BadInput(Reason::no_pose,
-                   fmt::format("{}: its marker was not seen", bone == Bone::femur ? "femur" : "tibia"));
+                   fmt::format("{}: its marker is not visible", bone == Bone::femur ? "femur" : "tibia"));
   return *pose;
 }
 
@@ -89,7 +89,7 @@ Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& 
                              const RigidTransform& marker_from_tip) {
   return guarded([&] {
     if (!exposure.tracker_from_calibrator || !now.tracker_from_tool)
-      throw BadInput(Reason::no_pose, "calibrator or tool: its marker was not seen");
+      throw BadInput(Reason::no_pose, "calibrator or tool: its marker is not visible");
     const RigidTransform calibrator_from_tip = exposure.tracker_from_calibrator->inverse() *
                                                pose_of(exposure, bone) * pose_of(now, bone).inverse() *
                                                *now.tracker_from_tool * marker_from_tip;

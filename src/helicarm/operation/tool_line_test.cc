@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 RobotTool drill() { return {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
 
-TEST(ToolLine, OfAToolOnTheTunnelMissesNothing) {
+TEST(ToolLine, ToolOnTheTunnelHasNoMiss) {
   const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
       end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
@@ -24,7 +24,7 @@ TEST(ToolLine, OfAToolOnTheTunnelMissesNothing) {
   EXPECT_NEAR(miss.predicted_mm(), 0, 1e-9);
 }
 
-TEST(ToolLine, MissIsMeasuredAcrossTheAxisAlone) {
+TEST(ToolLine, MissIsMeasuredAcrossTheAxisOnly) {
   const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
       end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
@@ -32,7 +32,7 @@ TEST(ToolLine, MissIsMeasuredAcrossTheAxisAlone) {
   EXPECT_TRUE(miss.across_mm.isApprox(Eigen::Vector2d(0.3, -0.4), 1e-9));
 }
 
-TEST(ToolLine, CovarianceOfAMissIsThatOfDrawnErrors) {
+TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
   HandEye known = exact_hand_eye();
   const Vector3d point(20, -100, 60);
   const Eigen::Matrix3d of_point = Vector3d(0.04, 0.01, 0.09).asDiagonal();
@@ -55,12 +55,12 @@ TEST(ToolLine, CovarianceOfAMissIsThatOfDrawnErrors) {
   EXPECT_LT((drawn - expected.covariance).norm(), 0.04 * expected.covariance.norm());
 }
 
-TEST(ToolLine, StandsInTheCalibratorAsItWouldHaveStoodAtTheExposure) {
+TEST(ToolLine, LineAtTheAcquisitionFollowsTheBone) {
   const RigidTransform tracker_from_calibrator{rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
   const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
   const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
   const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
-  // A tip on a point of the bone, now.
+  // A tip on a point of the bone, at the present poses.
   const Vector3d on_bone(30, 5, -20);
   Poses exposure, now;
   exposure.tracker_from_calibrator = tracker_from_calibrator;
@@ -90,7 +90,7 @@ TEST(HandEyeTour, TurnsAboutAllAxesAndEndsWhereItBegan) {
             1e-6);
 }
 
-TEST(OutcomeTable, FiguresAreThoseOfTheErrors) {
+TEST(OutcomeTable, StatisticsAreThoseOfTheErrors) {
   const std::vector<double> errors{1, 2, 3, 6};
   const ErrorFigures figures = figures_of(errors);
   EXPECT_EQ(figures.max, 6);
@@ -100,7 +100,7 @@ TEST(OutcomeTable, FiguresAreThoseOfTheErrors) {
   EXPECT_NEAR(figures.sd, std::sqrt(14.0 / 3), 1e-12);
 }
 
-TEST(OutcomeTable, OfNothingIsMisuse) { EXPECT_THROW(figures_of({}), std::invalid_argument); }
+TEST(OutcomeTable, EmptyInputIsMisuse) { EXPECT_THROW(figures_of({}), std::invalid_argument); }
 
 }  // namespace
 }  // namespace helicarm

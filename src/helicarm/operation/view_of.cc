@@ -10,7 +10,7 @@ namespace helicarm {
 namespace {
 
 constexpr double in_degrees = 180 / std::numbers::pi;
-/// A leg is seldom straight in the beam: so far off, a view still is what it is called.
+/// Tolerance of a view's angle: a leg is seldom aligned with the beam.
 constexpr double plain_deg = 30;
 
 enum class Kind { frontal, lateral, other };
@@ -20,7 +20,7 @@ Kind kind_of(const std::string& view) {
   return view.starts_with("LAT") ? Kind::lateral : Kind::other;
 }
 
-/// As the positioner stood; PS3.3 C.8.7.5: primary about the patient's long axis, secondary towards the head.
+/// Positioner angles; PS3.3 C.8.7.5: primary about the patient's long axis, secondary towards the head.
 std::optional<Eigen::Vector3d> beam(const Acquisition& shown) {
   if (!shown.primary_angle_deg) return std::nullopt;
   const double primary = *shown.primary_angle_deg / in_degrees;

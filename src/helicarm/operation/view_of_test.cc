@@ -15,7 +15,7 @@ Acquisition at(double primary_deg, double secondary_deg = 0) {
   return shown;
 }
 
-TEST(ViewOf, PositionersAngleRules) {
+TEST(ViewOf, PositionerAngleDecides) {
   for (const double frontal : {0.0, -12.0, 25.0, 180.0, -170.0}) {
     EXPECT_EQ(view_of(at(frontal), "AP", views), "AP") << frontal;
     EXPECT_EQ(view_of(at(frontal), "LAT", views), "AP") << frontal;
@@ -23,7 +23,7 @@ TEST(ViewOf, PositionersAngleRules) {
   for (const double lateral : {90.0, -90.0, 75.0, 270.0}) EXPECT_EQ(view_of(at(lateral), "AP", views), "LAT");
 }
 
-TEST(ViewOf, WhatIsNotPlainIsTakenAsWanted) {
+TEST(ViewOf, AmbiguousAngleKeepsTheWantedView) {
   EXPECT_EQ(view_of({}, "LAT", views), "LAT");
   EXPECT_EQ(view_of(at(45), "AP", views), "AP");
   EXPECT_EQ(view_of(at(90, 50), "AP", views), "AP");
@@ -31,13 +31,13 @@ TEST(ViewOf, WhatIsNotPlainIsTakenAsWanted) {
   EXPECT_EQ(view_of(at(90), "AP", std::vector<std::string>{"AP", "PA"}), "AP");
 }
 
-TEST(DegreesApart, AreThoseOfLines) {
+TEST(DegreesApart, AngleIsBetweenLines) {
   EXPECT_NEAR(*degrees_apart(at(0), at(90)), 90, 1e-9);
   EXPECT_NEAR(*degrees_apart(at(10), at(-170)), 0, 1e-4);
   EXPECT_NEAR(*degrees_apart(at(0), at(20, 10)), 22.3, 0.1);
 }
 
-TEST(DegreesApart, EqualOrAbsentAnglesSayNothing) {
+TEST(DegreesApart, EqualOrAbsentAnglesGiveNoAngle) {
   EXPECT_FALSE(degrees_apart(at(0), at(0)));
   EXPECT_FALSE(degrees_apart(at(0), {}));
 }
