@@ -18,11 +18,11 @@ namespace fs = std::filesystem;
 using virtual_devices::CArmFault;
 using virtual_devices::VirtualDevices;
 
-/// Longer than the window that an exposure's poses are taken from.
+/// Longer than the pose window of an acquisition.
 constexpr std::chrono::milliseconds window{1800};
 constexpr int most_takes = 5;
 
-/// One virtual room for all, and an operation of its own for each test.
+/// One set of virtual devices for all tests, and an operation for each test.
 class FaultyOperation : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -63,7 +63,7 @@ class FaultyOperation : public testing::Test {
     const DatedArrival image = acquired_view(view, fault);
     return operation_->take(view, image.arrival, image.time_s);
   }
-  /// Again where a busy machine made the tracker stutter.
+  /// Repeated where a busy machine delayed the tracker.
   void expose(const std::string& view, CArmFault fault = CArmFault::none) {
     Expected<void> taken = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_takes && !taken; ++i) taken = take(view, fault);
@@ -88,7 +88,7 @@ std::unique_ptr<Connections> FaultyOperation::devices_;
 OperationPlan FaultyOperation::plan_;
 std::unique_ptr<TemporaryFolder> FaultyOperation::folder_;
 
-TEST_F(FaultyOperation, SameImageForBothViewsIsRefusedAndTheNextOneTaken) {
+TEST_F(FaultyOperation, SameImageForBothViewsIsRefusedAndTheNextOneAccepted) {
   expose("AP");
   EXPECT_EQ(take("LAT", CArmFault::same_image).error().reason, Reason::views_too_close);
   EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"LAT"});
@@ -112,7 +112,7 @@ TEST_F(FaultyOperation, ImagesInTheOtherOrderAreSortedByTheirAngles) {
     EXPECT_TRUE(tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
 }
 
-TEST_F(FaultyOperation, OtherOrderThatNoFileReportsLeavesItsTunnelsUnmeasured) {
+TEST_F(FaultyOperation, UndetectableExchangeOfViewsLeavesTunnelsUnmeasured) {
   for (const auto& [view, taken_as] : {std::pair{"LAT", "AP"}, std::pair{"AP", "LAT"}}) {
     Expected<void> taken = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_takes && !taken; ++i) {
@@ -125,12 +125,12 @@ TEST_F(FaultyOperation, OtherOrderThatNoFileReportsLeavesItsTunnelsUnmeasured) {
   for (const PlannedTunnel& tunnel : plan_.tunnels)
     EXPECT_EQ(tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
   const auto warnings = std::ranges::count_if(reported_, [](const std::string& what) {
-    return what.find("no time of acquisition") != std::string::npos;
+    return what.find("no acquisition time") != std::string::npos;
   });
   EXPECT_EQ(warnings, 1);
 }
 
-TEST_F(FaultyOperation, ImageHeldBackWhileTheLegMovedIsRefused) {
+TEST_F(FaultyOperation, ImageDelayedWhileTheLegMovedIsRefused) {
   expose("AP");
   const auto late = take("LAT", CArmFault::held_back);
   ASSERT_FALSE(late);
@@ -141,7 +141,7 @@ TEST_F(FaultyOperation, ImageHeldBackWhileTheLegMovedIsRefused) {
   EXPECT_TRUE(operation_->measure());
 }
 
-TEST_F(FaultyOperation, FirstImageHeldBackIsAskedForAgainOnceTheSecondCame) {
+TEST_F(FaultyOperation, DelayedFirstImageIsRequestedAgainAfterTheSecond) {
   expose("AP", CArmFault::held_back);
   std::this_thread::sleep_for(window);
   expose("LAT");
@@ -151,7 +151,7 @@ TEST_F(FaultyOperation, FirstImageHeldBackIsAskedForAgainOnceTheSecondCame) {
   EXPECT_TRUE(operation_->measure());
 }
 
-TEST_F(FaultyOperation, ImageThatCameBeforeIsRefused) {
+TEST_F(FaultyOperation, RepeatedImageIsRefused) {
   DatedArrival again = acquired_view("AP");
   again.arrival.repeated = true;
   EXPECT_EQ(operation_->take("AP", again.arrival, again.time_s).error().reason, Reason::stale_pose);
@@ -159,12 +159,12 @@ TEST_F(FaultyOperation, ImageThatCameBeforeIsRefused) {
 
 TEST_F(FaultyOperation, ImageOfATimeWithoutPosesIsRefused) {
   const DatedArrival image = acquired_view("AP");
-  for (const double off_s : {3600.0, -3600.0})  // the later one first: it would have been held back
+  for (const double off_s : {3600.0, -3600.0})  // the later one first, else it would count as delayed
     EXPECT_EQ(operation_->take("AP", image.arrival, image.time_s + off_s).error().reason, Reason::no_pose);
   EXPECT_EQ(operation_->views_to_come().size(), 2u);
 }
 
-TEST_F(FaultyOperation, TrackerWhoseClockLeapsDuringTheExposureIsRefused) {
+TEST_F(FaultyOperation, TrackerClockJumpDuringTheAcquisitionIsRefused) {
   ASSERT_TRUE(virtual_or_->set_fault("time_jump", true));
   std::this_thread::sleep_for(std::chrono::milliseconds(500));
   EXPECT_EQ(take("AP").error().reason, Reason::stale_pose);
@@ -182,7 +182,7 @@ TEST_F(FaultyOperation, FrozenTrackerIsRefused) {
   expose("AP");
 }
 
-TEST_F(FaultyOperation, CalibratorWhoseMarkersMovedBetweenTheViewsIsRefused) {
+TEST_F(FaultyOperation, CalibratorMarkersMovedBetweenTheViewsIsRefused) {
   expose("AP");
   shift("calibrator", 5);
   expose("LAT");
@@ -208,7 +208,7 @@ class CheckedOperation : public FaultyOperation {
   }
   Expected<double> touch(const std::string& bone) {
     virtual_or_->touch(bone);
-    std::this_thread::sleep_for(window);  // until the gate believes the pointer's new place
+    std::this_thread::sleep_for(window);  // until the gate accepts the pointer's new position
     Expected<double> off = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_takes; ++i) {
       off = operation_->touch(bone + " notch");
@@ -218,13 +218,12 @@ class CheckedOperation : public FaultyOperation {
   }
 };
 
-TEST_F(CheckedOperation, BumpedMarkerIsFoundAtItsCheckPoint) {
+TEST_F(CheckedOperation, DisplacedMarkerIsDetectedAtItsCheckPoint) {
   for (const char* bone : {"femur", "tibia"}) ASSERT_TRUE(touch(bone)) << bone;
   expose("AP");
   expose("LAT");
   ASSERT_TRUE(operation_->measure());
-  EXPECT_EQ(operation_->plan_tunnel("femur").error().message,
-            "femur notch: this check point must be touched again first");
+  EXPECT_EQ(operation_->plan_tunnel("femur").error().message, "femur notch: touch this check point first");
   virtual_or_->simulated_scene().bump_marker("femur", {2.5, 0, 0});
   std::this_thread::sleep_for(window);
   const auto femur = touch("femur"), tibia = touch("tibia");
@@ -243,13 +242,13 @@ TEST_F(CheckedOperation, BumpedMarkerIsFoundAtItsCheckPoint) {
   EXPECT_TRUE(replayed->differences.empty());
 }
 
-TEST_F(CheckedOperation, BonesSwappedFromTheStartAreFoundOnceTheKneeBends) {
+TEST_F(CheckedOperation, ExchangedBonesAreDetectedOnceTheKneeBends) {
   ASSERT_TRUE(virtual_or_->set_fault("swapped_bones", true));
   std::this_thread::sleep_for(2 * window);
   for (const char* bone : {"femur", "tibia"}) ASSERT_TRUE(touch(bone)) << bone;
   expose("AP");
   expose("LAT");
-  ASSERT_TRUE(operation_->measure());  // nothing of the images tells two still bones apart
+  ASSERT_TRUE(operation_->measure());  // two bones at rest cannot be distinguished in the images
   shift("tibia", 8);
   const auto femur = touch("femur"), tibia = touch("tibia");
   shift("tibia", -8);
@@ -259,13 +258,13 @@ TEST_F(CheckedOperation, BonesSwappedFromTheStartAreFoundOnceTheKneeBends) {
   EXPECT_EQ(tibia.error().reason, Reason::residual_too_large);
 }
 
-TEST_F(CheckedOperation, CheckPointIsLearntBeforeTheFirstImage) {
+TEST_F(CheckedOperation, CheckPointIsRecordedBeforeTheFirstImage) {
   expose("AP");
   EXPECT_EQ(operation_->touch("femur notch").error().reason, Reason::usage);
   EXPECT_EQ(operation_->touch("patella").error().reason, Reason::bad_value);
 }
 
-TEST_F(FaultyOperation, BoneHiddenDuringTheExposureIsRefused) {
+TEST_F(FaultyOperation, BoneOccludedDuringTheAcquisitionIsRefused) {
   ASSERT_TRUE(virtual_or_->set_fault("hide:femur", true));
   std::this_thread::sleep_for(window);
   EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
@@ -274,7 +273,7 @@ TEST_F(FaultyOperation, BoneHiddenDuringTheExposureIsRefused) {
   expose("AP");
 }
 
-TEST_F(FaultyOperation, BoneHiddenInAPartOfTheExposureIsRefused) {
+TEST_F(FaultyOperation, BoneOccludedInPartOfTheAcquisitionIsRefused) {
   ASSERT_TRUE(virtual_or_->set_fault("hide:femur", true));
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   EXPECT_EQ(take("AP").error().reason, Reason::no_pose);
@@ -282,13 +281,13 @@ TEST_F(FaultyOperation, BoneHiddenInAPartOfTheExposureIsRefused) {
   std::this_thread::sleep_for(window);
 }
 
-TEST_F(FaultyOperation, SessionFolderIsOneOperations) {
+TEST_F(FaultyOperation, SessionFolderHoldsOneOperation) {
   EXPECT_EQ(begin().error().reason, Reason::cannot_write);
   operation_.reset();
   EXPECT_EQ(begin().error().reason, Reason::cannot_write);
 }
 
-/// A disk that is full behind so many bytes of a file.
+/// A disk that is full after this many bytes of a file.
 class FullDisk {
  public:
   explicit FullDisk(std::uintmax_t bytes) : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
@@ -306,7 +305,7 @@ class FullDisk {
   rlimit before_{};
 };
 
-TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndLeavesTheRecordWhole) {
+TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndKeepsTheRecordIntact) {
   expose("AP");
   const DatedArrival lateral = acquired_view("LAT");
   {

@@ -69,7 +69,7 @@ std::string table_of(std::span<const Rehearsal> rehearsals) {
   const auto end = figures_of(collected(rehearsals, 'E', &EndError::true_mm));
   const auto all = collected(rehearsals, '*', &EndError::true_mm);
   std::string text = fmt::format(
-      "Positioning errors, mm: tunnel's end to the tool's axis, {} points\n"
+      "Positioning errors, mm: distance of the tunnel's end from the tool's axis, {} points\n"
       "          start     end   | paper: start   end\n",
       all.size());
   const auto row = [&](const char* name, double ErrorFigures::*figure, const char* paper) {
@@ -79,7 +79,7 @@ std::string table_of(std::span<const Rehearsal> rehearsals) {
   row("min", &ErrorFigures::min, "        0.34  0.19");
   row("mean", &ErrorFigures::mean, "        0.81  0.88");
   row("SD", &ErrorFigures::sd, "        0.45  0.55   (printed as RMS)");
-  row("RMS", &ErrorFigures::rms, "        0.93  1.04   (by its mean and SD)");
+  row("RMS", &ErrorFigures::rms, "        0.93  1.04   (from its mean and SD)");
   text += fmt::format(
       "  mean of all {:.2f}; RMS {:.2f}, predicted {:.2f}; {} of {} within their 95 % ellipses\n",
       figures_of(all).mean, root_mean_square(all),

@@ -9,10 +9,10 @@
 
 namespace helicarm {
 
-/// Table 2 of all start and end points, every end, and how often the 95 % ellipses hold the truth.
+/// Table 2 for all start and end points, each end point, and the coverage of the 95 % ellipses.
 Json to_json(std::span<const Rehearsal> rehearsals);
 std::string to_csv(std::span<const Rehearsal> rehearsals);
-/// The table beside the paper's, for a person.
+/// The table beside the paper's, as text.
 std::string table_of(std::span<const Rehearsal> rehearsals);
 
 }  // namespace helicarm

@@ -20,11 +20,11 @@ using virtual_devices::VirtualDevices;
 constexpr std::chrono::seconds patience{20};
 constexpr double image_patience_s = 20;
 constexpr int most_attempts = 3;
-/// An exposure's poses are taken from the second and a half before it.
+/// The pose window of an acquisition is the 1.5 s before an image's arrival.
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
 
-/// Of virtual_tracker: its drift, rms over the axes, and the turn that a second's mean leaves.
+/// Of virtual_tracker: rms drift per axis, and rotation error after averaging over 1 s.
 constexpr double kept_sigma_mm = 0.114;
 constexpr double kept_sigma_deg = 0.03;
 
@@ -41,7 +41,7 @@ Json clicks_of(const simulation::SimulatedCase& virtual_or) {
   return picks;
 }
 
-/// A leg that was not held quite still.
+/// Small motion of a leg that is not fixed.
 void stir(virtual_devices::SimulatedScene& simulated_scene) {
   const auto motion = [](double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& shift) {
     return RigidTransform{
@@ -65,10 +65,10 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
           in_xrays ? std::optional(in_xrays->combined_mm) : std::nullopt};
 }
 
-/// Shoots, and again where the tracker did not see everything at rest: on a busy machine it may stutter.
+/// Acquires an image; repeats where a busy machine delayed the tracker.
 Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, Connections& devices,
                       Operation& operation) {
-  Expected<void> taken = fail(Reason::not_connected, "no picture came");
+  Expected<void> taken = fail(Reason::not_connected, "no image received");
   for (int attempt = 0; attempt < most_attempts && !taken; ++attempt) {
     std::this_thread::sleep_for(before_exposure);
     if (auto true_view = virtual_devices::shoot(virtual_or.simulated_scene(), view,
@@ -97,7 +97,7 @@ OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   plan.robot.approach.corrections.most = 8;
   plan.robot.approach.corrections.tolerance_mm = 0.25;
   plan.robot.approach.corrections.tolerance_deg = 0.25;
-  // Both are drilled from without.
+  // Both tunnels are drilled from outside the joint.
   plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end},
                   {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
   plan.tracker.pointer = Pointer{virtual_devices::pointer_marker, virtual_devices::tip_in_pointer};
@@ -108,7 +108,7 @@ OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
 Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& folder,
                              const RehearsalOptions& options) {
   return guarded([&] {
-    options.notify("opening the virtual room");
+    options.notify("starting the virtual devices");
     virtual_devices::VirtualDevicesOptions ports{seed, options.image_size, options.tracker_rate_hz, 0, 0, 0,
                                                  0};
     const auto virtual_or = value_or_throw(VirtualDevices::open(ports));
@@ -133,7 +133,7 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     value_or_throw(robot.unlock("the rehearsal"));
     value_or_throw(operation->register_robot(nod));
     if (options.move_bones) stir(virtual_or->simulated_scene());
-    std::this_thread::sleep_for(before_exposure);  // until the gate believes the bones again
+    std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
     Rehearsal done{seed, {}, operation->hand_eye().rms_mm, 0};
     for (const PlannedTunnel& tunnel : plan.tunnels) {

@@ -16,8 +16,8 @@ using virtual_devices::VirtualDevices;
 
 constexpr int most_attempts = 25;
 
-/// What a busy machine does to tracker and robot: a person tries again.
-bool came_late(const Failure& failure) {
+/// Failures that a busy machine causes; the test tries again.
+bool is_timing_failure(const Failure& failure) {
   return failure.reason == Reason::stale_pose || failure.reason == Reason::stale_state ||
          failure.reason == Reason::robot_stopped || failure.reason == Reason::robot_locked ||
          failure.reason == Reason::order_not_confirmed;
@@ -50,7 +50,7 @@ class StalePlan : public testing::Test {
   void expose(const std::string& view) {
     Expected<void> taken = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_attempts && !taken; ++i) {
-      std::this_thread::sleep_for(1800ms);  // the window of an exposure's poses
+      std::this_thread::sleep_for(1800ms);  // the pose window of an acquisition
       ASSERT_TRUE(virtual_devices::shoot(virtual_or_->simulated_scene(), view,
                                          {"127.0.0.1", devices_->receiver_port()}));
       const DatedArrival image = devices_->next_image(20).value();
@@ -67,7 +67,7 @@ class StalePlan : public testing::Test {
       }
       done = act();
       if (!done) {
-        ASSERT_TRUE(came_late(done.error())) << done.error().message;
+        ASSERT_TRUE(is_timing_failure(done.error())) << done.error().message;
       }
     }
     ASSERT_TRUE(done) << done.error().message;
@@ -114,8 +114,8 @@ class StalePlan : public testing::Test {
   };
 };
 
-TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
-  // The leg is moved while the confirmation is open, and even if it comes back.
+TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
+  // The leg moves while the confirmation is open; the plan stays stale even if the leg returns.
   RobotOrder order = plan();
   move_femur(40);
   const Failure moved = wait_until_stale(order);
@@ -125,7 +125,7 @@ TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
   move_femur(-40);
   std::this_thread::sleep_for(1s);
   expect_nothing_moves(order);
-  // Another plan to the same tunnel takes its place.
+  // Another plan to the same tunnel replaces it.
   const RobotOrder former = plan();
   order = plan();
   if (to_json(former) != to_json(order)) expect_nothing_moves(former);
@@ -134,7 +134,7 @@ TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
   EXPECT_GT(wait_until_stale(order).figures.at("distance_mm"), 10);
   ASSERT_TRUE(virtual_or_->set_fault("swapped_calibrator", false));
   expect_nothing_moves(order);
-  // The robot's table is pushed: seen since planning, and planned anew only where it was registered.
+  // The robot's table is pushed: detected since planning; a new plan also needs a new registration.
   std::this_thread::sleep_for(1s);
   order = plan();
   virtual_or_->simulated_scene().move_base({3, 0, 0});
@@ -142,7 +142,7 @@ TEST_F(StalePlan, NothingMovesByItThoughItIsConfirmed) {
   expect_nothing_moves(order);
   std::this_thread::sleep_for(1s);
   Expected<RobotOrder> again = operation_->plan_tunnel("femur");
-  for (int i = 0; i < most_attempts && !again && came_late(again.error()); ++i)
+  for (int i = 0; i < most_attempts && !again && is_timing_failure(again.error()); ++i)
     again = operation_->plan_tunnel("femur");
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().reason, Reason::plan_stale) << again.error().message;
@@ -190,16 +190,16 @@ TEST_F(StalePlan, OrderToABoneAtRestIsCarriedOutWithinTheLimits) {
     look.join();
     done = gone.has_value();
     if (!done) {
-      ASSERT_TRUE(came_late(gone.error())) << gone.error().message;
+      ASSERT_TRUE(is_timing_failure(gone.error())) << gone.error().message;
     }
     try_to([&] { return operation_->withdraw(order, rest, nod_); });
   }
-  EXPECT_TRUE(done) << "this machine is too busy";
+  EXPECT_TRUE(done) << "the machine is too busy for this test";
   RecordProperty("most_um", int(most_mm * 1000));
   RecordProperty("most_mdeg", int(most_deg * 1000));
 }
 
-TEST_F(StalePlan, BoneThatCreepsStopsTheToolWhichIsThenWithdrawn) {
+TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
     const RobotState rest = robot().wait_connected(5s).value();
     const RobotOrder order = plan();
@@ -221,11 +221,11 @@ TEST_F(StalePlan, BoneThatCreepsStopsTheToolWhichIsThenWithdrawn) {
     try_to([&] { return operation_->withdraw(order, rest, nod_); });
     const RobotState back = robot().wait_connected(5s).value();
     EXPECT_LT((back.base_from_tcp.translation - rest.base_from_tcp.translation).norm(), 0.5);
-    if (came_late(refused)) continue;  // nothing to do with the bone
+    if (is_timing_failure(refused)) continue;  // unrelated to the bone
     EXPECT_EQ(refused.reason, Reason::plan_stale) << refused.message;
     return;
   }
-  FAIL() << "this machine is too busy";
+  FAIL() << "the machine is too busy for this test";
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ std::string link(std::string_view chain, std::string_view text) {
   const std::string both = std::string(chain) + std::string(text);
   std::array<unsigned char, chain_digits / 2> hash{};
   if (EVP_Digest(both.data(), both.size(), hash.data(), nullptr, EVP_sha256(), nullptr) != 1)
-    throw std::runtime_error("SHA-256 is not to be had");
+    throw std::runtime_error("no SHA-256 implementation available");
   return fmt::format("{:02x}", fmt::join(hash, ""));
 }
 
@@ -74,16 +74,16 @@ Progress read(const fs::path& log, std::string_view bytes) {
       throw BadInput(reason, fmt::format("{}: {}", where, problem));
     };
     if (line.size() < chain_digits + 1 || line[chain_digits] != ' ')
-      refuse(Reason::bad_value, "is no record");
+      refuse(Reason::bad_value, "is not a record");
     const std::string_view text = line.substr(chain_digits + 1);
     progress.chain = link(progress.chain, text);
     if (line.substr(0, chain_digits) != progress.chain)
-      refuse(Reason::bad_value, "its checksum does not fit: it or an earlier line was changed");
+      refuse(Reason::bad_value, "invalid checksum: this or an earlier line was changed");
     progress.history.records.push_back(record_of(text, where));
     const SessionRecord& record = progress.history.records.back();
-    if (record.number != number) refuse(Reason::bad_value, "its number is wrong");
+    if (record.number != number) refuse(Reason::bad_value, "wrong record number");
     if (number == 0 && !begins_log(record))
-      refuse(Reason::unsupported, fmt::format("is not the beginning of a {} log", format_name));
+      refuse(Reason::unsupported, fmt::format("is not the first record of a {} log", format_name));
     at = end + 1;
   }
   return progress;
@@ -104,7 +104,7 @@ Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
       throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), std::strerror(errno)));
     std::unique_ptr<SessionLog> session(new SessionLog(log, file));
     if (::flock(file, LOCK_EX | LOCK_NB) != 0)
-      throw BadInput(Reason::cannot_write, fmt::format("{}: another program writes it", log.string()));
+      throw BadInput(Reason::cannot_write, fmt::format("{}: is open in another program", log.string()));
     Progress progress = read(log, value_or_throw(read_file(log, most_log_bytes)));
     session->history_ = std::move(progress.history);
     session->chain_ = std::move(progress.chain);

@@ -13,7 +13,7 @@
 
 namespace helicarm {
 
-/// One thing that happened in an operation.
+/// One event of an operation.
 struct SessionRecord {
   std::uint64_t number;  ///< from 0
   double time_s;         ///< UTC, seconds since 1970
@@ -23,31 +23,32 @@ struct SessionRecord {
 
 struct SessionHistory {
   std::vector<SessionRecord> records;
-  std::size_t whole_bytes = 0;  ///< of the file: up to the last whole record
-  bool torn = false;            ///< the program was killed while it wrote the next one, which is left out
+  std::size_t whole_bytes = 0;  ///< length of the file up to the last complete record
+  bool torn =
+      false;  ///< an incomplete record follows, which is left out: the program was killed while writing
 };
 
-/// Reads a log. Each line is the record's JSON after the SHA-256 of the digits before and this JSON, so
-/// that nothing can be changed, lost or exchanged in between unseen. Refuses: missing_file, unsupported
-/// (another format), bad_value (names the line that does not belong), and as `parse_json`.
+/// Reads a log. Each line holds the record's JSON after the SHA-256 of the previous digest and this JSON, so
+/// a changed, missing or exchanged line is detected. Refuses: missing_file, unsupported (another format),
+/// bad_value (with the line), and as `parse_json`.
 Expected<SessionHistory> read_session(const std::filesystem::path& log);
 
-/// The record of an operation: lines are only ever appended, and each is on disk when `append` returns. Safe
-/// to call from several threads. Patient data do not belong here: images are named by their digests.
+/// The record of an operation: append-only; each record is on disk when `append` returns. Thread-safe. Must
+/// not contain patient data: images are identified by their digests.
 class SessionLog {
  public:
-  /// Goes on with the log that is there (cutting off a torn end) or begins one. Refuses cannot_write, also
-  /// when another program writes it, and as `read_session`.
+  /// Continues an existing log (and removes an incomplete last record) or begins one. Refuses cannot_write,
+  /// also if another program has it open, and as `read_session`.
   static Expected<std::unique_ptr<SessionLog>> open(const std::filesystem::path& log);
   ~SessionLog();
   SessionLog(const SessionLog&) = delete;
   SessionLog& operator=(const SessionLog&) = delete;
 
-  /// Refuses cannot_write, and bad_json for content that `parse_json` would not read again; then it leaves
-  /// the log as it was: what cannot be recorded must not be done.
+  /// Refuses cannot_write, and bad_json for content that `parse_json` could not read back; the log is then
+  /// unchanged. An action that cannot be recorded must not be carried out.
   Expected<void> append(const std::string& kind, Json content);
 
-  /// What the log held when it was opened.
+  /// Content of the log when it was opened.
   const SessionHistory& history() const { return history_; }
 
  private:

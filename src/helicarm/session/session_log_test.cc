@@ -29,7 +29,7 @@ class Session : public testing::Test {
   }
 
   TemporaryFolder temporary_;
-  /// A log whose first record is this text, with the checksum that belongs to it.
+  /// A log whose first record is this text, with its checksum.
   void overwrite_with_record(const std::string& text) const {
     std::array<unsigned char, 32> hash{};
     EVP_Digest(text.data(), text.size(), hash.data(), nullptr, EVP_sha256(), nullptr);
@@ -39,7 +39,7 @@ class Session : public testing::Test {
   fs::path log_ = temporary_.path() / "session.log";
 };
 
-TEST_F(Session, WhatIsAppendedIsRead) {
+TEST_F(Session, AppendedRecordsReadBackEqual) {
   write_three();
   const SessionHistory history = read_session(log_).value();
   ASSERT_EQ(history.records.size(), 3u);
@@ -50,7 +50,7 @@ TEST_F(Session, WhatIsAppendedIsRead) {
   EXPECT_FALSE(history.torn);
 }
 
-TEST_F(Session, GoesOnWhereItEnded) {
+TEST_F(Session, ContinuesAnExistingLog) {
   write_three();
   const auto session = SessionLog::open(log_).value();
   EXPECT_EQ(session->history().records.size(), 3u);
@@ -58,7 +58,7 @@ TEST_F(Session, GoesOnWhereItEnded) {
   EXPECT_EQ(read_session(log_).value().records.back().number, 3u);
 }
 
-TEST_F(Session, CutAtAnyByteKeepsEveryWholeRecord) {
+TEST_F(Session, CutAtAnyByteKeepsEveryCompleteRecord) {
   write_three();
   const std::string whole = bytes();
   for (std::size_t size = 0; size < whole.size(); ++size) {
@@ -67,14 +67,14 @@ TEST_F(Session, CutAtAnyByteKeepsEveryWholeRecord) {
     const SessionHistory history = read_session(log_).value();
     EXPECT_EQ(history.records.size(), lines) << size;
     EXPECT_EQ(history.torn, size > 0 && whole[size - 1] != '\n') << size;
-    if (size % 16 != 0) continue;  // syncing takes its time
+    if (size % 16 != 0) continue;  // syncing to disk is slow
     const auto session = SessionLog::open(log_).value();
     EXPECT_TRUE(session->append("more", {}));
     EXPECT_EQ(read_session(log_).value().records.size(), std::max<std::size_t>(lines, 1) + 1) << size;
   }
 }
 
-TEST_F(Session, EveryChangedByteIsSeen) {
+TEST_F(Session, EveryChangedByteIsDetected) {
   write_three();
   const std::string whole = bytes();
   for (std::size_t at = 0; at + 1 < whole.size(); ++at) {
@@ -86,7 +86,7 @@ TEST_F(Session, EveryChangedByteIsSeen) {
   }
 }
 
-TEST_F(Session, LineThatWasTakenOutIsSeen) {
+TEST_F(Session, RemovedLineIsDetected) {
   write_three();
   const std::string whole = bytes();
   const std::size_t first = whole.find('\n') + 1, second = whole.find('\n', first) + 1;
@@ -111,7 +111,7 @@ TEST_F(Session, RecordNestedTooDeeplyIsRefused) {
   EXPECT_EQ(read_session(log_).error().reason, Reason::bad_json);
 }
 
-TEST_F(Session, ContentThatCouldNotBeReadAgainIsNotAppended) {
+TEST_F(Session, ContentThatCannotBeReadBackIsNotAppended) {
   const auto session = SessionLog::open(log_).value();
   Json deep;
   for (int i = 0; i < 100; ++i) deep = Json::array({deep});
@@ -139,19 +139,19 @@ TEST_F(Session, RecordWithFieldsOfAnotherTypeIsRefused) {
   }
 }
 
-TEST_F(Session, RecordThatIsNoObjectIsRefused) {
+TEST_F(Session, RecordThatIsNotAnObjectIsRefused) {
   for (const char* record : {"[]", "1", "null", "{", ""}) {
     overwrite_with_record(record);
     EXPECT_EQ(read_session(log_).error().reason, Reason::bad_json) << record;
   }
 }
 
-TEST_F(Session, IsOneProgramsAtATime) {
+TEST_F(Session, IsLockedByOneProgram) {
   const auto first = SessionLog::open(log_).value();
   EXPECT_EQ(SessionLog::open(log_).error().reason, Reason::cannot_write);
 }
 
-TEST_F(Session, FullDiskIsReportedAndLeavesTheLogWhole) {
+TEST_F(Session, FullDiskIsReportedAndKeepsTheLogIntact) {
   const auto session = SessionLog::open(log_).value();
   const auto before = std::signal(SIGXFSZ, SIG_IGN);
   rlimit old{};
@@ -169,7 +169,7 @@ TEST_F(Session, FullDiskIsReportedAndLeavesTheLogWhole) {
   EXPECT_EQ(history.records[1].content.at("x_mm"), 2);
 }
 
-TEST_F(Session, FolderThatCannotBeMadeIsReported) {
+TEST_F(Session, FolderThatCannotBeCreatedIsReported) {
   EXPECT_EQ(SessionLog::open("/dev/null/session.log").error().reason, Reason::cannot_write);
 }
 
