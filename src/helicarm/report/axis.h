@@ -20,7 +20,7 @@ inline double round_step(double range, int count) {
   return 10 * decade;
 }
 
-/// The range of a chart that one side of its frame shows, and the distance of its marks.
+/// The displayed range of one axis and the distance between its ticks.
 struct Axis {
   static constexpr int about_ticks = 7;
   double low, high, step;
@@ -32,7 +32,7 @@ struct Axis {
   double share(double value) const { return (value - low) / (high - low); }
 };
 
-/// Where an axis is marked, and by what: names if it has them, else round numbers.
+/// Tick positions and labels of an axis: names if given, else round numbers.
 inline std::vector<std::pair<double, std::string>> ticks(const Axis& axis,
                                                          const std::vector<std::string>& names) {
   std::vector<std::pair<double, std::string>> marks;

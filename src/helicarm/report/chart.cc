@@ -20,10 +20,10 @@ constexpr double chart_width = 460, chart_height = 360;  // of the frame
 constexpr double left_margin = 64, top_margin = 56, right_margin = 28, bottom_margin = 56;
 constexpr double column_width = left_margin + chart_width + right_margin;
 constexpr double legend_line = 17, legend_mark = 26;
-constexpr double letter_width = 6.5;  // of a name beside the frame, at most and on average
-constexpr std::size_t few_dots = 50;  // more are drawn smaller, and let others show through
+constexpr double letter_width = 6.5;  // of a tick name; mean width, an upper bound
+constexpr std::size_t few_dots = 50;  // more are drawn smaller and translucent
 
-/// Okabe and Ito's colours, told apart by the colour-blind too.
+/// Colour-blind safe palette of Okabe and Ito.
 constexpr std::array series_colours{"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                     "#e69f00", "#56b4e9", "#000000"};
 
@@ -85,7 +85,7 @@ class ChartDrawing {
     return top_margin + chart_height * (down ? y_.share(y) : 1 - y_.share(y));
   }
 
-  /// Widens the axis that has more room.
+  /// Widens the axis with the larger frame side, for equal scales.
   void share_scale() {
     const double scale = std::max((x_.high - x_.low) / chart_width, (y_.high - y_.low) / chart_height);
     for (const auto& [axis, length] : {std::pair{&x_, chart_width}, std::pair{&y_, chart_height}}) {
@@ -193,7 +193,8 @@ class ChartDrawing {
       const auto x_of = [&](double column) { return px(field.x_first + field.step * column); };
       const auto y_of = [&](double row) { return py(field.y_first + field.step * row); };
       std::string path;
-      // The label stands where the line is nearest to a diagonal from the middle, a turn on for each line.
+      // Each label stands where its line is nearest to a diagonal through the centre, the next diagonal for
+      // each line.
       const double way = 0.6 + 0.9 * double(i);
       constexpr double nowhere = 3;
       double best = nowhere, label_x = 0, label_y = 0;

@@ -9,31 +9,32 @@
 
 namespace helicarm {
 
-/// Points joined by a line, with a mark at each (one that is not finite breaks the line), or (`scattered`)
-/// small dots alone.
+/// Points joined by a line with a marker at each (a non-finite value breaks the line), or (`scattered`) small
+/// dots without a line.
 struct ChartSeries {
-  std::string name;  ///< for the legend; empty: not in it
+  std::string name;  ///< in the legend; empty: not listed
   std::vector<std::array<double, 2>> points = {};
   bool scattered = false;
   bool dashed = false;
-  std::vector<std::array<double, 2>> ranges = {};  ///< least and most at each point: bars, and no line
-  bool joined = false;                             ///< a line all the same
+  std::vector<std::array<double, 2>> ranges =
+      {};               ///< minimum and maximum at each point: bars instead of a line
+  bool joined = false;  ///< draws the line as well
 };
 
-/// A range of y that lies behind the curves: what was printed, say.
+/// A range of y drawn behind the curves, for example a published one.
 struct ChartBand {
   std::string name;
   double low;
   double high;
 };
 
-/// Lattice points whose surroundings are hatched; the first two kinds lean to different sides.
+/// Lattice points to hatch; the first two kinds have opposite slopes.
 struct ChartHatching {
   std::string name;
-  std::vector<bool> points;  ///< as the field's values
+  std::vector<bool> points;  ///< in the order of the field's values
 };
 
-/// Values on a lattice, x fastest, drawn as isolines that carry their level.
+/// Values on a lattice, x fastest, drawn as labelled isolines.
 struct ChartField {
   double x_first, y_first, step;
   int columns, rows;
@@ -49,17 +50,17 @@ struct Chart {
   std::vector<ChartSeries> series = {};
   std::optional<ChartBand> band = {};
   std::optional<ChartField> field = {};
-  std::vector<std::string> x_names = {};  ///< of x = 0, 1, ...: instead of numbers
-  std::vector<std::string> y_names = {};  ///< of y = 0, 1, ... downwards, likewise
+  std::vector<std::string> x_names = {};  ///< tick labels of x = 0, 1, ... instead of numbers
+  std::vector<std::string> y_names = {};  ///< tick labels of y = 0, 1, ... downwards
   bool y_from_zero = false;
-  bool image = false;                                 ///< y down, and the same scale both ways
-  std::optional<double> y_most = {};                  ///< what lies higher is cut off
+  bool image = false;                                 ///< y downwards, equal scales
+  std::optional<double> y_most = {};                  ///< values above are clipped
   std::string note = {};                              ///< a line below the title
-  std::optional<std::array<double, 2>> y_range = {};  ///< instead of the curves' own
+  std::optional<std::array<double, 2>> y_range = {};  ///< instead of the range of the curves
 };
 
-/// Charts side by side, `columns` in a row (0: up to three in one, more in rows of two), as one SVG document
-/// with axes, ticks and legends. The same input gives the same bytes.
+/// Charts in rows of `columns` (0: up to three in one row, more in rows of two) as one SVG document with
+/// axes, ticks and legends. Equal input gives equal bytes.
 std::string chart_svg(std::span<const Chart> charts, std::size_t columns = 0);
 
 }  // namespace helicarm

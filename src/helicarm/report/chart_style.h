@@ -3,7 +3,7 @@
 
 namespace helicarm {
 
-/// The style of every chart.
+/// CSS of all charts.
 inline constexpr const char* chart_style =
     ".grid{stroke:#e4e4e0} .frame{fill:none;stroke:#333} .band{fill:#b9b9b0;fill-opacity:0.45} "
     ".hatch{stroke:#8d8d85} .line{fill:none;stroke-width:1.8} .middle{text-anchor:middle} "

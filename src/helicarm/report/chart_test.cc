@@ -25,13 +25,13 @@ TEST(Chart, HasAxesWithUnitsAndLegend) {
     EXPECT_THAT(svg, HasSubstr(word));
 }
 
-TEST(Chart, EscapesWhatItIsGiven) {
+TEST(Chart, EscapesText) {
   const std::string svg = chart_svg(std::array{Chart{"a < b & c", "<x>", "y"}});
   EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; c"));
   EXPECT_THAT(svg, Not(HasSubstr("<x>")));
 }
 
-TEST(Chart, LeavesOutWhatIsNotFinite) {
+TEST(Chart, LeavesOutNonFiniteValues) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const std::string svg = chart_svg(
       std::array{Chart{"t", "x", "y", {{"s", {{0, 1}, {1, nan}, {2, 3}}}, {"none", {{nan, nan}}}}}});
@@ -39,10 +39,10 @@ TEST(Chart, LeavesOutWhatIsNotFinite) {
   EXPECT_THAT(chart_svg(std::array{Chart{"nothing", "x", "y"}}), Not(HasSubstr("inf")));
 }
 
-TEST(Chart, ImageHasYDownAndOneScaleBothWays) {
+TEST(Chart, ImageHasYDownAndEqualScales) {
   Chart chart{"t", "u, px", "v, px", {{"", {{0, 0}, {100, 0}, {100, 200}}}}};
   chart.image = true;
-  // 460 x 360 px of frame hold 200 units of v in 360 px, so 100 units of u take 180 px.
+  // The frame of 460 x 360 px shows 200 units of v in 360 px, so 100 units of u take 180 px.
   EXPECT_THAT(chart_svg(std::array{chart}), HasSubstr("M204.0 56.0L384.0 56.0L384.0 416.0"));
 }
 
@@ -54,7 +54,7 @@ TEST(Chart, LineBreaksWhereAPointIsMissing) {
   EXPECT_EQ(std::ranges::count(path.substr(0, path.find("class")), 'M'), 2);
 }
 
-TEST(Chart, NamesOfYStandBesideTheFrameFromAbove) {
+TEST(Chart, YNamesRunDownwardsBesideTheFrame) {
   Chart chart{"t", "x", "", {{"", {{1, 0}, {2, 1}}, true}}};
   chart.y_names = {"the first of two situations", "the second"};
   const std::string svg = chart_svg(std::array{chart});
@@ -66,12 +66,12 @@ TEST(Chart, NamesOfYStandBesideTheFrameFromAbove) {
   EXPECT_THAT(svg, Not(HasSubstr("viewBox=\"0 0 552 ")));
 }
 
-TEST(Chart, FourStandInTwoRows) {
+TEST(Chart, FourChartsTakeTwoRows) {
   const std::vector<Chart> four(4, Chart{"t", "x", "y"});
   EXPECT_THAT(chart_svg(four), HasSubstr("viewBox=\"0 0 1104 944\""));
 }
 
-TEST(Chart, HatchesARowOfPointsAsOneAndNamesIt) {
+TEST(Chart, HatchedRowIsOnePathWithALegend) {
   Chart chart{"t", "x", "y"};
   chart.field = ChartField{0, 0, 1, 3, 2, {1, 1, 1, 1, 1, 1}, {}};
   chart.field->hatchings = {{"not seen", {false, true, true, false, false, false}}};

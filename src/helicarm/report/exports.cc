@@ -16,7 +16,7 @@ namespace {
 
 using Files = std::map<std::string, std::string>;
 
-/// Comma and quote within a field as RFC 4180 has them.
+/// A field with commas and quotes in the form of RFC 4180.
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -53,7 +53,7 @@ Json control_point(const PointResult& point) {
   const Eigen::Vector3d& at = point.place->in_calibrator;
   return {{"id", point.name},
           {"label", point.name},
-          {"description", fmt::format("within {:.3f} mm (95 %), in the calibrator's frame",
+          {"description", fmt::format("within {:.3f} mm (95 %), calibrator frame",
                                       length_at_95(point.place->covariance_in_calibrator))},
           {"position", {at.x(), at.y(), at.z()}},
           {"positionStatus", "defined"}};
@@ -63,9 +63,8 @@ Json markup(const char* type, const std::string& name, Json points) {
   return {{"type", type},
           {"name", name},
           {"description",
-           "Coordinates are of helicarm's calibrator (mm), which is no patient's frame: LPS is a label only, "
-           "and L, "
-           "P, S here mean the calibrator's x, y, z. Register before laying them over a CT."},
+           "Coordinates are in helicarm's calibrator frame (mm), not in a patient frame: LPS is only a "
+           "label, and L, P, S mean the calibrator's x, y, z. Register them before overlaying them on a CT."},
           {"coordinateSystem", "LPS"},
           {"coordinateUnits", "mm"},
           {"locked", true},
@@ -87,8 +86,7 @@ std::string slicer_markups(const Result& result) {
   }
   return to_text({{"@schema",
                    "https://raw.githubusercontent.com/slicer/slicer/master/Modules/Loadable/Markups/"
-                   "Resources/Schema/"
-                   "markups-schema-v1.0.0.json#"},
+                   "Resources/Schema/markups-schema-v1.0.0.json#"},
                   {"markups", std::move(markups)}}) +
          "\n";
 }
@@ -114,18 +112,19 @@ std::string matrix_text(const ViewResult& view) {
          rows_of(view.calibrated->view.projection(), " ");
 }
 
-/// L1 to L11, a column for each view: u = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y + L11 z + 1), v with L5
-/// to L8.
+/// L1 to L11, one column per view: u = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y + L11 z + 1), v with L5 to
+/// L8.
 std::string dlt_csv(const std::vector<const ViewResult*>& views) {
   Eigen::MatrixXd columns(11, Eigen::Index(views.size()));
   for (Eigen::Index i = 0; i < columns.cols(); ++i) {
     const ViewResult& view = *views[std::size_t(i)];
     const Projection p = view.calibrated->view.projection();
     if (!factors_from_projection(p))
-      throw BadInput({Reason::point_at_infinity,
-                      "has no DLT coefficients: the calibrator's origin lies in the source's plane",
-                      view.name,
-                      {}});
+      throw BadInput(
+          {Reason::point_at_infinity,
+           "has no DLT coefficients: the calibrator's origin lies in the plane of the X-ray source",
+           view.name,
+           {}});
     const Projection scaled = p / p(2, 3);
     columns.col(i) << scaled.row(0).transpose(), scaled.row(1).transpose(),
         scaled.row(2).head<3>().transpose();

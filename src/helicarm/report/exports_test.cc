@@ -68,7 +68,7 @@ TEST_F(Exports, AllAreWritten) {
                                           "LAT_mayacam.txt", "dlt.csv", "points.csv", "points.mrk.json"));
 }
 
-TEST_F(Exports, MayaCamComesBackToTheLastBit) {
+TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
   ASSERT_TRUE(write_exports(result_, folder_));
   for (const ViewResult& view : result_.views) {
     const auto back = import_matrix(folder_ / (view.name + "_mayacam.txt"));
@@ -78,7 +78,7 @@ TEST_F(Exports, MayaCamComesBackToTheLastBit) {
   }
 }
 
-TEST_F(Exports, MatrixComesBack) {
+TEST_F(Exports, MatrixReadsBack) {
   ASSERT_TRUE(write_exports(result_, folder_));
   for (const ViewResult& view : result_.views) {
     const auto back = import_matrix(folder_ / (view.name + "_matrix.txt"));
@@ -105,7 +105,7 @@ TEST_F(Exports, DltCoefficientsProject) {
   }
 }
 
-TEST_F(Exports, PointsAreQuotedAndOnlyThoseFound) {
+TEST_F(Exports, OnlyLocatedPointsAreWrittenAndQuoted) {
   ASSERT_TRUE(write_exports(result_, folder_));
   const std::string csv = text("points.csv");
   EXPECT_EQ(std::ranges::count(csv, '\n'), 4);
@@ -115,21 +115,21 @@ TEST_F(Exports, PointsAreQuotedAndOnlyThoseFound) {
   EXPECT_THAT(csv, testing::Not(testing::HasSubstr("lost")));
 }
 
-TEST_F(Exports, MarkupsSayThatTheirFrameIsNoPatients) {
+TEST_F(Exports, MarkupsStateThatTheirFrameIsNotThePatients) {
   ASSERT_TRUE(write_exports(result_, folder_));
   const Json json = parse_json(text("points.mrk.json"), "markups").value();
   ASSERT_EQ(json.at("markups").size(), 2u);
   const Json& points = json["markups"][0];
   EXPECT_EQ(points.at("type"), "Fiducial");
   EXPECT_EQ(points.at("coordinateSystem"), "LPS");
-  EXPECT_THAT(points.at("description").get<std::string>(), testing::HasSubstr("no patient's frame"));
+  EXPECT_THAT(points.at("description").get<std::string>(), testing::HasSubstr("not in a patient frame"));
   EXPECT_EQ(points.at("controlPoints").size(), 2u);
   EXPECT_EQ(points.at("controlPoints")[0].at("position"), Json({1.0 / 3, 2.0, -3.0}));
   EXPECT_EQ(json["markups"][1].at("type"), "Line");
   EXPECT_EQ(json["markups"][1].at("name"), "tunnel femur");
 }
 
-TEST_F(Exports, OnlyWhatIsAskedForAndKnownIsWritten) {
+TEST_F(Exports, OnlyRequestedAndAvailablePartsAreWritten) {
   result_.points.clear();
   result_.tunnel_ends.clear();
   result_.views[1].calibrated.reset();
@@ -138,13 +138,13 @@ TEST_F(Exports, OnlyWhatIsAskedForAndKnownIsWritten) {
   EXPECT_EQ(write_exports(result_, folder_, kinds).value().size(), 1u);
 }
 
-TEST_F(Exports, RefusedResultIsRefusedForItsReason) {
+TEST_F(Exports, RefusedResultIsRefusedWithItsReason) {
   result_.failure = Failure{Reason::uncertain, "too far off", "", {}};
   EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::uncertain);
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
-TEST_F(Exports, NothingIsLeftWhereOneCannotBeWritten) {
+TEST_F(Exports, FailedWriteLeavesNoFiles) {
   fs::create_directories(folder_ / "points.csv");
   EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::cannot_write);
   EXPECT_FALSE(fs::exists(folder_ / "AP_matrix.txt"));
@@ -152,7 +152,7 @@ TEST_F(Exports, NothingIsLeftWhereOneCannotBeWritten) {
   EXPECT_EQ(write_exports(result_, folder_).error().reason, Reason::name_clash);
 }
 
-TEST_F(Exports, ViewWithoutDltCoefficientsIsNamed) {
+TEST_F(Exports, ViewWithoutDltCoefficientsIsNamedInTheMessage) {
   result_.views[1].calibrated->view.camera_from_world.translation.z() = 0;
   const auto written = write_exports(result_, folder_);
   ASSERT_FALSE(written);

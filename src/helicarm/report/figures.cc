@@ -16,8 +16,7 @@ namespace {
 
 using Pixel = Eigen::Vector2d;
 
-/// Collects SVG elements; `unit` is about a thousandth of the image's width, so that strokes look alike at
-/// any size.
+/// Collects SVG elements; `unit` is about a thousandth of the image's width, for equal strokes at any size.
 class Drawing {
  public:
   explicit Drawing(double unit) : unit_(unit) {}
@@ -67,7 +66,7 @@ class Drawing {
 
 double unit_of(const ViewResult& view) { return view.xray_image->pixels.width() / 1024.0; }
 
-/// A bar in the lower left corner that says how long `length` is once magnified.
+/// Scale bar in the lower left corner: the true length that the magnified bar shows.
 void scale_bar(Drawing& drawing, int height, double length, double magnification, std::string_view what) {
   const Pixel left{24 * drawing.unit(), height - 24 * drawing.unit()};
   drawing.line("bar", left, left + Pixel(length * magnification, 0));

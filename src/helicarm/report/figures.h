@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// SVG of one view: the rectified image with balls and labels, residuals as magnified arrows with a scale
-/// bar, plate dots, false blobs, points, planned tunnels and tool lines (Fig. 17).
+/// SVG of one view: the rectified image with labelled fiducials, residuals as magnified arrows with a scale
+/// bar, plate dots, outliers, points, planned tunnels and tool lines (Fig. 17).
 std::string view_figure(const Result& result, std::size_t view);
 
-/// SVG of the distortion: raw less rectified, magnified, over the image's field. Empty for a flat panel.
+/// SVG of the distortion: raw minus rectified position, magnified, over the image. Empty for a flat panel.
 std::string distortion_figure(const ViewResult& view);
 
 }  // namespace helicarm

@@ -7,10 +7,10 @@
 
 namespace helicarm {
 
-/// A piece of an isoline within one cell of a lattice: column and row of its two ends.
+/// A segment of an isoline within one lattice cell: column and row of both ends.
 using IsolinePiece = std::array<std::array<double, 2>, 2>;
 
-/// Marching squares: where the values `at(column, row)` cross a level. Cells with a NaN corner have none.
+/// Marching squares: where the values `at(column, row)` cross a level. Cells with a NaN corner give none.
 template <class At>
 std::vector<IsolinePiece> isoline(int columns, int rows, At at, double level) {
   std::vector<IsolinePiece> pieces;
@@ -34,7 +34,7 @@ std::vector<IsolinePiece> isoline(int columns, int rows, At at, double level) {
   return pieces;
 }
 
-/// Marked points of a lattice that stand side by side: columns begin .. end - 1 of a row.
+/// Adjacent marked lattice points: columns begin .. end - 1 of a row.
 struct LatticeRun {
   int row, begin, end;
 };

@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// A pure scale about the image's corner: simple enough to be seen through.
+/// A scaling about the image's corner, with simple expected values.
 DistortionMap doubling_map() {
   DistortionMap map = identity_map(200, 200, {});
   map.order = 1;
@@ -49,7 +49,7 @@ Result one_view() {
   return result;
 }
 
-TEST(MarksOf, HoldWhatWasFoundInRectifiedPixels) {
+TEST(MarksOf, HoldDetectionsInRectifiedPixels) {
   const ViewMarks marks = marks_of(one_view(), 0);
   ASSERT_EQ(marks.balls.size(), 2u);
   EXPECT_TRUE(marks.balls[0].used);
@@ -68,7 +68,7 @@ TEST(MarksOf, HoldWhatWasFoundInRectifiedPixels) {
   EXPECT_TRUE(marks.tool_lines[0].back().isApprox(Vector2d(34, 40), 1e-12));
 }
 
-TEST(RawMarks, LieWhereTheMapPutsThem) {
+TEST(RawMarks, AreMappedByTheDistortionMap) {
   const ViewMarks raw = raw_marks(marks_of(one_view(), 0), doubling_map());
   EXPECT_TRUE(raw.balls[0].place.isApprox(Vector2d(61, 80.5), 1e-9));
   EXPECT_TRUE(raw.balls[0].residual->isApprox(Vector2d(1, 0.5), 1e-9));
@@ -76,7 +76,7 @@ TEST(RawMarks, LieWhereTheMapPutsThem) {
   EXPECT_TRUE(raw.tunnels.at(0).back().isApprox(Vector2d(120, 40), 1e-9));
 }
 
-TEST(MarksOf, AnExposureAloneHasNone) {
+TEST(MarksOf, ImageWithoutDetectionsHasNone) {
   Result result;
   result.views.push_back({"AP", std::make_shared<const XrayImage>(), {}, {}, {}});
   const ViewMarks marks = marks_of(result, 0);

@@ -8,16 +8,15 @@
 
 namespace helicarm {
 
-/// Text made safe for HTML and SVG content and attributes: markup is escaped, control characters are
-/// replaced.
+/// Escapes markup for HTML and SVG content and attributes, and replaces control characters.
 std::string escaped(std::string_view text);
 
 std::string base64(std::string_view bytes);
 
-/// `digits` after the point, or an en dash where there is no value.
+/// `digits` decimals, or an en dash without a value.
 std::string fixed(std::optional<double> value, int digits);
 
-/// An HTML table. Cells are HTML already; a column is of numbers where its heading begins with '#'.
+/// An HTML table. Cells are HTML; a heading that begins with '#' marks a numeric column.
 class HtmlTable {
  public:
   explicit HtmlTable(std::vector<std::string> headings) : headings_(std::move(headings)) {}

@@ -8,12 +8,12 @@
 namespace helicarm {
 namespace {
 
-TEST(Escaped, MarkupAndControlCharactersLoseTheirMeaning) {
+TEST(Escaped, MarkupAndControlCharactersAreEscaped) {
   EXPECT_EQ(escaped("<script a='1' b=\"2\">&"), "&lt;script a=&#39;1&#39; b=&quot;2&quot;&gt;&amp;");
   EXPECT_EQ(escaped(std::string_view("a\0\x1b", 3)), "a\xef\xbf\xbd\xef\xbf\xbd");
 }
 
-TEST(Escaped, OtherLettersStay) { EXPECT_EQ(escaped("Kniegelenk größer"), "Kniegelenk größer"); }
+TEST(Escaped, OtherCharactersAreKept) { EXPECT_EQ(escaped("Kniegelenk größer"), "Kniegelenk größer"); }
 
 TEST(Base64, KnownVectors) {
   EXPECT_EQ(base64(""), "");
@@ -24,13 +24,13 @@ TEST(Base64, KnownVectors) {
   EXPECT_EQ(base64("\xff\xfe\xfd"), "//79");
 }
 
-TEST(Fixed, WhatIsNotThereIsADash) {
+TEST(Fixed, MissingValueIsADash) {
   EXPECT_EQ(fixed(1.2345, 2), "1.23");
   EXPECT_EQ(fixed(std::nullopt, 2), "–");
   EXPECT_EQ(fixed(std::numeric_limits<double>::quiet_NaN(), 2), "–");
 }
 
-TEST(HtmlTable, NumberColumnsAreMarked) {
+TEST(HtmlTable, NumericColumnsAreMarked) {
   HtmlTable table({"Ball", "#u"});
   table.row({"P1", "1.5"});
   const std::string html = table.html();

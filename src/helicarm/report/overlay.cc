@@ -18,7 +18,7 @@ namespace {
 const cv::Scalar green(74, 222, 128), red(248, 113, 113), blue(147, 197, 253), violet(240, 171, 252),
     yellow(250, 204, 21), crimson(239, 68, 68), orange(251, 146, 60);
 
-/// OpenCV draws at fixed-point places: here sixteenths of a pixel.
+/// OpenCV draws at fixed-point coordinates: here sixteenths of a pixel.
 constexpr int shift = 4;
 cv::Point fixed_point(const Eigen::Vector2d& at) {
   const Eigen::Vector2d safe = at.cwiseMax(-1e5).cwiseMin(1e5) * (1 << shift);

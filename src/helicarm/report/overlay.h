@@ -8,14 +8,14 @@
 
 namespace helicarm {
 
-/// The rectified image of a view as PNG, with balls and labels, points, planned tunnels and tool lines
-/// drawn in; `path`: where the tool's tip will go (rectified pixels).
+/// The rectified image of a view as PNG, with labelled fiducials, points, planned tunnels and tool lines;
+/// `path`: planned positions of the tool's tip (rectified pixels).
 std::string overlay_png(const Result& result, std::size_t view, std::span<const Eigen::Vector2d> path = {});
 
-/// What files of a view are named by: its name; view3 and the like where that does not suit a file.
+/// Stem of a view's file names: its name, or view3 and the like if the name is unsuitable.
 std::string file_stem(const std::string& view_name, std::size_t index);
 
-/// The stem and _overlay.png.
+/// The stem with _overlay.png.
 std::string overlay_name(const std::string& view_name, std::size_t index);
 
 }  // namespace helicarm

@@ -8,11 +8,11 @@
 
 namespace helicarm {
 
-/// The exposure resampled to rectified pixels (raw where it was not rectified) and windowed for the eye: 8
-/// bit, the darkest and brightest half percent clipped.
+/// The X-ray image resampled to rectified pixels (raw if it was not rectified), windowed for display: 8 bit,
+/// the darkest and brightest 0.5 % clipped.
 Image<std::uint8_t> rectified_image(const ViewResult& view);
 
-/// Length of a round number (1, 2 or 5 times a power of ten) at or below `limit`.
+/// The largest round number (1, 2 or 5 times a power of ten) at or below `limit`.
 double round_below(double limit);
 
 }  // namespace helicarm

@@ -22,8 +22,8 @@ std::string report_html(const Result& result) {
         fiducials_section, rectification_section, timing_section})
     html += section(result);
   html += fmt::format(
-      "</main>\n<footer><p class=\"soft\">helicarm {}, method {}. Millimetres and pixels; pixel (0, 0) "
-      "is the centre of the top-left one.</p></footer>\n</body>\n</html>\n",
+      "</main>\n<footer><p class=\"soft\">helicarm {}, method {}. Units: mm and px; pixel (0, 0) is the "
+      "centre of the top-left pixel.</p></footer>\n</body>\n</html>\n",
       HELICARM_VERSION, result.options.method == Method::paper ? "paper" : "best");
   return html;
 }

@@ -8,11 +8,10 @@
 
 namespace helicarm {
 
-/// The whole report as one HTML page: images inside, nothing loaded from elsewhere, no identity of the
-/// patient.
+/// The report as one HTML page: images embedded, no external resources, no patient identity.
 std::string report_html(const Result& result);
 
-/// Writes report.html and NAME_overlay.png for every view into `folder`.
+/// Writes report.html and NAME_overlay.png for each view into `folder`.
 Expected<void> write_report(const Result& result, const std::filesystem::path& folder);
 
 }  // namespace helicarm

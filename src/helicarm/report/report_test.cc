@@ -51,7 +51,7 @@ Result full_result() {
   return result;
 }
 
-/// Every tag that is opened is closed in turn; void elements close themselves.
+/// Every opened tag is closed in order; void elements close themselves.
 void expect_balanced(const std::string& html) {
   std::vector<std::string> open;
   for (std::size_t at = html.find('<'); at != std::string::npos; at = html.find('<', at + 1)) {
@@ -72,21 +72,21 @@ void expect_balanced(const std::string& html) {
 
 TEST(ReportHtml, IsBalanced) { expect_balanced(report_html(full_result())); }
 
-TEST(ReportHtml, TextOfFilesIsEscapedAndIdentityIsAbsent) {
+TEST(ReportHtml, TextFromFilesIsEscapedAndIdentityIsAbsent) {
   const std::string html = report_html(full_result());
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(html.find("CANARY"), std::string::npos);
   EXPECT_NE(html.find("&lt;script&gt;"), std::string::npos);
 }
 
-TEST(ReportHtml, LoadsNothingFromElsewhere) {
+TEST(ReportHtml, LoadsNoExternalResources) {
   const std::string html = report_html(full_result());
   for (const char* address : {"http:", "https:", "src=", "@import", "url("})
     EXPECT_EQ(html.find(address), std::string::npos) << address;
   EXPECT_NE(html.find("Research instrument, not a medical device"), std::string::npos);
 }
 
-TEST(ReportHtml, RefusalBeforeTheFirstStageIsStillAReport) {
+TEST(ReportHtml, RefusalBeforeTheFirstStageStillGivesAReport) {
   Result result;
   result.views.push_back({"AP", {}, {}, {}, {}});
   result.failure = Failure{Reason::blank_image, "nothing to see", "AP", {}};
@@ -95,7 +95,7 @@ TEST(ReportHtml, RefusalBeforeTheFirstStageIsStillAReport) {
   EXPECT_NE(html.find("blank_image"), std::string::npos);
 }
 
-TEST(OverlayName, OddNamesAreNumbered) {
+TEST(OverlayName, UnsuitableNamesAreNumbered) {
   EXPECT_EQ(overlay_name("AP", 0), "AP_overlay.png");
   EXPECT_EQ(overlay_name("../x", 1), "view2_overlay.png");
   EXPECT_EQ(overlay_name("", 0), "view1_overlay.png");

@@ -39,7 +39,7 @@ double largest_error_95(const Result& result) {
   return largest;
 }
 
-/// A bar as long as the error, on the scale of the largest.
+/// A bar proportional to the error, relative to the largest.
 std::string error_bar(double error, double largest) {
   return fmt::format("<span class=\"error\" style=\"width:{:.2f}rem\"></span>",
                      largest > 0 ? 8 * error / largest : 0);
@@ -77,7 +77,7 @@ std::string summary_section(const Result& result) {
   if (accuracy.fle_px.n)
     cards += card(fixed(accuracy.fle_px.rms, 3), "px", "fiducial localization error, rms");
   if (const double largest = largest_error_95(result); largest > 0)
-    cards += card(fixed(largest, 3), "mm", "least certain point, predicted at 95 %");
+    cards += card(fixed(largest, 3), "mm", "largest predicted error of a point at 95 %");
   if (!cards.empty()) html += "<div class=\"cards\">\n" + cards + "</div>\n";
   return html;
 }
@@ -90,16 +90,16 @@ std::string views_section(const Result& result) {
     if (figure.empty()) continue;
     std::string caption = "<b>" + escaped(view.name) + "</b>";
     if (view.calibrated)
-      caption += fmt::format(", balls reproject within {:.3f} px rms", view.calibrated->reprojection_rms_px);
+      caption += fmt::format(", reprojection error {:.3f} px rms", view.calibrated->reprojection_rms_px);
     if (view.found && view.found->mirrored) caption += ", stored mirrored";
     html += fmt::format("<figure>{}<figcaption>{}</figcaption></figure>\n", figure, caption);
   }
   if (html.empty()) return {};
-  return headed(
-      "The X-rays, rectified",
-      "<div class=\"views\">\n" + html +
-          "</div>\n<p class=\"soft\">Green: balls used, with their residuals as orange arrows. Red crosses: "
-          "false blobs. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: tool.</p>\n");
+  return headed("Rectified X-ray images",
+                "<div class=\"views\">\n" + html +
+                    "</div>\n<p class=\"soft\">Green: used fiducials, with their residuals as orange arrows. "
+                    "Red crosses: outliers. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: "
+                    "tool.</p>\n");
 }
 
 std::string points_section(const Result& result) {
@@ -127,8 +127,8 @@ std::string points_section(const Result& result) {
 std::string accuracy_section(const Result& result) {
   const Accuracy& accuracy = result.accuracy;
   HtmlTable table({"Error, mm", "#Mean", "#RMS", "#Max", "#Min", "#n"});
-  statistics_row(table, "FRE, the balls themselves (Eq. 11)", accuracy.fre_mm);
-  statistics_row(table, "TRE, the check targets (Eq. 12)", accuracy.tre_mm);
+  statistics_row(table, "FRE of the fiducials (Eq. 11)", accuracy.fre_mm);
+  statistics_row(table, "TRE of the check targets (Eq. 12)", accuracy.tre_mm);
   if (table.empty()) return {};
   std::string html = table.html();
   HtmlTable targets({"Target", "#Error, mm", "#Predicted rms, mm", "#Predicted at 95 %, mm"});
@@ -164,7 +164,7 @@ std::string fiducials_section(const Result& result) {
   std::string html;
   for (const ViewResult& view : result.views) {
     if (!view.found) continue;
-    HtmlTable table({"Ball", "Status", "#u raw", "#v raw", "#u", "#v", "#&#963;, px", "#Residual, px"});
+    HtmlTable table({"Fiducial", "Status", "#u raw", "#v raw", "#u", "#v", "#&#963;, px", "#Residual, px"});
     for (const Fiducial& fiducial : view.found->fiducials) {
       const bool seen =
           fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
@@ -175,7 +175,7 @@ std::string fiducials_section(const Result& result) {
                  if_seen(fiducial.uv_raw.y(), 2), if_seen(fiducial.uv.x(), 2), if_seen(fiducial.uv.y(), 2),
                  if_seen(fiducial.sigma_px, 3), if_seen(fiducial.residual_px, 3)});
     }
-    html += fmt::format("<div><h3>{}</h3>{}<p class=\"soft\">{} false blobs</p></div>\n", escaped(view.name),
+    html += fmt::format("<div><h3>{}</h3>{}<p class=\"soft\">{} outliers</p></div>\n", escaped(view.name),
                         table.html(), view.found->false_blobs.size());
   }
   return html.empty() ? html : headed("Fiducials", "<div class=\"views\">" + html + "</div>");

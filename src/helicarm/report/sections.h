@@ -7,7 +7,7 @@
 
 namespace helicarm {
 
-// Each gives one part of the report as HTML, empty where the result has nothing to show.
+// Each returns one part of the report as HTML, empty without data.
 std::string summary_section(const Result& result);
 std::string views_section(const Result& result);
 std::string points_section(const Result& result);

@@ -3,7 +3,7 @@
 
 namespace helicarm {
 
-/// The report's one style sheet, light or dark as the reader's system asks.
+/// Style sheet of the report, light or dark by the reader's system setting.
 inline constexpr const char* report_style = R"css(
 :root { color-scheme: light dark; --ink: #1d2326; --soft: #5d686e; --paper: #fbfaf7; --card: #fff; --rule: #dcd8cf;
   --accent: #0b6e75; --good: #1b7a43; --bad: #b3261e; --bar: #0b6e7533; }

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double slice_px = 380, left_px = 60, top_px = 40, gap_px = 80;
 
-/// Equal steps of viridis, dark to light.
+/// Equal steps of the viridis colour map, dark to light.
 constexpr std::array<std::array<int, 3>, 6> colours{
     {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {253, 231, 37}}};
 
@@ -35,7 +35,7 @@ struct Scale {
   double share(double value) const { return (value - low) / (high - low); }
 };
 
-/// Over the two slices that are shown.
+/// Range over the two displayed slices.
 Scale scale_of(const TreVolume& volume) {
   double low = 1e300, high = 0;
   const int middle = volume.side / 2;

@@ -7,8 +7,8 @@
 
 namespace helicarm {
 
-/// The predicted TRE as an SVG image: the slices through the volume's middle along XOY and XOZ (the paper's
-/// Fig. 7), with isolines at the ticks of the scale. A document of its own.
+/// Predicted TRE as a separate SVG document: slices along XOY and XOZ through the centre of the volume (the
+/// paper's Fig. 7), with isolines at the ticks of the scale.
 std::string tre_figure(const TreVolume& volume);
 
 }  // namespace helicarm
