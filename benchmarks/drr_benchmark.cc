@@ -6,7 +6,7 @@
 namespace helicarm {
 namespace {
 
-/// 256 voxels of 1 mm a side, none of them empty: every ray through it takes all its slabs.
+/// 256 voxels of 1 mm per side, none empty: every ray crosses all slabs.
 Volume full_volume() {
   Volume volume;
   volume.size.setConstant(256);
@@ -16,7 +16,7 @@ Volume full_volume() {
   return volume;
 }
 
-/// Along an axis, then turned about a slanted one by so many degrees.
+/// Along an axis, then rotated about an oblique one by this many degrees.
 View view_along(int axis, double turn_deg) {
   View view;
   view.intrinsics = {4000, 4000, 511.5, 511.5, 0};
@@ -29,7 +29,7 @@ View view_along(int axis, double turn_deg) {
   return view;
 }
 
-/// 1024 x 1024 rays that all (unturned) meet the volume: axis, turn, threads.
+/// 1024 x 1024 rays that all (unrotated) meet the volume: axis, rotation, threads.
 void drr_of_256(benchmark::State& state) {
   const Absorber absorber(full_volume(), attenuation_from_hu);
   const View view = view_along(static_cast<int>(state.range(0)), static_cast<double>(state.range(1)));

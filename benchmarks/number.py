@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Fig. 5's work for 10,000 groups of 12 balls, in one run: the study's lanes, plain Eigen, batched numpy.
+"""The computation of Fig. 5 for 10,000 groups of 12 balls: the study's SIMD code, plain Eigen, batched NumPy.
 
     cmake --preset release -DHELICARM_BENCHMARKS=ON && cmake --build build --target helicarm helicarm_benchmark
     benchmarks/number.py [--repetitions 9] [--build build]
 
 Each version draws its own groups, calibrates both views (Eq. 7) and intersects the calibration's pixels of all balls
-(Eq. 8); "median FRE" shows that they do the same. Then the whole command, from start to written files. Needs numpy.
+(Eq. 8); equal "median FRE" confirms that they agree. Then the whole command, including the files. Needs NumPy.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def drawn_groups(random):
 
 
 def calibrated(world, pixels):
-    """Eq. 7 by normal equations, pixels about their mean."""
+    """Eq. 7 by normal equations, with centred pixels."""
     mean = pixels.mean(1, keepdims=True)
     u, x = (pixels - mean) / 512, world / 64
     design = np.zeros((GROUPS, 2 * BALLS, 11))
@@ -89,8 +89,8 @@ def main():
     done = subprocess.run([options.build / "bin/helicarm_benchmark", "--benchmark_filter=^number_",
                            f"--benchmark_repetitions={options.repetitions}", "--benchmark_report_aggregates_only=true",
                            "--benchmark_format=json"], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-    names = {"number_in_eigen": "plain Eigen, group by group", "number_in_lanes": "study number, FRE",
-             "number_with_targets": "study number, FRE and TRE of 43 targets, fresh noise",
+    names = {"number_in_eigen": "plain Eigen, group by group", "number_simd": "study number, FRE",
+             "number_with_targets": "study number, FRE and TRE of 43 targets, independent noise",
              "number_of_all_readings": "study number, all 48 columns"}
     for entry in json.loads(done.stdout)["benchmarks"]:
         if entry["aggregate_name"] == "median":

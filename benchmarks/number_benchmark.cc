@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The work of Fig. 5 for 10,000 groups of 12 balls, two DLTs and 12 intersections each: the study's lanes,
-// and the same in plain Eigen, one group after the other. benchmarks/number.py sets them beside batched
-// numpy.
+// The computation of Fig. 5 for 10,000 groups of 12 balls with two DLTs and 12 intersections each: the
+// study's SIMD code and plain Eigen, one group after the other. benchmarks/number.py compares them with
+// batched NumPy.
 #include <random>
 #include <vector>
 
@@ -36,11 +36,11 @@ void run_study(benchmark::State& state, const NumberOptions& options) {
   }
 }
 
-/// Calibration's own pixels projected back, FRE only: what the other versions do.
+/// Back-projection of the calibration's pixels, FRE only, as in the other versions.
 void number_simd(benchmark::State& state) { run_study(state, yardstick()); }
 BENCHMARK(number_simd)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-/// One sigma, fresh noise, FRE and TRE of 43 targets.
+/// One sigma, independent noise, FRE and TRE of 43 targets.
 void number_with_targets(benchmark::State& state) {
   NumberOptions options = yardstick();
   options.readings = {PixelReading::fresh_noise};
@@ -48,7 +48,7 @@ void number_with_targets(benchmark::State& state) {
 }
 BENCHMARK(number_with_targets)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-/// Every reading of sigma and of the pixels.
+/// All readings of sigma and of the pixels.
 void number_of_all_readings(benchmark::State& state) {
   NumberOptions options;
   options.groups = groups;
@@ -57,7 +57,7 @@ void number_of_all_readings(benchmark::State& state) {
 }
 BENCHMARK(number_of_all_readings)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
-/// Eq. 7 by normal equations, pixels about their mean.
+/// Eq. 7 by normal equations, with centred pixels.
 Projection calibrated(const std::vector<Eigen::Vector3d>& world, const std::vector<Eigen::Vector2d>& pixels) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const auto& pixel : pixels) mean += pixel / balls;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a tracker's message to the tool's line in two X-rays: what the eye waits for, but for the wire.
+// From a tracker's message to the tool's line in two views: the display latency without the network.
 #include <benchmark/benchmark.h>
 
 #include "helicarm/devices/tracker/pose_board.h"

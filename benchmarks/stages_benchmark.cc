@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times every stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 acquisitions.
+// Times each stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 images.
 #include <filesystem>
 
 #include <benchmark/benchmark.h>
@@ -50,7 +50,7 @@ void search_blobs(benchmark::State& state) {
 }
 BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
-/// As the balls are fitted at last: from where the search left them, with the image's own look.
+/// The final fit of the balls: from the detected centres, with the image's estimated blur.
 void fit_one_ball(benchmark::State& state) {
   const Candidates candidates = detect_candidates(xray_image(), rectification());
   const auto found = value_or_throw(

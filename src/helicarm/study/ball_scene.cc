@@ -28,7 +28,7 @@ constexpr double wire_depth_mm = 735, wire_mm = 2;
 constexpr double a_third =
     0.265;  // of the radius: beyond it, or between it and its like, lies a third of the disc
 constexpr double bone_depth_mm = 770, bone_mm = 6;
-constexpr double rod_half_px = 36;  // of a wire or bone: within the square, beyond the fit's window
+constexpr double rod_half_px = 36;  // of a wire or bone: inside the square, longer than the fit's window
 
 Vector3d point_at(const View& view, const Vector2d& pixel, double depth) {
   const Intrinsics& k = view.intrinsics;
@@ -79,7 +79,7 @@ struct Sphere {
   double radius;
 };
 
-/// The square alone, its balls being the given ones.
+/// One square with its balls only.
 Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<const Sphere> balls,
                        double focus_sigma_px) {
   View view = scene.view;
@@ -103,7 +103,7 @@ Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<c
 double BallScene::radius_px() const { return view.intrinsics.fx * diameter_mm / 2 / depth_mm; }
 
 Image<float> BallScene::signal() const {
-  // Square by square: a ray then meets a few bodies, not all.
+  // Each square is rendered alone, so that a ray crosses few bodies.
   Image<float> image = simulation::render_view({muscle}, detector, view, 1);
   for (const BallTile& tile : tiles) {
     View shifted = view;
@@ -164,7 +164,7 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
     const Eigen::Affine3d& place = body.solids.front().world_from_unit;
     balls.push_back({place.translation(), place.linear().col(0).norm()});
   }
-  // By the place of a ball on the receiver and by its radius, both in px.
+  // By the ball's position on the receiver and its radius, both in px.
   std::vector<Eigen::ArrayXXd> slopes;
   const auto image = [&] {
     const Image<float> signal = signal_of(scene, tile, balls, imaging.focus_sigma_px);
@@ -209,7 +209,7 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
         window.push_back({u, v});
         break;
       }
-  // The screen spreads the light and with it the quanta's noise; the electronics' and the rounding are white.
+  // The screen's blur also acts on the quantum noise; electronic noise and rounding are white.
   const double sigma = imaging.screen_sigma_px;
   cv::Mat taps(1, 1, CV_64F, cv::Scalar(1));
   if (sigma > 0) taps = cv::getGaussianKernel(2 * int(std::ceil(4 * sigma)) + 1, sigma, CV_64F);

@@ -14,19 +14,19 @@
 
 namespace helicarm {
 
-/// What lies across a ball.
+/// What overlaps or adjoins a ball.
 enum class Companion { none, ball, plate_dot, wire_in_the_middle, wire_beside, bone };
 
-/// One ball in a square of its own. Frame: the camera's, mm.
+/// One ball in its own square of the image. Frame: the camera's, mm.
 struct BallTile {
   Eigen::Vector3d ball;
-  Eigen::Vector2d towards;   ///< in the image: where the companion lies, else the brighter side
-  simulation::Scene bodies;  ///< the ball first, then what lies across it
+  Eigen::Vector2d towards;   ///< direction in the image to the companion, else to the brighter side
+  simulation::Scene bodies;  ///< the ball first, then its companions
   int left, top;             ///< of the square, px
 };
 
-/// An image's worth of steel balls, 750 mm from the source and 247 mm from the receiver, in an ellipsoid of
-/// muscle that grows thinner towards the sides.
+/// Steel balls that fill an image, 750 mm from the source and 247 mm from the receiver, in an ellipsoid of
+/// muscle that becomes thinner towards the sides.
 struct BallScene {
   static constexpr int side_px = 96;  ///< of a ball's square
   double diameter_mm;
@@ -39,16 +39,16 @@ struct BallScene {
   Image<float> signal() const;
 };
 
-/// Whether a square's ball stands alone whatever the others' companion: those tell the look.
+/// Whether a square's ball has no companion; these balls give the common appearance.
 inline bool is_alone(std::size_t tile) { return tile % 8 == 0; }
 
-/// `squares` across the image, a ball in each.
+/// `squares` across the image, one ball in each.
 BallScene ball_scene(double diameter_mm, Companion companion, int squares, std::uint64_t seed,
                      std::uint64_t image);
 
-/// The bound (Cramer and Rao) on the standard deviation per axis of the ball's centre, px, from the pixels
-/// around it up to `window_px` beyond each rim, when places and radii of all balls in the square, a quadratic
-/// background and the scatter are unknown. Derivatives are differences of renderings.
+/// The Cramer-Rao bound on the standard deviation per axis of the ball's centre, px, from the pixels up to
+/// `window_px` beyond each rim, with unknown positions and radii of all balls in the square, quadratic
+/// background and scatter. Derivatives are differences of renderings.
 double centre_bound_px(const BallScene& scene, const BallTile& tile, const simulation::Light& light,
                        const simulation::Imaging& imaging, double window_px);
 

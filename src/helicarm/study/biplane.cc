@@ -20,8 +20,8 @@ constexpr double focal_length_mm = 900;
 
 constexpr std::size_t cells_of_table = 10;
 
-/// The table's cells in order, each with what the paper prints for it. The plates of the two views are in
-/// different places, so that their own balls have no two rays: their error is that of one.
+/// The table's cells in order, with the published values. The plates of the two views are in different
+/// positions, so their own balls have no two rays: the error is that of one ray.
 const std::array<BiplaneRow, cells_of_table> table_1{
     {{"udcsc", "fre", "intersection", {}, ErrorFigures{0.70, 0.05, 0.36, 0.43}},
      {"udcsc", "on_biplane", "intersection", {}, ErrorFigures{7.53, 3.30, 4.50, 4.68}},
@@ -57,7 +57,7 @@ std::vector<Eigen::Vector3d> points_of_udcsc() {
   return points;
 }
 
-/// The four check points of 3.2 on the cone's surface: left, right, and two on its upper face.
+/// The four check points of 3.2 on the cone's surface: left, right and two on the upper side.
 std::vector<Eigen::Vector3d> surface_targets() {
   const double half = cone_height_mm / 2, side = (cone_base_mm + cone_top_mm) / 2;
   return {{side, 0, half}, {-side, 0, half}, {15, 0, cone_height_mm}, {-15, 0, cone_height_mm}};
@@ -69,27 +69,27 @@ class BiplaneTrials {
     views_ = paper_views(WorldOrigin::centre);
     for (View& view : views_)
       view.camera_from_world.translation.z() +=
-          options.cone_mm - 800;  // paper_views has the middle at 800 mm
+          options.cone_mm - 800;  // paper_views puts the centre at 800 mm
     for (std::size_t i = 0; i < 2; ++i) plates_[i] = plates_in_world(views_[i]);
     cone_ = points_of_udcsc();
     on_cone_ = cone_;
     for (const auto& target : surface_targets()) on_cone_.push_back(target);
   }
 
-  /// Experiments first .. first + 3: the table's cells, four figures each.
+  /// Experiments first .. first + 3: the table's cells, four values each.
   void run(std::uint64_t first, std::span<double> out) const {
     std::array<Gathered, cells_of_table> cells;
     for (int test = 0; test < tests_of_experiment; ++test)
-      run_test(LaneRandom(options_.seed, biplane_stream + std::uint32_t(test), first), cells);
+      run_test(SimdRandom(options_.seed, biplane_stream + std::uint32_t(test), first), cells);
     for (int lane = 0; lane < simd_width; ++lane)
       for (const Gathered& cell : cells) put_record(cell.figures(lane), out);
   }
 
  private:
-  /// A list of places known to all lanes with noisy pixels.
+  /// Points known to all lanes, with noisy pixels.
   struct Seen {
-    std::vector<LanePoint> points;
-    std::vector<LanePixel> pixels[2];
+    std::vector<SimdPoint> points;
+    std::vector<SimdPixel> pixels[2];
   };
 
   std::vector<Eigen::Vector3d> plates_in_world(const View& view) const {
@@ -107,8 +107,8 @@ class BiplaneTrials {
     return balls;
   }
 
-  /// `at` counts blocks of random words on.
-  Seen seen(const std::vector<Eigen::Vector3d>& points, const LaneRandom& random, std::uint32_t& at) const {
+  /// `at` is the first block of random words; it is advanced.
+  Seen seen(const std::vector<Eigen::Vector3d>& points, const SimdRandom& random, std::uint32_t& at) const {
     const double sigma = sigma_px(options_.sigma, options_.fle);
     Seen result;
     for (const Eigen::Vector3d& point : points) {
@@ -122,20 +122,20 @@ class BiplaneTrials {
     return result;
   }
 
-  /// Where the tracker says that a view's plates are.
-  std::vector<LanePoint> tracked(const Seen& plates, const LaneRandom& random, std::uint32_t& at) const {
+  /// Tracked pose of a view's plates.
+  std::vector<SimdPoint> tracked(const Seen& plates, const SimdRandom& random, std::uint32_t& at) const {
     const auto a = random.normals(at++), b = random.normals(at++), c = random.normals(at++);
     const double angle = options_.tracker_sigma_deg * std::numbers::pi / 180;
-    const LanePoint turn{angle * a.first, angle * a.second, angle * b.first};
-    LanePoint middle{};
-    for (const LanePoint& ball : plates.points) {
+    const SimdPoint turn{angle * a.first, angle * a.second, angle * b.first};
+    SimdPoint middle{};
+    for (const SimdPoint& ball : plates.points) {
       middle.x += ball.x / double(plates.points.size());
       middle.y += ball.y / double(plates.points.size());
       middle.z += ball.z / double(plates.points.size());
     }
-    std::vector<LanePoint> moved;
-    for (const LanePoint& ball : plates.points) {
-      const LanePoint out = ball - middle;  // turned by a small angle
+    std::vector<SimdPoint> moved;
+    for (const SimdPoint& ball : plates.points) {
+      const SimdPoint out = ball - middle;  // rotated by a small angle
       moved.push_back({ball.x + turn.y * out.z - turn.z * out.y + options_.tracker_sigma_mm * b.second,
                        ball.y + turn.z * out.x - turn.x * out.z + options_.tracker_sigma_mm * c.first,
                        ball.z + turn.x * out.y - turn.y * out.x + options_.tracker_sigma_mm * c.second});
@@ -143,26 +143,26 @@ class BiplaneTrials {
     return moved;
   }
 
-  void run_test(const LaneRandom& random, std::array<Gathered, cells_of_table>& cells) const {
+  void run_test(const SimdRandom& random, std::array<Gathered, cells_of_table>& cells) const {
     std::uint32_t at = 0;
     const Seen cone = seen(cone_, random, at);
     const Seen plates[2] = {seen(plates_[0], random, at), seen(plates_[1], random, at)};
     const Seen anew[2] = {seen(plates_[0], random, at), seen(plates_[1], random, at)};
     const Seen centre = seen({middle_of_cone()}, random, at);
     const Seen on_cone = seen(on_cone_, random, at);
-    const std::vector<LanePoint> told[2] = {tracked(plates[0], random, at), tracked(plates[1], random, at)};
+    const std::vector<SimdPoint> told[2] = {tracked(plates[0], random, at), tracked(plates[1], random, at)};
 
-    const LaneBalls cone_model(cone.points);
-    const LaneProjection by_cone[2] = {cone_model.calibrate(cone.pixels[0]),
+    const SimdBalls cone_model(cone.points);
+    const SimdProjection by_cone[2] = {cone_model.calibrate(cone.pixels[0]),
                                        cone_model.calibrate(cone.pixels[1])};
-    const LaneProjection by_plates[2] = {LaneBalls(told[0]).calibrate(plates[0].pixels[0]),
-                                         LaneBalls(told[1]).calibrate(plates[1].pixels[1])};
-    const auto intersections = [](const LaneProjection(&views)[2], const Seen& s, Gathered& cell) {
+    const SimdProjection by_plates[2] = {SimdBalls(told[0]).calibrate(plates[0].pixels[0]),
+                                         SimdBalls(told[1]).calibrate(plates[1].pixels[1])};
+    const auto intersections = [](const SimdProjection(&views)[2], const Seen& s, Gathered& cell) {
       for (std::size_t i = 0; i < s.points.size(); ++i)
         cell.add(norm(intersect(views[0], s.pixels[0][i], views[1], s.pixels[1][i]) - s.points[i]));
     };
-    const auto rays = [](const LaneProjection& view, const std::vector<LanePixel>& pixels,
-                         const std::vector<LanePoint>& points, Gathered& cell) {
+    const auto rays = [](const SimdProjection& view, const std::vector<SimdPixel>& pixels,
+                         const std::vector<SimdPoint>& points, Gathered& cell) {
       for (std::size_t i = 0; i < points.size(); ++i) cell.add(ray_distance(view, pixels[i], points[i]));
     };
     intersections(by_cone, cone, cells[0]);
@@ -186,12 +186,12 @@ class BiplaneTrials {
 };
 
 Expected<void> check(const BiplaneOptions& o) {
-  if (o.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (o.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   if (o.balls_a_side < 2 || o.balls_a_side > 5)
     return fail(Reason::bad_value, fmt::format("balls_a_side: {}, limits 2 and 5", o.balls_a_side));
   if (!(o.cone_mm > 0 && o.near_plate_mm > 0 && o.far_plate_mm > o.near_plate_mm))
     return fail(Reason::bad_value,
-                "the plates and the cone must lie before the source, the far plate beyond the near one");
+                "cone_mm, near_plate_mm and far_plate_mm must be positive, far_plate_mm the larger one");
   return {};
 }
 

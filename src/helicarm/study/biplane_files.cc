@@ -27,15 +27,12 @@ std::string biplane_summary(const std::vector<BiplaneRow>& rows) {
                plates_cone = mean("biplane", "on_udcsc", "intersection");
   const bool same_order = cone_centre < plates_centre && cone_near < plates_cone && plates_own < cone_far;
   return fmt::format(
-      "Printed (Table 1), mean errors in mm by UDCSC and by biplane: points on the biplane 4.50 and 0.58, "
-      "centre of UDCSC "
-      "0.30 and 2.65, points on UDCSC 0.54 and 2.04. Here: {:.2f} and {:.2f}, {:.2f} and {:.2f}, {:.2f} and "
-      "{:.2f}{}. Each "
-      "calibrator is good where its balls are. The print gives neither the lengths nor the tracker's noise, "
-      "and the "
-      "plates turn with the C-arm: the balls of one view are elsewhere in the other, so the error on their "
-      "own points "
-      "is taken as the distance from one view's ray; as the intersection of two it is {:.2f} mm.",
+      "Published (Table 1), mean errors in mm by UDCSC and by biplane: points on the biplane 4.50 and 0.58, "
+      "centre of UDCSC 0.30 and 2.65, points on UDCSC 0.54 and 2.04. Here: {:.2f} and {:.2f}, {:.2f} and "
+      "{:.2f}, {:.2f} and {:.2f}{}. Errors are small near the balls of each calibrator. The paper states "
+      "neither the lengths nor the tracker's noise. The plates rotate with the C-arm, so their balls have "
+      "different positions in the two views; the error on their own points is the distance from the ray of "
+      "one view; as the intersection of two rays it is {:.2f} mm.",
       cone_far, plates_own, cone_centre, plates_centre, cone_near, plates_cone,
       same_order ? ": the same order" : ": not the same order",
       mean("biplane", "on_biplane", "intersection"));
@@ -45,12 +42,12 @@ std::string biplane_svg(const std::vector<BiplaneRow>& rows, const BiplaneOption
   Chart chart{"Table 1: UDCSC and biplane", "Points", "Error, mm: mean, largest and least of ten tests"};
   chart.x_names = {"FRE", "TRE on biplane", "TRE at the centre", "TRE on UDCSC"};
   chart.y_from_zero = true;
-  chart.note = fmt::format("medians of {} simulated experiments beside the print", options.groups);
+  chart.note = fmt::format("medians of {} simulated experiments and published values", options.groups);
   const std::array places{"fre", "on_biplane", "centre", "on_udcsc"};
   for (const char* calibrator : {"udcsc", "biplane"})
     for (const bool print : {false, true}) {
       ChartSeries series{fmt::format("{}, {}", calibrator == std::string_view("udcsc") ? "UDCSC" : "biplane",
-                                     print ? "printed" : "here")};
+                                     print ? "published" : "here")};
       series.dashed = print;
       for (const BiplaneRow& row : rows) {
         if (row.calibrator != calibrator || !row.printed) continue;

@@ -51,7 +51,7 @@ void run_calibration_test(const CalibrationStudyOptions& options, std::size_t nu
   simulated.threads = 1;
   const auto folder = options.folder / fmt::format("calibration.partial-{}", number);
   std::error_code ignored;
-  std::filesystem::remove_all(folder, ignored);  // half a case, where a run was killed
+  std::filesystem::remove_all(folder, ignored);  // incomplete case of a killed run
   value_or_throw(simulation::write_case(folder, value_or_throw(simulation::simulate_case(simulated))));
   const Case given = value_or_throw(read_case(folder));
   for (const Method method : {Method::paper, Method::best}) put_record(measured(given, method), out);
@@ -83,7 +83,7 @@ struct TestRow {
   TestSummary paper, best;
 };
 
-/// Table 1's columns: balls, the target in the middle, and balls with the four targets on the surface.
+/// Table 1's columns: fiducials, the central target, and fiducials with the four targets on the surface.
 std::array<TestRow, 3> rows_of(const std::vector<CalibrationTests>& tests) {
   std::array<TestRow, 3> rows{{{"fre", {0.70, 0.05, 0.36, 0.43}, {}, {}},
                                {"centre", {0.42, 0.18, 0.30, 0.42}, {}, {}},
@@ -103,9 +103,9 @@ std::array<TestRow, 3> rows_of(const std::vector<CalibrationTests>& tests) {
 
 Chart chart_of(const std::vector<CalibrationTests>& tests, CalibrationTest CalibrationTests::*method,
                const char* title) {
-  Chart chart{title, "Test", "Target's error, mm"};
+  Chart chart{title, "Test", "Target error, mm"};
   chart.y_from_zero = true;
-  chart.note = "T1 in the middle; printed means: 0.30 mm there, 0.41 mm over all";
+  chart.note = "T1 in the centre; published means: 0.30 mm there, 0.41 mm over all";
   for (std::size_t target = 0; target < 5; ++target) {
     ChartSeries series{fmt::format("T{}", target + 1)};
     for (std::size_t i = 0; i < tests.size(); ++i)
@@ -119,7 +119,7 @@ Chart chart_of(const std::vector<CalibrationTests>& tests, CalibrationTest Calib
 
 Expected<std::vector<CalibrationTests>> study_calibration(const CalibrationStudyOptions& options,
                                                           const EngineOptions& engine, const Ranks& ranks) {
-  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   StudySetting setting;
   setting.blocks = options.groups;
   setting.values_per_block = 2 * numbers_in<CalibrationTest>;
@@ -162,24 +162,22 @@ StudyFiles files_of(const std::vector<CalibrationTests>& tests, const Calibratio
                      {"printed_mm", json_of(row.printed)},
                      {"paper_mm", json_of(row.paper.figures())},
                      {"best_mm", json_of(row.best.figures())}});
-    means += fmt::format("{}{} {:.2f} printed, {:.2f} by the printed recipe, {:.2f} by the best one",
+    means += fmt::format("{}{} {:.2f} published, {:.2f} by the paper method, {:.2f} by the best method",
                          means.empty() ? "" : "; ", row.points, row.printed[2], row.paper.figures()[2],
                          row.best.figures()[2]);
   }
   files.summary = fmt::format(
-      "Table 1's columns of UDCSC and Fig. 14, from {} simulated tests of an AP and a lateral picture, mean "
-      "errors in mm: "
-      "{}. Refused: {} by the printed recipe, {} by the best one. Printed figures are of a real C-arm, whose "
-      "distortion, "
-      "noise and calibrator's tolerance are not known.",
+      "Table 1's columns of UDCSC and Fig. 14, from {} simulated tests with an AP and a lateral image, mean "
+      "errors in mm: {}. Refused: {} by the paper method, {} by the best method. The published values are of "
+      "a real C-arm with unknown distortion, noise and calibrator tolerance.",
       tests.size(), means, refused_paper, refused_best);
   files.json = study_json("calibration", options);
   files.json.update({{"size_px", options.size_px},
                      {"refused", {{"paper", refused_paper}, {"best", refused_best}}},
                      {"summary", files.summary},
                      {"rows", std::move(table)}});
-  files.svg = chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) the printed recipe"),
-                                   chart_of(tests, &CalibrationTests::best, "(b) the best one")});
+  files.svg = chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) paper method"),
+                                   chart_of(tests, &CalibrationTests::best, "(b) best method")});
   return files;
 }
 

@@ -16,11 +16,11 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::uint32_t pose_stream = 3001;
-constexpr std::uint32_t noise_stream = 4000;  // and the next, for each image
-constexpr double pose_px = 0.5;               // per axis: how well a pose tells where a ball is
+constexpr std::uint32_t noise_stream = 4000;  // and the next one, for each image
+constexpr double pose_px = 0.5;               // error of a ball's predicted position, per axis
 constexpr int bounds_per_image = 4;
 constexpr std::size_t images_with_bounds = 6;
-constexpr double grey_of_the_open = 0.75;  // the field's brightest part, as a share of white
+constexpr double grey_of_the_open = 0.75;  // brightest part of the field as a share of white
 
 simulation::Imaging imaging_of(const CentreSituation& s, const Image<float>& signal) {
   simulation::Imaging imaging;
@@ -35,7 +35,7 @@ simulation::Imaging imaging_of(const CentreSituation& s, const Image<float>& sig
   return imaging;
 }
 
-/// Makes each square brighter until the given share of the ball's background is clipped.
+/// Brightens each square until the given share of the ball's background is clipped.
 void clip(XrayImage& xray_image, const BallScene& scene, double share) {
   const double radius = scene.radius_px();
   for (const BallTile& tile : scene.tiles) {

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double not_computed = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* whole_view = "cone before a knee";
-constexpr double cost_of_case = 2;  // over that of an image, roughly
+constexpr double cost_of_case = 2;  // relative to that of an image, approximately
 
 std::vector<CentreSituation> all_situations() {
   std::vector<CentreSituation> all;
@@ -57,7 +57,7 @@ std::vector<CentreSituation> all_situations() {
   return all;
 }
 
-/// The sums over the images, `kinds` of them side by side.
+/// The sums over the images, for `kinds` of balls.
 StudySetting summed_over(std::size_t images, std::size_t kinds) {
   StudySetting setting{images, kinds * numbers_in<CentreSums>};
   setting.settle = [size = setting.values_per_block](std::span<const double> values) {
@@ -85,7 +85,7 @@ CentreRow row_of(const std::string& group, const std::string& name, const Centre
 
 Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, const EngineOptions& engine,
                                                const Ranks& ranks) {
-  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   const auto squares = std::size_t(options.squares * options.squares), measured = squares - (squares + 7) / 8;
   const std::size_t images = (options.groups + measured - 1) / measured;
   const auto wanted = [&](const std::string& group) {

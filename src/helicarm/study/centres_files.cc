@@ -57,7 +57,7 @@ std::string centres_table(const std::vector<CentreRow>& rows) {
   return text;
 }
 
-/// A mark for each situation, from above; values beyond `most` stand at the edge.
+/// A marker for each situation, from the top; values above `most` are drawn at the edge.
 ChartSeries marks_of(const char* name, const std::vector<CentreRow>& rows, double most,
                      const std::function<double(const CentreRow&)>& value) {
   ChartSeries series{name, {}, true};
@@ -84,10 +84,10 @@ std::string centres_svg(const std::vector<CentreRow>& rows) {
   Chart coverage{"(b) coverage", "truth inside the 95 % ellipse, % of balls", ""};
   coverage.y_names.resize(rows.size());
   ratio.series = {marks_of("error", rows, most, [](const CentreRow& row) { return row.ratio(); }),
-                  marks_of("what the fit predicts", rows, most,
+                  marks_of("predicted by the fit", rows, most,
                            [](const CentreRow& row) { return row.sigma_px / row.bound_px; }),
                   line_at("the bound", 1, rows.size())};
-  ratio.note = fmt::format("marks at {:g}: that or more; no bound is computed where there is no mark", most);
+  ratio.note = fmt::format("markers at {:g}: that value or more; no marker: no bound computed", most);
   coverage.series = {marks_of("", rows, 100, [](const CentreRow& row) { return 100 * row.coverage; }),
                      line_at("95 %", 95, rows.size())};
   return chart_svg(std::array{ratio, coverage});

@@ -19,14 +19,14 @@ double bound_of(Companion companion, double quanta) {
   return centre_bound_px(scene, scene.tiles[1], simulation::illuminate(scene.signal(), imaging), imaging, 3);
 }
 
-TEST(CentreBound, FallsWithTheRootOfTheQuanta) {
+TEST(CentreBound, ScalesWithTheInverseRootOfTheQuanta) {
   const double bound = bound_of(Companion::none, 1000);
   EXPECT_GT(bound, 0.005);
   EXPECT_LT(bound, 0.05);
   EXPECT_NEAR(bound_of(Companion::none, 4000), bound / 2, 1e-4 * bound);
 }
 
-TEST(CentreBound, IsWorseBesideAnotherBall) {
+TEST(CentreBound, IsLargerBesideAnotherBall) {
   EXPECT_GT(bound_of(Companion::ball, 1000), 1.05 * bound_of(Companion::none, 1000));
 }
 
@@ -49,7 +49,7 @@ TEST(StudyCentres, BytesDoNotDependOnThreads) {
   EXPECT_LT(rows[0].z, 2);
 }
 
-TEST(StudyCentres, WholeViewsAreMeasuredToo) {
+TEST(StudyCentres, MeasuresWholeViews) {
   const CentreOptions options{1, 5, {"cone before a knee"}, 2};
   const std::vector<CentreRow> rows = study_centres(options, {}, Ranks()).value();
   ASSERT_EQ(rows.size(), 2u);

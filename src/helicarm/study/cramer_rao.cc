@@ -30,7 +30,7 @@ View changed(View view, int number, double step) {
   return view;
 }
 
-/// Derivative of a function of one number at 0, to fourth order in the step.
+/// Derivative of a function of one variable at 0, fourth order in the step.
 template <class Function>
 Vector2d slope(const Function& at, double step) {
   return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
@@ -50,7 +50,7 @@ Eigen::Matrix<double, 2, 3> by_place(const View& view, const Vector3d& point) {
   return jacobian;
 }
 
-/// Adds what is believed of one combination of each view's numbers, `covariance` being that of all views.
+/// Adds the prior of one linear combination of each view's parameters; `covariance` is over all views.
 void accept(Eigen::MatrixXd& information, const std::vector<Numbers>& combination,
             const Eigen::MatrixXd& covariance) {
   if (covariance.size() == 0) return;

@@ -10,8 +10,8 @@
 
 namespace helicarm {
 
-/// What is believed of a view's intrinsics and of two views' together, as inverse variances; zero: nothing.
-/// `focal` and `principal` are the covariance of all views' departures (px^2); empty: nothing is believed.
+/// Prior of one view's intrinsics and of the views jointly; zero: no prior. `focal` and `principal` are the
+/// covariances of all views' deviations (px^2); empty: no prior.
 struct PriorInformation {
   Eigen::MatrixXd focal_covariance;
   Eigen::MatrixXd principal_covariance;  ///< of u0, and of v0 alike
@@ -19,10 +19,10 @@ struct PriorInformation {
   double skew_sigma = 0;                 ///< of skew / fy; 0: free
 };
 
-/// The least covariance (mm^2) that any unbiased estimate of a point can have, when views are calibrated by
-/// balls of known place with `ball_sigma_px` of normal noise per axis and the point's own pixels carry
-/// `point_sigma_px` (Cramer 1946, Rao 1945; with priors: van Trees 1968). It knows the pinhole camera and
-/// nothing of the estimators: the derivatives are differences of `View::project`.
+/// Cramer-Rao bound: the least covariance (mm^2) of an unbiased estimate of a point, with views calibrated by
+/// balls at known positions with `ball_sigma_px` of normal noise per axis and point pixels with
+/// `point_sigma_px` (Cramer 1946, Rao 1945; with priors: van Trees 1968). Uses only the pinhole camera,
+/// independently of the estimators: the derivatives are differences of `View::project`.
 Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Eigen::Vector3d> balls,
                                  const Eigen::Vector3d& point, double ball_sigma_px, double point_sigma_px,
                                  const PriorInformation& prior);

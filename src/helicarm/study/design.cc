@@ -22,11 +22,11 @@ constexpr std::uint64_t search_draws = 256, report_draws = 8192;
 constexpr double least_spacing_mm = 5;  // two 4 mm balls and a wall between them
 constexpr double design_ball_mm = 4;    // 2.3.4
 
-/// Two shares of (0, 1) for each ball: along the surface's axis or the spiral, and around.
+/// Two parameters in (0, 1) for each ball: along the surface's axis or the spiral, and around it.
 using Shares = std::vector<double>;
 
 Eigen::Vector3d place_on(DesignSurface surface, double share, double around) {
-  constexpr double margin = design_ball_mm / 2 / cone_height_mm;  // no ball sticks out at the base or the top
+  constexpr double margin = design_ball_mm / 2 / cone_height_mm;  // no ball protrudes at the base or the top
   const double along = margin + (1 - 2 * margin) * share;
   const double angle = 2 * std::numbers::pi * around, z = along * cone_height_mm;
   switch (surface) {
@@ -51,7 +51,7 @@ std::vector<Eigen::Vector3d> places_of(DesignSurface surface, const Shares& shar
   return places;
 }
 
-/// Labels from the base upwards; not P1 to P12, to which the rules by label go.
+/// Labels from the base upwards; not P1 to P12, which have rules by label.
 Calibrator calibrator_of(std::string name, std::vector<Eigen::Vector3d> places) {
   std::ranges::sort(places, {}, [](const Eigen::Vector3d& p) { return p.z(); });
   Calibrator calibrator{std::move(name), {}, {}};
@@ -75,8 +75,8 @@ bool keeps_rules(const Calibrator& calibrator) {
                              [](const RuleFinding& finding) { return finding.passed(); });
 }
 
-/// Predicts TRE by noise of its own: every set is judged by the same draws, so that two sets differ by their
-/// balls alone.
+/// Predicts TRE from simulated noise: all sets share the same draws, so that two sets differ only by their
+/// balls.
 class Judge {
  public:
   Judge(const DesignOptions& options, std::uint32_t stream, std::uint64_t draws)
@@ -85,24 +85,24 @@ class Judge {
         lane_targets_(targets_, views_) {
     for (std::uint64_t first = 0; first < draws; first += simd_width) {
       noise_.emplace_back();
-      draw_noise(LaneRandom(options.seed, stream, first), draw::calibration, LaneBalls::most, noise_.back());
+      draw_noise(SimdRandom(options.seed, stream, first), draw::calibration, SimdBalls::most, noise_.back());
     }
   }
 
   double tre_mm(const std::vector<Eigen::Vector3d>& places) const {
     const std::size_t count = places.size();
-    std::vector<LanePoint> balls;
-    LanePixels exact, pixels;
+    std::vector<SimdPoint> balls;
+    SimdPixels exact, pixels;
     for (const auto& place : places) {
       balls.push_back({simd(place.x()), simd(place.y()), simd(place.z())});
       for (std::size_t view = 0; view < 2; ++view)
         exact.of_view[view][balls.size() - 1] = lane_views_.project(view, balls.back());
     }
-    const LaneBalls model(balls);
+    const SimdBalls model(balls);
     Simd sum{};
-    for (const LanePixels& noise : noise_) {
+    for (const SimdPixels& noise : noise_) {
       add_noise(exact, sigma_, noise, count, pixels);
-      const LaneProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
+      const SimdProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
                                             model.calibrate({pixels.of_view[1], count})};
       sum += lane_targets_.mean_square(0, lane_targets_.size(), calibrated);
     }
@@ -113,10 +113,10 @@ class Judge {
  private:
   double sigma_;
   std::array<View, 2> views_ = paper_views(WorldOrigin::centre);
-  LaneViews lane_views_{views_};
+  SimdViews lane_views_{views_};
   std::vector<Eigen::Vector3d> targets_;
-  LaneTargets lane_targets_;
-  std::vector<LanePixels> noise_;
+  SimdTargets lane_targets_;
+  std::vector<SimdPixels> noise_;
 };
 
 Shares random_shares(const DesignOptions& options, std::uint32_t stream, std::uint64_t trial) {
@@ -131,12 +131,12 @@ double reflected(double share) {
   return share > 1 ? std::max(0.0, 2 - share) : share;
 }
 
-/// One restart: infinity in front where it never kept the rules, else the TRE; then the shares.
+/// Result of one restart: the TRE, infinity if it never kept the rules; then the parameters.
 std::vector<double> search(const DesignOptions& options, const Judge& judge, std::size_t restart) {
   RandomStream random(options.seed, design_stream + 2, restart);
   Shares now;
   std::vector<Eigen::Vector3d> places;
-  // Evenly along, at a random turn: a start that keeps the rules more often than a random one.
+  // Equally spaced with a random rotation: keeps the rules more often than a random start.
   for (int attempt = 0; attempt < 200; ++attempt) {
     now.clear();
     const double turn = random.uniform(), step = random.uniform();
@@ -177,7 +177,7 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
   if (options.balls < 6 || options.balls > 20)
     return fail(Reason::bad_value, fmt::format("balls: {}, limits 6 and 20", options.balls));
   if (options.groups < 1 || options.restarts < 1)
-    return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+    return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   const Judge judge(options, design_stream, search_draws);
   const std::size_t size = 1 + 2 * std::size_t(options.balls);
 
@@ -223,8 +223,11 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
   };
   const std::vector<double>& found = kept->back();
   if (!std::isfinite(found[0]))
-    return fail(Reason::uncertain, fmt::format("no set of {} balls on the {} that keeps the rules was found",
-                                               options.balls, name_of(options.surface)));
+    return fail(
+        Reason::uncertain,
+        fmt::format(
+            "no set of {} balls on the {} that keeps the rules was found: allow more restarts or fewer balls",
+            options.balls, name_of(options.surface)));
   answer.design =
       judged(calibrator_of("design", places_of(options.surface, Shares(found.begin() + 1, found.end()))));
   answer.udcsc = judged(udcsc());

@@ -33,16 +33,14 @@ StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
   const bool ruled = !answer.best_random_ruled.calibrator.balls.empty();
   files.summary = fmt::format(
       "{} balls on the {}, TRE in the cone (rms, exact target pixels): {:.3f} mm by design, {:.3f} mm with "
-      "udcsc ({:.0f} % "
-      "less), {:.3f} mm with the best of {} random sets ({:.0f} % less; {}), {:.3f} mm in the middle of "
-      "them. The design "
-      "{} every rule that does not go by label.",
+      "udcsc ({:.0f} % less), {:.3f} mm with the best of {} random sets ({:.0f} % less; {}), median of the "
+      "random sets {:.3f} mm. The design {} all rules that do not depend on labels.",
       options.balls, name_of(options.surface), answer.design.tre_mm, answer.udcsc.tre_mm, gain(answer.udcsc),
       answer.best_random.tre_mm, options.groups, gain(answer.best_random),
       answer.best_random.keeps_rules ? "it keeps the rules"
-      : ruled                        ? fmt::format("it breaks rules, the best that keeps them has {:.3f} mm",
-                                                   answer.best_random_ruled.tre_mm)
-              : fmt::format("it breaks rules, as do all of the best {}", tried_random_sets),
+      : ruled ? fmt::format("it breaks rules; the best set that keeps them has {:.3f} mm",
+                            answer.best_random_ruled.tre_mm)
+              : fmt::format("it breaks rules, as do the best {} random sets", tried_random_sets),
       answer.median_random_mm, answer.design.keeps_rules ? "keeps" : "breaks");
   files.json = study_json("design", options);
   files.json.update(

@@ -14,7 +14,7 @@
 namespace helicarm {
 namespace {
 
-constexpr std::size_t blocks_per_turn = 4;  // of a thread, between two gatherings of the ranks
+constexpr std::size_t blocks_per_turn = 4;  // per thread, between two exchanges of the ranks
 
 class Run {
  public:
@@ -49,8 +49,8 @@ class Run {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// From the journal, if the study is to be resumed. The ranks that do not lead learn how many settings are
-  /// over.
+  /// Continues from the journal if the study is resumed. The other ranks receive the number of finished
+  /// settings.
   JournalContent content_before() {
     JournalContent content;
     double trouble = 0;
@@ -70,7 +70,7 @@ class Run {
     return content;
   }
 
-  /// Tells every rank which blocks are done.
+  /// Sends the finished blocks' numbers to all ranks.
   void share_done() {
     const auto told = ranks_.from_leader(std::vector<double>(done_.begin(), done_.end()));
     for (std::size_t i = 0; i < told.size(); ++i) done_[i] = told[i] != 0;
@@ -81,8 +81,8 @@ class Run {
     for (std::size_t block = 0; block < setting.blocks; ++block)
       if (!done_[block]) open.push_back(block);
     const auto crew = std::size_t(ranks_.count());
-    // The leader's threads: all ranks must meet as often, also where their machines have other numbers of
-    // them.
+    // The number of the leader's threads: all ranks must exchange equally often, also if their machines have
+    // different numbers of threads.
     const auto threads = std::size_t(ranks_.from_leader({double(threads_)}).front());
     const std::size_t turn =
         crew == 1 ? std::max<std::size_t>(open.size(), 1) : crew * threads * blocks_per_turn;
@@ -102,7 +102,7 @@ class Run {
     }
   }
 
-  /// With several ranks: each brings its blocks, with their numbers, to the leader.
+  /// With several ranks: each sends its blocks, with their numbers, to the leader.
   void run_turn(const StudySetting& setting, const std::vector<std::size_t>& own) {
     const std::size_t size = 1 + setting.values_per_block;
     std::vector<double> parcel(own.size() * size);
@@ -150,8 +150,8 @@ class Run {
   std::optional<Journal> journal_;
   bool journal_begun_ = false;
   std::vector<std::vector<double>> settled_;
-  std::vector<double> values_;  ///< of the setting that runs, block after block
-  std::vector<bool> done_;      ///< which of its blocks
+  std::vector<double> values_;  ///< of the current setting, by block
+  std::vector<bool> done_;      ///< finished blocks of the current setting
 };
 
 }  // namespace

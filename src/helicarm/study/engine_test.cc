@@ -33,8 +33,8 @@ class Engine : public ::testing::Test {
     return options;
   }
 
-  /// Settings of 10 blocks of 3 values that tell where they come from; counts the blocks that are worked on
-  /// and stops as a kill would at the given one.
+  /// Settings of 10 blocks with 3 values that encode their block; counts the computed blocks and stops at the
+  /// given one, as a kill would.
   std::vector<StudySetting> settings(int stop_at = -1) {
     std::vector<StudySetting> all;
     for (int s = 0; s < 3; ++s) {
@@ -59,7 +59,7 @@ class Engine : public ::testing::Test {
 
 const std::vector<std::vector<double>> expected{{0, 92, 1380}, {100, 192, 4380}, {200, 292, 7380}};
 
-TEST_F(Engine, AnswersDoNotDependOnThreads) {
+TEST_F(Engine, ResultsDoNotDependOnThreads) {
   for (const unsigned threads : {1u, 2u, 5u}) {
     EngineOptions given = options();
     given.threads = threads;
@@ -67,7 +67,7 @@ TEST_F(Engine, AnswersDoNotDependOnThreads) {
   }
 }
 
-TEST_F(Engine, ResumedRunWorksOnlyOnWhatIsMissing) {
+TEST_F(Engine, ResumedRunComputesOnlyMissingBlocks) {
   for (const int stop : {1, 9, 10, 14, 25}) {
     worked_ = 0;
     fs::remove(options().journal);
@@ -81,7 +81,7 @@ TEST_F(Engine, ResumedRunWorksOnlyOnWhatIsMissing) {
   }
 }
 
-TEST_F(Engine, TornEndOfTheJournalIsWorkedOnAgain) {
+TEST_F(Engine, IncompleteEndOfTheJournalIsRecomputed) {
   EngineOptions given = options();
   given.threads = 1;
   EXPECT_THROW((void)run_study(settings(14), "a", given, ranks_), std::runtime_error);
@@ -104,7 +104,7 @@ TEST_F(Engine, AnotherStudysJournalIsRefused) {
   EXPECT_EQ(run_study(settings(), "b", given, ranks_).value(), expected);
 }
 
-TEST_F(Engine, ResumingWithoutAJournalBeginsAnew) {
+TEST_F(Engine, ResumingWithoutAJournalStartsFromTheBeginning) {
   EngineOptions given = options();
   given.resume = true;
   EXPECT_EQ(run_study(settings(), "a", given, ranks_).value(), expected);
@@ -128,7 +128,7 @@ TEST_F(Engine, ProgressRisesToOne) {
   EXPECT_NEAR(last, 1, 1e-12);
 }
 
-TEST_F(Engine, JournalHoldsWhatWasWrittenAndNoForeignBytes) {
+TEST_F(Engine, JournalIgnoresForeignBytes) {
   Journal journal(options().journal, "x");
   ASSERT_TRUE(journal.write({{{1, 2}, {}}, {{4, {7, 8, 9}}}}));
   ASSERT_TRUE(journal.append(2, std::vector{0.5}));

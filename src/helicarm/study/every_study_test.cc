@@ -37,7 +37,7 @@ class EveryStudy : public ::testing::TestWithParam<SmallStudy> {
 
 TEST_P(EveryStudy, BytesDoNotDependOnThreads) { EXPECT_EQ(bytes_by(1), bytes_by(3)); }
 
-/// What a journal holds, whosever it is.
+/// The content of a journal of any study.
 JournalContent content_of(const fs::path& path) {
   std::string kind, identity;
   std::ifstream file(path);
@@ -46,7 +46,7 @@ JournalContent content_of(const fs::path& path) {
   return Journal(path, identity).read().value();
 }
 
-TEST_P(EveryStudy, KilledRunLosesNoFinishedBlockAndGoesOnToTheSameBytes) {
+TEST_P(EveryStudy, KilledRunKeepsFinishedBlocksAndResumesToTheSameBytes) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");  // OpenCV may have threads
   EngineOptions engine;
   engine.threads = 2;

@@ -16,7 +16,7 @@ namespace helicarm {
 namespace {
 
 constexpr std::uintmax_t most_journal_bytes = std::uintmax_t{1} << 36;
-constexpr std::uint64_t settled_number = ~std::uint64_t{0};  // no block has it
+constexpr std::uint64_t settled_number = ~std::uint64_t{0};  // not a block number
 
 struct RecordHead {
   std::uint64_t number;  ///< of the block
@@ -24,7 +24,7 @@ struct RecordHead {
   std::uint64_t sum;
 };
 
-/// Fowler, Noll and Vo's hash, by words.
+/// FNV hash over 64-bit words (Fowler, Noll, Vo).
 std::uint64_t check_sum(std::uint64_t number, std::span<const double> values) {
   std::uint64_t hash = 0xCBF29CE484222325;
   const auto add = [&](std::uint64_t word) { hash = (hash ^ word) * 0x100000001B3; };
@@ -42,7 +42,7 @@ std::string record(std::uint64_t number, std::span<const double> values) {
   return bytes;
 }
 
-/// Takes the first record off; nothing where it is not whole.
+/// Removes the first record; empty if it is incomplete.
 std::optional<JournalContent::Block> take_record(std::string_view& bytes) {
   RecordHead head{};
   if (bytes.size() < sizeof head) return std::nullopt;
@@ -72,11 +72,10 @@ Expected<JournalContent> Journal::read() const {
   const auto bytes = read_file(path_, most_journal_bytes);
   if (!bytes) return tl::unexpected<Failure>(bytes.error());
   if (!bytes->starts_with(identity_))
-    return fail(
-        Reason::bad_value,
-        fmt::format("{}: was left by a study with other options or by another version; take it away, or "
-                    "run without --resume",
-                    path_.string()));
+    return fail(Reason::bad_value,
+                fmt::format("{}: belongs to a study with other options or of another version; remove it, or "
+                            "run without --resume",
+                            path_.string()));
   std::string_view rest = std::string_view(*bytes).substr(identity_.size());
   while (auto next = take_record(rest)) {
     if (next->number == settled_number)

@@ -11,18 +11,18 @@
 
 namespace helicarm {
 
-/// What a study had done when it stopped.
+/// State of an interrupted study.
 struct JournalContent {
   struct Block {
     std::size_t number;
     std::vector<double> values;
   };
-  std::vector<std::vector<double>> settled;  ///< of the settings that are over
-  std::vector<Block> blocks;                 ///< of the next setting
+  std::vector<std::vector<double>> settled;  ///< of the finished settings
+  std::vector<Block> blocks;                 ///< of the current setting
 };
 
-/// A file of records, each with its check sum: those that are whole survive a kill at any moment. A setting
-/// that is over replaces the file as a whole; blocks are appended.
+/// A file of records with checksums: complete records survive a kill at any time. A finished setting replaces
+/// the file as a whole; blocks are appended.
 class Journal {
  public:
   Journal(std::filesystem::path path, std::string identity);
@@ -30,9 +30,10 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// What the file holds; nothing where there is none. A torn end is left out. Another study's is bad_value.
+  /// Content of the file; empty without a file. An incomplete end is left out. A journal of another study is
+  /// bad_value.
   Expected<JournalContent> read() const;
-  /// Begins the file anew with this content.
+  /// Rewrites the file with this content.
   Expected<void> write(const JournalContent& content);
   Expected<void> append(std::size_t block, std::span<const double> values);
 

@@ -43,7 +43,7 @@ Expected<Labelling> label(const Calibrator& calibrator, const std::vector<Synthe
   return label_balls(calibrator, candidates, nominal_prior());
 }
 
-/// A false disc may pass for a hidden ball unless a fit to the true ones puts that 4 sigma away.
+/// An outlier may imitate an occluded ball unless a fit to the true ones excludes it by 4 sigma.
 Verdict judge(const Labelling& labelling, const SyntheticView& image, const Calibrator& calibrator) {
   if (labelling.mirrored != image.mirrored()) return Verdict::wrong;
   std::vector<WeightedCorrespondence> seen;

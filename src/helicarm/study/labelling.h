@@ -11,8 +11,7 @@
 
 namespace helicarm {
 
-/// Random views of a calibrator, each with balls hidden and false discs added. Any view can be replayed
-/// alone.
+/// Random views of a calibrator, each with occluded balls and outliers. Each view can be replayed alone.
 struct LabellingStudy {
   int views = 10000;
   std::uint64_t seed = 1;
@@ -23,31 +22,31 @@ struct LabellingStudy {
   double noise_px = 0.5;  ///< of centres, per axis
 };
 
-/// Measured: of views with eight balls or more, one of three is not solved within 20 degrees, one of ten from
-/// there to 25, one of 90 to 30, one of 400 to 35 and one of 2200 beyond.
+/// Measured: of views with at least eight balls, the unsolved share is 1/3 within 20 degrees, 1/10 from 20 to
+/// 25, 1/90 from 25 to 30, 1/400 from 30 to 35 and 1/2200 beyond.
 constexpr double spread_deg = 35;
 
 struct LabellingCount {
   int views = 0;
-  int solved = 0;    ///< accepted, and every name and the mirroring are right
-  int imitated = 0;  ///< of these: a false disc passes for a hidden ball, within the noise
-  int wrong = 0;     ///< accepted, but not right
+  int solved = 0;    ///< accepted, with all labels and the mirroring correct
+  int imitated = 0;  ///< of these: an outlier imitates an occluded ball within the noise
+  int wrong = 0;     ///< accepted, but not correct
   std::map<Reason, int> refused;
 };
 
 struct LabellingTally {
   LabellingCount all;
-  std::vector<LabellingCount> by_visible;  ///< index: balls that show a disc of their own
-  /// Of the views with eight balls or more. Spread: the ray to the balls' middle is at least `spread_deg` off
-  /// the cone's axis, so that the rise of the helix shows. Along the axis, the balls' names may all be
-  /// shifted by one: a quarter turn, the cone a twentieth wider.
+  std::vector<LabellingCount> by_visible;  ///< index: number of separately visible balls
+  /// Views with at least eight balls. Spread: the ray to the balls' centre is at least `spread_deg` off the
+  /// cone's axis, so that the helix's pitch is visible. Along the axis all labels may be shifted by one: a
+  /// quarter turn with the cone 5 % wider.
   LabellingCount spread;
   LabellingCount not_spread;
-  double median_ms = 0;  ///< of CPU time, by view: the only figures that another run does not repeat
+  double median_ms = 0;  ///< CPU time per view; the only values that differ between runs
   double p99_ms = 0;
 };
 
-/// The same counts whatever the number of threads.
+/// The counts do not depend on the number of threads.
 LabellingTally study_labelling(const Calibrator& calibrator, const LabellingStudy& study);
 
 }  // namespace helicarm

@@ -19,7 +19,7 @@ void expect_same(const LabellingCount& a, const LabellingCount& b) {
   EXPECT_EQ(a.refused, b.refused);
 }
 
-TEST(StudyLabelling, EveryViewOffTheAxisIsNamedAndNoneIsNamedWrong) {
+TEST(StudyLabelling, EveryViewOffTheAxisIsLabelledAndNoneWrongly) {
   const auto tally = study_labelling(udcsc(), {.views = 100});
   EXPECT_EQ(tally.all.views, 100);
   EXPECT_EQ(tally.all.wrong, 0);
@@ -27,7 +27,7 @@ TEST(StudyLabelling, EveryViewOffTheAxisIsNamedAndNoneIsNamedWrong) {
   EXPECT_EQ(tally.spread.solved, tally.spread.views);
 }
 
-TEST(StudyLabelling, OutliersThatImitateBallsAreNeverLabelledWrong) {
+TEST(StudyLabelling, OutliersThatImitateBallsNeverCauseWrongLabels) {
   for (const auto kind : {OutlierKind::imitating, OutlierKind::lattice}) {
     const auto tally = study_labelling(udcsc(), {.views = 40, .seed = 2, .outliers = kind});
     EXPECT_EQ(tally.all.wrong, 0);
@@ -43,7 +43,7 @@ TEST(StudyLabelling, ThreadsDoNotChangeTheCounts) {
   for (std::size_t i = 0; i < one.by_visible.size(); ++i) expect_same(one.by_visible[i], three.by_visible[i]);
 }
 
-TEST(StudyLabelling, NoViewsNoCounts) {
+TEST(StudyLabelling, NoViewsGiveNoCounts) {
   const auto tally = study_labelling(udcsc(), {.views = 0});
   EXPECT_EQ(tally.all.views, 0);
   EXPECT_EQ(tally.median_ms, 0);
@@ -57,7 +57,7 @@ TEST(StudyLabelling, DISABLED_TenThousandViews) {
       runs.push_back({seed, kind});
   for (const auto& [seed, kind] : runs) {
     const auto tally = study_labelling(udcsc(), {.seed = seed, .outliers = kind});
-    fmt::print("seed {}, false discs of kind {}\n", seed, static_cast<int>(kind));
+    fmt::print("seed {}, outliers of kind {}\n", seed, static_cast<int>(kind));
     const auto print = [](const std::string& what, const LabellingCount& count) {
       if (count.views == 0) return;
       fmt::print("{}: {} views, {:.2f} % solved, {} imitated, {} wrong", what, count.views,

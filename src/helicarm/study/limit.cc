@@ -13,7 +13,7 @@
 namespace helicarm {
 namespace {
 
-/// What is kept of a setting's trials for one place.
+/// Statistics of a setting's trials for one place.
 struct LimitFigures {
   double failures = 0, bound_mm = 0, error_mm = 0, dlt_mm = 0, coverage = 0;
 };
@@ -39,7 +39,7 @@ LimitFigures limit_figures(const std::vector<LimitOutcomes>& trials, std::size_t
 
 std::vector<LimitSetting> settings_of(const LimitOptions& options) {
   std::vector<LimitSetting> settings;
-  std::uint32_t stream = 100;  // each setting's own, whatever is left out
+  std::uint32_t stream = 100;  // fixed for each setting, whichever are computed
   for (const int balls : {8, 12, 20})
     for (const double sigma : {0.1, 0.5, 1.0, 2.34})
       for (const LimitModel model : limit_models) settings.push_back({balls, sigma, model, stream++});
@@ -68,7 +68,7 @@ StudySetting work_of(const LimitSetting& setting, const LimitOptions& options) {
 
 Expected<std::vector<LimitRow>> study_limit(const LimitOptions& options, const EngineOptions& engine,
                                             const Ranks& ranks) {
-  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   constexpr std::array model_names{"free", "square", "prior", "machine", "known"};
   const std::vector<LimitSetting> settings = settings_of(options);
   std::vector<StudySetting> work;

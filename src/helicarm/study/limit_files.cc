@@ -60,7 +60,7 @@ Json limit_json(const std::vector<LimitRow>& rows, const LimitOptions& options) 
   return json;
 }
 
-/// One model's curves over the noise, a curve for each place.
+/// Curves of one model over the noise, one for each place.
 template <class Value>
 Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Value value) {
   Chart chart{model, "noise of ball centres, px per axis", {}};
@@ -76,7 +76,7 @@ Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Valu
   return chart;
 }
 
-/// What all charts of one row span, on whole tenths of `unit`.
+/// Common range of all charts in a row, in tenths of `unit`.
 void share_range(std::span<Chart> charts, double unit) {
   Extent extent;
   for (const Chart& chart : charts) {

@@ -36,15 +36,15 @@ double bound(double ball_sigma, double point_sigma, const PriorInformation& prio
   return std::sqrt(least_covariance(views, balls(), {5, 10, -3}, ball_sigma, point_sigma, prior).trace());
 }
 
-TEST(LeastCovariance, ExactViewsLeaveThePixelsOwnError) {
-  // Two views share one axis; the others are seen in one view each.
+TEST(LeastCovariance, ExactViewsLeaveOnlyThePixelError) {
+  // Two views share one axis; each other axis is observed in one view only.
   const auto covariance = least_covariance(views, balls(), {0, 0, 0}, 1e-4, 0.5, known());
   EXPECT_NEAR(std::sqrt(covariance.trace()), 0.5 * 800 / 6000 * std::sqrt(2.5), 1e-3 * 0.1);
 }
 
 TEST(LeastCovariance, GrowsWithTheNoise) { EXPECT_NEAR(bound(1, 1, {}), 2 * bound(0.5, 0.5, {}), 1e-6); }
 
-TEST(LeastCovariance, KnowledgeNeverHurts) {
+TEST(LeastCovariance, PriorsNeverIncreaseTheBound) {
   PriorInformation wide{100 * Eigen::Matrix2d::Identity(), 100 * Eigen::Matrix2d::Identity(), 1e-3, 1e-3};
   EXPECT_LT(bound(0.5, 1e-3, wide), bound(0.5, 1e-3, {}));
   EXPECT_LT(bound(0.5, 1e-3, known()), bound(0.5, 1e-3, wide));

@@ -26,17 +26,17 @@ using Eigen::Vector3d;
 constexpr double px_per_mm = 1 / 0.15;
 constexpr double focal_mm = 900;
 constexpr double middle_px = 511.5;
-constexpr double exact_px = 1e-3;              // of a pixel that counts as exact
+constexpr double exact_px = 1e-3;              // noise of an exact pixel
 constexpr double chi2_95 = 7.814727903251179;  // 3 degrees of freedom
-constexpr double pinned = 1e-6;                // sigma of what is known
-constexpr double known_mm = 1e-3;              // likewise, of a length
+constexpr double pinned = 1e-6;                // sigma of a known parameter
+constexpr double known_mm = 1e-3;              // as above, for a length
 constexpr double aspect_sigma = 1e-3;
-constexpr std::size_t bound_trials = 200;  // where each trial has a bound of its own
+constexpr std::size_t bound_trials = 200;  // if each trial has its own bound
 constexpr int entries_of_history = 12;
 
 const Vector3d centre(0, 0, 40);  // of the places
 
-/// What the experiment's C-arms are like: an unknown one of its make, and one that sags little.
+/// The experiment's C-arms: an unknown one of its make, and one with small sag.
 const CArmPrior make = unknown_c_arm();
 const CArmPrior stiff{IntrinsicsVariation{10, 0.3}, IntrinsicsVariation{7, 0.5}};
 
@@ -47,7 +47,7 @@ std::vector<Vector3d> balls_on_helix(int n) {
   return balls;
 }
 
-/// Departures from nominal of focal length and principal point, mm.
+/// Deviations of focal length and principal point from nominal, mm.
 Vector3d variation(const CArmPrior& c_arm, double IntrinsicsVariation::*part, RandomStream& random) {
   return {*c_arm.focal.*part * random.normal(), *c_arm.principal.*part * random.normal(),
           *c_arm.principal.*part * random.normal()};
@@ -86,7 +86,7 @@ ViewFiducials pictured(const char* name, const View& view, const std::vector<Vec
   return seen;
 }
 
-/// A machine and what its earlier acquisitions have told of it.
+/// A C-arm and its history of earlier acquisitions.
 struct KnownCArm {
   Vector3d mean_variation_mm;
   LearnedIntrinsics knowledge;
@@ -107,7 +107,7 @@ KnownCArm c_arm_with_history(const LimitSetting& setting, const std::vector<Vect
   return known;
 }
 
-/// What the estimator is told, and what the bound is told.
+/// The priors given to the estimator and to the bound.
 struct PriorKnowledge {
   CArmPrior c_arm;
   std::optional<NormalPrior> aspect;
@@ -134,7 +134,7 @@ PriorKnowledge told_of(LimitModel model) {
       return {{}, NormalPrior{1, pinned}, NormalPrior{0, pinned}, {{}, {}, pinned, pinned}};
     case LimitModel::prior:
       return with(make, aspect_sigma);
-    case LimitModel::c_arm:  // the bound is that of a machine whose mean and sag are known
+    case LimitModel::c_arm:  // bound for a C-arm with known mean and sag
       return with({IntrinsicsVariation{known_mm, stiff.focal->of_view},
                    IntrinsicsVariation{known_mm, stiff.principal->of_view}},
                   aspect_sigma);

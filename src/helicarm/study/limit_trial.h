@@ -11,12 +11,12 @@
 
 namespace helicarm {
 
-/// What is known of the intrinsics.
+/// Knowledge of the intrinsics.
 enum class LimitModel { free, square, prior, c_arm, known };
 inline constexpr std::array limit_models{LimitModel::free, LimitModel::square, LimitModel::prior,
                                          LimitModel::c_arm, LimitModel::known};
 
-/// Where the points are, each with noisy and with exact pixels.
+/// Positions of the points, each with noisy and with exact pixels.
 struct LimitPlace {
   const char* name;
   Eigen::Vector3d off_centre_mm;
@@ -34,17 +34,17 @@ struct LimitSetting {
   std::uint32_t stream;
 };
 
-/// What a trial tells of one place; NaN where there is no answer, or no bound was asked for.
+/// Result of a trial for one place; NaN without an answer or bound.
 struct LimitOutcome {
   double located = 0, covered = 0, error2 = 0;
   double dlt2 = std::numeric_limits<double>::quiet_NaN(), bound2 = dlt2;
 };
 using LimitOutcomes = std::array<LimitOutcome, rows_of_limit_setting>;
 
-/// Trials of one block share a machine, where the model knows one.
+/// Trials of one block share a C-arm if the model has one.
 inline constexpr std::size_t limit_trials_of_block = 50;
 
-/// The outcomes of a block's trials, as records; the last block's may be fewer.
+/// The results of a block's trials as records; the last block may have fewer.
 void run_limit_trials(const LimitSetting& setting, const LimitOptions& options, std::size_t block,
                       std::span<double> out);
 

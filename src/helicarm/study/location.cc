@@ -14,43 +14,43 @@ namespace {
 
 constexpr std::size_t draws_of_block = 128;
 constexpr std::uint32_t location_balls = 12;
-constexpr std::uint32_t of_point = 2;  // blocks of words: one a view
+constexpr std::uint32_t of_point = 2;  // blocks of words, one per view
 
 struct LocationTrials {
   const LocationOptions& options;
   const LocationMap& map;
   std::array<View, 2> views = paper_views(options.origin);
-  LaneViews lane_views{views};
+  SimdViews lane_views{views};
 
   struct Sums {
     double fresh, fresh_squares, exact, exact_squares;
   };
   static constexpr std::size_t sums_of_point = numbers_in<Sums>;
 
-  /// Sums over the draws of a block; the last one's may be fewer.
+  /// Sums over the draws of a block; the last one may have fewer.
   void run(std::size_t block, std::span<double> values) const {
     const std::size_t count = map.balls.size();
     const double sigma = sigma_px(options.sigma, options.fle);
-    std::vector<LanePoint> balls;
-    LanePixels exact, noise, pixels;
+    std::vector<SimdPoint> balls;
+    SimdPixels exact, noise, pixels;
     for (const Eigen::Vector3d& ball : map.balls) {
       balls.push_back({simd(ball.x()), simd(ball.y()), simd(ball.z())});
       for (std::size_t view = 0; view < 2; ++view)
         exact.of_view[view][balls.size() - 1] = lane_views.project(view, balls.back());
     }
-    const LaneBalls model(balls);
+    const SimdBalls model(balls);
     const std::size_t end = std::min(options.groups, (block + 1) * draws_of_block);
     for (std::size_t first = block * draws_of_block; first < end; first += simd_width) {
-      const LaneRandom random(options.seed, location_stream, first);
+      const SimdRandom random(options.seed, location_stream, first);
       draw_noise(random, draw::calibration, count, noise);
       add_noise(exact, sigma, noise, count, pixels);
-      const LaneProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
+      const SimdProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
                                             model.calibrate({pixels.of_view[1], count})};
       const auto drawn = std::min<std::size_t>(simd_width, end - first);
       for (std::size_t i = 0; i < map.points.size(); ++i) {
         const Eigen::Vector3d& place = map.points[i].place;
-        const LanePoint target{simd(place.x()), simd(place.y()), simd(place.z())};
-        LanePixel bare[2], noisy[2];
+        const SimdPoint target{simd(place.x()), simd(place.y()), simd(place.z())};
+        SimdPixel bare[2], noisy[2];
         for (std::size_t view = 0; view < 2; ++view) {
           const auto [u, v] =
               random.normals(draw::repetition + of_point * std::uint32_t(i) + std::uint32_t(view));
@@ -73,9 +73,9 @@ struct LocationTrials {
 
 std::vector<Eigen::Vector3d> balls_of(const LocationOptions& options) {
   if (!options.balls.empty()) return options.balls;
-  const auto drawn = balls_on_spiral(LaneRandom(options.seed, location_stream + 1, 0), location_balls);
+  const auto drawn = balls_on_spiral(SimdRandom(options.seed, location_stream + 1, 0), location_balls);
   std::vector<Eigen::Vector3d> balls;
-  for (const LanePoint& ball : drawn) balls.emplace_back(ball.x[0], ball.y[0], ball.z[0]);
+  for (const SimdPoint& ball : drawn) balls.emplace_back(ball.x[0], ball.y[0], ball.z[0]);
   return balls;
 }
 
@@ -111,11 +111,11 @@ LocationMap empty_map(const LocationOptions& options) {
 Expected<LocationMap> study_location(const LocationOptions& options, const EngineOptions& engine,
                                      const Ranks& ranks) {
   LocationMap map = empty_map(options);
-  if (map.balls.size() < 6 || map.balls.size() > LaneBalls::most)
+  if (map.balls.size() < 6 || map.balls.size() > SimdBalls::most)
     return fail(Reason::bad_value,
-                fmt::format("balls: {}, limits 6 and {}", map.balls.size(), LaneBalls::most));
+                fmt::format("balls: {}, limits 6 and {}", map.balls.size(), SimdBalls::most));
   if (options.groups < 2)
-    return fail(Reason::bad_value, fmt::format("groups: {}, at least 2 are needed", options.groups));
+    return fail(Reason::bad_value, fmt::format("groups: {}, at least 2 are required", options.groups));
   const LocationTrials trials{options, map};
   constexpr std::size_t stride = LocationTrials::sums_of_point;
   StudySetting setting;

@@ -16,7 +16,7 @@ namespace helicarm {
 struct LocationOptions {
   std::size_t groups = 10000;  ///< noise draws
   std::uint64_t seed = 1;
-  /// mm, calibrator frame; 6 to 64. None: twelve random ones on the spiral, the seed's.
+  /// mm, calibrator frame; 6 to 64. Empty: twelve random ones on the spiral, from the seed.
   std::vector<Eigen::Vector3d> balls;
   SigmaReading sigma = SigmaReading::std;
   double fle = printed_fle;
@@ -28,17 +28,17 @@ struct LocationOptions {
 
 enum class TargetPlane { xoy, xoz };
 
-/// Which of the two images of 1024 x 1024 pixels hold a target: its bits are AP and LAT. One that is not in
-/// both cannot be located in reality; the map shows what rays beyond the image would give.
+/// Which of the two images of 1024 x 1024 px contain a target: bits for AP and LAT. A target outside one of
+/// them cannot be located in reality; the map shows the result of rays beyond the image.
 enum class SeenIn { none, ap, lat, both };
 
 struct LocationPoint {
   TargetPlane plane;
   Eigen::Vector3d place;  ///< mm, calibrator frame
   SeenIn seen_in;
-  double tre_fresh;  ///< mean distance (Eq. 12) over the draws, mm; the target's pixels carry noise
+  double tre_fresh;  ///< mean distance (Eq. 12) over the draws, mm; noisy target pixels
   double se_fresh;   ///< its standard error
-  double tre_exact;  ///< likewise; only the calibration is noisy
+  double tre_exact;  ///< as above, with exact target pixels
   double se_exact;
 };
 
@@ -49,11 +49,11 @@ struct LocationMap {
   std::vector<LocationPoint> points;  ///< XOY, then XOZ; x runs fastest
 };
 
-/// No points at ranks that do not lead.
+/// No points at ranks other than the leader.
 Expected<LocationMap> study_location(const LocationOptions& options, const EngineOptions& engine,
                                      const Ranks& ranks);
 
-/// location.csv, location.json, location.svg and how it compares with the print.
+/// location.csv, location.json, location.svg and the comparison with the paper.
 StudyFiles files_of(const LocationMap& map, const LocationOptions& options);
 
 }  // namespace helicarm

@@ -21,7 +21,7 @@ std::string_view name_of_seen(SeenIn seen) {
 }
 bool is_seen_by(SeenIn seen, SeenIn view) { return (int(seen) & int(view)) != 0; }
 
-/// Mean TRE of the points about so far from the centre.
+/// Mean TRE of the points at about this distance from the centre.
 double tre_at(const LocationMap& map, double distance_mm, double step_mm, double LocationPoint::*tre) {
   double sum = 0;
   int count = 0;
@@ -30,7 +30,7 @@ double tre_at(const LocationMap& map, double distance_mm, double step_mm, double
   return sum / count;
 }
 
-/// Spearman's correlation of TRE with the distance, of all points or of those in both images.
+/// Spearman's correlation of TRE with the distance, over all points or those in both images.
 double rise_of(const LocationMap& map, bool seen_only) {
   std::vector<double> distance, tre;
   for (const LocationPoint& point : map.points) {
@@ -46,7 +46,7 @@ ChartField field_of(const LocationMap& map, const LocationOptions& options, Targ
   const std::size_t first = plane == TargetPlane::xoy ? 0 : cells;
   const double reach = options.step_mm * (map.side - 1) / 2;
   ChartField field{-reach, -reach, options.step_mm, map.side, map.side, {}, {}};
-  field.hatchings = {{"outside the AP picture", {}}, {"outside the lateral picture", {}}};
+  field.hatchings = {{"outside the AP image", {}}, {"outside the lateral image", {}}};
   double most = 0;
   for (std::size_t i = 0; i < cells; ++i) {
     const LocationPoint& point = map.points[first + i];
@@ -55,7 +55,7 @@ ChartField field_of(const LocationMap& map, const LocationOptions& options, Targ
     field.hatchings[0].points.push_back(!is_seen_by(point.seen_in, SeenIn::ap));
     field.hatchings[1].points.push_back(!is_seen_by(point.seen_in, SeenIn::lat));
   }
-  // Lines so near that they would touch are left out.
+  // Lines that would nearly touch are left out.
   double interval = options.interval_mm;
   while (most / interval > 24) interval *= 2;
   for (double level = interval; level < most; level += interval) field.levels.push_back(level);
@@ -102,14 +102,14 @@ StudyFiles files_of(const LocationMap& map, const LocationOptions& options) {
     by_distance.push_back({{"distance_mm", at}, {"fresh_noise", fresh}, {"exact", exact}});
   }
   files.summary = fmt::format(
-      "Printed (Fig. 7): TRE rises with the distance between target and balls (isolines every 0.5 mm). Here, "
-      "over {} noise draws, the mean TRE on both planes is {} mm from the balls' centre; Spearman's "
-      "correlation with the distance is {:.3f}{}. The print gives neither the balls nor whether the target's "
-      "own pixels carry noise: with exact ones the centre has {:.2f} mm. Of the {} targets {} lie outside a "
-      "picture of {:g} x {:g} pixels ({} outside AP alone, {} outside the lateral one alone, {} outside "
-      "both) "
-      "and could not be located in reality; over the other {} Spearman's correlation is {:.3f}.",
-      options.groups, steps, rise, rise > 0.5 ? ", as printed" : ": the print is not confirmed",
+      "Published (Fig. 7): TRE increases with the distance between target and balls (isolines every 0.5 mm). "
+      "Here, over {} noise draws, the mean TRE on both planes is {} mm from the balls' centre; Spearman's "
+      "correlation with the distance is {:.3f}{}. The paper states neither the balls nor whether the "
+      "target's pixels have noise: with exact ones the TRE at the centre is {:.2f} mm. Of the {} targets {} "
+      "lie outside an image of {:g} x {:g} pixels ({} outside AP only, {} outside lateral only, {} outside "
+      "both) and could not be located in reality; over the other {} Spearman's correlation is {:.3f}.",
+      options.groups, steps, rise,
+      rise > 0.5 ? ", as published" : ": the published increase is not reproduced",
       tre_at(map, 0, options.step_mm, &LocationPoint::tre_exact), map.points.size(),
       map.points.size() - in_both, image_px, image_px, in_lat, in_ap, in_none, in_both, rise_seen);
   Json balls = Json::array();

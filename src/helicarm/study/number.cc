@@ -32,10 +32,10 @@ std::vector<NumberColumn> columns_of(const NumberOptions& options) {
   return columns;
 }
 
-/// The targets of all places in one list.
+/// The targets of all regions in one list.
 struct PlacedTargets {
   std::vector<Eigen::Vector3d> points;
-  std::size_t cone, middle;  ///< where these begin
+  std::size_t cone, middle;  ///< index of each region's first target
 
   explicit PlacedTargets(WorldOrigin origin)
       : points(targets_in_ball(origin)), cone(points.size()), middle(0) {
@@ -58,14 +58,14 @@ class NumberTrials {
 
   std::size_t columns() const { return columns_.size(); }
 
-  /// Groups first .. first + 3: column c of them at out[c * stride].
+  /// Groups first .. first + 3: their column c at out[c * stride].
   void run(std::size_t count, std::uint64_t first_group, double* out, std::size_t stride) const {
-    const LaneRandom random(options_.seed, number_stream + std::uint32_t(count), first_group);
+    const SimdRandom random(options_.seed, number_stream + std::uint32_t(count), first_group);
     const auto wants = [&](PixelReading reading) {
       return std::ranges::count(options_.readings, reading) > 0;
     };
-    const std::vector<LanePoint> balls = balls_on_spiral(random, count);
-    LanePixels exact, noise, fresh_noise, target_noise, calibrating, anew;
+    const std::vector<SimdPoint> balls = balls_on_spiral(random, count);
+    SimdPixels exact, noise, fresh_noise, target_noise, calibrating, anew;
     for (std::size_t view = 0; view < 2; ++view)
       for (std::size_t i = 0; i < count; ++i) exact.of_view[view][i] = lane_views_.project(view, balls[i]);
     draw_noise(random, draw::calibration, count, noise);
@@ -73,11 +73,11 @@ class NumberTrials {
       draw_noise(random, draw::fresh, count, fresh_noise);
       draw_noise(random, draw::targets, targets_.size(), target_noise);
     }
-    const LaneBalls model(balls);
+    const SimdBalls model(balls);
     for (const SigmaReading reading : options_.sigmas) {
       const double sigma = sigma_px(reading, options_.fle);
       add_noise(exact, sigma, noise, count, calibrating);
-      const LaneProjection views[2] = {model.calibrate({calibrating.of_view[0], count}),
+      const SimdProjection views[2] = {model.calibrate({calibrating.of_view[0], count}),
                                        model.calibrate({calibrating.of_view[1], count})};
       for (const PixelReading which : options_.readings) {
         if (which == PixelReading::calibration_pixels) {
@@ -105,8 +105,8 @@ class NumberTrials {
     return out + stride;
   }
 
-  static double* put_fre(const std::vector<LanePoint>& balls, const LaneProjection (&views)[2],
-                         const LanePixels& pixels, double* out, std::size_t stride) {
+  static double* put_fre(const std::vector<SimdPoint>& balls, const SimdProjection (&views)[2],
+                         const SimdPixels& pixels, double* out, std::size_t stride) {
     Simd sum{}, largest{};
     for (std::size_t i = 0; i < balls.size(); ++i) {
       const Simd error =
@@ -118,7 +118,7 @@ class NumberTrials {
     return put(largest, out, stride);
   }
 
-  double* put_tre(const LaneProjection (&views)[2], double sigma, const LanePixels* noise, double* out,
+  double* put_tre(const SimdProjection (&views)[2], double sigma, const SimdPixels* noise, double* out,
                   std::size_t stride) const {
     out = put(targets_.mean_error(0, placed_.cone, views, sigma, noise), out, stride);
     out = put(targets_.mean_error(placed_.cone, placed_.middle, views, sigma, noise), out, stride);
@@ -127,13 +127,13 @@ class NumberTrials {
 
   NumberOptions options_;
   std::array<View, 2> views_;
-  LaneViews lane_views_;
+  SimdViews lane_views_;
   PlacedTargets placed_;
-  LaneTargets targets_;
+  SimdTargets targets_;
   std::vector<NumberColumn> columns_;
 };
 
-/// The blocks' columns put end to end.
+/// The blocks' columns concatenated.
 std::vector<double> column_of(std::span<const double> values, std::size_t columns, std::size_t column,
                               std::size_t groups) {
   std::vector<double> whole;
@@ -149,7 +149,7 @@ StudySetting setting_of(const NumberTrials& trials, std::size_t balls, std::size
   StudySetting setting;
   setting.blocks = (groups + groups_per_block - 1) / groups_per_block;
   setting.values_per_block = groups_per_block * trials.columns();
-  setting.cost = double(balls) + 20;  // what does not grow with them: targets
+  setting.cost = double(balls) + 20;  // constant part: targets
   setting.work = [&trials, balls, groups](std::size_t block, std::span<double> values) {
     const std::size_t first = block * groups_per_block;
     for (std::size_t i = 0; i < groups_per_block && first + i < groups; i += simd_width)
@@ -190,13 +190,13 @@ std::string_view name_of(GroupError error) {
 Expected<std::vector<NumberRow>> study_number(const NumberOptions& options, const EngineOptions& engine,
                                               const Ranks& ranks) {
   for (const int balls : options.balls)
-    if (balls < 6 || balls > int(LaneBalls::most))
-      return fail(Reason::bad_value, fmt::format("balls: {}, limits 6 and {}", balls, LaneBalls::most));
+    if (balls < 6 || balls > int(SimdBalls::most))
+      return fail(Reason::bad_value, fmt::format("balls: {}, limits 6 and {}", balls, SimdBalls::most));
   std::vector<int> sorted = options.balls;
   std::ranges::sort(sorted);
   if (const auto twice = std::ranges::adjacent_find(sorted); twice != sorted.end())
     return fail(Reason::bad_value, fmt::format("balls: {} is given twice", *twice));
-  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   const NumberTrials trials(options);
   std::vector<StudySetting> settings;
   for (const int balls : options.balls)

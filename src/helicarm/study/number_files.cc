@@ -12,11 +12,11 @@
 namespace helicarm {
 namespace {
 
-// Fig. 5a as it can be read off the print.
+// Fig. 5a, values read from the figure.
 constexpr double printed_fre_low = 0.68, printed_fre_high = 0.80;
 constexpr int printed_dip = 12;
 
-/// One reading's rows over the number of balls.
+/// Rows of one reading over the number of balls.
 struct NumberCurve {
   SigmaReading sigma;
   PixelReading reading;
@@ -28,7 +28,7 @@ struct NumberCurve {
   }
   const NumberRow& first() const { return *rows.front(); }
   const NumberRow& last() const { return *rows.back(); }
-  /// How far the medians lie outside the printed range, mm on average.
+  /// Distance of the medians from the published range, mm on average.
   double off_print() const {
     double sum = 0;
     for (const NumberRow* row : rows) {
@@ -37,7 +37,7 @@ struct NumberCurve {
     }
     return sum / double(rows.size());
   }
-  /// Whether the medians at 12 balls lie below those of fewer and of more by 3 standard errors.
+  /// Whether the medians at 12 balls are below those of fewer and of more by 3 standard errors.
   bool dips() const {
     const auto at = std::ranges::find(rows, printed_dip, [](const NumberRow* row) { return row->balls; });
     if (at == rows.begin() || at == rows.end() || at + 1 == rows.end()) return false;
@@ -85,17 +85,17 @@ std::string number_csv(const std::vector<NumberRow>& rows) {
 
 std::string change(const NumberCurve& curve) {
   const double from = curve.first().of_groups.median, to = curve.last().of_groups.median;
-  return fmt::format("{} from {:.3f} mm at {} to {:.3f} mm at {} balls", to > from ? "rises" : "falls", from,
-                     curve.first().balls, to, curve.last().balls);
+  return fmt::format("{} from {:.3f} mm at {} to {:.3f} mm at {} balls",
+                     to > from ? "increases" : "decreases", from, curve.first().balls, to,
+                     curve.last().balls);
 }
 
 std::string number_summary(const std::vector<NumberCurve>& curves) {
   if (curves.empty()) return {};
   const SigmaReading sigma = curves.front().sigma;
   std::string text = fmt::format(
-      "Printed (Fig. 5): FRE of {:.2f} to {:.2f} mm, least at {} balls; TRE falls, hardly more beyond {}. "
-      "The print "
-      "fixes neither sigma nor the pixels that are projected back. Medians over the groups, sigma read as "
+      "Published (Fig. 5): FRE of {:.2f} to {:.2f} mm, least at {} balls; TRE decreases, little beyond {}. "
+      "The paper defines neither sigma nor the back-projected pixels. Medians over the groups, sigma read as "
       "{}: ",
       printed_fre_low, printed_fre_high, printed_dip, printed_dip, name_of(sigma));
   if (curves.front().rows.size() < 2) {
@@ -112,16 +112,16 @@ std::string number_summary(const std::vector<NumberCurve>& curves) {
         text += fmt::format("{} {}. ", name_of(curve.error), change(curve));
   }
   if (const NumberCurve* nearest = nearest_to_print(curves)) {
-    text += fmt::format("Nearest to the printed range is {} ({:.3f} mm off on average). ", nearest->name(),
+    text += fmt::format("Nearest to the published range: {} (mean distance {:.3f} mm). ", nearest->name(),
                         nearest->off_print());
     std::string dips;
     for (const NumberCurve& curve : curves)
       if (is_fre(curve) && curve.dips()) dips += (dips.empty() ? "" : ", ") + curve.name();
     if (nearest->rows.size() > 2)
-      text += dips.empty() ? fmt::format("No reading has its printed dip at {} balls. ", printed_dip)
-                           : fmt::format("A dip at {} balls shows in: {}. ", printed_dip, dips);
+      text += dips.empty() ? fmt::format("No reading has the published minimum at {} balls. ", printed_dip)
+                           : fmt::format("A minimum at {} balls is found for: {}. ", printed_dip, dips);
   }
-  return text + "At 6 and 7 balls the mean over random groups has no finite variance: quote the median.";
+  return text + "At 6 and 7 balls the mean over random groups has no finite variance: use the median.";
 }
 
 Json number_json(const std::vector<NumberRow>& rows, const std::vector<NumberCurve>& curves,
@@ -162,8 +162,8 @@ std::string words_of(std::string_view name) {
 }
 
 std::string place_of(GroupError error) {
-  if (error == GroupError::tre_ball) return "TRE in the ball of 100 mm";
-  return error == GroupError::tre_cone ? "TRE in the cone" : "TRE in the cone's middle";
+  if (error == GroupError::tre_ball) return "TRE in the sphere of 100 mm";
+  return error == GroupError::tre_cone ? "TRE in the cone" : "TRE at the cone's centre";
 }
 
 ChartSeries series_of(const NumberCurve& curve, std::string name) {
@@ -179,7 +179,7 @@ std::string number_svg(const std::vector<NumberCurve>& curves, const NumberOptio
   const std::string balls = "Number of fiducial points";
   const std::string note =
       fmt::format("medians of {} random groups; sigma as {}", options.groups, name_of(sigma));
-  Chart fre{"(a) FRE", balls, "FRE, mm", {}, ChartBand{"printed range", printed_fre_low, printed_fre_high}};
+  Chart fre{"(a) FRE", balls, "FRE, mm", {}, ChartBand{"published range", printed_fre_low, printed_fre_high}};
   Chart tre{"(b) TRE", balls, "TRE, mm"};
   fre.note = tre.note = note;
   fre.y_from_zero = tre.y_from_zero = true;
@@ -188,7 +188,7 @@ std::string number_svg(const std::vector<NumberCurve>& curves, const NumberOptio
     if (curve.error == GroupError::fre)
       fre.series.push_back(series_of(curve, "FRE, " + words_of(name_of(curve.reading))));
     if (!is_fre(curve) && curve.reading == PixelReading::fresh_noise)
-      tre.series.push_back(series_of(curve, place_of(curve.error) + ", fresh noise"));
+      tre.series.push_back(series_of(curve, place_of(curve.error) + ", independent noise"));
   }
   for (const NumberCurve& curve : curves)
     if (curve.sigma == sigma && !is_fre(curve) && curve.reading == PixelReading::exact) {
@@ -198,7 +198,7 @@ std::string number_svg(const std::vector<NumberCurve>& curves, const NumberOptio
   if (const NumberCurve* nearest = nearest_to_print(curves)) {
     fre.series.push_back(series_of(
         *nearest,
-        fmt::format("nearest to the print: {}, {}, {}",
+        fmt::format("nearest to the published values: {}, {}, {}",
                     nearest->error == GroupError::fre ? "FRE" : "largest ball error",
                     "sigma as " + words_of(name_of(nearest->sigma)), words_of(name_of(nearest->reading)))));
     fre.series.back().dashed = true;

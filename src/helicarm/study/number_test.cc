@@ -73,7 +73,7 @@ TEST(StudyNumber, TreFallsWithTheNumberOfBallsInEveryReading) {
       }
 }
 
-TEST(StudyNumber, WhatIsNotAskedForChangesNothing) {
+TEST(StudyNumber, OmittedSettingsDoNotChangeOthers) {
   NumberOptions all;
   all.groups = 300;
   all.balls = {6, 12};
@@ -100,7 +100,7 @@ TEST(StudyNumber, BytesDoNotDependOnThreads) {
                                              "6,std,calibration_pixels,fre,"));
 }
 
-TEST(StudyNumber, NoNoiseNoError) {
+TEST(StudyNumber, NoNoiseGivesNoError) {
   NumberOptions options;
   options.groups = 200;
   options.balls = {12};
@@ -108,7 +108,7 @@ TEST(StudyNumber, NoNoiseNoError) {
   for (const NumberRow& r : rows_of(options)) EXPECT_LT(r.of_groups.median, 1e-7);
 }
 
-TEST(StudyNumber, RefusesTooFewBallsEqualOnesAndNoGroups) {
+TEST(StudyNumber, RefusesTooFewBallsDuplicatesAndNoGroups) {
   NumberOptions options;
   options.balls = {12, 5};
   EXPECT_EQ(study_number(options, {}, by_itself).error().reason, Reason::bad_value);
@@ -119,7 +119,7 @@ TEST(StudyNumber, RefusesTooFewBallsEqualOnesAndNoGroups) {
   EXPECT_EQ(study_number(options, {}, by_itself).error().reason, Reason::bad_value);
 }
 
-TEST(StudyNumber, FilesOfASingleNumberStandToo) {
+TEST(StudyNumber, FilesOfASingleNumberAreWritten) {
   NumberOptions options;
   options.groups = 1;
   options.balls = {12};
@@ -129,7 +129,7 @@ TEST(StudyNumber, FilesOfASingleNumberStandToo) {
   EXPECT_EQ(files.csv.find("nan"), std::string::npos);
 }
 
-TEST(StudyUniformity, EvennessGoesWithSmallErrors) {
+TEST(StudyUniformity, UniformityCorrelatesWithSmallErrors) {
   UniformityOptions options;
   options.groups = 150;
   options.draws = 20;
@@ -148,7 +148,7 @@ TEST(StudyUniformity, EvennessGoesWithSmallErrors) {
   EXPECT_EQ(study_uniformity(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
-TEST(StudyLocation, TreRisesAwayFromTheBalls) {
+TEST(StudyLocation, TreIncreasesWithTheDistanceFromTheBalls) {
   LocationOptions options;
   options.groups = 203;
   options.step_mm = 50;
@@ -172,7 +172,7 @@ TEST(StudyLocation, TreRisesAwayFromTheBalls) {
   EXPECT_EQ(int(seen["none"]) + int(seen["AP"]) + int(seen["LAT"]) + int(seen["both"]), 98);
   EXPECT_EQ(seen["both"], std::ranges::count(map.points, SeenIn::both, &LocationPoint::seen_in));
   EXPECT_THAT(files.csv, ::testing::HasSubstr(",seen_in\n"));
-  EXPECT_THAT(files.svg, ::testing::HasSubstr("outside the lateral picture"));
+  EXPECT_THAT(files.svg, ::testing::HasSubstr("outside the lateral image"));
   options.balls = {{0, 0, 0}};
   EXPECT_EQ(study_location(options, one, by_itself).error().reason, Reason::bad_value);
 }
@@ -203,7 +203,7 @@ TEST(StudyBiplane, HasTheOrderOfTable1) {
   EXPECT_EQ(study_biplane(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
-TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
+TEST(StudyDesign, HasLessTreThanUdcscAndRandomSetsUnderTheRules) {
   DesignOptions options;
   options.groups = 300;
   options.restarts = 2;
@@ -223,7 +223,7 @@ TEST(StudyDesign, BeatsUdcscAndRandomSetsUnderTheRules) {
   EXPECT_EQ(study_design(options, one, by_itself).error().reason, Reason::bad_value);
 }
 
-TEST(StudyCalibration, MeasuresSimulatedImagesByBothRecipes) {
+TEST(StudyCalibration, MeasuresSimulatedImagesByBothMethods) {
   CalibrationStudyOptions options;
   options.groups = 2;
   options.size_px = 512;

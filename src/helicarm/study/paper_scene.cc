@@ -11,12 +11,12 @@
 namespace helicarm {
 namespace {
 
-// 19 points within sqrt(2) steps: 6 at one step, 12 at sqrt(2). A ball's points have 3/5 of its radius
-// squared.
+// 19 points within sqrt(2) steps: 6 at one step, 12 at sqrt(2). The mean squared radius of a sphere's points
+// is 3/5 of its radius squared.
 const double ball_lattice_mm = space_radius_mm * std::sqrt(0.6 * 19 / 30);
 constexpr double cone_lattice_mm = 30;
 
-/// Lattice points about `middle` for which `inside` holds; none is farther out than four steps.
+/// Lattice points about `middle` for which `inside` holds, up to four steps away.
 template <class Inside>
 std::vector<Eigen::Vector3d> lattice_points(const Eigen::Vector3d& middle, double step_mm, Inside inside) {
   std::vector<Eigen::Vector3d> points;
@@ -44,11 +44,11 @@ double sigma_px(SigmaReading reading, double fle) {
     case SigmaReading::var:
       return std::sqrt(fle);
     case SigmaReading::mean_distance:
-      return fle / std::sqrt(std::numbers::pi / 2);  // a Rayleigh distribution's mean
+      return fle / std::sqrt(std::numbers::pi / 2);  // mean of a Rayleigh distribution
     case SigmaReading::rms_distance:
       return fle / std::numbers::sqrt2;
   }
-  throw std::invalid_argument("sigma_px: no such reading");
+  throw std::invalid_argument("sigma_px: unknown reading");
 }
 
 Eigen::Vector3d origin_in_calibrator(WorldOrigin origin) {
@@ -82,7 +82,7 @@ std::vector<Eigen::Vector3d> targets_in_cone() {
 
 Eigen::Vector3d middle_of_cone() { return {0, 0, cone_height_mm / 2}; }
 
-LaneViews::LaneViews(const std::array<View, 2>& views) {
+SimdViews::SimdViews(const std::array<View, 2>& views) {
   for (std::size_t i = 0; i < 2; ++i) {
     const Projection projection = views[i].projection();
     for (Eigen::Index row = 0; row < 3; ++row)
@@ -90,7 +90,7 @@ LaneViews::LaneViews(const std::array<View, 2>& views) {
   }
 }
 
-LanePixel LaneViews::project(std::size_t view, const LanePoint& point) const {
+SimdPixel SimdViews::project(std::size_t view, const SimdPoint& point) const {
   const auto row = [&](int i) {
     const double(&p)[4] = p_[view][i];
     return p[0] * point.x + p[1] * point.y + p[2] * point.z + p[3];
@@ -99,15 +99,15 @@ LanePixel LaneViews::project(std::size_t view, const LanePoint& point) const {
   return {row(0) * one_over_depth, row(1) * one_over_depth};
 }
 
-LanePoint on_spiral(Simd share) {
+SimdPoint on_spiral(Simd share) {
   constexpr ConicalHelix spiral;
   const SineCosine direction = sine_cosine_of_turns(share * (spiral.t_end / (2 * std::numbers::pi)));
   const Simd radius = spiral.rr * exponential(share * (-spiral.t_end / spiral.pp));
   return {radius * direction.cosine, radius * direction.sine, share * (spiral.h * spiral.t_end)};
 }
 
-std::vector<LanePoint> balls_on_spiral(const LaneRandom& random, std::size_t count) {
-  std::vector<LanePoint> balls(count);
+std::vector<SimdPoint> balls_on_spiral(const SimdRandom& random, std::size_t count) {
+  std::vector<SimdPoint> balls(count);
   for (std::size_t i = 0; i < count; i += 2) {
     const auto [first, second] = random.uniforms(draw::places + std::uint32_t(i / 2));
     balls[i] = on_spiral(first);
@@ -116,46 +116,46 @@ std::vector<LanePoint> balls_on_spiral(const LaneRandom& random, std::size_t cou
   return balls;
 }
 
-void draw_noise(const LaneRandom& random, std::uint32_t from, std::size_t count, LanePixels& noise) {
-  // In two passes: each is short enough for the processor to work on several pixels at once.
+void draw_noise(const SimdRandom& random, std::uint32_t from, std::size_t count, SimdPixels& noise) {
+  // In two passes, each short enough for the compiler to vectorise over pixels.
   for (std::uint32_t view = 0; view < 2; ++view) {
-    LanePixel(&pixels)[LaneBalls::most] = noise.of_view[view];
+    SimdPixel(&pixels)[SimdBalls::most] = noise.of_view[view];
     for (std::uint32_t i = 0; i < count; ++i) {
-      const auto [u, v] = random.uniforms(from + view * std::uint32_t(LaneBalls::most) + i);
+      const auto [u, v] = random.uniforms(from + view * std::uint32_t(SimdBalls::most) + i);
       pixels[i] = {u, v};
     }
     for (std::uint32_t i = 0; i < count; ++i) {
-      const auto [u, v] = LaneRandom::normals_of({pixels[i].u, pixels[i].v});
+      const auto [u, v] = SimdRandom::normals_of({pixels[i].u, pixels[i].v});
       pixels[i] = {u, v};
     }
   }
 }
 
-void add_noise(const LanePixels& exact, double sigma, const LanePixels& noise, std::size_t count,
-               LanePixels& pixels) {
+void add_noise(const SimdPixels& exact, double sigma, const SimdPixels& noise, std::size_t count,
+               SimdPixels& pixels) {
   for (std::size_t view = 0; view < 2; ++view)
     for (std::size_t i = 0; i < count; ++i) {
-      const LanePixel& unit = noise.of_view[view][i];
-      const LanePixel& from = exact.of_view[view][i];
+      const SimdPixel& unit = noise.of_view[view][i];
+      const SimdPixel& from = exact.of_view[view][i];
       pixels.of_view[view][i] = {from.u + sigma * unit.u, from.v + sigma * unit.v};
     }
 }
 
-LaneTargets::LaneTargets(std::span<const Eigen::Vector3d> points, const std::array<View, 2>& views) {
-  if (points.size() > LaneBalls::most) throw std::invalid_argument("LaneTargets: more than 64");
-  const LaneViews lane_views(views);
+SimdTargets::SimdTargets(std::span<const Eigen::Vector3d> points, const std::array<View, 2>& views) {
+  if (points.size() > SimdBalls::most) throw std::invalid_argument("SimdTargets: more than 64");
+  const SimdViews lane_views(views);
   for (const Eigen::Vector3d& point : points) {
-    const LanePoint target{simd(point.x()), simd(point.y()), simd(point.z())};
+    const SimdPoint target{simd(point.x()), simd(point.y()), simd(point.z())};
     for (std::size_t i = 0; i < 2; ++i) exact_.of_view[i][points_.size()] = lane_views.project(i, target);
     points_.push_back(target);
   }
 }
 
-Simd LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProjection (&views)[2],
-                             double sigma, const LanePixels* noise) const {
+Simd SimdTargets::mean_error(std::size_t begin, std::size_t end, const SimdProjection (&views)[2],
+                             double sigma, const SimdPixels* noise) const {
   Simd sum{};
   for (std::size_t i = begin; i < end; ++i) {
-    LanePixel seen[2];
+    SimdPixel seen[2];
     for (std::size_t view = 0; view < 2; ++view) {
       seen[view] = exact_.of_view[view][i];
       if (!noise) continue;
@@ -167,10 +167,10 @@ Simd LaneTargets::mean_error(std::size_t begin, std::size_t end, const LaneProje
   return sum / double(end - begin);
 }
 
-Simd LaneTargets::mean_square(std::size_t begin, std::size_t end, const LaneProjection (&views)[2]) const {
+Simd SimdTargets::mean_square(std::size_t begin, std::size_t end, const SimdProjection (&views)[2]) const {
   Simd sum{};
   for (std::size_t i = begin; i < end; ++i) {
-    const LanePoint off =
+    const SimdPoint off =
         intersect(views[0], exact_.of_view[0][i], views[1], exact_.of_view[1][i]) - points_[i];
     sum += dot(off, off);
   }

@@ -17,7 +17,7 @@ namespace helicarm {
 
 namespace {
 
-/// MPI alone takes a third of a second to begin: only for who asked for it.
+/// MPI takes 0.3 s to initialise, so only on request.
 bool started_by_mpi() {
   return std::ranges::any_of(std::array{"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"},
                              [](const char* name) { return std::getenv(name) != nullptr; });

@@ -5,9 +5,8 @@
 
 namespace helicarm {
 
-/// The processes that share a study's work: MPI's ranks, or one alone where MPI is not built in or the
-/// program was not started by mpirun or the like. One at a time, once in a program. A rank that leaves by an
-/// exception takes no leave of the others: mpirun then ends them all.
+/// The processes that share a study's work: MPI ranks, or one process without MPI or mpirun. Create it once
+/// per program. A rank that ends by an exception does not finalize MPI: mpirun then ends all ranks.
 class Ranks {
  public:
   Ranks();
@@ -20,16 +19,16 @@ class Ranks {
   bool leads() const { return own_ == 0; }
   int on_this_machine() const { return on_this_machine_; }
 
-  /// Every rank's values, one rank after the other, at the leader; empty elsewhere.
+  /// The values of all ranks, in order, at the leader; empty elsewhere.
   std::vector<double> gather(const std::vector<double>& values) const;
-  /// The leader's values, everywhere.
+  /// The leader's values, at all ranks.
   std::vector<double> from_leader(std::vector<double> values) const;
 
  private:
   int count_ = 1;
   int own_ = 0;
   int on_this_machine_ = 1;
-  int exceptions_;  ///< on the way when the ranks met
+  int exceptions_;  ///< in flight at construction
 };
 
 }  // namespace helicarm

@@ -9,7 +9,7 @@ import sys
 import tempfile
 
 program, mpirun = sys.argv[1:]
-surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                 "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
                 "OMPI_MCA_plm_rsh_agent": "false"}  # all on this machine: no remote shell is needed
 
@@ -18,7 +18,7 @@ def studies(ranks, *command):
     """Name and bytes of each study."""
     with tempfile.TemporaryDirectory() as folder:
         text = subprocess.run([*command, program, folder], check=True, stdout=subprocess.PIPE, text=True,
-                              env=surroundings, timeout=300).stdout
+                              env=environment, timeout=300).stdout
     parts = re.split(f"^=== (.*), {ranks} ranks\n", text, flags=re.M)[1:]
     return dict(zip(parts[::2], parts[1::2]))
 

@@ -9,7 +9,7 @@
 
 namespace helicarm {
 
-/// A record is a struct of doubles alone: the form in which blocks bring their answers to the engine.
+/// A record is a struct of doubles only: the form in which blocks return their results to the engine.
 template <class Record>
 inline constexpr std::size_t numbers_in = sizeof(Record) / sizeof(double);
 
@@ -21,7 +21,7 @@ NumbersOf<Record> numbers_of(const Record& record) {
   return std::bit_cast<NumbersOf<Record>>(record);
 }
 
-/// Writes a record to the front of `to`, and moves `to` behind it.
+/// Writes a record to the front of `to`, and advances `to`.
 template <class Record>
 void put_record(const Record& record, std::span<double>& to) {
   std::ranges::copy(numbers_of(record), to.begin());

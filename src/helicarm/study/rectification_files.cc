@@ -14,7 +14,7 @@ namespace {
 
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
 
-/// The print's figures, in pixels of its own intensifier.
+/// Published values, in pixels of the paper's intensifier.
 constexpr double printed_mean_ratio = 2, printed_max_ratio = 2.5, printed_best_max_ratio = 3.47;
 constexpr double printed_raw_max = 13.26, printed_rectified_mean = 2.67;
 
@@ -26,8 +26,8 @@ struct GridCurve {
 };
 constexpr std::array<GridCurve, 3> curves{
     {{"raw", "raw", &GridErrors::raw_mean, &GridErrors::raw_max},
-     {"paper", "rectified, the printed recipe", &GridErrors::paper_mean, &GridErrors::paper_max},
-     {"best", "rectified, the best one", &GridErrors::best_mean, &GridErrors::best_max}}};
+     {"paper", "rectified, paper method", &GridErrors::paper_mean, &GridErrors::paper_max},
+     {"best", "rectified, best method", &GridErrors::best_mean, &GridErrors::best_max}}};
 
 struct GridReading {
   const char* name;
@@ -35,7 +35,7 @@ struct GridReading {
 };
 constexpr std::array<GridReading, 2> readings{{{"nine", &GridImage::nine}, {"all", &GridImage::all}}};
 
-/// Over the intensifiers; what has no answer is left out.
+/// Over the intensifiers; missing answers are left out.
 struct Spread {
   double mean = 0, sd = 0, least = gap, most = gap;
   explicit Spread(const std::vector<double>& values) {
@@ -60,7 +60,7 @@ class Results {
     return Spread(
         over(reading, [&](std::size_t k, const GridErrors& e) { return k == distance ? e.*figure : gap; }));
   }
-  /// Of the raw error to the rectified one, each by its own similarity.
+  /// Ratio of the raw to the rectified error, each with its own similarity transform.
   Spread ratio(const GridReading& raw, double GridErrors::*raw_error, const GridReading& rectified,
                double GridErrors::*rectified_error) const {
     std::vector<double> ratios;
@@ -85,10 +85,10 @@ class Results {
   const std::vector<Intensifier>& intensifiers_;
 };
 
-/// Fig. 9: the grid as it is seen, and where it ought to be.
+/// Fig. 9: observed and ideal grid.
 Chart figure_9(const Intensifier& first, double distance_mm) {
   Chart chart{fmt::format("Fig. 9: test grid, {:g} mm from the receiver", distance_mm), "u, px", "v, px"};
-  chart.note = "the first intensifier's raw picture; ideal places by the nine central crosses (Eq. 14)";
+  chart.note = "raw image of the first intensifier; ideal positions from the nine central crosses (Eq. 14)";
   chart.image = true;
   constexpr std::size_t side = 9;
   ChartSeries raw{"raw", {}, false, true};
@@ -126,9 +126,9 @@ Chart figure_10(const Intensifier& first, double distance_mm) {
 Chart figure_11(const Results& results, const RectificationStudyOptions& options, bool max) {
   Chart chart{max ? "Fig. 11: largest error" : "Fig. 11: mean error", "Test grid from the receiver, mm",
               "Error, px"};
-  chart.note = fmt::format("means over {} intensifiers; bars: least and most of them", options.groups);
+  chart.note = fmt::format("means over {} intensifiers; bars: minimum and maximum", options.groups);
   chart.y_from_zero = true;
-  constexpr double aside_mm = 1.2;  // so that bars do not hide one another
+  constexpr double aside_mm = 1.2;  // offset, so that the bars do not overlap
   for (std::size_t c = 0; c < curves.size(); ++c) {
     ChartSeries series{curves[c].name};
     series.joined = true;
@@ -173,7 +173,7 @@ Json rows_of(const Results& results, const RectificationStudyOptions& options) {
   return rows;
 }
 
-/// The third: the ideal grid of the raw image by the nine, that of the rectified one by all.
+/// Third ratio: ideal grid of the raw image from the nine crosses, that of the rectified one from all.
 constexpr std::array<std::array<std::size_t, 2>, 3> pairs_of_readings{{{0, 0}, {1, 1}, {0, 1}}};
 
 Json ratios_of(const Results& results) {
@@ -189,7 +189,7 @@ Json ratios_of(const Results& results) {
   return ratios;
 }
 
-/// Rank correlation of an error with the distance, the mean over the intensifiers at each.
+/// Rank correlation of an error with the distance, mean over the intensifiers.
 double trend(const Results& results, const RectificationStudyOptions& options, double GridErrors::*figure) {
   std::vector<double> means;
   for (std::size_t k = 0; k < options.distances_mm.size(); ++k)
@@ -213,23 +213,16 @@ std::string summary_of(const std::vector<Intensifier>& intensifiers, const Resul
   const auto& [raw, paper, best] = curves;
   const auto most = [&](double E::*figure) { return results.everywhere(&GridImage::nine, figure).most; };
   return fmt::format(
-      "Figs. 9 to 11: {} simulated intensifiers, the test grid at {} distances; pictures without an answer: "
-      "{}. "
-      "Printed (one real intensifier; of its ten distances only 45 mm is told): raw over rectified about {} "
-      "in the "
-      "mean and {} in the largest error, {} at best; largest raw error {} px, largest mean rectified {} px; "
-      "errors "
-      "fall with the distance. Here, raw over rectified by the printed recipe, mean (least to most), the "
-      "ideal grid "
-      "being that of the nine central crosses (Eq. 14): {} in the mean, {} in the largest error; of all "
-      "crosses: {} "
-      "and {}; of the nine in the raw picture and of all in the rectified one: {} and {}. By the best recipe "
-      "with "
-      "the nine: {} and {}. Largest raw error {:.2f} px; largest mean by the printed recipe {:.2f} px, by "
-      "the best "
-      "one {:.2f} px. Spearman of the mean error with the distance: raw {:.2f}, printed recipe {:.2f}, best "
-      "one "
-      "{:.2f}.",
+      "Figs. 9 to 11: {} simulated intensifiers, the test grid at {} distances; images without an answer: "
+      "{}. Published (one real intensifier; of its ten distances only 45 mm is stated): ratio of raw to "
+      "rectified error about {} for the mean and {} for the largest error, {} at best; largest raw error {} "
+      "px, largest mean rectified error {} px; errors decrease with the distance. Here, ratio of raw to "
+      "rectified error by the paper method, mean (minimum to maximum), ideal grid from the nine central "
+      "crosses (Eq. 14): {} for the mean, {} for the largest error; from all crosses: {} and {}; from the "
+      "nine in the raw image and all in the rectified one: {} and {}. By the best method with the nine: {} "
+      "and {}. Largest raw error {:.2f} px; largest mean error by the paper method {:.2f} px, by the best "
+      "method {:.2f} px. Spearman's correlation of the mean error with the distance: raw {:.2f}, paper "
+      "method {:.2f}, best method {:.2f}.",
       intensifiers.size(), options.distances_mm.size(), refused, printed_mean_ratio, printed_max_ratio,
       printed_best_max_ratio, printed_raw_max, printed_rectified_mean, ratio(nine, paper, false),
       ratio(nine, paper, true), ratio(all, paper, false), ratio(all, paper, true), ratio(mixed, paper, false),

@@ -34,7 +34,7 @@ struct Maps {
   DistortionMap paper, best;
 };
 
-/// Crosses that both maps carry, so that all errors are of the same ones.
+/// Crosses within both maps, so that all errors are of the same ones.
 std::vector<Dot> within_both(std::vector<Dot> crosses, const Maps& maps) {
   std::erase_if(crosses, [&](const Dot& cross) {
     return !maps.paper.rectified_from_raw(cross.centre_px) || !maps.best.rectified_from_raw(cross.centre_px);
@@ -57,7 +57,7 @@ std::optional<Measured> measured_by(const std::vector<Dot>& crosses, const Maps&
   return Measured{*std::move(paper), *std::move(best)};
 }
 
-/// Number of the true cross that is seen there; a mesh is 80 px wide, and 40 px with 512 pixels a side.
+/// Index of the true cross at this position; a mesh is 80 px wide, 40 px for images of 512 px.
 std::optional<std::size_t> true_cross(const simulation::SimulatedView& view, const Eigen::Vector2d& raw) {
   constexpr double same_px = 5;
   for (std::size_t i = 0; i < view.crosses.size(); ++i)
@@ -65,7 +65,7 @@ std::optional<std::size_t> true_cross(const simulation::SimulatedView& view, con
   return {};
 }
 
-/// Where a map or the grid is refused, what hangs on it stays NaN.
+/// Results that depend on a refused map or grid stay NaN.
 GridImage measure_image(const simulation::SimulatedView& view, const std::optional<Maps>& maps,
                         std::span<GridCross> kept) {
   GridImage image = all_missing<GridImage>();
@@ -126,10 +126,10 @@ void run_intensifier(const RectificationStudyOptions& options, std::size_t numbe
 
 Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyOptions& options,
                                                        const EngineOptions& engine, const Ranks& ranks) {
-  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is needed");
+  if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
   if (std::ranges::count(options.distances_mm, options.figure_distance_mm) != 1)
     return fail(Reason::bad_value,
-                fmt::format("distances: {} mm is not once among them, its crosses are drawn",
+                fmt::format("distances: must contain {} mm, the figure's distance, exactly once",
                             options.figure_distance_mm));
   StudySetting setting;
   setting.blocks = options.groups;

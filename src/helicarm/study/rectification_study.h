@@ -11,32 +11,32 @@
 
 namespace helicarm {
 
-/// The paper's 3.1 (Figs. 9 to 11) from images: each intensifier takes the plate alone, which gives the
-/// maps, and then the test grid of wires at several distances from the receiver.
+/// The paper's 3.1 (Figs. 9 to 11) from images: each intensifier images the plate, which gives the maps, and
+/// then the test grid of wires at several distances from the receiver.
 struct RectificationStudyOptions {
   std::size_t groups = 10;  ///< intensifiers
   std::uint64_t seed = 1;
   int size_px = 1024;  ///< 512 or 1024
-  /// Of the wires from the receiver. The print has ten, of which it names one, 45 mm.
+  /// From the receiver to the wires. The paper has ten distances and states one, 45 mm.
   std::vector<double> distances_mm = {30, 45, 60, 75, 90, 105, 120, 135, 150, 165};
-  double figure_distance_mm = 45;  ///< whose crosses are kept (Figs. 9 and 10); one of the above
+  double figure_distance_mm = 45;  ///< of Figs. 9 and 10, whose crosses are kept; one of the above
 };
 
-/// Mean and largest error over the crosses of one image (Eq. 15), raw pixels' scale; NaN: no answer.
+/// Mean and largest error over the crosses of one image (Eq. 15), in raw pixels; NaN: no answer.
 struct GridErrors {
   double raw_mean, raw_max;
-  double paper_mean, paper_max;  ///< rectified by the printed recipe: Hough centres, quadratic
-  double best_mean, best_max;    ///< rectified by the best one
+  double paper_mean, paper_max;  ///< rectified by the published method: Hough centres, quadratic model
+  double best_mean, best_max;    ///< rectified by the best method
 };
 
 struct GridImage {
   double crosses;     ///< found, and within both maps
-  double finder_rms;  ///< of the crosses found from their true places, px
-  GridErrors nine;    ///< the ideal grid is that of the nine central crosses (Eq. 14)
-  GridErrors all;     ///< it is that of all crosses
+  double finder_rms;  ///< error of the detected crosses against their true positions, px
+  GridErrors nine;    ///< ideal grid from the nine central crosses (Eq. 14)
+  GridErrors all;     ///< ideal grid from all crosses
 };
 
-/// One cross; NaN: not found. Ideal place by the nine of the raw image.
+/// One cross; NaN: not found. Ideal position from the nine crosses of the raw image.
 struct GridCross {
   double u, v, ideal_u, ideal_v, raw_error, paper_error, best_error;
 };
@@ -44,16 +44,16 @@ struct GridCross {
 constexpr std::size_t crosses_of_grid = 81;
 
 struct Intensifier {
-  std::uint32_t case_seed;  ///< `helicarm simulate --kind grid --seed` draws the same one
+  std::uint32_t case_seed;  ///< `helicarm simulate --kind grid --seed` gives the same one
   std::vector<GridImage> images;
   std::array<GridCross, crosses_of_grid> crosses;  ///< at figure_distance_mm, row by row
 };
 
-/// Empty at ranks that do not lead.
+/// Empty at ranks other than the leader.
 Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyOptions& options,
                                                        const EngineOptions& engine, const Ranks& ranks);
 
-/// rectification.csv, rectification.json, rectification.svg and how it compares with the print.
+/// rectification.csv, rectification.json, rectification.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<Intensifier>& intensifiers, const RectificationStudyOptions& options);
 
 }  // namespace helicarm

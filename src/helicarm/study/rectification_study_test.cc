@@ -23,7 +23,7 @@ EngineOptions engine(unsigned threads) {
   return options;
 }
 
-TEST(RectificationStudy, IntensifierIsTheSameAmongOthersAndOnMoreThreadsAndTheBestMapLeavesLittle) {
+TEST(RectificationStudy, IntensifierDoesNotDependOnOthersOrThreadsAndTheBestMapHasSmallErrors) {
   const Ranks ranks;
   RectificationStudyOptions alone = small();
   alone.groups = 1;
@@ -35,7 +35,7 @@ TEST(RectificationStudy, IntensifierIsTheSameAmongOthersAndOnMoreThreadsAndTheBe
   EXPECT_THAT(files.csv, testing::StartsWith(of_one.csv));
   EXPECT_EQ(to_text(files.json["first_intensifier"]), to_text(of_one.json["first_intensifier"]));
   EXPECT_THAT(files.svg, testing::HasSubstr("Fig. 10"));
-  EXPECT_THAT(files.summary, testing::HasSubstr("Printed ("));
+  EXPECT_THAT(files.summary, testing::HasSubstr("Published ("));
   for (const Intensifier& intensifier : *two) {
     const GridImage& image = intensifier.images.at(0);
     EXPECT_GT(image.crosses, 65);
@@ -48,13 +48,13 @@ TEST(RectificationStudy, IntensifierIsTheSameAmongOthersAndOnMoreThreadsAndTheBe
   }
 }
 
-TEST(RectificationStudy, WhatCannotBeIsRefused) {
+TEST(RectificationStudy, InvalidOptionsAreRefused) {
   const Ranks ranks;
   RectificationStudyOptions options = small();
   options.groups = 0;
   EXPECT_EQ(study_rectification(options, engine(1), ranks).error().reason, Reason::bad_value);
   options = small();
-  options.distances_mm = {60};  // Figs. 9 and 10 are of 45 mm
+  options.distances_mm = {60};  // Figs. 9 and 10 use 45 mm
   EXPECT_EQ(study_rectification(options, engine(1), ranks).error().reason, Reason::bad_value);
   options = small();
   options.distances_mm = {45, 10};  // behind the plate

@@ -13,9 +13,9 @@
 
 namespace helicarm {
 
-/// Four trials side by side: what one of them computes never depends on the other three, so neither does it
-/// on how trials are dealt to lanes. The functions below are polynomials instead of the system's library:
-/// the same bits on every machine with the same instruction set.
+/// Four trials in the lanes of a vector: the result of a lane never depends on the other three, nor on how
+/// trials are assigned to lanes. The functions below are polynomials instead of the system's library: the
+/// same bits on every machine with the same instruction set.
 constexpr int simd_width = 4;
 using Simd = double __attribute__((vector_size(simd_width * sizeof(double))));
 using SimdWords = std::uint64_t __attribute__((vector_size(simd_width * sizeof(std::uint64_t))));

@@ -6,18 +6,18 @@
 namespace helicarm {
 namespace {
 
-// Powers of two near the spread of a knee phantom and of its image: what matters is that no column of Eq. 7
-// is a thousand times as long as another.
+// Powers of two near the spread of a knee phantom and of its image, so that the columns of Eq. 7 have similar
+// norms.
 constexpr double world_scale_mm = 32;
 constexpr double pixel_scale_px = 256;
 
 /// A row of the projection at the scaled balls: y . ball + one.
 struct Row {
-  LanePoint y;
+  SimdPoint y;
   Simd one;
 
-  Simd at(const LanePoint& ball) const { return dot(y, ball) + one; }
-  void add(const LanePoint& ball, Simd weight) {
+  Simd at(const SimdPoint& ball) const { return dot(y, ball) + one; }
+  void add(const SimdPoint& ball, Simd weight) {
     y.x += weight * ball.x;
     y.y += weight * ball.y;
     y.z += weight * ball.z;
@@ -27,13 +27,13 @@ struct Row {
   void operator+=(const Row& o) { *this = *this + o; }
 };
 
-/// Sums of Eq. 7's normal matrix that hold one pixel coordinate: sum c y y' and sum c y over the balls y.
+/// Sums of Eq. 7's normal matrix with one pixel coordinate: sum c y y' and sum c y over the balls y.
 struct Weighted {
   SimdSymmetric second;
-  LanePoint first{};
+  SimdPoint first{};
 
-  void add(const LanePoint& ball, Simd weight) {
-    const LanePoint weighted{weight * ball.x, weight * ball.y, weight * ball.z};
+  void add(const SimdPoint& ball, Simd weight) {
+    const SimdPoint weighted{weight * ball.x, weight * ball.y, weight * ball.z};
     second.add(ball, weighted);
     first.x += weighted.x;
     first.y += weighted.y;
@@ -41,25 +41,25 @@ struct Weighted {
   }
   /// The 4x4 matrix [second, first; first', 0] times a row.
   Row times(const Row& row) const {
-    const LanePoint s = second * row.y;
+    const SimdPoint s = second * row.y;
     return {{s.x + row.one * first.x, s.y + row.one * first.y, s.z + row.one * first.z}, dot(first, row.y)};
   }
 };
 
-/// What is left of the third row's 4x4 matrix [inner, border; border', corner] once the first two rows are
-/// eliminated.
+/// Schur complement of the third row's 4x4 matrix [inner, border; border', corner] after elimination of the
+/// first two rows.
 struct Reduced {
   SimdSymmetric inner;
-  LanePoint border;
+  SimdPoint border;
   Simd corner;
 
   void subtract(const Weighted& view, const SimdSymmetric& inverse, double one_over_n) {
     const SimdSymmetric& s = view.second;
-    const LanePoint& f = view.first;
-    const LanePoint c0 = inverse * LanePoint{s.xx, s.xy, s.xz};
-    const LanePoint c1 = inverse * LanePoint{s.xy, s.yy, s.yz};
-    const LanePoint c2 = inverse * LanePoint{s.xz, s.yz, s.zz};
-    const LanePoint cf = inverse * f;
+    const SimdPoint& f = view.first;
+    const SimdPoint c0 = inverse * SimdPoint{s.xx, s.xy, s.xz};
+    const SimdPoint c1 = inverse * SimdPoint{s.xy, s.yy, s.yz};
+    const SimdPoint c2 = inverse * SimdPoint{s.xz, s.yz, s.zz};
+    const SimdPoint cf = inverse * f;
     inner.xx -= s.xx * c0.x + s.xy * c0.y + s.xz * c0.z + one_over_n * f.x * f.x;
     inner.xy -= s.xy * c0.x + s.yy * c0.y + s.yz * c0.z + one_over_n * f.x * f.y;
     inner.xz -= s.xz * c0.x + s.yz * c0.y + s.zz * c0.z + one_over_n * f.x * f.z;
@@ -70,8 +70,8 @@ struct Reduced {
     corner -= dot(f, cf);
   }
 
-  /// For rows y of which the last element is y . d.
-  SimdSymmetric within(const LanePoint& d) const {
+  /// For rows y whose last element is y . d.
+  SimdSymmetric within(const SimdPoint& d) const {
     SimdSymmetric left = inner;
     left.add(d, {border.x + corner * d.x, border.y + corner * d.y, border.z + corner * d.z});
     left.add(border, d);
@@ -81,35 +81,35 @@ struct Reduced {
 
 }  // namespace
 
-LaneBalls::LaneBalls(std::span<const LanePoint> balls) : count_(balls.size()), centre_{} {
-  if (count_ == 0 || count_ > most) throw std::invalid_argument("LaneBalls: 1 to 64 balls");
+SimdBalls::SimdBalls(std::span<const SimdPoint> balls) : count_(balls.size()), centre_{} {
+  if (count_ == 0 || count_ > most) throw std::invalid_argument("SimdBalls: 1 to 64 balls");
   const double share = 1 / double(count_);
-  for (const LanePoint& ball : balls) {
+  for (const SimdPoint& ball : balls) {
     centre_.x += share * ball.x;
     centre_.y += share * ball.y;
     centre_.z += share * ball.z;
   }
   SimdSymmetric moments;
   for (std::size_t i = 0; i < count_; ++i) {
-    const LanePoint out = balls[i] - centre_;
+    const SimdPoint out = balls[i] - centre_;
     scaled_[i] = {out.x / world_scale_mm, out.y / world_scale_mm, out.z / world_scale_mm};
     moments.add(scaled_[i], scaled_[i]);
   }
   inverse_ = moments.careful_inverse();
 }
 
-LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
+SimdProjection SimdBalls::calibrate(std::span<const SimdPixel> pixels) const {
   const double share = 1 / double(count_);
-  LanePixel mean{};
+  SimdPixel mean{};
   for (std::size_t i = 0; i < count_; ++i) {
     mean.u += share * pixels[i].u;
     mean.v += share * pixels[i].v;
   }
   const auto cleared = [&](const Row& row) { return Row{inverse_ * row.y, share * row.one}; };
-  LanePixel at[most];  // scaled, about the mean
+  SimdPixel at[most];  // scaled, about the mean
   for (std::size_t i = 0; i < count_; ++i)
     at[i] = {(pixels[i].u - mean.u) / pixel_scale_px, (pixels[i].v - mean.v) / pixel_scale_px};
-  // Sum by sum, for the registers hold the terms of one only.
+  // Sum by sum: the registers hold the terms of only one.
   Weighted by_u, by_v, by_both;
   Simd corner{};
   for (std::size_t i = 0; i < count_; ++i) by_u.add(scaled_[i], at[i].u);
@@ -120,21 +120,21 @@ LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
     corner += weight;
   }
   Reduced reduced{by_both.second, by_both.first, corner};
-  // The gradient of the first step, which begins at the row (0, 1): its residuals are the pixels.
+  // Gradient of the first step from the row (0, 1), where the residuals are the pixels.
   Row g_u{by_u.first, {}}, g_v{by_v.first, {}}, g_w{reduced.border, reduced.corner};
   reduced.subtract(by_u, inverse_, share);
   reduced.subtract(by_v, inverse_, share);
 
   // The third row at the scaled balls is b.y + h with h = 1 + b.d, so that it is 1 at the world's origin.
-  const LanePoint d{centre_.x / world_scale_mm, centre_.y / world_scale_mm, centre_.z / world_scale_mm};
+  const SimdPoint d{centre_.x / world_scale_mm, centre_.y / world_scale_mm, centre_.z / world_scale_mm};
   const SimdSymmetric inner = reduced.within(d).careful_inverse();
   Row of_u{}, of_v{}, of_w{{}, simd(1)};
-  // The second round takes back what the normal equations lose: residuals are computed anew.
+  // The second iteration recovers the precision lost in the normal equations: residuals are recomputed.
   for (int round = 0; round < 2; ++round) {
     if (round > 0) {
       g_u = g_v = g_w = Row{};
       for (std::size_t i = 0; i < count_; ++i) {
-        const LanePoint& y = scaled_[i];
+        const SimdPoint& y = scaled_[i];
         const Simd w = of_w.at(y);
         const Simd r_u = at[i].u * w - of_u.at(y), r_v = at[i].v * w - of_v.at(y);
         g_u.add(y, r_u);
@@ -144,8 +144,8 @@ LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
     }
     const Row s_u = by_u.times(cleared(g_u)), s_v = by_v.times(cleared(g_v));
     const Simd h = s_u.one + s_v.one - g_w.one;
-    const LanePoint b =
-        inner * LanePoint{s_u.y.x + s_v.y.x - g_w.y.x + h * d.x, s_u.y.y + s_v.y.y - g_w.y.y + h * d.y,
+    const SimdPoint b =
+        inner * SimdPoint{s_u.y.x + s_v.y.x - g_w.y.x + h * d.x, s_u.y.y + s_v.y.y - g_w.y.y + h * d.y,
                           s_u.y.z + s_v.y.z - g_w.y.z + h * d.z};
     const Row step{b, dot(b, d)};
     of_u += cleared(g_u + by_u.times(step));
@@ -153,7 +153,7 @@ LaneProjection LaneBalls::calibrate(std::span<const LanePixel> pixels) const {
     of_w += step;
   }
 
-  LaneProjection projection;
+  SimdProjection projection;
   projection.w[0] = of_w.y.x / world_scale_mm;
   projection.w[1] = of_w.y.y / world_scale_mm;
   projection.w[2] = of_w.y.z / world_scale_mm;

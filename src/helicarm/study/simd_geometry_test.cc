@@ -13,7 +13,7 @@
 namespace helicarm {
 namespace {
 
-Projection projection_of(const LaneProjection& simd_of, int lane) {
+Projection projection_of(const SimdProjection& simd_of, int lane) {
   Projection p;
   for (int i = 0; i < 4; ++i) {
     p(0, i) = simd_of.u[i][lane];
@@ -29,18 +29,18 @@ Eigen::Vector2d pixel_of(const Projection& p, const Eigen::Vector3d& x) {
 
 /// Four random groups of balls on the spiral with their noisy pixels in both views.
 struct Scene {
-  std::vector<LanePoint> balls;
-  std::vector<LanePixel> pixels[2];
+  std::vector<SimdPoint> balls;
+  std::vector<SimdPixel> pixels[2];
 
   Scene(std::size_t count, double sigma, std::uint64_t first_trial) {
-    const LaneRandom random(5, 1, first_trial);
-    const LaneViews views(paper_views(WorldOrigin::base));
+    const SimdRandom random(5, 1, first_trial);
+    const SimdViews views(paper_views(WorldOrigin::base));
     balls = balls_on_spiral(random, count);
-    LanePixels noise;
+    SimdPixels noise;
     draw_noise(random, draw::calibration, count, noise);
     for (std::size_t view = 0; view < 2; ++view)
       for (std::size_t i = 0; i < count; ++i) {
-        LanePixel pixel = views.project(view, balls[i]);
+        SimdPixel pixel = views.project(view, balls[i]);
         pixel.u += sigma * noise.of_view[view][i].u;
         pixel.v += sigma * noise.of_view[view][i].v;
         pixels[view].push_back(pixel);
@@ -57,14 +57,14 @@ struct Scene {
   }
 };
 
-TEST(LaneBalls, GiveTheScalarLeastSquaresSolution) {
+TEST(SimdBalls, AgreeWithTheScalarLeastSquaresSolution) {
   const Eigen::Vector3d far(70, -60, 120);
   for (const std::size_t count : {6u, 7u, 12u, 20u, 64u})
     for (std::uint64_t trial = 0; trial < 200; trial += 4) {
       const Scene scene(count, 2.34, trial);
-      const LaneBalls model(scene.balls);
+      const SimdBalls model(scene.balls);
       for (std::size_t view = 0; view < 2; ++view) {
-        const LaneProjection four = model.calibrate(scene.pixels[view]);
+        const SimdProjection four = model.calibrate(scene.pixels[view]);
         for (int lane = 0; lane < simd_width; ++lane) {
           const auto pairs = scene.pairs(view, lane);
           const double condition = dlt_condition(pairs).value_or(1e9);
@@ -81,36 +81,36 @@ TEST(LaneBalls, GiveTheScalarLeastSquaresSolution) {
     }
 }
 
-TEST(LaneBalls, RecoverTheViewFromExactPixels) {
+TEST(SimdBalls, RecoverTheViewFromExactPixels) {
   const Scene scene(8, 0, 0);
   const auto views = paper_views(WorldOrigin::base);
   for (std::size_t view = 0; view < 2; ++view) {
-    const LaneProjection four = LaneBalls(scene.balls).calibrate(scene.pixels[view]);
+    const SimdProjection four = SimdBalls(scene.balls).calibrate(scene.pixels[view]);
     const Projection truth = views[view].projection() / views[view].projection()(2, 3);
     for (int lane = 0; lane < simd_width; ++lane)
       EXPECT_LT((projection_of(four, lane) - truth).norm(), 1e-8 * truth.norm());
   }
 }
 
-TEST(LaneBalls, OneLaneDoesNotTouchAnother) {
+TEST(SimdBalls, LanesAreIndependent) {
   Scene scene(9, 1, 0);
-  const LaneProjection before = LaneBalls(scene.balls).calibrate(scene.pixels[0]);
-  for (LanePoint& ball : scene.balls) ball.x[1] = ball.y[1] = ball.z[1] = 0;  // degenerate
-  const LaneProjection after = LaneBalls(scene.balls).calibrate(scene.pixels[0]);
+  const SimdProjection before = SimdBalls(scene.balls).calibrate(scene.pixels[0]);
+  for (SimdPoint& ball : scene.balls) ball.x[1] = ball.y[1] = ball.z[1] = 0;  // degenerate
+  const SimdProjection after = SimdBalls(scene.balls).calibrate(scene.pixels[0]);
   for (const int lane : {0, 2, 3}) EXPECT_EQ(projection_of(before, lane), projection_of(after, lane));
 }
 
-TEST(LaneBalls, RefuseNoneAndTooMany) {
-  EXPECT_THROW(LaneBalls({}), std::invalid_argument);
-  EXPECT_THROW(LaneBalls(std::vector<LanePoint>(LaneBalls::most + 1)), std::invalid_argument);
+TEST(SimdBalls, NoneAndTooManyAreRefused) {
+  EXPECT_THROW(SimdBalls({}), std::invalid_argument);
+  EXPECT_THROW(SimdBalls(std::vector<SimdPoint>(SimdBalls::most + 1)), std::invalid_argument);
 }
 
-TEST(LaneIntersect, AgreesWithTheScalarOne) {
+TEST(SimdIntersect, AgreesWithTheScalarSolution) {
   const Scene scene(12, 2.34, 8);
-  const LaneBalls model(scene.balls);
-  const LaneProjection views[2] = {model.calibrate(scene.pixels[0]), model.calibrate(scene.pixels[1])};
+  const SimdBalls model(scene.balls);
+  const SimdProjection views[2] = {model.calibrate(scene.pixels[0]), model.calibrate(scene.pixels[1])};
   for (std::size_t i = 0; i < scene.balls.size(); ++i) {
-    const LanePoint point = intersect(views[0], scene.pixels[0][i], views[1], scene.pixels[1][i]);
+    const SimdPoint point = intersect(views[0], scene.pixels[0][i], views[1], scene.pixels[1][i]);
     for (int lane = 0; lane < simd_width; ++lane) {
       const std::array projections{projection_of(views[0], lane), projection_of(views[1], lane)};
       const std::array pixels{scene.pairs(0, lane)[i].pixel, scene.pairs(1, lane)[i].pixel};
@@ -120,10 +120,10 @@ TEST(LaneIntersect, AgreesWithTheScalarOne) {
   }
 }
 
-TEST(LaneRay, DistanceIsThatOfTheRay) {
+TEST(SimdRay, DistanceAgreesWithTheScalarRay) {
   const View view = paper_views(WorldOrigin::base)[1];
   const Projection p = view.projection() / view.projection()(2, 3);
-  LaneProjection four;
+  SimdProjection four;
   for (int i = 0; i < 4; ++i) {
     four.u[i] = simd(p(0, i));
     four.v[i] = simd(p(1, i));
@@ -137,17 +137,17 @@ TEST(LaneRay, DistanceIsThatOfTheRay) {
               2.5, 1e-9);
 }
 
-TEST(PaperScene, SimdProjectsAsTheViewsDo) {
+TEST(PaperScene, SimdProjectionAgreesWithTheViews) {
   const auto views = paper_views(WorldOrigin::centre);
-  const LaneViews simd_of(views);
+  const SimdViews simd_of(views);
   const Eigen::Vector3d point(20, -35, 60);
   for (std::size_t view = 0; view < 2; ++view) {
-    const LanePixel pixel = simd_of.project(view, {simd(20), simd(-35), simd(60)});
+    const SimdPixel pixel = simd_of.project(view, {simd(20), simd(-35), simd(60)});
     EXPECT_LT((views[view].project(point) - Eigen::Vector2d(pixel.u[3], pixel.v[3])).norm(), 1e-9);
   }
 }
 
-TEST(PaperScene, WithTheCentreAsOriginBothImagesHoldTheCone) {
+TEST(PaperScene, WithTheCentreAsOriginBothImagesContainTheCone) {
   const Eigen::Vector3d top(0, 0, cone_height_mm);
   EXPECT_GT(paper_views(WorldOrigin::base)[1].project(top).y(), 1024);
   for (const View& view : paper_views(WorldOrigin::centre)) {
@@ -157,7 +157,7 @@ TEST(PaperScene, WithTheCentreAsOriginBothImagesHoldTheCone) {
 }
 
 TEST(PaperScene, BallsLieOnTheSpiral) {
-  for (const LanePoint& ball : balls_on_spiral(LaneRandom(1, 1, 0), 7))
+  for (const SimdPoint& ball : balls_on_spiral(SimdRandom(1, 1, 0), 7))
     for (int lane = 0; lane < simd_width; ++lane) {
       const double t = ball.z[lane] / 3.979;
       EXPECT_GT(t, 0);
@@ -167,7 +167,7 @@ TEST(PaperScene, BallsLieOnTheSpiral) {
     }
 }
 
-TEST(PaperScene, TargetsFillTheirSpaces) {
+TEST(PaperScene, TargetsFillTheirRegions) {
   for (const WorldOrigin origin : {WorldOrigin::base, WorldOrigin::centre}) {
     const auto targets = targets_in_ball(origin);
     EXPECT_EQ(targets.size(), 19u);
@@ -179,7 +179,7 @@ TEST(PaperScene, TargetsFillTheirSpaces) {
   for (const auto& target : targets_in_cone()) EXPECT_LT(target.head<2>().norm(), 60);
 }
 
-TEST(SigmaReadings, GiveTheirSpreadPerAxis) {
+TEST(SigmaReadings, GiveTheStandardDeviationPerAxis) {
   EXPECT_EQ(sigma_px(SigmaReading::std, 2.34), 2.34);
   EXPECT_NEAR(sigma_px(SigmaReading::var, 2.34), 1.5297, 1e-4);
   EXPECT_NEAR(sigma_px(SigmaReading::mean_distance, 2.34), 1.8671, 1e-4);

@@ -8,12 +8,12 @@
 
 namespace helicarm {
 
-/// Four of core's RandomStreams side by side, for the trials first .. first + 3: the same words (Philox
-/// 4x32-10), but each block of four is asked for by its number, so that a draw that is left out moves no
-/// other.
-class LaneRandom {
+/// Four of core's RandomStreams in SIMD lanes, for the trials first .. first + 3: the same words (Philox
+/// 4x32-10), but each block of four is addressed by its number, so that an omitted draw does not shift
+/// others.
+class SimdRandom {
  public:
-  LaneRandom(std::uint64_t seed, std::uint32_t stream, std::uint64_t first_trial)
+  SimdRandom(std::uint64_t seed, std::uint32_t stream, std::uint64_t first_trial)
       : key0_(static_cast<std::uint32_t>(seed)),
         key1_(static_cast<std::uint32_t>(seed >> 32)),
         stream_(SimdWords{} + stream),
@@ -46,7 +46,7 @@ class LaneRandom {
     Simd second;
   };
 
-  /// Two numbers of the open interval (0, 1).
+  /// Two numbers in the open interval (0, 1).
   Pair uniforms(std::uint32_t block) const {
     const auto [w0, w1, w2, w3] = words(block);
     return {uniform(w0, w1), uniform(w2, w3)};
@@ -69,7 +69,7 @@ class LaneRandom {
 #endif
   }
 
-  /// 52 bits as the mantissa of a number in [1, 2), less what brings it into the middle of (0, 1).
+  /// 52 bits as the mantissa of a number in [1, 2), shifted to the centre of (0, 1).
   static Simd uniform(SimdWords high, SimdWords low) {
     return Simd((high << 20) | (low >> 12) | 0x3FF0000000000000) - (1 - 0x1p-53);
   }

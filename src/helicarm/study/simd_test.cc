@@ -21,7 +21,7 @@ TEST(Simd, LogarithmAgreesWithTheLibrary) {
 }
 
 TEST(Simd, ExponentialAgreesWithTheLibrary) {
-  // Twice as many: the fourth power at the end multiplies rounding errors by four.
+  // Twice the error: the fourth power at the end multiplies rounding errors by four.
   for (double x = -1; x <= 1; x += 0.00317)
     ASSERT_NEAR(exponential(simd(x))[0], std::exp(x), 2 * few_units * std::exp(x)) << x;
 }
@@ -37,9 +37,9 @@ TEST(Simd, SineAndCosineAgreeWithTheLibraryInAllQuadrants) {
   EXPECT_EQ(sine_cosine_of_turns(simd(0.75)).sine[0], -1);
 }
 
-TEST(LaneRandom, HasTheWordsOfTheScalarStreams) {
+TEST(SimdRandom, WordsEqualThoseOfTheScalarStreams) {
   const std::uint64_t seed = 0x123456789ABCDEF, first = (std::uint64_t{1} << 32) - 2;
-  const LaneRandom four(seed, 77, first);
+  const SimdRandom four(seed, 77, first);
   for (int lane = 0; lane < simd_width; ++lane) {
     RandomStream one(seed, 77, first + std::uint64_t(lane));
     for (std::uint32_t block = 0; block < 5; ++block)
@@ -47,10 +47,10 @@ TEST(LaneRandom, HasTheWordsOfTheScalarStreams) {
   }
 }
 
-TEST(LaneRandom, UniformsLieInsideTheOpenInterval) {
+TEST(SimdRandom, UniformsLieInsideTheOpenInterval) {
   double sum = 0;
   constexpr std::uint32_t blocks = 5000;
-  const LaneRandom random(3, 0, 0);
+  const SimdRandom random(3, 0, 0);
   for (std::uint32_t block = 0; block < blocks; ++block) {
     const auto [a, b] = random.uniforms(block);
     for (int lane = 0; lane < simd_width; ++lane) {
@@ -63,10 +63,10 @@ TEST(LaneRandom, UniformsLieInsideTheOpenInterval) {
   EXPECT_NEAR(sum / n, 0.5, 5 / std::sqrt(12 * n));
 }
 
-TEST(LaneRandom, NormalsHaveTheNormalMoments) {
+TEST(SimdRandom, NormalsHaveNormalMoments) {
   double sum = 0, squares = 0, fourths = 0, products = 0;
   constexpr std::uint32_t blocks = 20000;
-  const LaneRandom random(1, 2, 0);
+  const SimdRandom random(1, 2, 0);
   for (std::uint32_t block = 0; block < blocks; ++block) {
     const auto [a, b] = random.normals(block);
     for (int lane = 0; lane < simd_width; ++lane) {

@@ -7,7 +7,7 @@
 int main(int, char** arguments) {
   const helicarm::Ranks ranks;
   helicarm::EngineOptions engine;
-  engine.threads = 1 + unsigned(ranks.own());  // as on machines that differ
+  engine.threads = 1 + unsigned(ranks.own());  // as on different machines
   for (const auto& study : helicarm::small_studies()) {
     const std::string bytes = study.bytes(engine, ranks, arguments[1]);
     if (ranks.leads())

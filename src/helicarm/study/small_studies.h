@@ -16,13 +16,12 @@
 
 namespace helicarm {
 
-/// For tests: a study as small as it can be with several blocks in each setting.
+/// For tests: the smallest study with several blocks in each setting.
 struct SmallStudy {
   std::string name;
   std::size_t blocks;  ///< of each setting
-  std::size_t stop;    ///< after so many blocks a run is in mid-work
-  /// All that the study writes; nothing at ranks that do not lead. The folder is for what it leaves
-  /// meanwhile.
+  std::size_t stop;    ///< number of blocks after which a run is unfinished
+  /// All output of the study; empty at ranks other than the leader. The folder is for its temporary files.
   std::function<std::string(const EngineOptions&, const Ranks&, const std::filesystem::path& folder)> bytes;
 };
 

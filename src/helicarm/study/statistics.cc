@@ -16,8 +16,8 @@ namespace {
 
 constexpr double trimmed_share = 0.01;
 
-/// Values at chosen ranks without sorting all: dealt into bins by the leading bits of the numbers (256 bins
-/// an octave), of which only those that are asked for are sorted.
+/// Order statistics without a full sort: values are binned by their leading bits (256 bins per octave), and
+/// only the bins that contain requested ranks are sorted.
 class RankedValues {
  public:
   explicit RankedValues(std::span<const double> values) : dealt_(values.size()) {
@@ -37,11 +37,11 @@ class RankedValues {
     sorted(std::size_t(above - begins_.begin()) - 1);
     return dealt_[rank];
   }
-  /// How many values are less than this one of them, and how many are not more.
+  /// Number of values less than this one, and number not greater.
   std::size_t less_than(double value) { return counted(std::ranges::lower_bound(sorted(bin(value)), value)); }
   std::size_t up_to(double value) { return counted(std::ranges::upper_bound(sorted(bin(value)), value)); }
 
-  /// Linear between the two nearest ranks.
+  /// Linear interpolation between the two nearest ranks.
   double quantile(double share) {
     const double at_rank = share * double(dealt_.size() - 1);
     const auto below = static_cast<std::size_t>(at_rank);
@@ -71,7 +71,7 @@ class RankedValues {
   std::size_t last_sorted_ = most_bins + 2;
 };
 
-/// In a fixed order, in four strands: the sum is the same everywhere, yet not one long chain.
+/// Fixed order in four accumulators: a reproducible sum without one long dependency chain.
 template <class Term>
 double sum_of(std::span<const double> values, Term term) {
   std::array<double, 4> strands{};
@@ -88,7 +88,7 @@ double trimmed_mean(std::span<const double> values, RankedValues& ranked) {
   const double low = ranked.at(cut), high = ranked.at(n - 1 - cut);
   if (!(low < high)) return low;
   const double inside = sum_of(values, [&](double x) { return x > low && x < high ? x : 0; });
-  // Of values equal to a limit, as many count as have their rank inside.
+  // Of values equal to a limit, those with ranks inside are counted.
   const double kept_low = double(ranked.up_to(low)) - double(cut);
   const double kept_high = double(n - ranked.less_than(high)) - double(cut);
   return (inside + kept_low * low + kept_high * high) / double(n - 2 * cut);
@@ -130,7 +130,7 @@ ColumnStatistics column_statistics(std::span<const double> all) {
   result.se = n > 1 ? std::sqrt(squares / (n - 1) / n) : std::numeric_limits<double>::quiet_NaN();
   RankedValues ranked(values);
   result.median = ranked.quantile(0.5);
-  // The ranks a standard error away, but over three times as many values.
+  // Ranks one standard error away, over three times as many values.
   const double half_width = 3 * 0.5 / std::sqrt(n);
   const double above = ranked.quantile(std::min(1.0, 0.5 + half_width));
   const double below = ranked.quantile(std::max(0.0, 0.5 - half_width));

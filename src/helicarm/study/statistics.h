@@ -5,8 +5,8 @@
 
 namespace helicarm {
 
-/// One column of a study's trials. Values that are not finite are counted and left out; with none left
-/// everything else is NaN.
+/// Statistics of one column of a study's trials. Non-finite values are counted and left out; without any
+/// finite value all others are NaN.
 struct ColumnStatistics {
   double mean = 0;
   double median = 0;
@@ -17,13 +17,13 @@ struct ColumnStatistics {
   double left_out = 0;
 };
 
-/// Of values that are not negative.
+/// For non-negative values.
 ColumnStatistics column_statistics(std::span<const double> values);
 
 /// Pearson's correlation coefficient of two columns of equal length.
 double pearson(std::span<const double> a, std::span<const double> b);
 
-/// Spearman's: Pearson's of the ranks, ties sharing their mean rank.
+/// Spearman's rank correlation: Pearson's of the ranks, ties share their mean rank.
 double spearman(std::span<const double> a, std::span<const double> b);
 
 }  // namespace helicarm

@@ -21,7 +21,7 @@ std::vector<double> heavy_tailed(std::size_t count) {
   return values;
 }
 
-TEST(ColumnStatistics, AgreeWithThoseOfASortedColumn) {
+TEST(ColumnStatistics, AgreeWithASortedColumn) {
   for (const std::size_t n : {1u, 2u, 99u, 100u, 1000u, 4321u}) {
     const std::vector<double> values = heavy_tailed(n);
     std::vector<double> sorted = values;
@@ -44,7 +44,7 @@ TEST(ColumnStatistics, AgreeWithThoseOfASortedColumn) {
   }
 }
 
-TEST(ColumnStatistics, StandardErrorsAreThoseOfTheNormalLaw) {
+TEST(ColumnStatistics, StandardErrorsAgreeWithTheNormalDistribution) {
   RandomStream random(2, 1);
   std::vector<double> values(20000);
   for (double& value : values) value = 10 + random.normal();
@@ -53,7 +53,7 @@ TEST(ColumnStatistics, StandardErrorsAreThoseOfTheNormalLaw) {
   EXPECT_NEAR(s.median_se / s.se, std::sqrt(std::acos(-1.0) / 2), 0.15);
 }
 
-TEST(ColumnStatistics, ValuesOfAnySizeAndEqualOnesAreRanked) {
+TEST(ColumnStatistics, RanksValuesOfAnySizeAndTies) {
   EXPECT_EQ(column_statistics(std::vector{0.0, 1e-300, 1.0, 1e300, 1e12}).median, 1.0);
   const ColumnStatistics same = column_statistics(std::vector<double>(300, 0.25));
   EXPECT_EQ(same.median, 0.25);
@@ -64,7 +64,7 @@ TEST(ColumnStatistics, ValuesOfAnySizeAndEqualOnesAreRanked) {
   EXPECT_NEAR(column_statistics(ties).trimmed, 292.0 / 294, 1e-15);
 }
 
-TEST(ColumnStatistics, WhatIsNotFiniteIsLeftOutAndCounted) {
+TEST(ColumnStatistics, NonFiniteValuesAreCountedAndLeftOut) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
                    inf = std::numeric_limits<double>::infinity();
   const ColumnStatistics s = column_statistics(std::vector{1.0, nan, 2.0, inf, 3.0});
@@ -76,13 +76,13 @@ TEST(ColumnStatistics, WhatIsNotFiniteIsLeftOutAndCounted) {
   EXPECT_TRUE(std::isnan(none.median));
 }
 
-TEST(Correlation, OfALineIsOneAndOfItsMirrorMinusOne) {
+TEST(Correlation, IsOneForALineAndMinusOneForItsMirror) {
   const std::vector a{1.0, 2.0, 3.0, 5.0}, b{2.0, 4.0, 6.0, 10.0}, c{-1.0, -2.0, -3.0, -5.0};
   EXPECT_NEAR(pearson(a, b), 1, 1e-15);
   EXPECT_NEAR(pearson(a, c), -1, 1e-15);
 }
 
-TEST(Correlation, SpearmanSeesOnlyTheOrderAndSharesTies) {
+TEST(Correlation, SpearmanUsesOnlyTheOrderAndSharesTies) {
   EXPECT_NEAR(spearman(std::vector{1.0, 2.0, 3.0, 4.0}, std::vector{1.0, 10.0, 100.0, 1e6}), 1, 1e-15);
   // Ranks 1 2.5 2.5 4 against 1 2 3 4.
   EXPECT_NEAR(spearman(std::vector{1.0, 2.0, 2.0, 9.0}, std::vector{1.0, 2.0, 3.0, 4.0}),

@@ -9,7 +9,7 @@
 
 namespace helicarm {
 
-/// What a study writes, and what it says of itself beside the paper.
+/// Output of a study, with its comparison with the paper.
 struct StudyFiles {
   std::string csv;
   Json json;
@@ -17,10 +17,10 @@ struct StudyFiles {
   std::string summary;  ///< a few sentences; also in the JSON
 };
 
-/// Cells of a CSV row, a comma before each; empty where a number is not finite.
+/// Cells of a CSV row, each after a comma; empty for a non-finite number.
 std::string csv_cells(std::span<const double> values);
 
-/// How every study's JSON begins: what it is, and those of its options that several studies share.
+/// Common head of the studies' JSON: the study and the options that several studies share.
 template <class Options>
 Json study_json(const char* study, const Options& options) {
   Json json{{"format", "helicarm-study/1"},

@@ -14,7 +14,7 @@
 namespace helicarm {
 namespace {
 
-constexpr std::size_t groups_of_turn = 32;  // a block: E(A) takes long
+constexpr std::size_t groups_of_turn = 32;  // per block; E(A) is slow
 constexpr double printed_pearson = 0.4224;
 constexpr std::size_t figures_of_group = numbers_in<UniformityGroup>;
 
@@ -35,33 +35,33 @@ constexpr std::array<const char*, figures_of_group> figure_names{"uniformity",
 struct UniformityTrials {
   UniformityOptions options;
   std::array<View, 2> views = paper_views(options.origin);
-  LaneViews lane_views{views};
-  std::array<LaneTargets, 3> places{LaneTargets(targets_in_ball(options.origin), views),
-                                    LaneTargets(targets_in_cone(), views),
-                                    LaneTargets(std::array{middle_of_cone()}, views)};
+  SimdViews lane_views{views};
+  std::array<SimdTargets, 3> places{SimdTargets(targets_in_ball(options.origin), views),
+                                    SimdTargets(targets_in_cone(), views),
+                                    SimdTargets(std::array{middle_of_cone()}, views)};
 
-  /// Groups first .. first + 3, figures_of_group numbers each.
+  /// Groups first .. first + 3, figures_of_group values each.
   void run(std::uint64_t first_group, double* out) const {
     const auto count = std::size_t(options.balls);
     const double sigma = sigma_px(options.sigma, options.fle);
-    const LaneRandom random(options.seed, uniformity_stream, first_group);
-    const std::vector<LanePoint> balls = balls_on_spiral(random, count);
-    LanePixels exact, noise, pixels;
+    const SimdRandom random(options.seed, uniformity_stream, first_group);
+    const std::vector<SimdPoint> balls = balls_on_spiral(random, count);
+    SimdPixels exact, noise, pixels;
     for (std::size_t view = 0; view < 2; ++view)
       for (std::size_t i = 0; i < count; ++i) exact.of_view[view][i] = lane_views.project(view, balls[i]);
-    const LaneBalls model(balls);
+    const SimdBalls model(balls);
     Simd first[6]{}, sum[6]{};
     for (int k = 0; k < options.draws; ++k) {
       const std::uint32_t at = draw::repetition * std::uint32_t(k);
       draw_noise(random, at + draw::calibration, count, noise);
       add_noise(exact, sigma, noise, count, pixels);
-      const LaneProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
+      const SimdProjection calibrated[2] = {model.calibrate({pixels.of_view[0], count}),
                                             model.calibrate({pixels.of_view[1], count})};
       std::uint32_t from = draw::targets;
       for (std::size_t place = 0; place < 3; ++place) {
-        const LaneTargets& targets = places[place];
+        const SimdTargets& targets = places[place];
         draw_noise(random, at + from, targets.size(), noise);
-        from += 2 * LaneBalls::most;
+        from += 2 * SimdBalls::most;
         const Simd fresh = targets.mean_error(0, targets.size(), calibrated, sigma, &noise);
         const Simd bare = targets.mean_error(0, targets.size(), calibrated, sigma, nullptr);
         if (k == 0) first[place] = fresh, first[3 + place] = bare;
@@ -72,7 +72,7 @@ struct UniformityTrials {
     const SurgicalSpace space{origin_in_calibrator(options.origin), space_radius_mm};
     for (int lane = 0; lane < simd_width; ++lane, out += figures_of_group) {
       std::vector<Eigen::Vector3d> points;
-      for (const LanePoint& ball : balls) points.emplace_back(ball.x[lane], ball.y[lane], ball.z[lane]);
+      for (const SimdPoint& ball : balls) points.emplace_back(ball.x[lane], ball.y[lane], ball.z[lane]);
       out[0] = uniformity(points, space);
       for (std::size_t i = 0; i < 6; ++i) {
         out[1 + i] = first[i][lane];
@@ -92,12 +92,12 @@ std::vector<double> figure_of(const std::vector<UniformityGroup>& groups, std::s
 
 Expected<std::vector<UniformityGroup>> study_uniformity(const UniformityOptions& options,
                                                         const EngineOptions& engine, const Ranks& ranks) {
-  if (options.balls < 6 || options.balls > int(LaneBalls::most))
-    return fail(Reason::bad_value, fmt::format("balls: {}, limits 6 and {}", options.balls, LaneBalls::most));
+  if (options.balls < 6 || options.balls > int(SimdBalls::most))
+    return fail(Reason::bad_value, fmt::format("balls: {}, limits 6 and {}", options.balls, SimdBalls::most));
   if (options.groups < 3)
-    return fail(Reason::bad_value, fmt::format("groups: {}, at least 3 are needed", options.groups));
+    return fail(Reason::bad_value, fmt::format("groups: {}, at least 3 are required", options.groups));
   if (options.draws < 1)
-    return fail(Reason::bad_value, fmt::format("draws: {}, at least 1 is needed", options.draws));
+    return fail(Reason::bad_value, fmt::format("draws: {}, at least 1 is required", options.draws));
   const UniformityTrials trials{options};
   StudySetting setting;
   setting.blocks = (options.groups + groups_of_turn - 1) / groups_of_turn;
@@ -138,15 +138,11 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
   }
   const double first_spearman = correlations[0]["spearman"];
   files.summary = fmt::format(
-      "Printed (Fig. 6): Pearson's correlation of E(A) with TRE is {}, weakly positive. Here, over {} groups "
-      "of {} balls, "
-      "targets in the ball, one noise draw: Pearson {:.3f}, Spearman {:.3f}. Spearman's is {:.2f} to {:.2f} "
-      "over where "
-      "the targets are, whether their pixels carry noise, and averaging over {} draws: evenly spread balls "
-      "are better "
-      "in every reading. The print says neither where the targets lie nor how many groups there were, and a "
-      "few groups "
-      "whose TRE is huge move Pearson's.",
+      "Published (Fig. 6): Pearson's correlation of E(A) with TRE is {}, weakly positive. Here, over {} "
+      "groups of {} balls, targets in the sphere, one noise draw: Pearson {:.3f}, Spearman {:.3f}. "
+      "Spearman's is {:.2f} to {:.2f} over target region, pixel noise and averaging over {} draws: evenly "
+      "spread balls are better in every reading. The paper states neither the target positions nor the "
+      "number of groups, and a few groups with a very large TRE dominate Pearson's coefficient.",
       printed_pearson, groups.size(), options.balls, first_pearson, first_spearman, least, most,
       options.draws);
   if (least <= 0)
@@ -163,12 +159,12 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
   for (const std::size_t figure : {std::size_t{1}, std::size_t{7}}) {
     std::vector<double> tre = figure_of(groups, figure);
     Chart chart{figure == 1 ? "(a) one noise draw" : fmt::format("(b) mean of {} noise draws", options.draws),
-                "Uniformity E(A)", "TRE of targets in the ball of 100 mm, mm"};
+                "Uniformity E(A)", "TRE of targets in the sphere of 100 mm, mm"};
     ChartSeries dots{"", {}, true};
     for (std::size_t i = 0; i < groups.size(); ++i) dots.points.push_back({evenness[i], tre[i]});
     chart.series.push_back(std::move(dots));
-    chart.note = fmt::format("Pearson {:.3f}, Spearman {:.3f} (printed: Pearson {})", pearson(evenness, tre),
-                             spearman(evenness, tre), printed_pearson);
+    chart.note = fmt::format("Pearson {:.3f}, Spearman {:.3f} (published: Pearson {})",
+                             pearson(evenness, tre), spearman(evenness, tre), printed_pearson);
     chart.y_from_zero = true;
     chart.y_most = column_statistics(tre).p99;
     charts.push_back(std::move(chart));
