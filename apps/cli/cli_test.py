@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""The program from outside: exit codes, streams and files. Usage: cli_test.py PROGRAM"""
+"""Tests of the executable: exit codes, streams and files. Usage: cli_test.py PROGRAM"""
 
 import json
 import os
@@ -43,7 +43,7 @@ class CommandLine(unittest.TestCase):
         self.assertIn("<svg", (self.root / "tre/tre.svg").read_text())
         self.assertEqual(run("predict", self.root / "case", "--at", "1,2").returncode, 2)
 
-    def test_test_grid_is_rehearsed_from_simulation_to_errors(self):
+    def test_simulated_test_grid_is_rectified_and_measured(self):
         folder = self.root / "grid"
         done = run("simulate", folder, "--kind", "grid", "--size", 512, "--seed", 2)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -68,7 +68,7 @@ class CommandLine(unittest.TestCase):
                       ("--preset", "c-arm"), ("--kind", "grid", "--fault", "screws")):
             self.assertEqual(run("simulate", folder, *wrong).returncode, 2, wrong)
 
-    def test_machine_remembers_each_picture_once(self):
+    def test_history_contains_each_image_once(self):
         machine = self.root / "machine.json"
         for _ in range(2):
             done = run("run", self.root / "case", "--out", self.root / "known", "--no-report", "--machine", machine)
@@ -98,7 +98,7 @@ class CommandLine(unittest.TestCase):
                 folder = self.root / f"{name}{threads}"
                 done = run("study", name, "--groups", 70, *more, "--seed", 4, "--threads", threads, "--out", folder)
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertIn("by design" if name == "design" else "Printed (", done.stdout)
+                self.assertIn("by design" if name == "design" else "Published (", done.stdout)
                 out[threads] = {path.name: path.read_bytes() for path in folder.iterdir()}
             self.assertEqual(out[1], out[2])
             self.assertEqual(sorted(out[1]), [f"{name}.csv", f"{name}.json", f"{name}.svg"])
@@ -117,9 +117,9 @@ class CommandLine(unittest.TestCase):
 
     @unittest.skipUnless(os.environ.get("HELICARM_MPIRUN"), "built without MPI")
     def test_study_writes_the_same_bytes_on_any_number_of_ranks(self):
-        surroundings = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        environment = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
                         "OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_mpi_yield_when_idle": "1",
-                        "OMPI_MCA_plm_rsh_agent": "false"}  # all on this machine: no remote shell is needed
+                        "OMPI_MCA_plm_rsh_agent": "false"}  # local ranks only: no remote shell is needed
         for name, *more in (("number", "--groups", "3001", "--balls", "6,12"), ("limit", "--groups", "51"),
                             ("biplane", "--groups", "200"), ("location", "--groups", "300")):
             study = ("study", name, *more, "--seed", "4", "--out")
@@ -127,7 +127,7 @@ class CommandLine(unittest.TestCase):
             for ranks in ("1", "2", "3") if name == "number" else ("2",):
                 folder = self.root / f"{name}{ranks}"
                 done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", ranks, PROGRAM, *study, str(folder)],
-                                      capture_output=True, text=True, env=surroundings)
+                                      capture_output=True, text=True, env=environment)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertEqual(done.stdout.count("written to"), 1)
                 self.assertEqual(f"{ranks} ranks" in done.stderr, ranks != "1")
@@ -135,10 +135,10 @@ class CommandLine(unittest.TestCase):
                     self.assertEqual((folder / f"{name}.{ending}").read_bytes(),
                                      (self.root / f"{name}0/{name}.{ending}").read_bytes())
         done = subprocess.run([os.environ["HELICARM_MPIRUN"], "-n", "2", PROGRAM, "study", "number", "--fle", "no"],
-                              capture_output=True, text=True, env=surroundings)
+                              capture_output=True, text=True, env=environment)
         self.assertEqual(done.returncode, 2, done.stderr)
 
-    def test_study_that_was_killed_goes_on_to_the_same_bytes(self):
+    def test_killed_study_resumes_to_the_same_bytes(self):
         study = ("study", "uniformity", "--groups", 1000, "--seed", 3, "--quiet")
         folder = self.root / "killed"
         journal = folder / "uniformity.partial"
@@ -199,7 +199,7 @@ class CommandLine(unittest.TestCase):
         (self.root / "only-result/result.json").write_text("{}")
         self.assertIn("give the case", run("export", self.root / "only-result").stderr)
 
-    def test_published_recipe_gives_the_same_fields(self):
+    def test_paper_method_gives_the_same_fields(self):
         outs = []
         for method in ("best", "paper"):
             done = run("run", self.root / "case", "--out", self.root / method, "--method", method, "--json", "--no-report")
@@ -250,7 +250,7 @@ class CommandLine(unittest.TestCase):
         done = run("phantom", "export", "--svg", drawing, "--json")
         self.assertEqual(json.loads(done.stdout), {"written": [str(drawing)]})
 
-    def test_help_teaches_with_an_example(self):
+    def test_help_has_an_example(self):
         for command in ("demo", "run", "export", "solve", "locate", "rectify", "detect", "import", "simulate", "phantom"):
             done = run(command, "--help")
             self.assertEqual(done.returncode, 0)
@@ -271,7 +271,7 @@ class CommandLine(unittest.TestCase):
             self.assertAlmostEqual(point["u"], u, 6)
             self.assertAlmostEqual(point["v"], v, 6)
 
-    def test_rectify_carries_nothing_from_off_the_picture(self):
+    def test_rectify_returns_null_for_points_outside_the_image(self):
         out = self.root / "rectified_twice"
         run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out, "--quiet")
         points = self.root / "off.csv"
@@ -289,17 +289,17 @@ class CommandLine(unittest.TestCase):
         self.assertIn("cannot_write", done.stderr)
         self.assertEqual([path.name for path in out.iterdir()], ["LAT_overlay.png"])
 
-    def test_check_of_the_rules_says_the_same_in_both_forms(self):
+    def test_phantom_check_agrees_as_text_and_as_json(self):
         rules = json.loads(run("phantom", "check", "--json").stdout)["rules"]
         lines = run("phantom", "check").stdout.splitlines()
         self.assertEqual([rule["passed"] for rule in rules], [line.startswith("kept") for line in lines[:len(rules)]])
 
-    def test_file_name_that_is_no_utf8_is_refused_like_any_other(self):
+    def test_file_name_that_is_not_utf8_is_refused(self):
         done = run("detect", b"\xff.dcm".decode(errors="surrogateescape"), "--json")
         self.assertEqual(done.returncode, 2, done.stderr)
         self.assertEqual(json.loads(done.stdout)["failure"]["code"], "missing_file")
 
-    def test_message_shows_no_control_character_of_a_file(self):
+    def test_message_contains_no_control_character_of_a_file(self):
         matrix = self.root / "matrix.txt"
         matrix.write_text("1 0 0 0\n0 1 0 0\n0 0 1 \x1b[31m\n")
         done = run("import", matrix)
@@ -324,7 +324,7 @@ class CommandLine(unittest.TestCase):
         for a, b in zip(json.loads(done.stdout)["points"][0]["xyz_mm"], target["xyz_mm"]):
             self.assertAlmostEqual(a, b, 2)
 
-    def test_locate_answers_raw_picks_as_run_does(self):
+    def test_locate_agrees_with_run_on_raw_picks(self):
         case = self.root / "picked"
         shutil.copytree(self.root / "case", case)
         clicks = [("near", "AP", 250.3, 240.1, None), ("near", "LAT", 255.9, 241.7, 1.5),
@@ -380,7 +380,7 @@ class Tracker(unittest.TestCase):
         server.terminate()
         self.assertEqual(server.wait(timeout=5), 0)
 
-    def test_port_that_is_taken_and_turnless_pivot_are_refused(self):
+    def test_port_in_use_and_pivot_without_rotation_are_refused(self):
         _, port = self.replay()
         done = run("tracker", "replay", self.file, "--port", port)
         self.assertEqual(done.returncode, 2)
@@ -389,7 +389,7 @@ class Tracker(unittest.TestCase):
         self.assertEqual(done.returncode, 3)
         self.assertIn("poses_too_alike", done.stderr)
 
-    def test_what_is_asked_for_must_be_there(self):
+    def test_missing_or_invalid_arguments_are_named(self):
         for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),
                             (("tracker", "watch", "127.0.0.1:70000"), "1 to 65535"),
                             (("tracker", "replay", self.file, "--port", "70000"), "0 to 65535"),
@@ -400,12 +400,12 @@ class Tracker(unittest.TestCase):
 
 
 class Operate(unittest.TestCase):
-    def test_told_to_end_it_says_so(self):
+    def test_stop_signal_is_reported(self):
         with tempfile.TemporaryDirectory() as folder:
             operate = subprocess.Popen([PROGRAM, "operate", "--cases", "1", "--size", "512", "--out", folder], text=True,
                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             self.addCleanup(operate.kill)
-            operate.stderr.readline()  # opening the virtual room
+            operate.stderr.readline()  # starting the virtual devices
             operate.send_signal(signal.SIGINT)
             _, said = operate.communicate(timeout=60)
             self.assertEqual(operate.returncode, 3)

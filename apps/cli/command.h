@@ -8,8 +8,7 @@
 
 namespace helicarm::cli {
 
-/// What every command is given beside its own arguments. Answers go to `out`, progress and messages to
-/// `progress`.
+/// Context of every command. Answers go to `out`, progress and messages to `progress`.
 struct Console {
   std::ostream& out;
   std::ostream& progress;
@@ -20,7 +19,7 @@ struct Console {
 };
 
 /// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc
-/// turns its failure into a message and an exit code.
+/// converts its failure to a message and an exit code.
 using CommandResult = Expected<void>;
 
 }  // namespace helicarm::cli

@@ -16,7 +16,7 @@
 
 namespace helicarm::cli {
 
-/// The chosen command with its arguments; set while the command line is parsed.
+/// The selected command with its arguments; set while the command line is parsed.
 using Action = std::function<CommandResult(Console&)>;
 
 inline CLI::App* add_command(CLI::App& app, const char* name, const char* what, const char* example) {
@@ -25,18 +25,18 @@ inline CLI::App* add_command(CLI::App& app, const char* name, const char* what, 
   return command;
 }
 
-/// A number within bounds that the message names. CLI11's own checks let NaN pass.
+/// A number within bounds, which the message states. CLI11's own checks accept NaN.
 inline CLI::Validator within(double low, double high) {
   const std::string bounds = fmt::format("{:g} to {:g}", low, high);
   const auto check = [=](const std::string& word) -> std::string {
     double value = 0;
     const bool good = CLI::detail::lexical_cast(word, value) && value >= low && value <= high;
-    return good ? std::string{} : fmt::format("{} is not a number of {}", word, bounds);
+    return good ? std::string{} : fmt::format("{} is not a number from {}", word, bounds);
   };
   return {check, bounds};
 }
 
-/// The number that a word means to a field, if any.
+/// The number that a word stands for in a field, if any.
 template <class Options>
 std::optional<double> number_for(const Field<Options>& field, const std::string& word) {
   if (const auto choice = std::ranges::find(field.words, word); choice != field.words.end())
@@ -46,7 +46,7 @@ std::optional<double> number_for(const Field<Options>& field, const std::string&
   return std::nullopt;
 }
 
-/// Flags of those fields that have one, with their help, limits and defaults.
+/// Options for the fields that have a flag, with help, limits and defaults.
 template <class Options, std::size_t count>
 void add_fields(CLI::App* command, Options& options, const std::array<Field<Options>, count>& fields) {
   for (const Field<Options>& field : fields) {
@@ -78,11 +78,11 @@ Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(
   return *arguments;
 }
 
-/// Images to points and error bars.
+/// From images to points with confidence regions.
 void add_measuring_commands(CLI::App& app, Action& action);
-/// What needs no hardware: simulations, studies, the phantom.
+/// Commands without hardware: simulations, studies, the phantom.
 void add_rehearsal_commands(CLI::App& app, Action& action);
-/// What speaks with C-arm, tracker and robot.
+/// Commands that communicate with C-arm, tracker and robot.
 void add_device_commands(CLI::App& app, Action& action);
 
 }  // namespace helicarm::cli

@@ -14,10 +14,10 @@ namespace {
 
 using simulation::SimulatedCase;
 
-/// How the measurement compares with what is true of the simulated pair.
+/// Comparison of the measurement with the ground truth of the simulated pair.
 struct Comparison {
-  int balls = 0;           ///< measured in all views
-  double ball_rms_px = 0;  ///< raw image of the centre against truth, distance
+  int balls = 0;           ///< fiducials detected, summed over the views
+  double ball_rms_px = 0;  ///< distance of the raw centres from the ground truth
   std::map<std::string, double> point_error_mm;
 };
 
@@ -49,10 +49,10 @@ void print(const Comparison& comparison, const std::filesystem::path& report, Co
     console.out << to_text(json) << '\n';
     return;
   }
-  console.out << fmt::format("\n  Against the truth: {} images of balls, {:.3f} px rms off\n",
+  console.out << fmt::format("\n  Differences from the ground truth: {} fiducial images, {:.3f} px rms\n",
                              comparison.balls, comparison.ball_rms_px);
   for (const auto& [name, error] : comparison.point_error_mm)
-    console.out << fmt::format("    {:<6} {:.3f} mm off\n", name, error);
+    console.out << fmt::format("    {:<6} {:.3f} mm\n", name, error);
   console.out << fmt::format("\n  Report: {}\n", report.string());
 }
 
@@ -64,7 +64,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     options.seed = console.seed;
     options.threads = console.threads;
     if (!console.quiet)
-      console.progress << "helicarm: simulating two X-rays of a knee with the calibrator on it\n";
+      console.progress << "helicarm: simulating two X-ray images of a knee with the calibrator\n";
     const SimulatedCase truth = value_or_throw(simulation::simulate_case(options));
     RunArguments run{arguments.out / "case", arguments.out / "result"};
     value_or_throw(simulation::check_case_folder(run.folder));

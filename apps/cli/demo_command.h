@@ -11,7 +11,7 @@ struct DemoArguments {
   std::filesystem::path out = "helicarm-demo";
 };
 
-/// Simulates a pair of X-rays with known truth, runs it and compares: shows the whole way in one command.
+/// Simulates two X-ray images with known ground truth, measures them and compares.
 CommandResult demo_command(const DemoArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

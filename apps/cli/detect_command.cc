@@ -24,7 +24,7 @@ std::vector<Dot> found_in(const XrayImage& xray_image, bool crosses, Polarity po
   return find_clear_dots(xray_image, options);
 }
 
-/// Metal is dark in most images and bright in the others: the polarity that shows more of it is right.
+/// Metal may be dark or bright in an image; the polarity with more detections is used.
 std::vector<Dot> metal_in(const XrayImage& xray_image, bool crosses) {
   auto dark = found_in(xray_image, crosses, Polarity::dark);
   auto bright = found_in(xray_image, crosses, Polarity::bright);

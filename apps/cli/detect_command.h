@@ -15,7 +15,7 @@ struct DetectArguments {
   std::string kind = "balls";  ///< balls, holes or crosses
 };
 
-/// Sub-pixel places of all dots or wire crossings in one X-ray, raw pixels.
+/// Sub-pixel positions of all dots or wire crossings in one X-ray image, raw px.
 CommandResult detect_command(const DetectArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

@@ -17,44 +17,47 @@ CLI::Option* add_port(CLI::App* command, const char* name, std::uint16_t& port, 
 }
 
 void add_receive(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "receive", "Take X-rays from a C-arm by DICOM (C-STORE), or from a folder",
-                              "helicarm receive --out inbox\n"
-                              "  helicarm receive --out inbox --address 192.168.7.2 --peer C_ARM\n"
-                              "  helicarm receive --out inbox --watch /mnt/c-arm");
+  auto* command =
+      add_command(app, "receive", "Receive X-ray images from a C-arm by DICOM (C-STORE) or from a folder",
+                  "helicarm receive --out inbox\n"
+                  "  helicarm receive --out inbox --address 192.168.7.2 --peer C_ARM\n"
+                  "  helicarm receive --out inbox --watch /mnt/c-arm");
   auto& a = arguments_of(command, action, receive_command);
-  command->add_option("--out", a.out, "Folder for the pictures: one program at a time")
-      ->capture_default_str();
+  command->add_option("--out", a.out, "Folder for the images; one program at a time")->capture_default_str();
   auto* address = command
                       ->add_option("--address", a.receiver.address,
-                                   "Where to listen; other than 127.0.0.1 opens the port to the network")
+                                   "Address to listen on; other than 127.0.0.1 opens the port to the network")
                       ->capture_default_str();
   add_fields(command, a.receiver, receiver_fields);
   auto* port = command->get_option("--port");
-  auto* title = command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
-                    ->capture_default_str();
+  auto* title =
+      command
+          ->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
+          ->capture_default_str();
   auto* peer = command->add_option("--peer", a.receiver.negotiation.peers,
                                    "Title of a C-arm that may send; repeatable (default: any)");
-  auto* certificate = command->add_option("--tls-certificate", a.certificate, "PEM: speak TLS only, as this");
+  auto* certificate = command->add_option("--tls-certificate", a.certificate,
+                                          "PEM: certificate; only TLS connections are accepted");
   auto* key = command->add_option("--tls-key", a.key, "PEM: key of the certificate");
-  auto* authorities =
-      command->add_option("--tls-authorities", a.authorities, "PEM: who signs the C-arms' certificates");
+  auto* authorities = command->add_option("--tls-authorities", a.authorities,
+                                          "PEM: authorities that sign the C-arms' certificates");
   certificate->needs(key, authorities);
   key->needs(certificate);
   authorities->needs(certificate);
   auto* watch =
-      command->add_option("--watch", a.watch, "Take pictures from this folder instead; its files stay");
+      command->add_option("--watch", a.watch, "Read images from this folder instead; its files are kept");
   for (auto* of_network : {address, port, title, peer, certificate}) watch->excludes(of_network);
-  command->add_option("--count", a.count, "End after so many pictures")->check(within(1, 1e9));
+  command->add_option("--count", a.count, "End after this number of images")->check(within(1, 1e9));
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
 
 void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
   command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
-  command->add_option("--seconds", a.seconds, "End by itself; otherwise when interrupted")
+  command->add_option("--seconds", a.seconds, "End after this time; default: when interrupted")
       ->check(within(0, 1e6));
   a.options.ask_for_tracking = true;
   command->add_flag("--ask,!--no-ask", a.options.ask_for_tracking,
-                    "Ask for tracking (STT_TDATA), as some servers expect (default)");
+                    "Request tracking (STT_TDATA), which some servers require (default)");
 }
 
 void add_tracker(CLI::App& app, Action& action) {
@@ -65,28 +68,28 @@ void add_tracker(CLI::App& app, Action& action) {
                   "  helicarm tracker replay poses.mha --port 18944\n"
                   "  helicarm tracker pivot poses.mha --tool PointerToTracker");
   tracker->require_subcommand(1);
-  auto* watch = tracker->add_subcommand("watch", "What comes, tool by tool");
+  auto* watch = tracker->add_subcommand("watch", "Print the received poses of each tool");
   add_tracker_link(watch, arguments_of(watch, action, tracker_watch_command));
 
-  auto* record = tracker->add_subcommand("record", "Into a MetaImage sequence file");
+  auto* record = tracker->add_subcommand("record", "Record into a MetaImage sequence file");
   auto& recorded = arguments_of(record, action, tracker_record_command);
   add_tracker_link(record, recorded);
   record->add_option("FILE", recorded.file, "The file to write")->required();
 
-  auto* replay = tracker->add_subcommand("replay", "A MetaImage sequence file as a tracker, over and over");
+  auto* replay = tracker->add_subcommand("replay", "Play a MetaImage sequence file as a tracker, repeatedly");
   auto& replayed = arguments_of(replay, action, tracker_replay_command);
   replay->add_option("FILE", replayed.file, "The file to play")->required();
-  add_port(replay, "--port", replayed.options.port, "Port to listen at; 0: any");
+  add_port(replay, "--port", replayed.options.port, "Port to listen on; 0: any");
   replay
       ->add_option("--address", replayed.options.address,
-                   "Address to listen at: whoever reaches it may connect")
+                   "Address to listen on; every host that reaches it may connect")
       ->capture_default_str();
-  replay->add_option("--seconds", replayed.seconds, "End by itself; otherwise when interrupted")
+  replay->add_option("--seconds", replayed.seconds, "End after this time; default: when interrupted")
       ->check(within(0, 1e6));
-  replay->add_flag("--tdata", replayed.as_tracking,
-                   "Send TDATA to those who ask instead of TRANSFORM to all");
+  replay->add_flag("--tdata", replayed.as_tracking, "Send TDATA on request instead of TRANSFORM to all");
 
-  auto* pivot = tracker->add_subcommand("pivot", "A pointer's tip from a file of it turning about its tip");
+  auto* pivot = tracker->add_subcommand(
+      "pivot", "Calibrate a pointer's tip from a recording of rotations about the tip");
   auto& turned = arguments_of(pivot, action, tracker_pivot_command);
   pivot->add_option("FILE", turned.file, "A MetaImage sequence file")->required();
   pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
@@ -94,60 +97,57 @@ void add_tracker(CLI::App& app, Action& action) {
 
 void add_virtual_or(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "virtual-or", "A virtual C-arm, tracker and robot that speak the real ones' protocols",
+      add_command(app, "virtual-or", "Virtual C-arm, tracker and robot on the protocols of the real ones",
                   "helicarm virtual-or --plan plan.json\n"
                   "  (then type: shoot AP, shoot LAT, fault hide:femur on, fault cut_cable on, where, quit)");
   auto& a = arguments_of(command, action, virtual_or_command);
-  command->add_option("--plan", a.plan, "Write a plan for navigate, with a surgeon's clicks");
-  command->add_flag("--check-points", a.check_points, "The plan asks for a check point on each bone");
+  command->add_option("--plan", a.plan, "Write a plan for navigate, with simulated picks");
+  command->add_flag("--check-points", a.check_points, "The plan requires a check point on each bone");
   add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
-  add_port(command, "--tracker-port", a.virtual_or.tracker_port,
-           "OpenIGTLink; each port 0: any that is free");
+  add_port(command, "--tracker-port", a.virtual_or.tracker_port, "OpenIGTLink; each port 0: any free one");
   add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
   add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
   add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");
-  add_port(command, "--receiver-port", a.receiver.port, "Where the C-arm sends its pictures");
-  command->add_option("--receiver-title", a.receiver.title, "Its application entity title")
+  add_port(command, "--receiver-port", a.receiver.port, "Port to which the C-arm sends its images");
+  command->add_option("--receiver-title", a.receiver.title, "Application entity title of the receiver")
       ->capture_default_str();
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }
 
 void add_navigate(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "navigate", "A whole operation by a plan: X-rays, measurement, robot, check",
-                  "helicarm virtual-or --plan plan.json        (in one terminal)\n"
-                  "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)");
+  auto* command = add_command(
+      app, "navigate", "Carry out an operation by a plan: X-ray images, measurement, robot, verification",
+      "helicarm virtual-or --plan plan.json        (in one terminal)\n"
+      "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)");
   auto& a = arguments_of(command, action, navigate_command);
   command->add_option("PLAN", a.plan, "plan.json (docs/formats.md)")->required();
-  command->add_option("--out", a.out, "Folder of the session: pictures, cases, record")
+  command->add_option("--out", a.out, "Folder of the session: images, cases, record")->capture_default_str();
+  command->add_option("--picks", a.picks, "JSON with \"picks\" as in case.json; awaited after the images");
+  command->add_option("--address", a.receiver.address, "Address to listen on for images")
       ->capture_default_str();
-  command->add_option("--picks", a.picks,
-                      "JSON with \"picks\" as in case.json: waited for after the pictures");
-  command->add_option("--address", a.receiver.address, "Where to listen for pictures")->capture_default_str();
   add_fields(command, a.receiver, receiver_fields);
-  command->add_option("--title", a.receiver.negotiation.title, "Our application entity title")
+  command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
       ->capture_default_str();
-  command->add_flag("--yes", a.yes, "Confirm every order without asking: only where nobody can be hurt");
+  command->add_flag("--yes", a.yes, "Confirm every order automatically; only where no person can be injured");
 }
 
 void add_operate(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "operate", "Table 2's experiment in the virtual operating room, end to end",
-                  "helicarm operate --cases 4 --out operate");
+  auto* command = add_command(app, "operate", "Table 2's experiment with virtual devices, end to end",
+                              "helicarm operate --cases 4 --out operate");
   auto& a = arguments_of(command, action, operate_command);
   command->add_option("--cases", a.cases, "Pairs of bones, four points each")
       ->check(within(1, 1000))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for operate.csv, operate.json and the sessions")
       ->capture_default_str();
-  command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
-  command->add_option("--rate", a.rate_hz, "Of the tracker, Hz")
+  command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
+  command->add_option("--rate", a.rate_hz, "Rate of the tracker, Hz")
       ->check(within(5, 1000))
       ->capture_default_str();
 }
 
 void add_replay(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "replay", "Recompute an operation from its record, to the last bit",
+  auto* command = add_command(app, "replay", "Recompute an operation from its record and compare bit for bit",
                               "helicarm replay operate/case-1");
   auto& a = arguments_of(command, action, replay_command);
   command->add_option("SESSION", a.session, "Folder that holds session.log")->required();

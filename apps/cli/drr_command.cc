@@ -54,10 +54,10 @@ std::string grey_png(const Image<float>& integrals, float greatest) {
 
 void check_outputs(const DrrArguments& arguments, const Console& console) {
   if (arguments.out.empty() && arguments.raw.empty() && !console.json)
-    throw BadInput(Reason::usage, "drr: give --out for a picture or --raw for the line integrals");
+    throw BadInput(Reason::usage, "drr: give --out for an image or --raw for the line integrals");
   if (!arguments.out.empty() && arguments.out.extension() != ".png")
-    throw BadInput(Reason::usage,
-                   fmt::format("--out: {} must end in .png, the one format written", arguments.out.string()));
+    throw BadInput(Reason::usage, fmt::format("--out: {} must end in .png, the only format written",
+                                              arguments.out.string()));
 }
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {

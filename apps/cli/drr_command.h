@@ -9,7 +9,7 @@
 
 namespace helicarm::cli {
 
-/// `helicarm drr VOLUME`: line integrals on a flat detector at right angles to the central ray.
+/// `helicarm drr VOLUME`: line integrals on a flat detector perpendicular to the central ray.
 struct DrrArguments {
   std::filesystem::path volume;
   std::filesystem::path out;

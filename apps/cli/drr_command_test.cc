@@ -16,11 +16,11 @@ namespace helicarm::cli {
 namespace {
 namespace fs = std::filesystem;
 
-TEST(DrrCommand, LeftAndHeadAreWhereTheHelpSays) {
+TEST(DrrCommand, LeftAndHeadAgreeWithTheHelp) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_drr_command_{}", ::getpid());
   fs::create_directories(folder);
   std::string voxels(27, '\0');
-  voxels[2 + 3 * 1 + 9 * 2] = 100;  // to the left, halfway back, at the head
+  voxels[2 + 3 * 1 + 9 * 2] = 100;  // left, centre in depth, at the head
   ASSERT_TRUE(
       write_file(folder / "a.mha",
                  "NDims = 3\nDimSize = 3 3 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + voxels));

@@ -32,7 +32,7 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
     const std::filesystem::path& folder = arguments.run.folder;
     if (std::filesystem::exists(folder / "result.json") && !std::filesystem::exists(folder / "case.json"))
       throw BadInput(Reason::usage,
-                     fmt::format("{}: holds a result; give the case it came from, which is measured again",
+                     fmt::format("{}: holds a result; give the case of this result, which is measured again",
                                  folder.string()));
     const Result result = value_or_throw(measure(arguments.run, console));
     const auto written = value_or_throw(write_exports(result, arguments.run.out, kinds));

@@ -13,7 +13,7 @@ struct ImportArguments {
   std::string unit = "mm";  ///< of lengths in the file: mm or cm
 };
 
-/// A projection made by another program, in mm and in this program's conventions.
+/// Converts the projection of another program to mm and this program's conventions.
 CommandResult import_command(const ImportArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

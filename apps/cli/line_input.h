@@ -6,15 +6,15 @@
 
 namespace helicarm::cli {
 
-/// Lines of a descriptor, such as a terminal or a pipe, of bounded length.
+/// Lines of bounded length from a descriptor such as a terminal or a pipe.
 class LineInput {
  public:
   static constexpr std::size_t longest = 1000;
 
   explicit LineInput(int descriptor) : descriptor_(descriptor) {}
 
-  /// The next line without its end; nothing where none came within this time. Throws BadInput: `interrupted`
-  /// once the input has ended, `bad_size` for a line over 1000 bytes.
+  /// The next line without its end; empty if none arrives within this time. Throws BadInput: `interrupted` at
+  /// the end of the input, `bad_size` for a line over 1000 bytes.
   std::optional<std::string> next(int patience_ms);
 
  private:

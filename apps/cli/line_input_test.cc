@@ -12,7 +12,7 @@ namespace {
 
 constexpr int at_once = 0;
 
-/// Writes into the input that it reads.
+/// Writes into the input under test.
 struct Pipe {
   int ends[2];
   Pipe() { EXPECT_EQ(::pipe(ends), 0); }
@@ -33,7 +33,7 @@ Reason reason_of_next(LineInput& input) {
   return line ? Reason::usage : line.error().reason;
 }
 
-TEST(LineInput, LinesThatCameTogetherAreTakenOneByOne) {
+TEST(LineInput, LinesOfOneWriteAreReadOneByOne) {
   Pipe pipe;
   LineInput input(pipe.ends[0]);
   pipe.write("shoot AP\nwhere\nqu");
@@ -55,7 +55,7 @@ TEST(LineInput, LastLineNeedsNoEnd) {
   EXPECT_EQ(reason_of_next(input), Reason::interrupted);
 }
 
-TEST(LineInput, LineOfAThousandBytesIsTakenAndALongerOneRefused) {
+TEST(LineInput, LineOf1000BytesIsReadAndALongerOneRefused) {
   Pipe pipe;
   LineInput input(pipe.ends[0]);
   pipe.write(std::string(LineInput::longest, 'x') + "\n");
@@ -64,7 +64,7 @@ TEST(LineInput, LineOfAThousandBytesIsTakenAndALongerOneRefused) {
   EXPECT_EQ(reason_of_next(input), Reason::bad_size);
 }
 
-TEST(LineInput, InputWithoutAnEndOfLineTakesNoMemory) {
+TEST(LineInput, InputWithoutLineEndsIsBounded) {
   const int zeros = ::open("/dev/zero", O_RDONLY | O_CLOEXEC);
   LineInput input(zeros);
   EXPECT_EQ(reason_of_next(input), Reason::bad_size);

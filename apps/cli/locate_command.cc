@@ -16,14 +16,14 @@
 namespace helicarm::cli {
 namespace {
 
-/// One point as it was picked, in the order of the first picks.
+/// A point of the picks, in the order of first occurrence.
 struct PickedPoint {
   std::string name;
   std::vector<PointObservation> images;
-  std::optional<Failure> unseen = {};  ///< why the last image missing here is so
+  std::optional<Failure> unseen = {};  ///< the last failure of one of its picks
 };
 
-/// As `run` sees the picks of its case; rectified ones are taken as they are.
+/// Converts picks as `run` does for its case; rectified ones are used unchanged.
 Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
                                       const SavedCalibration& calibration, bool raw) {
   const std::string where = fmt::format("picks: row {}", row + 1);
@@ -38,7 +38,7 @@ Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
   const Eigen::Vector2d uv{table.number(row, "u_px"), table.number(row, "v_px")};
   const auto& map = calibration.maps[view];
   if (raw && map && !map->shows(uv))
-    throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the picture of {} x {} pixels",
+    throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the image of {} x {} pixels",
                                                   where, uv.x(), uv.y(), map->width, map->height));
   return (raw && map ? see_click(*map, uv, given_sigma)
                      : ImagePoint{uv, uv, given_sigma.value_or(click_sigma_px)})

@@ -13,7 +13,7 @@ struct LocateArguments {
   bool raw = false;                   ///< picks are raw pixels, not rectified ones
 };
 
-/// Points in the calibrator's frame from their images in views that were calibrated before.
+/// Points in the calibrator's frame from picks in calibrated views.
 CommandResult locate_command(const LocateArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

@@ -56,7 +56,7 @@ std::string picks_of(const Eigen::Vector3d& point) {
                      a.y(), b.x(), b.y());
 }
 
-TEST(LocateCommand, PointsAndReasonsComeInTheOrderOfThePicks) {
+TEST(LocateCommand, PointsAndReasonsKeepTheOrderOfThePicks) {
   for (bool raw : {false, true}) {
     const Answer answer = locate_in(result_json(), picks_of({10, 20, 30}), raw);
     ASSERT_TRUE(answer.result.has_value()) << answer.result.error().message;
@@ -70,7 +70,7 @@ TEST(LocateCommand, PointsAndReasonsComeInTheOrderOfThePicks) {
   }
 }
 
-TEST(LocateCommand, CovarianceOfTheCalibrationWidensThatOfThePoint) {
+TEST(LocateCommand, CovarianceOfTheCalibrationAddsToThatOfThePoint) {
   Json calibrated = result_json();
   calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(22, 22));
   const double with =
@@ -82,7 +82,7 @@ TEST(LocateCommand, CovarianceOfTheCalibrationWidensThatOfThePoint) {
   EXPECT_EQ(locate_in(calibrated, picks_of({10, 20, 30})).result.error().reason, Reason::bad_value);
 }
 
-TEST(LocateCommand, BadInputIsNamed) {
+TEST(LocateCommand, BadInputIsNamedInTheMessage) {
   const auto reason_of = [](const Json& calibration, const std::string& picks) {
     return locate_in(calibration, picks).result.error().reason;
   };

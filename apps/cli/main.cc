@@ -32,17 +32,17 @@ int run(int argc, char** argv) {
   Console console{std::cout, std::cerr};
   Action action;
   CLI::App app(
-      "helicarm: two X-rays of a knee with a plastic cone on it become points in space, with error bars.\n"
+      "helicarm: 3-D points with confidence regions from X-ray images of a knee with a calibrator.\n"
       "Research instrument, not a medical device.",
       "helicarm");
-  app.footer("Begin with:\n  helicarm demo\nEach command explains itself: helicarm COMMAND --help");
+  app.footer("Begin with:\n  helicarm demo\nHelp for a command: helicarm COMMAND --help");
   app.set_version_flag("--version", "helicarm " HELICARM_VERSION);
   app.fallthrough();
   app.require_subcommand(1);
   app.add_flag("--json", console.json, "Print the answer as JSON");
-  app.add_flag("--quiet", console.quiet, "Print nothing but failures, and what --json asks for");
+  app.add_flag("--quiet", console.quiet, "Print only failures, and the answer with --json");
   app.add_option("--threads", console.threads, "Threads to use; 0: all cores")->check(within(0, 1024));
-  app.add_option("--seed", console.seed, "Seed of whatever is drawn at random")
+  app.add_option("--seed", console.seed, "Seed of the random numbers")
       ->check(within(0, 1e19))
       ->capture_default_str();
   add_measuring_commands(app, action);
@@ -52,7 +52,7 @@ int run(int argc, char** argv) {
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     if (argc > 1 && argv[1][0] != '-' &&
         std::ranges::none_of(commands, [&](const CLI::App* c) { return c->get_name() == argv[1]; }))
-      throw CLI::ParseError(fmt::format("\"{}\" is no command; helicarm --help lists them",
+      throw CLI::ParseError(fmt::format("\"{}\" is not a command; helicarm --help lists the commands",
                                         without_control_characters(argv[1])),
                             CLI::ExitCodes::ExtrasError);
     if (argc == 1) {

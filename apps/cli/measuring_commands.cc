@@ -15,16 +15,16 @@ namespace helicarm::cli {
 namespace {
 
 void add_run(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "run", "Measure a case: two or more X-rays to points, tunnels and error bars",
-                  "helicarm run my-case --out my-result");
+  auto* command = add_command(
+      app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
+      "helicarm run my-case --out my-result");
   auto& a = arguments_of(command, action, run_command);
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
       ->capture_default_str();
   add_fields(command, a.options, run_fields);
   command->add_option("--machine", a.history,
-                      "The C-arm's history (JSON): serves as prior, and this case's shots are added to it");
+                      "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
 }
 
@@ -38,36 +38,38 @@ void add_export(CLI::App& app, Action& action) {
   command
       ->add_option(
           "--as", a.as,
-          fmt::format("Some of {}, with commas between (default: all)", fmt::join(export_words, ", ")))
+          fmt::format("One or more of {}, separated by commas (default: all)", fmt::join(export_words, ", ")))
       ->delimiter(',');
   add_fields(command, a.run.options, run_fields);
-  command->add_option("--machine", a.run.history, "The C-arm's history (JSON), which is left as it is");
+  command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
 }
 
 void add_predict(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "predict", "How far off a point would be, before it is picked",
+  auto* command = add_command(app, "predict", "Predict the error of a point before it is picked",
                               "helicarm predict my-case --at 0,0,40 --at 60,0,40 --map tre");
   auto& a = arguments_of(command, action, predict_command);
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--at", a.at,
-                      "x,y,z in the calibrator's frame, mm; may be given again. Default: its middle");
+                      "x,y,z in the calibrator's frame, mm; repeatable (default: the calibrator's centre)");
   command->add_option("--sigma-px", a.sigma_px, "Noise of a pick, per axis")
       ->check(within(0, 100))
       ->capture_default_str();
   command->add_option("--max-error", a.max_error_mm, "Limit of the decision, mm (95 %)")
       ->check(within(1e-6, 1000))
       ->capture_default_str();
-  command->add_option("--machine", a.history, "The C-arm's history (JSON), which is left as it is");
+  command->add_option("--machine", a.history, "The C-arm's history (JSON), read only");
   command->add_option("--map", a.map, "Folder for a map about the calibrator: tre.csv, tre.vtk, tre.svg");
-  command->add_option("--half", a.half_mm, "The map reaches so far, mm")
+  command->add_option("--half", a.half_mm, "Half the side of the map, mm")
       ->check(within(1, 1000))
       ->capture_default_str();
-  command->add_option("--step", a.step_mm, "of the map, mm")->check(within(0.5, 100))->capture_default_str();
+  command->add_option("--step", a.step_mm, "Spacing of the map's points, mm")
+      ->check(within(0.5, 100))
+      ->capture_default_str();
 }
 
 void add_solve(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "solve", "Calibrate one view from points of known place and their pixels (Eq. 4-7)",
+      add_command(app, "solve", "Calibrate one view from known 3-D points and their pixels (Eq. 4-7)",
                   "helicarm solve --points points.csv --method ml --json");
   auto& a = arguments_of(command, action, solve_command);
   command->add_option("--points", a.points, "CSV: label,x_mm,y_mm,z_mm,u_px,v_px[,sigma_px]")->required();
@@ -75,9 +77,8 @@ void add_solve(CLI::App& app, Action& action) {
 }
 
 void add_locate(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "locate", "Intersect rays of picked pixels in views calibrated before (Eq. 8)",
-                  "helicarm locate --calibration my-result/result.json --picks picks.csv --json");
+  auto* command = add_command(app, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
+                              "helicarm locate --calibration my-result/result.json --picks picks.csv --json");
   auto& a = arguments_of(command, action, locate_command);
   command->add_option("--calibration", a.calibration, "result.json of a run")->required();
   command->add_option("--picks", a.picks, "CSV: name,view,u_px,v_px[,sigma_px], rectified pixels")
@@ -86,18 +87,19 @@ void add_locate(CLI::App& app, Action& action) {
 }
 
 void add_rectify(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "rectify", "Undo an intensifier's distortion by its plate, or apply a known map (2.1)",
-                  "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
-                  "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
-                  "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
+  auto* command = add_command(app, "rectify",
+                              "Correct an intensifier's distortion by its plate, or apply a known map (2.1)",
+                              "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
+                              "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
+                              "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
   auto& a = arguments_of(command, action, rectify_command);
   command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF");
-  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(within(1, 100000));
+  command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
+      ->check(within(1, 100000));
   command->add_option("--plate", a.plate, "plate.json, or plate48");
   command->add_option("--map", a.map, "map.json of an earlier rectification");
   command->add_option("--points", a.points, "CSV: u_px,v_px, raw pixels");
-  command->add_flag("--inverse", a.inverse, "The points are rectified pixels; give raw ones");
+  command->add_flag("--inverse", a.inverse, "The points are rectified pixels; return raw ones");
   command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
       ->check(within(0.1, 1000));
   command->add_option("--out", a.out, "Folder for rectified.dcm, inpainted.dcm, map.json and residuals.csv")
@@ -107,17 +109,18 @@ void add_rectify(CLI::App& app, Action& action) {
 }
 
 void add_detect(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "detect", "Find balls, holes or wire crossings to a fraction of a pixel",
+  auto* command = add_command(app, "detect", "Detect balls, holes or wire crossings with sub-pixel precision",
                               "helicarm detect AP.dcm --kind balls --json");
   auto& a = arguments_of(command, action, detect_command);
   command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF")->required();
-  command->add_option("--frame", a.frame, "Which picture of several, from 1")->check(within(1, 100000));
+  command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
+      ->check(within(1, 100000));
   command->add_option("--kind", a.kind, "balls, holes or crosses")->capture_default_str();
 }
 
 void add_import(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "import", "Read a projection that another program made: MayaCam 2, NRRD, a matrix",
+      add_command(app, "import", "Read a projection of another program: MayaCam 2, NRRD, a matrix",
                   "helicarm import camera.txt --unit cm --json");
   auto& a = arguments_of(command, action, import_command);
   command->add_option("FILE", a.file, "MayaCam 2, NRRD header, or a 3x4 matrix as text or JSON")->required();

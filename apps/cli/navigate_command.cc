@@ -29,8 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::seconds robot_patience{10};
 
-/// Stops the robot, and what waits for the tracker, when the program is told to end, whatever it does just
-/// then.
+/// Stops the robot and every wait for the tracker on a stop signal, at any time.
 class Ending {
  public:
   Ending(StopSignal& signal, RobotLink& robot, Operation& operation)
@@ -44,9 +43,9 @@ class Ending {
         }) {}
 
   void check() const {
-    if (reported_) throw BadInput(Reason::interrupted, "told to end");
+    if (reported_) throw BadInput(Reason::interrupted, "stopped by signal");
   }
-  /// Until this holds, looking again and again.
+  /// Polls until the condition holds.
   template <class Holds>
   void wait_until(const Holds& holds) const {
     for (check(); !holds(); check()) std::this_thread::sleep_for(std::chrono::duration<double>(glance_s));
@@ -63,7 +62,7 @@ bool input_waits() {
   return ::poll(&input, 1, 0) > 0;
 }
 
-/// Asks the person at the terminal; nobody there means no.
+/// Asks for confirmation at the terminal; without a terminal the answer is no.
 class Consent {
  public:
   Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
@@ -75,7 +74,7 @@ class Consent {
       const std::function<Expected<void>()>& holds = [] { return Expected<void>(); }) {
     ending_.check();
     if (!yes_ && !agreed(order, holds))
-      return fail(Reason::order_not_confirmed, fmt::format("{}: nobody confirmed it", order.name));
+      return fail(Reason::order_not_confirmed, fmt::format("{}: not confirmed", order.name));
     return robot_.confirm(order);
   }
 
@@ -85,13 +84,13 @@ class Consent {
     const RigidTransform& last = order.waypoints.back().base_from_tcp;
     console_.progress
         << fmt::format(
-               "order \"{}\": {} moves, tip to {:.0f} {:.0f} {:.0f} mm in the robot's base; stand "
-               "clear. Type \"go\" to confirm: ",
+               "order \"{}\": {} moves, tip to {:.0f} {:.0f} {:.0f} mm in the robot's base frame; keep "
+               "clear of the robot. Type \"go\" to confirm: ",
                without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
                last.translation.y(), last.translation.z())
         << std::flush;
     ending_.wait_until([&] {
-      // Poses may be missing for a while, as when somebody stands before the tracker.
+      // Poses may be missing temporarily, for example when the line of sight is blocked.
       if (const auto held = holds(); !held && held.error().reason == Reason::plan_stale)
         throw BadInput(held.error());
       return input_waits();
@@ -106,14 +105,14 @@ class Consent {
   Console& console_;
 };
 
-/// What can be known to be wrong before anybody is irradiated.
+/// Checks for errors that can be detected before the first X-ray image.
 void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
   const auto refuse = [&](Reason reason, const std::string& problem) {
     throw BadInput(reason, fmt::format("{}: {}", arguments.plan.string(), problem));
   };
   if (!arguments.yes && !::isatty(STDIN_FILENO))
     throw BadInput(Reason::order_not_confirmed,
-                   "no terminal to confirm orders at; --yes confirms all, where nobody can be hurt");
+                   "no terminal to confirm orders; --yes confirms all, only where no person can be injured");
   if (plan.tunnels.empty()) refuse(Reason::bad_value, "\"tunnels\" is empty");
   if (plan.calibrator != udcsc().name && !fs::exists(plan.calibrator))
     refuse(Reason::missing_file, fmt::format("\"calibrator\": {}: no such file", plan.calibrator));
@@ -125,10 +124,10 @@ void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
       if (std::ranges::none_of(plan.picks, [&](const Json& pick) {
             return pick.is_object() && pick.value("name", Json()) == Json(end);
           }))
-        refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is no pick", tunnel.name, end));
+        refuse(Reason::bad_value, fmt::format("tunnel \"{}\": \"{}\" is not a pick", tunnel.name, end));
 }
 
-/// Markers of the plan that the tracker does not show now; of the facets one is enough.
+/// Markers of the plan that the tracker does not report now; one facet suffices.
 std::string not_seen(const OperationPlan& plan, const PoseBoard& board) {
   const auto seen = [&](const std::string& tool) {
     return board.latest(tool, monotonic_seconds()).has_value();
@@ -141,25 +140,25 @@ std::string not_seen(const OperationPlan& plan, const PoseBoard& board) {
   return missing;
 }
 
-/// Waits until tracker and robot are there, and says what it waits for.
+/// Waits for tracker and robot, and prints what is missing.
 void wait_for_devices(const OperationPlan& plan, Connections& devices, const Ending& ending,
                       Console& console) {
-  std::string told;
+  std::string last_printed;
   ending.wait_until([&] {
     std::string wants;
     if (const std::string missing = not_seen(plan, devices.board()); !missing.empty())
       wants =
-          fmt::format("tracker {} port {}: not seen:{}", plan.tracker.address, plan.tracker.port, missing);
+          fmt::format("tracker {} port {}: not visible:{}", plan.tracker.address, plan.tracker.port, missing);
     else if (const auto state = devices.robot().wait_connected({}); !state)
       wants = fmt::format("robot {}: {}", plan.robot.address, state.error().message);
     else if (const auto why = why_stopped(*state))
       wants = fmt::format("robot {}: {}", plan.robot.address, why->message);
-    if (!wants.empty() && wants != told && !console.quiet)
+    if (!wants.empty() && wants != last_printed && !console.quiet)
       console.progress << "waiting: " << without_control_characters(wants) << std::endl;
-    told = wants;
+    last_printed = wants;
     return wants.empty();
   });
-  // An exposure's poses are taken from the second and a half before it.
+  // The pose window of an acquisition is the 1.5 s before an image's arrival.
   const auto full = std::chrono::steady_clock::now() + std::chrono::milliseconds(1600);
   ending.wait_until([&] { return std::chrono::steady_clock::now() > full; });
 }
@@ -170,7 +169,7 @@ Json picks_of(const fs::path& file) {
   return reader.has("picks") ? reader.raw("picks") : Json::array();
 }
 
-void tell_points(const Result& result, Console& console) {
+void print_points(const Result& result, Console& console) {
   for (const PointResult& point : result.points)
     if (point.place) {
       const Eigen::Vector3d& at = point.place->in_calibrator;
@@ -179,24 +178,26 @@ void tell_points(const Result& result, Console& console) {
     }
 }
 
-/// What the robot is about to do before anything is known of where it stands.
-void tell_tour(const std::vector<RobotOrder>& orders, Console& console) {
+/// Prints the robot's moves for hand-eye calibration, relative to its present pose.
+void print_tour(const std::vector<RobotOrder>& orders, Console& console) {
   if (console.quiet || orders.empty()) return;
   const RigidTransform home = orders.back().waypoints.back().base_from_tcp;  // where it stands now
-  console.progress << fmt::format("hand-eye calibration: {} moves at {:g} mm/s about where the tool is\n",
-                                  orders.size(), orders.front().waypoints.back().speed_mm_s);
+  console.progress << fmt::format(
+      "hand-eye calibration: {} moves at {:g} mm/s about the tool's present pose\n", orders.size(),
+      orders.front().waypoints.back().speed_mm_s);
   for (std::size_t i = 0; i < orders.size(); ++i) {
     const RigidTransform there = orders[i].waypoints.back().base_from_tcp;
     const Eigen::Vector3d shift = there.translation - home.translation;
     const double turn_rad = Eigen::AngleAxisd(home.rotation.transpose() * there.rotation).angle();
     console.progress << fmt::format(
-        "  {}: tip {:+.0f} {:+.0f} {:+.0f} mm along the robot's base, turned by {:.0f} degrees\n", i + 1,
-        shift.x(), shift.y(), shift.z(), turn_rad * 180 / std::numbers::pi);
+        "  {}: tip {:+.0f} {:+.0f} {:+.0f} mm along the axes of the robot's base, rotated by {:.0f} "
+        "degrees\n",
+        i + 1, shift.x(), shift.y(), shift.z(), turn_rad * 180 / std::numbers::pi);
   }
   console.progress << std::flush;
 }
 
-/// Until the pointer is held still where the tracker sees it.
+/// Waits until the pointer is held still in view of the tracker.
 void touch(Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
            Console& console) {
   console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
@@ -206,7 +207,8 @@ void touch(Operation& operation, const std::string& name, LineInput& input, cons
     ending.wait_until([&] { return input.next(0).has_value(); });
     const auto off = operation.touch(name);
     if (off) {
-      console.progress << fmt::format("{}: taken, {:.2f} mm off\n", without_control_characters(name), *off)
+      console.progress << fmt::format("{}: recorded, deviation {:.2f} mm\n", without_control_characters(name),
+                                      *off)
                        << std::flush;
       return;
     }
@@ -219,10 +221,10 @@ void touch(Operation& operation, const std::string& name, LineInput& input, cons
   }
 }
 
-void tell_outcome(const TunnelOutcome& outcome, Console& console) {
+void print_outcome(const TunnelOutcome& outcome, Console& console) {
   console.out << fmt::format(
-      "{}: start {:.2f} mm off the tool's axis (expect {:.2f}), end {:.2f} (expect {:.2f}), after {} "
-      "corrections\n",
+      "{}: distance from the tool's axis: start {:.2f} mm (predicted {:.2f}), end {:.2f} mm (predicted "
+      "{:.2f}), after {} corrections\n",
       outcome.tunnel, outcome.start.distance_mm(), outcome.start.predicted_mm(), outcome.end.distance_mm(),
       outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1);
 }
@@ -266,7 +268,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       operation->pick(picks_of(arguments.picks));
     }
     value_or_throw(operation->measure());
-    tell_points(operation->result(), console);
+    print_points(operation->result(), console);
 
     Consent consent(devices.robot(), ending, arguments.yes, console);
     const Operation::Confirm confirm = [&](const RobotOrder& order) { return consent(order); };
@@ -274,18 +276,18 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     ending.wait_until(
         [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
     value_or_throw(devices.robot().unlock("the operator at the terminal"));
-    tell_tour(value_or_throw(operation->preview_tour()), console);
+    print_tour(value_or_throw(operation->preview_tour()), console);
     value_or_throw(operation->register_robot(confirm));
     for (const PlannedTunnel& tunnel : plan.tunnels) {
       const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
       for (const std::string& name : operation->checks_to_come(tunnel.bone))
         touch(*operation, name, input, ending, console);
       const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
-      console.progress << fmt::format("look at {}\n",
+      console.progress << fmt::format("preview: {}\n",
                                       (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())
                        << std::flush;
       const std::string token = value_or_throw(consent(order, [&] { return operation->check_plan(order); }));
-      tell_outcome(value_or_throw(operation->go(order, token)), console);
+      print_outcome(value_or_throw(operation->go(order, token)), console);
       value_or_throw(operation->withdraw(order, rest, confirm));
     }
     value_or_throw(operation->finish());

@@ -11,12 +11,12 @@ namespace helicarm::cli {
 struct NavigateArguments {
   std::filesystem::path plan;
   std::filesystem::path out = "session";
-  std::filesystem::path picks;  ///< waited for once the images are in; empty: those of the plan
+  std::filesystem::path picks;  ///< awaited after the images; empty: those of the plan
   ReceiverOptions receiver;
-  bool yes = false;  ///< confirm every order without asking: for rehearsals
+  bool yes = false;  ///< confirm every order automatically: for rehearsals
 };
 
-/// A whole operation from a plan: images, measurement, robot, check.
+/// A whole operation from a plan: images, measurement, robot, verification.
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

@@ -15,12 +15,12 @@
 namespace helicarm::cli {
 namespace {
 
-/// Two at a time keep a small machine's robots on time.
+/// Two at a time: a small machine still serves the robots in time.
 constexpr unsigned most_at_once = 2;
 constexpr int most_attempts = 3;
 
-/// What a machine too busy to keep a robot's time leads to; nothing moved that should not have.
-bool came_late(const Failure& failure) {
+/// Failures caused by a machine that is too busy to serve the robot in time; none of them moves the robot.
+bool is_timing_failure(const Failure& failure) {
   return failure.reason == Reason::stale_state || failure.reason == Reason::stale_pose ||
          failure.reason == Reason::robot_stopped;
 }
@@ -44,12 +44,13 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
     });
     const auto check = [&] {
       if (told)
-        throw BadInput(Reason::interrupted,
-                       fmt::format("told to end; the sessions in {} are broken off", arguments.out.string()));
+        throw BadInput(
+            Reason::interrupted,
+            fmt::format("stopped by signal; the sessions in {} are incomplete", arguments.out.string()));
     };
     std::mutex telling;
     std::vector<Expected<Rehearsal>> done(static_cast<std::size_t>(arguments.cases),
-                                          fail(Reason::not_connected, "not begun"));
+                                          fail(Reason::not_connected, "not started"));
     const unsigned crew = console.threads == 0 ? most_at_once : console.threads;
     parallel_for(done.size(), crew, [&](std::size_t i) {
       RehearsalOptions options;
@@ -69,8 +70,8 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
             attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
         done[i] = guarded(
             [&] { return value_or_throw(rehearse(console.seed + i, arguments.out / folder, options)); });
-        if (done[i] || told || !came_late(done[i].error())) break;
-        say(fmt::format("broken off ({}: {})", code(done[i].error().reason), done[i].error().message));
+        if (done[i] || told || !is_timing_failure(done[i].error())) break;
+        say(fmt::format("aborted ({}: {})", code(done[i].error().reason), done[i].error().message));
       }
     });
     check();

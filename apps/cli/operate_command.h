@@ -14,7 +14,7 @@ struct OperateArguments {
   std::filesystem::path out = "operate";
 };
 
-/// Table 2's experiment in the virtual operating room, end to end over sockets.
+/// Table 2's experiment with virtual devices, end to end over sockets.
 CommandResult operate_command(const OperateArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

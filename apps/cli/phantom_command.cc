@@ -128,7 +128,8 @@ CommandResult phantom_command(const PhantomArguments& arguments, Console& consol
         return arguments.plate ? show(plate_of(arguments), console) : show(calibrator_of(arguments), console);
       case PhantomAction::check:
         if (arguments.plate)
-          throw BadInput(Reason::usage, "phantom check: the rules are the calibrator's, not the plate's");
+          throw BadInput(Reason::usage,
+                         "phantom check: the rules apply to the calibrator only; omit --plate");
         return check(calibrator_of(arguments), console);
       case PhantomAction::export_files:
         return write(arguments.plate ? exported(plate_of(arguments), arguments)

@@ -15,7 +15,7 @@ enum class PhantomAction { show, check, export_files };
 /// `show` prints a valid calibrator.json or plate.json.
 struct PhantomArguments {
   PhantomAction action = PhantomAction::show;
-  std::string name_or_file;                   ///< a built-in's name or a file; empty: udcsc or plate48
+  std::string name_or_file;                   ///< name of a built-in or a file; empty: udcsc or plate48
   bool plate = false;                         ///< the rectification plate instead of the calibrator
   std::optional<std::filesystem::path> stl;   ///< export: the printable body
   std::optional<std::filesystem::path> svg;   ///< export: the drawing

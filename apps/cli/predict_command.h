@@ -21,7 +21,7 @@ struct PredictArguments {
   double step_mm = 10;
 };
 
-/// How far off a point would be that is picked in all views of a case: before anything is picked there.
+/// Predicted error of a point picked in all views of a case, without picks.
 CommandResult predict_command(const PredictArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

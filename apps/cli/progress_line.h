@@ -8,8 +8,8 @@
 
 namespace helicarm::cli {
 
-/// What a long command says of itself while it works: share done and time left, on one line of a terminal,
-/// else a line for each tenth. Work of less than a second is silent.
+/// Progress of a long command: percentage and remaining time, on one line of a terminal, else one line per 10
+/// %. Work of less than a second prints nothing.
 class ProgressLine {
  public:
   explicit ProgressLine(const Console& console);
@@ -17,7 +17,7 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  /// `share` of the whole; what was done before the first call does not count for the time left.
+  /// `share` of the whole; the share at the first call is excluded from the time estimate.
   void notify(double share);
 
  private:

@@ -12,7 +12,7 @@
 namespace helicarm::cli {
 namespace {
 
-/// Tells the console of images as they come, from whatever thread.
+/// Prints images as they arrive, from any thread.
 class ReceptionLog {
  public:
   ReceptionLog(Console& console, std::optional<std::uint64_t> count, StopSignal& stop)
@@ -60,8 +60,8 @@ void check_titles(const dicom::NegotiationOptions& options) {
   const auto check = [](const char* option, const std::string& title) {
     if (!dicom::is_title(title))
       throw BadInput(Reason::usage,
-                     fmt::format("{}: \"{}\" is no title: 1 to 16 printable characters, no backslash", option,
-                                 without_control_characters(title)));
+                     fmt::format("{}: \"{}\" is not a title: 1 to 16 printable characters, no backslash",
+                                 option, without_control_characters(title)));
   };
   check("--title", options.title);
   for (const std::string& peer : options.peers) check("--peer", peer);
@@ -92,7 +92,7 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
         throw BadInput(Reason::missing_file,
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
       if (std::filesystem::equivalent(arguments.watch, arguments.out))
-        throw BadInput(Reason::usage, "--watch: is the folder of --out itself");
+        throw BadInput(Reason::usage, "--watch: is the folder of --out; give another folder");
       watched.emplace(arguments.watch, *inbox, tale.hooks(), WatchedFolder::usual_pause, arguments.count);
     }
     stop.wait(arguments.seconds);

@@ -18,7 +18,7 @@ struct ReceiveArguments {
   std::optional<double> seconds;
 };
 
-/// Prints one line (or one line of JSON) for each image until it is told to end.
+/// Prints one line (or one line of JSON) for each image until stopped.
 CommandResult receive_command(const ReceiveArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

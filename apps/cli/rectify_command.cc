@@ -81,8 +81,8 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
     console.out << to_text(figures_of(r)) << '\n';
   else if (!console.quiet)
     console.out << fmt::format(
-        "{}: {} dots, residual {:.3f} px rms, {:.3f} max, held out {:.3f}; written to {}\n", r.map.model,
-        r.dots_found, r.map.residual_rms_px, r.map.residual_max_px, r.map.held_out_rms_px,
+        "{}: {} dots, residual {:.3f} px rms, {:.3f} max, cross-validated {:.3f}; written to {}\n",
+        r.map.model, r.dots_found, r.map.residual_rms_px, r.map.residual_max_px, r.map.held_out_rms_px,
         arguments.out.string());
 }
 

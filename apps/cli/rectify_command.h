@@ -23,7 +23,7 @@ struct RectifyArguments {
 };
 
 /// Fits the distortion of an image and writes rectified.dcm, map.json and residuals.csv; or applies a map to
-/// points; or measures what a map leaves on the test grid (Eq. 14-15).
+/// points; or measures the residual errors of a map on the test grid (Eq. 14-15).
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

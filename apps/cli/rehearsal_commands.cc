@@ -10,64 +10,64 @@ namespace helicarm::cli {
 namespace {
 
 void add_demo(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "demo", "Simulate a pair of X-rays, measure it and compare with the truth",
-                              "helicarm demo --out helicarm-demo");
+  auto* command =
+      add_command(app, "demo", "Simulate two X-ray images, measure them and compare with the ground truth",
+                  "helicarm demo --out helicarm-demo");
   auto& a = arguments_of(command, action, demo_command);
   command->add_option("--out", a.out, "Folder for the case and its result")->capture_default_str();
 }
 
 void add_simulate(CLI::App& app, Action& action) {
-  auto* command =
-      add_command(app, "simulate", "Draw a case with known truth: X-rays of a knee with the calibrator",
-                  "helicarm simulate my-case --kind tunnels --seed 7");
+  auto* command = add_command(
+      app, "simulate", "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
+      "helicarm simulate my-case --kind tunnels --seed 7");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
   command
       ->add_option("--kind", a.kind,
-                   "accuracy: AP and lateral picture, five check targets\n"
+                   "accuracy: AP and lateral image, five check targets\n"
                    "tunnels: balls at the tunnels' ends, tracker and tool\n"
                    "flat: as accuracy, on a flat panel\n"
                    "grid: the test grid of wires (3.1), for rectify --test-grid")
       ->capture_default_str();
   command
-      ->add_option(
-          "--distance", a.distances_mm,
-          "grid: of the wires from the receiver, mm; one gives GRID.dcm (default: 45), 30,60,90 give "
-          "GRID-30.dcm and so on")
+      ->add_option("--distance", a.distances_mm,
+                   "grid: distance of the wires from the receiver, mm; one value gives GRID.dcm (default: "
+                   "45), 30,60,90 give GRID-30.dcm and so on")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(20, 500));
   command->add_option(
       "--preset", a.preset,
-      "The C-arm; pixels are those of 1024 a side\n"
+      "The C-arm; pixel sizes are those of images with 1024 px per side\n"
       "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
       "no distortion, no plate\n"
       "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
       "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
-  command->add_option("--size", a.size, "Pixels a side: 512 or 1024")->capture_default_str();
+  command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
-  command->add_flag("!--no-knee", a.knee, "Leave the knee out");
+  command->add_flag("!--no-knee", a.knee, "Without the knee");
   command->add_option("--response", a.response,
-                      "Of the grey values: linear or log (default: log with the knee, else linear)");
+                      "Response of the grey values: linear or log (default: log with the knee, else linear)");
   command
       ->add_option(
           "--view", a.views,
-          "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 looks up from below, "
-          "LAT:90,0 from the side (default: these two, roughly)")
+          "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 has the source below, "
+          "LAT:90,0 from the side (default: these two, approximately)")
       ->allow_extra_args(false);
-  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm itself (default: the seed)")
+  command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm (default: the seed)")
       ->check(within(0, 1e19));
   command->add_option("--ct", a.ct,
-                      "A CT in place of the drawn knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
+                      "A CT instead of the synthetic knee: MHA, NRRD, NIfTI or a folder of DICOM slices");
   command
       ->add_option("--ct-centre", a.ct_centre_mm,
-                   "x,y,z (L, P, S; mm) of the CT that comes to the knee's origin; default: its middle")
+                   "x,y,z (L, P, S; mm) of the CT at the knee's origin; default: its centre")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(-1e5, 1e5));
   command
       ->add_option("--ct-turn", a.ct_turn_deg,
-                   "x,y,z: turn it about the knee's distal, lateral and anterior axis, degrees")
+                   "x,y,z: rotation of the CT about the knee's distal, lateral and anterior axis, degrees")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(-360, 360));
@@ -84,7 +84,7 @@ void add_drr(CLI::App& app, Action& action) {
       ->required();
   command->add_option("--out", a.out, "PNG, 16 bits, from no attenuation (black) to the greatest (white)");
   command->add_option("--raw", a.raw, "The line integrals as 32-bit floats, little endian, row by row");
-  command->add_option("--size", a.size, "Pixels a side")->check(within(1, 8192))->capture_default_str();
+  command->add_option("--size", a.size, "Pixels per side")->check(within(1, 8192))->capture_default_str();
   command->add_option("--pixel", a.pixel_mm, "Pixel on the detector, mm")
       ->check(within(0.01, 20))
       ->capture_default_str();
@@ -96,27 +96,26 @@ void add_drr(CLI::App& app, Action& action) {
       ->capture_default_str();
   command
       ->add_option("--centre", a.centre_mm,
-                   "x,y,z (L, P, S; mm) on the central ray; default: the volume's middle")
+                   "x,y,z (L, P, S; mm) on the central ray; default: the volume's centre")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(-1e5, 1e5));
-  command
-      ->add_option("--angle", a.angle_deg, "Where the source is: 0 before the patient, 90 at the left side")
+  command->add_option("--angle", a.angle_deg, "Position of the source: 0 anterior, 90 at the patient's left")
       ->check(within(-360, 360))
       ->capture_default_str();
-  command->add_option("--tilt", a.tilt_deg, "The source towards the head")
+  command->add_option("--tilt", a.tilt_deg, "Tilt of the source towards the head")
       ->check(within(-89, 89))
       ->capture_default_str();
   command
       ->add_option("--values", a.values,
                    "hu: attenuation by Hounsfield units, water 0.02059 / mm, 0 below -800\n"
-                   "raw: integrate the voxels' values as they are")
+                   "raw: integrate the voxels' values unchanged")
       ->capture_default_str();
 }
 
 void add_study(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "study", "The paper's simulations, and the estimators against the statistical limit",
+      add_command(app, "study", "The paper's simulations, and the estimators against the Cramer-Rao bound",
                   "helicarm study number --out number\n"
                   "  helicarm study location --calibrator udcsc --out location\n"
                   "  helicarm study limit --groups 10000 --seed 1 --out limit");
@@ -125,18 +124,18 @@ void add_study(CLI::App& app, Action& action) {
       ->add_option("NAME", a.name,
                    "number: FRE and TRE by number of balls (Fig. 5)\n"
                    "uniformity: E(A) against TRE (Fig. 6)\n"
-                   "location: TRE by place of the target (Fig. 7)\n"
+                   "location: TRE by position of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
                    "rectification: the test grid at ten distances, by ten intensifiers (Figs. 9 to 11)\n"
                    "design: ball positions of least TRE under the rules\n"
-                   "limit: error over the Cramer-Rao bound, and coverage of error bars\n"
-                   "centres: what wrong assumptions about a ball's picture cost")
+                   "limit: error over the Cramer-Rao bound, and coverage of the confidence regions\n"
+                   "centres: errors of ball centres under wrong assumptions about the image")
       ->required();
   command->add_option("--groups", a.groups, "Trials of each setting; centres: balls of each situation")
       ->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
-  command->add_flag("--resume", a.resume, "Go on where a run was stopped that wrote to the same folder");
+  command->add_flag("--resume", a.resume, "Continue an interrupted run that wrote to the same folder");
   command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")
       ->delimiter(',')
       ->allow_extra_args(false)
@@ -144,20 +143,21 @@ void add_study(CLI::App& app, Action& action) {
   command
       ->add_option(
           "--sigma", a.sigmas,
-          "How N(0, 2.34) is read: std, var, mean_distance, rms_distance; number: several (default: all)")
+          "Reading of N(0, 2.34): std, var, mean_distance, rms_distance; number: several (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--reading", a.readings,
-                   "number: pixels projected back: calibration_pixels, fresh_noise, exact (default: all)")
+                   "number: back-projected pixels: calibration_pixels, fresh_noise, exact (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--fle", a.fle, "Instead of 2.34")->check(within(0, 1000));
-  command->add_option("--origin", a.origin, "World's origin on the cone's axis: base (as printed) or centre");
+  command->add_option("--fle", a.fle, "Value instead of 2.34")->check(within(0, 1000));
+  command->add_option("--origin", a.origin,
+                      "Origin of the world frame on the cone's axis: base (as published) or centre");
   command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
   command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome");
   command->add_option("--calibrator", a.calibrator,
-                      "location: a built-in's name or a file; else random balls");
+                      "location: name of a built-in or a file (default: random balls)");
 }
 
 void add_phantom(CLI::App& app, Action& action) {
@@ -172,7 +172,7 @@ void add_phantom(CLI::App& app, Action& action) {
                                                {"export", PhantomAction::export_files}}))
       ->required();
   command->add_option("NAME_OR_FILE", a.name_or_file,
-                      "A built-in's name or a file; udcsc or plate48 without it");
+                      "Name of a built-in or a file (default: udcsc or plate48)");
   command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
   command->add_option("--stl", a.stl, "export: the printable body");
   command->add_option("--svg", a.svg, "export: the drawing");

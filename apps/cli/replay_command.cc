@@ -23,16 +23,16 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                   << '\n';
     } else {
       console.out << fmt::format(
-          "{} records{}{}: {} exposures, {} pictures of cases, {} results, {} hand-eye calibrations\n",
-          report.records, report.torn ? " and a torn one" : "",
-          report.finished ? "" : ", without the operation's end", report.exposures, report.images,
-          report.results, report.hand_eyes);
+          "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations\n",
+          report.records, report.torn ? " and an incomplete one" : "",
+          report.finished ? "" : ", operation not ended", report.exposures, report.images, report.results,
+          report.hand_eyes);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())
       throw BadInput(Reason::replay_differs,
-                     fmt::format("{} of the record's values come out otherwise", report.differences.size()));
-    if (!console.json) console.out << "all come out the same, to the last bit\n";
+                     fmt::format("{} recorded values differ on recomputation", report.differences.size()));
+    if (!console.json) console.out << "all recorded values are reproduced bit for bit\n";
   });
 }
 

@@ -11,7 +11,7 @@ struct ReplayArguments {
   std::filesystem::path session;
 };
 
-/// Recomputes an operation from its record and says whether everything comes out the same.
+/// Recomputes an operation from its record and reports differences.
 CommandResult replay_command(const ReplayArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

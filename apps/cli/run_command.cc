@@ -24,7 +24,7 @@ std::string statistics_line(std::string_view what, const Statistics& s) {
                      s.n);
 }
 
-/// What an earlier run left, or one that could write only a part, must never pass for an answer.
+/// Removes files of an earlier or incomplete run, which could be taken for an answer.
 void forget(const std::filesystem::path& out) {
   std::error_code ignored;
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
@@ -38,13 +38,14 @@ Expected<void> remember(const std::filesystem::path& path, CArmHistory history,
     if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
       history.entries.push_back(entry);
   if (!console.quiet)
-    console.progress << fmt::format("helicarm: {}: {} earlier shots, {} added{}\n", path.string(), earlier,
-                                    history.entries.size() - earlier,
-                                    entries.empty() ? ": the residuals belie this case" : "");
+    console.progress << fmt::format(
+        "helicarm: {}: {} earlier acquisitions, {} added{}\n", path.string(), earlier,
+        history.entries.size() - earlier,
+        entries.empty() ? ": the residuals of this case are inconsistent with the noise model" : "");
   return write_file(path, to_text(to_json(history)) + "\n");
 }
 
-/// The result goes last: where it lies, all that belongs to it lies there too.
+/// result.json is written last, so that its presence implies the other files.
 Expected<void> write(const Result& result, const RunArguments& arguments) {
   auto written = arguments.no_report ? Expected<void>() : write_report(result, arguments.out);
   if (written) written = write_file(arguments.out / "result.json", to_text(to_json(result)) + "\n");
@@ -56,7 +57,7 @@ Expected<void> write(const Result& result, const RunArguments& arguments) {
   return written;
 }
 
-/// A case whose description already allows no answer (a flat calibrator, say) is refused like any other.
+/// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
 Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions& options) {
   const auto given = read_case(folder);
   if (given) return run_case(*given, options);
@@ -86,7 +87,7 @@ std::string summary_of(const Result& result) {
                      statistics_line("FRE mm", result.accuracy.fre_mm) +
                      statistics_line("TRE mm", result.accuracy.tre_mm);
   if (!result.points.empty())
-    text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm in the calibrator\n", "point", "x", "y", "z");
+    text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm, calibrator frame\n", "point", "x", "y", "z");
   for (const PointResult& point : result.points)
     text += point.place
                 ? fmt::format("  {:<12} {}   within {:.3f} (95 %)\n", point.name,
@@ -96,7 +97,7 @@ std::string summary_of(const Result& result) {
   for (const Tunnel& tunnel : result.tunnels)
     if (tunnel.start_in_tool && tunnel.end_in_tool)
       text += fmt::format(
-          "\n  tunnel {:<8} in the tool's frame, {:.2f} mm long, axis within {:.2f} degrees (one sigma)\n"
+          "\n  tunnel {:<8} in the tool's frame, length {:.2f} mm, axis sigma {:.2f} degrees\n"
           "    start {}\n    end   {}\n",
           tunnel.name, tunnel.length_mm.value_or(0), tunnel.axis_sigma_deg().value_or(0),
           coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
@@ -104,8 +105,8 @@ std::string summary_of(const Result& result) {
     for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
       if (*error)
         text += fmt::format(
-            "\n  tool line {:<8} misses the {} by {:.2f} px, {:.2f} mm (Eq. 17), {:.2f} mm in space", v.name,
-            end, (*error)->combined_px, (*error)->combined_mm, (*error)->distance_mm);
+            "\n  tool line {:<8} distance from the {}: {:.2f} px, {:.2f} mm (Eq. 17), {:.2f} mm in space",
+            v.name, end, (*error)->combined_px, (*error)->combined_mm, (*error)->distance_mm);
   return text + (result.verifications.empty() ? "" : "\n");
 }
 

@@ -13,22 +13,22 @@ namespace helicarm::cli {
 struct RunArguments {
   std::filesystem::path folder;  ///< holds case.json
   std::filesystem::path out = "helicarm-result";
-  RunOptions options = {};                            ///< threads and the machine's history are filled in
+  RunOptions options = {};                            ///< threads and C-arm history are filled in
   bool no_report = false;                             ///< only result.json
-  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read, and added to
+  std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read and extended
 };
 
-/// Runs a case and writes result.json, report.html and NAME_overlay.png. A refusal writes them too and then
-/// fails with its reason; input that cannot be used leaves no result.json behind.
+/// Measures a case and writes result.json, report.html and NAME_overlay.png. A refusal also writes them and
+/// then fails with its reason; unusable input leaves no result.json.
 CommandResult run_command(const RunArguments& arguments, Console& console);
 
-/// Only runs the case, and warns on `console.progress`; a refusal is in the result.
+/// Only measures the case, with warnings on `console.progress`; a refusal is in the result.
 Expected<Result> measure(const RunArguments& arguments, Console& console);
 
-/// As `run_command`, and the result for the caller to look at; prints nothing to `console.out`.
+/// As `run_command`, and returns the result; prints nothing to `console.out`.
 Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
 
-/// A C-arm's history, where a file is named; one that is not there yet is empty.
+/// A C-arm's history from the named file; empty if the file does not exist or none is named.
 Expected<std::optional<CArmHistory>> history_at(const std::optional<std::filesystem::path>& path);
 
 /// "best" or "paper"; usage otherwise.

@@ -28,7 +28,7 @@ void check_inside(const Volume& volume, const Eigen::Vector3d& centre) {
       Eigen::AlignedBox3d(Eigen::Vector3d::Zero(), last).transformed(volume.patient_from_voxel);
   throw BadInput(
       Reason::bad_value,
-      fmt::format("--ct-centre: {:g},{:g},{:g} lies outside the CT, which reaches from {:g},{:g},{:g} to "
+      fmt::format("--ct-centre: {:g},{:g},{:g} lies outside the CT, which extends from {:g},{:g},{:g} to "
                   "{:g},{:g},{:g} mm",
                   centre.x(), centre.y(), centre.z(), block.min().x(), block.min().y(), block.min().z(),
                   block.max().x(), block.max().y(), block.max().z()));
@@ -38,12 +38,12 @@ std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& ar
                                                      const Console& console) {
   if (arguments.ct.empty()) {
     if (!arguments.ct_centre_mm.empty() || !arguments.ct_turn_deg.empty())
-      throw BadInput(Reason::usage, "simulate: --ct-centre and --ct-turn are for --ct");
+      throw BadInput(Reason::usage, "simulate: --ct-centre and --ct-turn require --ct");
     return nullptr;
   }
-  if (!arguments.knee) throw BadInput(Reason::usage, "simulate: --ct is the knee; not with --no-knee");
+  if (!arguments.knee) throw BadInput(Reason::usage, "simulate: --no-knee cannot be combined with --ct");
   if (arguments.kind == "grid")
-    throw BadInput(Reason::usage, "simulate: --kind grid has no knee, so no --ct");
+    throw BadInput(Reason::usage, "simulate: --ct cannot be combined with --kind grid");
   simulation::CtOptions ct;
   ct.volume = value_or_throw(read_volume(arguments.ct));
   for (const Warning& warning : ct.volume.warnings)
@@ -74,7 +74,7 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
   options.arm_seed = arguments.arm_seed;
   if (!arguments.distances_mm.empty()) {
     if (options.kind != simulation::CaseKind::grid)
-      throw BadInput(Reason::usage, "simulate: --distance is for --kind grid");
+      throw BadInput(Reason::usage, "simulate: --distance requires --kind grid");
     options.grid_distances_mm = arguments.distances_mm;
   }
   options.ct = ct_from(arguments, console);
@@ -128,7 +128,7 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     for (const Json& view : written["views"]) {
       console.out << fmt::format("  {}.dcm", view["name"].get<std::string>());
       if (view[things].get<int>() > 0)
-        console.out << fmt::format("  {} of {} {} clear", view["clear_" + things].get<int>(),
+        console.out << fmt::format("  {} of {} {} unobstructed", view["clear_" + things].get<int>(),
                                    view[things].get<int>(), things);
       console.out << '\n';
     }

@@ -11,23 +11,23 @@
 
 namespace helicarm::cli {
 
-/// `helicarm simulate DIR`: a case with known truth, drawn from `console.seed`.
+/// `helicarm simulate DIR`: a case with known ground truth from `console.seed`.
 struct SimulateArguments {
   std::filesystem::path folder;
   std::string kind = "accuracy";  ///< accuracy, tunnels, flat or grid
-  std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: as the kind needs it
-  int size = 1024;                ///< 512 or 1024 pixels a side
+  std::string preset;             ///< paper-sim, ii-9in or flat-panel; empty: by kind
+  int size = 1024;                ///< 512 or 1024 pixels per side
   int bits = 12;                  ///< 8, 10, 12, 14 or 16
   bool knee = true;
   std::string response;                   ///< linear or log; empty: log with the knee
   std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
   std::optional<std::uint64_t> arm_seed;  ///< none: the seed
-  std::filesystem::path ct;               ///< a CT volume in place of the drawn knee
+  std::filesystem::path ct;               ///< a CT volume instead of the synthetic knee
   std::vector<double> ct_centre_mm;       ///< three numbers or none
   std::vector<double> ct_turn_deg;
-  /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a ball that fell out
+  /// decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL for a missing ball
   std::vector<std::string> faults;
-  std::vector<double> distances_mm;  ///< kind grid: of the wires from the receiver; none: 45 mm
+  std::vector<double> distances_mm;  ///< kind grid: from the receiver to the wires; none: 45 mm
 };
 
 CommandResult simulate_command(const SimulateArguments& arguments, Console& console);

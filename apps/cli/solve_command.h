@@ -13,8 +13,8 @@ struct SolveArguments {
   std::string method = "ml";     ///< dlt, homogeneous or ml
 };
 
-/// A view from points of known place and their images. Every point is believed. Without sigmas the
-/// covariance is scaled by the residuals.
+/// A view from known 3-D points and their pixels. No outlier rejection. Without sigmas the covariance is
+/// scaled by the residuals.
 CommandResult solve_command(const SolveArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

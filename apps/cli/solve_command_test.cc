@@ -47,7 +47,7 @@ Answer solve_text(const std::string& table, const std::string& method, bool json
   return {std::move(result), out.str()};
 }
 
-TEST(SolveCommand, EveryMethodGivesTheMirroredViewBack) {
+TEST(SolveCommand, EveryMethodRecoversTheMirroredView) {
   for (const char* method : {"dlt", "homogeneous", "ml"}) {
     const Answer answer = solve_text(table_of(12, false), method);
     ASSERT_TRUE(answer.result.has_value()) << answer.result.error().message;
@@ -63,14 +63,14 @@ TEST(SolveCommand, EveryMethodGivesTheMirroredViewBack) {
   }
 }
 
-TEST(SolveCommand, TableNamesEveryPoint) {
+TEST(SolveCommand, TableContainsEveryPoint) {
   const Answer answer = solve_text(table_of(8, false, "0.2"), "ml", false);
   ASSERT_TRUE(answer.result.has_value());
   EXPECT_NE(answer.text.find("P7"), std::string::npos);
   EXPECT_NE(answer.text.find("+-"), std::string::npos);
 }
 
-TEST(SolveCommand, BadInputIsNamed) {
+TEST(SolveCommand, BadInputIsNamedInTheMessage) {
   const auto reason_of = [](const std::string& table, const std::string& method) {
     return solve_text(table, method).result.error().reason;
   };

@@ -5,13 +5,13 @@
 
 namespace helicarm::cli {
 
-/// SIGINT and SIGTERM as something to wait for. Made before any other thread, which then inherit that these
-/// signals are blocked.
+/// SIGINT and SIGTERM as an event. Construct it before any other thread, so that all threads inherit the
+/// blocked signals.
 class StopSignal {
  public:
   StopSignal();
 
-  /// Returns when one of them comes or `raise` is called, or after `seconds`; whether it was told to end.
+  /// Waits for a signal, `raise` or the end of `seconds`; true for a stop.
   bool wait(std::optional<double> seconds);
   /// From any thread.
   void raise();

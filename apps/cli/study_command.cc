@@ -24,7 +24,7 @@
 namespace helicarm::cli {
 namespace {
 
-/// What a study's run needs beside its own options.
+/// Context of a study besides its own options.
 struct StudyRun {
   const StudyArguments& arguments;
   Console& console;
@@ -34,7 +34,7 @@ struct StudyRun {
 
 [[noreturn]] void refuse(const std::string& message) { throw BadInput(Reason::usage, "study: " + message); }
 
-/// The value of an enumeration that has this name.
+/// The enumeration value with this name.
 template <class Values>
 auto named(const char* option, const std::string& name, const Values& values) {
   const auto at = std::ranges::find_if(values, [&](auto value) { return name_of(value) == name; });
@@ -56,7 +56,7 @@ void choose(std::vector<Value>& chosen, const char* option, const std::vector<st
   }
 }
 
-/// An option this study does not know is an error, not a silence.
+/// An option that this study does not have is an error.
 void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
   const std::array<std::pair<const char*, bool>, 8> given{{{"--balls", !a.balls.empty()},
                                                            {"--sigma", !a.sigmas.empty()},
@@ -72,7 +72,7 @@ void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
                          known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
 }
 
-/// A study's defaults, and what is given in place of them.
+/// A study's defaults, overridden by the given options.
 template <class Options>
 Options options_of(const StudyRun& run) {
   Options options;
@@ -101,7 +101,7 @@ StudyFiles files_by(const StudyRun& run, const Options& options) {
   return run.ranks.leads() ? files_of(answer, options) : StudyFiles{};
 }
 
-/// A study whose options are all shared ones.
+/// A study with shared options only.
 template <class Options, auto study>
 StudyFiles run_plain(const StudyRun& run) {
   return files_by<study>(run, options_of<Options>(run));
@@ -145,7 +145,7 @@ StudyFiles run_design(const StudyRun& run) {
 struct KnownStudy {
   std::string_view name;
   StudyFiles (*run)(const StudyRun&);
-  std::vector<std::string_view> options = {};  ///< beside those that all have
+  std::vector<std::string_view> options = {};  ///< besides the common ones
 };
 const std::array<KnownStudy, 9> studies{
     {{"number", run_number, {"--balls", "--sigma", "--reading", "--fle", "--origin"}},

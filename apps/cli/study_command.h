@@ -10,7 +10,7 @@
 
 namespace helicarm::cli {
 
-/// What is not given has the default of the study's own options.
+/// Omitted options take the study's defaults.
 struct StudyArguments {
   /// number, uniformity, location, biplane, calibration, rectification, design, limit or centres
   std::string name;
@@ -27,8 +27,8 @@ struct StudyArguments {
   std::string surface;
 };
 
-/// Runs an experiment on simulated numbers and writes NAME.csv, NAME.json and NAME.svg. The
-/// same seed gives the same bytes, whatever the number of threads and ranks.
+/// Runs a simulated experiment and writes NAME.csv, NAME.json and NAME.svg. The same seed gives the same
+/// bytes, whatever the number of threads and ranks.
 CommandResult study_command(const StudyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

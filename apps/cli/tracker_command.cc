@@ -20,7 +20,7 @@
 namespace helicarm::cli {
 namespace {
 
-/// Calls `tell` each second until the time is over or the user interrupts.
+/// Calls `report` each second until the time is over or the user interrupts.
 template <class Notify>
 void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Notify notify) {
   const double until = seconds ? monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
@@ -40,7 +40,7 @@ Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments
     int port = 0;
     const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
     if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
-      return fail(Reason::usage, fmt::format("PEER: \"{}\" is no address:port, the port 1 to 65535",
+      return fail(Reason::usage, fmt::format("PEER: \"{}\" is not address:port with a port from 1 to 65535",
                                              without_control_characters(peer)));
     options.port = static_cast<std::uint16_t>(port);
   }
@@ -70,7 +70,7 @@ std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>
   std::string table = fmt::format("{}  {}\n", code(link.state), link.trouble);
   for (const ToolState& tool : tools) {
     table +=
-        fmt::format("  {:20} {:>9} {:6.1f} Hz {:9} taken", tool.name,
+        fmt::format("  {:20} {:>9} {:6.1f} Hz {:9} accepted", tool.name,
                     tool.age_s ? fmt::format("{:.3f} s", *tool.age_s) : "never", tool.rate_hz, tool.accepted);
     for (const auto& [fault, count] : tool.rejected) table += fmt::format("  {} {}", fault, count);
     table += '\n';
@@ -129,12 +129,12 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
   (*client)->stop();
   const std::vector<SequenceFrame>& frames = recorder.frames();
   if (full)
-    console.progress << fmt::format("recording ended: {} poses are the most that one file takes\n",
+    console.progress << fmt::format("recording ended: limit of {} poses per file reached\n",
                                     recorder.most_poses())
                      << std::flush;
   if (frames.empty()) {
     const std::string trouble = (*client)->status().trouble;
-    return fail(Reason::no_pose, fmt::format("{}: no pose came, nothing is written{}{}", arguments.peer,
+    return fail(Reason::no_pose, fmt::format("{}: no pose received, no file written{}{}", arguments.peer,
                                              trouble.empty() ? "" : ": ", trouble));
   }
   if (auto written = write_sequence(arguments.file, frames); !written) return written;

@@ -15,14 +15,14 @@ namespace helicarm::cli {
 struct TrackerLinkArguments {
   std::string peer;  ///< address:port
   std::filesystem::path file;
-  std::optional<double> seconds;  ///< until interrupted, where not given
+  std::optional<double> seconds;  ///< empty: until interrupted
   IgtlClientOptions options;
 };
 
 struct TrackerReplayArguments {
   std::filesystem::path file;
   std::optional<double> seconds;
-  bool as_tracking = false;  ///< TDATA instead of a TRANSFORM for each tool
+  bool as_tracking = false;  ///< TDATA instead of one TRANSFORM per tool
   IgtlServerOptions options;
 };
 
@@ -32,13 +32,13 @@ struct TrackerPivotArguments {
   PivotOptions options;
 };
 
-/// What a tracker sends, tool by tool.
+/// Prints a tracker's poses, tool by tool.
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console);
-/// The same into a MetaImage sequence file.
+/// Records them into a MetaImage sequence file.
 CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Console& console);
-/// A recorded file as a tracker.
+/// Plays a recorded file as a tracker.
 CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Console& console);
-/// A pointer's tip from a recording of it turning about its tip.
+/// Pivot calibration of a pointer's tip from a recording.
 CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

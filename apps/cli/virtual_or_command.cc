@@ -21,16 +21,14 @@ namespace {
 
 using virtual_devices::VirtualDevices;
 
-/// Five times what the virtual tracker's drift makes of two touches.
+/// Five times the difference of two touches due to the virtual tracker's drift.
 constexpr double notch_limit_mm = 1.5;
 
 std::string words() {
   return fmt::format(
       "shoot VIEW | shoot VIEW {} | fault NAME on|off ({}) | move femur|tibia|base X Y Z (mm) | turn "
-      "femur|tibia "
-      "DEG (about its tunnel's outer end) | bump femur|tibia X Y Z (mm: its marker) | touch "
-      "femur|tibia|nothing | power on | where "
-      "| quit",
+      "femur|tibia DEG (about its tunnel's outer end) | bump femur|tibia X Y Z (mm: its marker) | touch "
+      "femur|tibia|nothing | power on | where | quit",
       virtual_devices::c_arm_fault_names(), virtual_devices::virtual_fault_names());
 }
 
@@ -41,9 +39,9 @@ virtual_devices::CArmFault fault_of_shot(const std::string& name) {
                  fmt::format("a fault of the C-arm is one of {}", virtual_devices::c_arm_fault_names()));
 }
 
-/// Does what one line says and answers with one; throws BadInput.
-std::string obey(const std::string& line, VirtualDevices& virtual_or,
-                 const virtual_devices::ImageReceiver& receiver) {
+/// Executes one command line and returns the answer; throws BadInput.
+std::string execute(const std::string& line, VirtualDevices& virtual_or,
+                    const virtual_devices::ImageReceiver& receiver) {
   std::istringstream said(line);
   std::string verb, what, how;
   said >> verb >> what;
@@ -101,10 +99,10 @@ std::string obey(const std::string& line, VirtualDevices& virtual_or,
                              : "never moved";
     return fmt::format("tip {:.3f} {:.3f} {:.3f}, {}", tip.x(), tip.y(), tip.z(), motion);
   }
-  throw BadInput(Reason::usage, "words are: " + words());
+  throw BadInput(Reason::usage, "commands: " + words());
 }
 
-/// Until its input ends, "quit", or the stop token.
+/// Reads commands until the input ends, "quit", or a stop request.
 void listen(const std::stop_token& stop, VirtualDevices& virtual_or, const VirtualOrArguments& arguments,
             Console& console, StopSignal& end) {
   constexpr int look_again_ms = 100;
@@ -113,12 +111,12 @@ void listen(const std::stop_token& stop, VirtualDevices& virtual_or, const Virtu
     const auto line = guarded([&] { return input.next(look_again_ms); });
     if (!line) {
       if (line.error().reason != Reason::interrupted)
-        console.progress << fmt::format("{}; no more is read\n", line.error().message) << std::flush;
+        console.progress << fmt::format("{}; input closed\n", line.error().message) << std::flush;
       return;
     }
     if (!*line || (*line)->empty()) continue;
     if (**line == "quit") return end.raise();
-    const auto answer = guarded([&] { return obey(**line, virtual_or, arguments.receiver); });
+    const auto answer = guarded([&] { return execute(**line, virtual_or, arguments.receiver); });
     if (answer)
       console.out << *answer << std::endl;
     else
@@ -151,7 +149,7 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     if (!console.quiet)
       console.progress << fmt::format(
                               "tracker (OpenIGTLink) port {}\nrobot (UR5): RTDE {}, dashboard {}, script {}\n"
-                              "C-arm sends to {} {} port {}\nsay: {}\n",
+                              "C-arm sends to {} {} port {}\ncommands: {}\n",
                               virtual_or->tracker().port(), virtual_or->robot().rtde_port(),
                               virtual_or->robot().dashboard_port(), virtual_or->robot().script_port(),
                               arguments.receiver.title, arguments.receiver.address, arguments.receiver.port,

@@ -17,7 +17,8 @@ struct VirtualOrArguments {
   std::optional<double> seconds;
 };
 
-/// A virtual C-arm, tracker and robot on their ports; words on standard input shoot, move and spoil.
+/// A virtual C-arm, tracker and robot on their ports; commands on standard input acquire images, move objects
+/// and inject faults.
 CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli
