@@ -43,7 +43,7 @@ void forget_measurement(ApplicationState& state) {
   state.refusals.clear();
 }
 
-/// Names and bones of a case's tunnels; without any, the two of an ACL operation.
+/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none.
 std::vector<PlannedTunnel> tunnels_of(const Case& given) {
   std::vector<PlannedTunnel> tunnels;
   for (const TunnelPlan& tunnel : given.tunnels) {
@@ -166,7 +166,7 @@ void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& o
       state.bones = bones;
     };
   };
-  open(Source::virtual_or, folder, "opening the virtual operating room", work);
+  open(Source::virtual_or, folder, "starting the virtual devices", work);
 }
 
 void Controller::open_devices(const fs::path& file, const ReceiverOptions& receiver, const fs::path& folder) {
@@ -205,7 +205,7 @@ void Controller::open_case(const fs::path& folder) {
 
 void Controller::open_images(const std::vector<fs::path>& images) {
   const fs::path folder = images.empty() ? fs::path() : images.front().parent_path();
-  open(Source::files, folder, "reading the pictures", [=, this](Equipment& equipment) {
+  open(Source::files, folder, "reading the images", [=, this](Equipment& equipment) {
     return with_case(value_or_throw(case_of_images(images)), equipment);
   });
 }
@@ -231,7 +231,7 @@ void Controller::expect(const std::string& view) {
 
 void Controller::shoot(const std::string& view) {
   if (!equipment_ || !equipment_->virtual_or) return;
-  begin(Phase::acquire, "shooting " + view, [this, view, equipment = equipment_]() -> Change {
+  begin(Phase::acquire, "acquiring " + view, [this, view, equipment = equipment_]() -> Change {
     return came(value_or_throw(shoot_and_take(*equipment, view)));
   });
 }
@@ -240,7 +240,7 @@ void Controller::take_waiting_image() {
   if (state_.busy || !equipment_ || !equipment_->operation) return;
   const auto view_image = equipment_->devices->next_image(0);
   if (!view_image) return;
-  begin(Phase::acquire, "a picture came",
+  begin(Phase::acquire, "image received",
         [this, view = state_.next_view, equipment = equipment_, view_image]() -> Change {
           return came(value_or_throw(take(*equipment, view, *view_image)));
         });
@@ -249,7 +249,7 @@ void Controller::take_waiting_image() {
 Controller::Change Controller::came(Images images) {
   return [this, images = std::move(images)](ApplicationState& state) {
     forget_measurement(state);
-    live_tool_.reset();  // its lines belong to the former images
+    live_tool_.reset();  // its lines belong to the previous images
     state.result = only(images);
     state.next_view = first_missing(state);
     if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.xray_image != nullptr; }))
@@ -302,7 +302,7 @@ void Controller::pick(Pick pick) {
                 [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
   const std::string point = pick.name;
   state_.picks.push_back(std::move(pick));
-  picks_changed(is_whole(point));  // its place and how far its rays miss show at once
+  picks_changed(is_whole(point));  // shows its position and ray gap immediately
 }
 
 void Controller::take_offered_picks() {
@@ -325,7 +325,7 @@ void Controller::cancel() {
 
 void Controller::export_to(const fs::path& folder) {
   if (!state_.measured) {
-    emit refused(Phase::verify, tr("Nothing is measured yet: there is nothing to export."));
+    emit refused(Phase::verify, tr("Nothing to export: measure first."));
     return;
   }
   Result result = *state_.result;
@@ -346,7 +346,7 @@ void Controller::set_fault(const std::string& name, bool on) {
     equipment_->c_arm_fault = on ? *of_c_arm : virtual_devices::CArmFault::none;
     return;
   }
-  errands_.start(
+  background_.start(
       [equipment = equipment_, name, on] { static_cast<void>(equipment->virtual_or->set_fault(name, on)); });
 }
 

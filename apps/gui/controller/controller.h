@@ -16,20 +16,20 @@ namespace helicarm::gui {
 
 struct Equipment;
 
-/// The live part of the window at one moment.
+/// The live data of the window at one time.
 struct LiveState {
   double at_s = 0;  ///< monotonic
   std::vector<Lamp> lamps;
   RobotLinkStatus robot;
-  Bone bone = Bone::femur;                    ///< against which the tool is seen
-  std::optional<Expected<ToolOverlay>> tool;  ///< nothing before the robot is registered
-  QString tunnel;                             ///< that is followed
-  std::optional<Expected<TunnelAim>> aim;     ///< nothing before a tunnel is followed
-  std::optional<Failure> stale;               ///< why the path on show is no longer to be confirmed
+  Bone bone = Bone::femur;                    ///< reference bone of the tool
+  std::optional<Expected<ToolOverlay>> tool;  ///< empty before registration
+  QString tunnel;                             ///< tunnel of `aim`
+  std::optional<Expected<TunnelAim>> aim;     ///< empty without a tunnel
+  std::optional<Failure> stale;               ///< why the displayed path can no longer be confirmed
 };
 
-/// Everything the window can ask for. Work goes on in a thread of its own; what came of it arrives as
-/// `changed`. Lives in the interface's thread; no member waits.
+/// Operations available to the window. Work runs in a separate thread; its results arrive as `changed`. Lives
+/// in the interface thread; no member blocks.
 class Controller : public QObject {
   Q_OBJECT
 
@@ -39,26 +39,26 @@ class Controller : public QObject {
 
   const ApplicationState& state() const { return state_; }
 
-  /// A virtual operating room in this program, over its real protocols through sockets; its plan has those
-  /// `plan_fields` of `wished` that are not as usual.
+  /// Virtual devices in this program, over the real protocols through sockets; the plan takes the non-default
+  /// `plan_fields` of `wished`.
   void open_virtual_or(const virtual_devices::VirtualDevicesOptions& options, const OperationPlan& wished,
                        const std::filesystem::path& folder);
   /// The devices of a plan.
   void open_devices(const std::filesystem::path& plan, const ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
-  /// A case folder, or X-rays without tracker and robot.
+  /// A case folder, or X-ray images without tracker and robot.
   void open_case(const std::filesystem::path& folder);
   void open_images(const std::vector<std::filesystem::path>& images);
 
-  /// For virtual rooms opened from now on, never for real devices: a test on a busy machine sets longer ones.
+  /// For virtual devices opened from now on, never for real ones: tests on a busy machine set longer limits.
   void set_virtual_freshness(const FreshnessLimits& limits) { freshness_ = limits; }
 
   /// For the next measurement.
   void set_options(const RunOptions& options);
-  void expect(const std::string& view);        ///< the next image is this view's
-  void shoot(const std::string& view);         ///< in the virtual room
+  void expect(const std::string& view);        ///< view of the next image
+  void shoot(const std::string& view);         ///< with the virtual C-arm
   void touch(const std::string& check_point);  ///< with the pointer
-  /// Also while an earlier pick is being measured; then measures again.
+  /// Also during a measurement with earlier picks, which is then repeated.
   void pick(Pick pick);
   bool takes_picks() const;
   void take_offered_picks();
@@ -68,22 +68,23 @@ class Controller : public QObject {
   void unlock(const std::string& who);
   void register_robot();
   void plan_tunnel(const std::string& tunnel);
-  /// The path on show is taken away, on record, and the refusal shown: it must be planned again.
+  /// Withdraws the displayed path, with a record, and shows the refusal; a new plan is required.
   void drop_plan(const Failure& why);
   void go();
   void withdraw();
-  /// Stops the robot, at once and whatever else goes on.
+  /// Stops the robot immediately, whatever else is in progress.
   void stop();
-  /// Ends what is being done as soon as it can end; nothing of it is kept.
+  /// Cancels the work in progress as soon as possible and discards its result.
   void cancel();
 
-  /// Report (HTML, PDF), result.json and other programs' formats into a folder; `exported` tells the end.
+  /// Writes the report (HTML, PDF), result.json and other programs' formats into a folder; `exported` signals
+  /// the end.
   void export_to(const std::filesystem::path& folder);
 
   void set_fault(const std::string& name, bool on);
   void move_bone(const std::string& bone, const Eigen::Vector3d& shift_mm);
 
-  /// Cheap: the newest poses, not what is measured.
+  /// Fast: reads the newest poses, not the measurement.
   LiveState live() const;
   void follow(const std::string& tunnel) { followed_ = tunnel; }
 
@@ -99,7 +100,7 @@ class Controller : public QObject {
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Equipment&)> work);
   void start_operation(Equipment& equipment, OperationPlan plan, const std::filesystem::path& folder);
-  /// From any thread: a change while the work goes on.
+  /// From any thread: a state change during the work.
   void meanwhile(Change change);
   void take_waiting_image();
   void picks_changed(bool measurable);
@@ -112,14 +113,14 @@ class Controller : public QObject {
   ApplicationState state_;
   std::shared_ptr<Equipment> equipment_;
   std::optional<LiveTool> live_tool_;
-  std::optional<PlanWatch> plan_watch_;  ///< of the path on show
+  std::optional<PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
-  bool picks_came_ = false;  ///< while it measured
+  bool picks_came_ = false;  ///< during the measurement
   RunOptions options_;
   FreshnessLimits freshness_;
   QTimer images_;
-  QThreadPool errands_;  ///< what must not wait for the worker: the stop above all
-  Worker worker_;        ///< last: its jobs use all the others
+  QThreadPool background_;  ///< tasks that must not wait for the worker, such as the robot's stop
+  Worker worker_;           ///< last: its jobs use all other members
 };
 
 }  // namespace helicarm::gui

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The desk's threads, its devices' and the interface's at work at once; also for the thread sanitizer.
+// The threads of controller, devices and interface at work together; also for the thread sanitizer.
 #include <QCoreApplication>
 #include <QElapsedTimer>
 #include <QThread>
@@ -12,7 +12,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int patience_ms = 600000;  // a sanitized program on a busy machine
+constexpr int patience_ms = 600000;  // for a sanitized program on a busy machine
 constexpr int most_attempts = 10;
 
 class ControllerRehearsal : public testing::Test {
@@ -25,7 +25,7 @@ class ControllerRehearsal : public testing::Test {
     controller_->open_virtual_or(equipment, {}, folder_.path());
   }
 
-  /// Meanwhile it looks at everything that is live, as the window does.
+  /// Meanwhile reads all live data, as the window does.
   template <class Done>
   bool wait(const char* what, const Done& done) {
     QElapsedTimer since;
@@ -39,11 +39,11 @@ class ControllerRehearsal : public testing::Test {
     const ApplicationState& state = controller_->state();
     std::string why = state.busy ? "busy with " + state.doing : "idle";
     for (const auto& [phase, failure] : state.refusals) why += "; " + failure.message;
-    ADD_FAILURE() << "waited in vain until " << what << "; seen: " << why;
+    ADD_FAILURE() << "timeout waiting until " << what << "; observed: " << why;
     return false;
   }
   bool idle() {
-    return wait("nothing is being done", [&] { return !controller_->state().busy; });
+    return wait("the controller is idle", [&] { return !controller_->state().busy; });
   }
   template <class Act, class Done>
   bool attempt(const char* what, const Act& act, const Done& done) {
@@ -61,7 +61,7 @@ class ControllerRehearsal : public testing::Test {
   bool moves() const { return controller_->live().robot.phase == LinkPhase::moving; }
 
   int argc_ = 1;
-  char name_[5] = "desk";
+  char name_[5] = "ctrl";
   char* argv_[2] = {name_, nullptr};
   QCoreApplication app_;
   TemporaryFolder folder_;
@@ -72,7 +72,7 @@ TEST_F(ControllerRehearsal, MeasuresAndFollowsTheToolWhileTheDevicesWork) {
   ASSERT_TRUE(idle());
   for (const std::size_t view : {0, 1})
     ASSERT_TRUE(attempt(
-        "the view is taken", [&] { controller_->shoot(controller_->state().views[view]); },
+        "the view is acquired", [&] { controller_->shoot(controller_->state().views[view]); },
         [&] { return controller_->state().result->views[view].xray_image != nullptr; }));
   ASSERT_TRUE(wait("the views are measured", [&] { return controller_->state().measured; }));
   ASSERT_TRUE(attempt(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the desk does with robot and pointer, and what is live.
+// Controller: robot, pointer and live data.
 #include <algorithm>
 #include <utility>
 
@@ -10,7 +10,7 @@ namespace helicarm::gui {
 namespace {
 
 constexpr std::chrono::seconds robot_patience{5};
-/// Nearer than this to where it was, the tool needs no way back.
+/// If the tool is nearer than this to its initial position, no retreat is needed.
 constexpr double at_rest_mm = 1;
 
 bool has_left(const RobotLinkStatus& status, const RobotState& rest) {
@@ -27,7 +27,7 @@ QString words_of(const std::vector<RobotOrder>& tour) {
       farthest_mm = std::max(farthest_mm, (waypoint.base_from_tcp.translation - from).norm());
       speed_mm_s = std::max(speed_mm_s, waypoint.speed_mm_s);
     }
-  return Controller::tr("%1 moves; the tip stays within %2 mm of where it is, at %3 mm/s at most")
+  return Controller::tr("%1 moves; the tip stays within %2 mm of its position, at most %3 mm/s")
       .arg(tour.size())
       .arg(farthest_mm, 0, 'f', 0)
       .arg(speed_mm_s, 0, 'f', 0);
@@ -75,23 +75,24 @@ void Controller::register_robot() {
 void Controller::plan_tunnel(const std::string& tunnel) {
   if (!equipment_ || !equipment_->operation) return;
   follow(tunnel);
-  begin(Phase::navigate, "planning the way to " + tunnel, [this, equipment = equipment_, tunnel]() -> Change {
-    const RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
-    const PathPreview path = value_or_throw(equipment->operation->preview(order));
-    const PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
-    return [this, order, path, watch](ApplicationState& state) {
-      state.order = order;
-      state.path = path;
-      plan_watch_ = watch;
-    };
-  });
+  begin(Phase::navigate, "planning the path to " + tunnel,
+        [this, equipment = equipment_, tunnel]() -> Change {
+          const RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
+          const PathPreview path = value_or_throw(equipment->operation->preview(order));
+          const PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
+          return [this, order, path, watch](ApplicationState& state) {
+            state.order = order;
+            state.path = path;
+            plan_watch_ = watch;
+          };
+        });
 }
 
 void Controller::drop_plan(const Failure& why) {
   if (state_.busy || !state_.order) return;
   const RobotOrder order = *std::exchange(state_.order, std::nullopt);
   state_.path = {};
-  begin(Phase::navigate, "taking the path away", [equipment = equipment_, order, why]() -> Change {
+  begin(Phase::navigate, "withdrawing the path", [equipment = equipment_, order, why]() -> Change {
     static_cast<void>(equipment->operation->check_plan(order));
     throw BadInput(why);
   });
@@ -100,7 +101,7 @@ void Controller::drop_plan(const Failure& why) {
 void Controller::go() {
   if (!equipment_ || !equipment_->operation || !state_.order) return;
   const RobotOrder order = *state_.order;
-  begin(Phase::navigate, "going to " + order.name, [this, equipment = equipment_, order]() -> Change {
+  begin(Phase::navigate, "moving to " + order.name, [this, equipment = equipment_, order]() -> Change {
     RobotLink& robot = equipment->devices->robot();
     const std::string token = robot.confirm(order);
     equipment->rest = value_or_throw(robot.wait_connected(robot_patience));
@@ -134,7 +135,7 @@ void Controller::withdraw() {
 void Controller::stop() {
   if (!equipment_ || !equipment_->devices) return;
   equipment_->stopped = true;
-  errands_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
+  background_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
 }
 
 LiveState Controller::live() const {

@@ -45,16 +45,16 @@ TEST(Steps, WithoutASourceAllWait) {
   for (const StepCard& card : steps_of({})) EXPECT_EQ(card.mood, StepMood::waiting);
 }
 
-TEST(Steps, NameTheImageThatIsToCome) {
+TEST(Steps, NameTheNextImage) {
   ViewResult missing;
   missing.name = "LAT";
   const auto cards = steps_of(state_with({exposed("AP"), missing}));
-  EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 of 2 X-rays");
-  EXPECT_EQ(card_of(cards, Phase::acquire).why, "LAT is to come");
+  EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 of 2 X-ray images");
+  EXPECT_EQ(card_of(cards, Phase::acquire).why, "LAT is next");
   EXPECT_EQ(card_of(cards, Phase::acquire).mood, StepMood::waiting);
 }
 
-TEST(Steps, RefusalNamesItsReasonAndDoesNotPassForGood) {
+TEST(Steps, RefusalNamesItsReasonAndIsCleared) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.refusals[Phase::rectify] = {Reason::plate_not_found, "no plate", "LAT"};
   const StepCard card = card_of(steps_of(state), Phase::rectify);
@@ -62,7 +62,7 @@ TEST(Steps, RefusalNamesItsReasonAndDoesNotPassForGood) {
   EXPECT_EQ(card.why, "LAT: no plate (plate_not_found)");
 }
 
-TEST(Steps, WhatIsBeingDoneIsSaid) {
+TEST(Steps, WorkInProgressIsShown) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.busy = Phase::calibrate;
   state.doing = "measuring";
@@ -70,7 +70,7 @@ TEST(Steps, WhatIsBeingDoneIsSaid) {
   EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).why, "measuring");
 }
 
-TEST(Steps, PlanIsGoodOnlyWithAllEndsPlacedAndSaysTheWorst) {
+TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.measured = true;
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).why, "click FS in AP");
@@ -89,7 +89,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsPlacedAndSaysTheWorst) {
   EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
 }
 
-TEST(Steps, PointThatCannotBePlacedRefusesThePlan) {
+TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.measured = true;
   for (const char* end : {"FS", "FE"})
@@ -109,7 +109,7 @@ TEST(Picks, NextOneGoesThroughViewsThenEnds) {
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSLAT");
 }
 
-TEST(Lamps, OldPoseIsNoGreenLight) {
+TEST(Lamps, OldPoseIsNotGreen) {
   TrackerPlan plan;
   const auto lamps = tracker_lamps(plan, {{.name = "femur", .rejected = {}, .age_s = 0.02},
                                           {.name = "tibia", .rejected = {}, .age_s = 0.4},
@@ -122,7 +122,7 @@ TEST(Lamps, OldPoseIsNoGreenLight) {
   EXPECT_EQ(lamps[3].text, "7.0 s");
 }
 
-TEST(Lamps, CalibratorIsSeenByOneFacet) {
+TEST(Lamps, CalibratorIsVisibleByOneFacet) {
   TrackerPlan plan;
   plan.facets = {{"calibrator/1", {}}, {"calibrator/2", {}}};
   const auto lamps = tracker_lamps(plan, {{.name = "calibrator/1", .rejected = {}, .age_s = 30.0},
@@ -130,7 +130,7 @@ TEST(Lamps, CalibratorIsSeenByOneFacet) {
   EXPECT_EQ(lamps[0].light, Light::green);
 }
 
-TEST(Lamps, StoppedRobotIsRedAndSaysWhy) {
+TEST(Lamps, StoppedRobotIsRedWithTheReason) {
   RobotLinkStatus status;
   status.phase = LinkPhase::stopped;
   status.why = Failure{Reason::robot_stopped, "emergency stop"};
@@ -139,7 +139,7 @@ TEST(Lamps, StoppedRobotIsRedAndSaysWhy) {
   EXPECT_THAT(lamp.why.toStdString(), HasSubstr("emergency stop"));
 }
 
-TEST(Lamps, CArmIsGreenByItsLastImageAndRedByWhatWentWrongSince) {
+TEST(Lamps, CArmIsGreenByItsLastImageAndRedAfterAFailure) {
   EXPECT_EQ(c_arm_lamp({}, 100).light, Light::off);
   const Lamp well = c_arm_lamp({.last_image_s = 93, .refused = {}}, 100);
   EXPECT_EQ(well.light, Light::green);
@@ -150,7 +150,7 @@ TEST(Lamps, CArmIsGreenByItsLastImageAndRedByWhatWentWrongSince) {
   EXPECT_THAT(refused.why.toStdString(), HasSubstr("cut"));
 }
 
-TEST(Worker, DoesItsJobsInOrderAndEndsWithThoseThatRan) {
+TEST(Worker, RunsItsJobsInOrderAndStopsAfterTheRunningOne) {
   std::vector<int> done;
   {
     Worker worker;

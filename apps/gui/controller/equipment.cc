@@ -13,7 +13,7 @@ namespace {
 
 constexpr int most_entries = 3;
 constexpr double image_patience_s = 20, image_glance_s = 0.1;
-/// An exposure's poses are taken from the second and a half before it.
+/// The pose window of an acquisition is the 1.5 s before an image's arrival.
 constexpr std::chrono::milliseconds before_exposure{1800};
 
 }  // namespace
@@ -47,7 +47,7 @@ std::optional<DatedArrival> wait_for_image(Equipment& equipment) {
 
 Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view) {
   const virtual_devices::ImageReceiver receiver{"127.0.0.1", equipment.devices->receiver_port()};
-  Expected<Images> taken = fail(Reason::not_connected, "no picture came");
+  Expected<Images> taken = fail(Reason::not_connected, "no image received");
   for (int acquired_view = 0; acquired_view < most_entries && !taken && !equipment.stopped; ++acquired_view) {
     std::this_thread::sleep_for(before_exposure);
     const auto sent = virtual_devices::shoot(equipment.virtual_or->simulated_scene(), view, receiver,
@@ -91,11 +91,13 @@ Expected<Case> case_of_images(const std::vector<std::filesystem::path>& images) 
     view.image = std::filesystem::absolute(view_image);
     for (const CaseView& other : given.views)
       if (other.name == view.name)
-        return fail(Reason::name_clash, fmt::format("{}: two pictures of this name", view.name));
+        return fail(Reason::name_clash, fmt::format("{}: two images have this name", view.name));
     given.views.push_back(std::move(view));
   }
   if (given.views.size() < 2)
-    return fail(Reason::usage, "one X-ray alone places nothing: drop two or more at once, or a case folder");
+    return fail(Reason::usage,
+                "at least two views are required to locate a point: drop two or more images at once, or a "
+                "case folder");
   return given;
 }
 

@@ -20,10 +20,10 @@ std::optional<double> least_age(const std::vector<ToolState>& tools, const std::
 }
 
 Lamp marker_lamp(const QString& name, const std::optional<double>& age_s) {
-  if (!age_s) return {name, Light::off, age_text(age_s), tr("the tracker has not shown it yet")};
+  if (!age_s) return {name, Light::off, age_text(age_s), tr("no pose from the tracker yet")};
   if (*age_s <= fresh_s) return {name, Light::green, age_text(age_s), {}};
   return {name, *age_s <= late_s ? Light::amber : Light::red, age_text(age_s),
-          tr("hidden, or the tracker is away: nothing is steered by a pose this old")};
+          tr("not visible, or tracker disconnected: a pose of this age is not used for motion")};
 }
 
 QString words(std::string_view text) { return QString::fromUtf8(text.data(), qsizetype(text.size())); }
@@ -31,7 +31,7 @@ QString words(std::string_view text) { return QString::fromUtf8(text.data(), qsi
 }  // namespace
 
 QString age_text(const std::optional<double>& age_s) {
-  if (!age_s) return tr("not seen");
+  if (!age_s) return tr("not visible");
   return *age_s < 1 ? tr("%1 ms").arg(*age_s * 1000, 0, 'f', 0) : tr("%1 s").arg(*age_s, 0, 'f', 1);
 }
 
@@ -68,13 +68,13 @@ Lamp robot_lamp(const RobotLinkStatus& status) {
 }
 
 Lamp c_arm_lamp(const CArmStatus& status, double now_s) {
-  Lamp lamp{tr("C-arm"), Light::off, tr("no picture yet"), tr("it calls when it has a picture")};
+  Lamp lamp{tr("C-arm"), Light::off, tr("no image yet"), tr("it connects when it has an image")};
   if (status.last_image_s)
     lamp = {lamp.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
   if (status.broke_off) {
     lamp.light = Light::red;
-    lamp.text = tr("broke off");
-    lamp.why = tr("a connection was lost or turned down before it had sent a picture");
+    lamp.text = tr("disconnected");
+    lamp.why = tr("a connection was lost or rejected before an image was sent");
   }
   if (status.refused) {
     lamp.light = Light::red;

@@ -12,25 +12,25 @@ namespace helicarm::gui {
 
 enum class Light { off, red, amber, green };
 
-/// A device or a marker at this moment.
+/// State of a device or marker at one time.
 struct Lamp {
   QString name;
   Light light = Light::off;
-  QString text;  ///< age or state, in words
-  QString why;   ///< of red and amber
+  QString text;  ///< age or state, as text
+  QString why;   ///< reason for red and amber
 };
 
-/// A pose up to so old steers a robot; up to the other it is worth a warning.
+/// Greatest pose age for robot motion; up to the second limit the lamp is amber.
 inline constexpr double fresh_s = 0.1;
 inline constexpr double late_s = 1;
 
-/// The markers that the plan names; the calibrator is seen where one of its facets is.
+/// The markers of the plan; the calibrator is visible if one of its facets is.
 std::vector<Lamp> tracker_lamps(const TrackerPlan& plan, const std::vector<ToolState>& tools);
 Lamp robot_lamp(const RobotLinkStatus& status);
-/// At this moment, monotonic seconds.
+/// At this time, monotonic seconds.
 Lamp c_arm_lamp(const CArmStatus& status, double now_s);
 
-/// "23 ms", "4.1 s", "not seen".
+/// "23 ms", "4.1 s", "not visible".
 QString age_text(const std::optional<double>& age_s);
 
 }  // namespace helicarm::gui

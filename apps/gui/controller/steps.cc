@@ -13,14 +13,14 @@ QString tr(const char* text) { return QCoreApplication::translate("Steps", text)
 
 QString text(const std::string& words) { return QString::fromStdString(words); }
 
-/// What the answer gives to doubt, of this view and phase or of all.
+/// Warnings of the result for this phase, of this view or of all.
 QString doubts(const std::vector<Warning>& warnings) {
   if (warnings.empty()) return {};
   const QString first = sentence_of(warnings.front());
   return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
 }
 
-/// A point's doubt concerns the plan, not the calibration.
+/// Warnings about a point concern the plan, not the calibration.
 bool is_of_a_point(const Warning& warning) { return warning.figures.contains("ray_gap_mm"); }
 
 std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points) {
@@ -39,9 +39,9 @@ void acquire(StepCard& card, const ApplicationState& state) {
   const auto& views = state.result->views;
   const auto come =
       std::ranges::count_if(views, [](const ViewResult& view) { return view.xray_image != nullptr; });
-  card.figure = tr("%1 of %2 X-rays").arg(come).arg(state.views.size());
+  card.figure = tr("%1 of %2 X-ray images").arg(come).arg(state.views.size());
   if (come == std::ssize(state.views)) return settle(card, {});
-  card.why = tr("%1 is to come").arg(text(state.next_view));
+  card.why = tr("%1 is next").arg(text(state.next_view));
 }
 
 void rectify(StepCard& card, const ApplicationState& state) {
@@ -55,7 +55,7 @@ void rectify(StepCard& card, const ApplicationState& state) {
     worst = std::max(worst, done.map.residual_rms_px);
     warnings.insert(warnings.end(), done.warnings.begin(), done.warnings.end());
   }
-  card.figure = bent ? tr("%1 px rms left").arg(worst, 0, 'f', 3) : tr("flat panel");
+  card.figure = bent ? tr("residual %1 px rms").arg(worst, 0, 'f', 3) : tr("flat panel");
   settle(card, doubts(warnings));
 }
 
@@ -99,7 +99,7 @@ void plan(StepCard& card, const ApplicationState& state) {
 void navigate(StepCard& card, const ApplicationState& state) {
   if (!state.hand_eye_rms_mm) return;
   card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
-  if (state.order) card.why = tr("%1: look at the path, then confirm").arg(text(state.order->name));
+  if (state.order) card.why = tr("%1: inspect the path, then confirm").arg(text(state.order->name));
   if (state.outcomes.empty()) return;
   double worst = 0;
   for (const auto& [name, outcome] : state.outcomes)
@@ -117,7 +117,7 @@ void verify(StepCard& card, const ApplicationState& state) {
   for (const auto& [name, outcome] : state.outcomes)
     for (const EndMiss& end : {outcome.start, outcome.end})
       if (end.distance_mm() >= worst) worst = end.distance_mm(), expected = end.predicted_mm();
-  card.figure = tr("%1 mm (expect %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
+  card.figure = tr("%1 mm (predicted %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 

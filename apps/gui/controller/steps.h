@@ -9,7 +9,7 @@ namespace helicarm::gui {
 
 enum class StepMood { waiting, running, good, warning, refused };
 
-/// A step as the strip shows it: its mood, the figure that decided it, and why or what to do next.
+/// A step as shown: its mood, the decisive number, and the reason or the next action.
 struct StepCard {
   Phase phase = Phase::acquire;
   QString name;
@@ -23,7 +23,7 @@ std::array<StepCard, phases.size()> steps_of(const ApplicationState& state);
 /// The step that a refused measurement concerns.
 Phase phase_of(const Failure& failure);
 
-/// In words, with its code.
+/// As text, with its code.
 QString sentence_of(const Failure& failure);
 
 }  // namespace helicarm::gui

@@ -9,13 +9,13 @@
 
 namespace helicarm::gui {
 
-/// One thread that does what it is given, in order, so that the interface never waits.
+/// One thread that runs jobs in order, so that the interface never blocks.
 class Worker {
  public:
   using Job = std::function<void()>;
 
   Worker() : thread_([this](const std::stop_token& stop) { run(stop); }) {}
-  /// Drops what has not begun and waits for the job that runs.
+  /// Drops the queued jobs and waits for the running one.
   ~Worker();
 
   void post(Job job);

@@ -5,7 +5,7 @@
 
 namespace helicarm::gui {
 
-/// The one application that widgets, fonts and painters need.
+/// The single QApplication that widgets, fonts and painters need.
 inline QApplication& application() {
   static int count = 1;
   static char name[] = "test";

@@ -73,7 +73,7 @@ void FieldBox::set(std::optional<double> number) {
     (words_ ? static_cast<QWidget*>(words_) : number_)->setEnabled(number.has_value());
   }
   if (!number) {
-    if (number_) number_->setValue(1);  // to begin with, once it is ticked
+    if (number_) number_->setValue(1);  // initial value after ticking
     return;
   }
   given_ = number;

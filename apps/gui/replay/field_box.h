@@ -12,7 +12,7 @@ class QDoubleSpinBox;
 
 namespace helicarm::gui {
 
-/// A box for one number of a field: a spin box, a list of words, and a tick where it may be left unset.
+/// An editor for one number of a field: a spin box or a list of words, with a tick if it may be unset.
 class FieldBox : public QWidget {
   Q_OBJECT
 
@@ -25,8 +25,8 @@ class FieldBox : public QWidget {
     set(given_);
   }
 
-  /// What stands there, snapped to the field's steps; what was given, to the last bit, where nobody changed
-  /// it.
+  /// The displayed value, snapped to the field's steps; the given value, to the last bit, if it was not
+  /// edited.
   std::optional<double> value() const;
   void set(std::optional<double> number);
 
@@ -39,7 +39,7 @@ class FieldBox : public QWidget {
   QCheckBox* tick_ = nullptr;
   QComboBox* words_ = nullptr;
   QDoubleSpinBox* number_ = nullptr;
-  std::optional<double> shown_;  ///< by the box, once `given_` was put in
+  std::optional<double> shown_;  ///< by the box for `given_`
 };
 
 }  // namespace helicarm::gui

@@ -86,7 +86,7 @@ void PdfLayout::title(const QString& text) {
 }
 
 void PdfLayout::heading(const QString& text) {
-  need(mm(35));  // a heading does not stand alone below a page
+  need(mm(35));  // a heading is not the last line of a page
   if (y_ > 0) y_ += mm(gap_mm);
   write(text, font_of(13, QFont::DemiBold), ink);
   y_ += mm(1.5);
@@ -198,7 +198,7 @@ void PdfLayout::figures(const std::vector<LayoutFigure>& figures) {
     for (std::size_t j = i; j < end; ++j) {
       const QRectF box(double(j - i) * (width + mm(between)), y_, width, heights[j - i]);
       painter_.save();
-      painter_.setClipRect(box);  // lines may lead out of the image
+      painter_.setClipRect(box);  // lines may extend beyond the image
       QSvgRenderer(figures[j].svg).render(&painter_, box);
       painter_.restore();
       painter_.setPen(soft);

@@ -10,21 +10,21 @@
 
 namespace helicarm::gui {
 
-/// A figure as SVG text, with what stands below it.
+/// A figure as SVG text with its caption.
 struct LayoutFigure {
   QByteArray svg;
   QString caption;
 };
 
-/// A number to be seen first: value, unit and what it is.
+/// A key figure: value, unit and name.
 struct LayoutCard {
   QString value, unit, what;
 };
 
-/// Fills A4 pages from top to bottom; what does not fit goes to the next one. Lengths are mm.
+/// Fills A4 pages from top to bottom, with page breaks. Lengths in mm.
 class PdfLayout {
  public:
-  /// `footer` stands below each page.
+  /// `footer` appears on each page.
   PdfLayout(QPdfWriter& writer, QString footer);
 
   void title(const QString& text);
@@ -32,7 +32,7 @@ class PdfLayout {
   enum class Tone { plain, soft, bad, good };
   void paragraph(const QString& text, Tone tone = Tone::plain);
   void cards(const std::vector<LayoutCard>& cards);
-  /// A column is of numbers where its heading begins with '#'. The headings come again on each page.
+  /// A heading that begins with '#' marks a numeric column. Headings repeat on each page.
   void table(const QStringList& headings, const std::vector<QStringList>& rows);
   /// Two side by side.
   void figures(const std::vector<LayoutFigure>& figures);
@@ -41,7 +41,7 @@ class PdfLayout {
   double mm(double length) const { return length * dots_per_mm_; }
   void begin_page();
   void next_page();
-  /// Goes to the next page where less than this is left.
+  /// Starts a new page if less than this height remains.
   void need(double height);
   double write(const QString& text, const QFont& font, const QColor& ink);
   double row_height(const QStringList& cells, const std::vector<double>& widths, const QFont& font) const;

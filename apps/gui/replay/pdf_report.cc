@@ -54,7 +54,7 @@ void draw_summary(const Result& result, PdfLayout& layout) {
   for (const PointResult& point : result.points)
     if (point.place) largest = std::max(largest, length_at_95(point.place->covariance_in_calibrator));
   if (largest > 0)
-    cards.push_back({fixed(largest), "mm", Words::tr("least certain point, predicted at 95 %")});
+    cards.push_back({fixed(largest), "mm", Words::tr("largest predicted error of a point at 95 %")});
   layout.cards(cards);
   if (!result.warnings.empty()) layout.heading(Words::tr("Warnings"));
   for (const Warning& warning : result.warnings) layout.paragraph("• " + message_of(warning));
@@ -68,16 +68,15 @@ void draw_views(const Result& result, PdfLayout& layout) {
     if (figure.empty()) continue;
     QString caption = text_of(view.name);
     if (view.calibrated)
-      caption +=
-          Words::tr(": balls reproject within %1 px rms").arg(fixed(view.calibrated->reprojection_rms_px));
+      caption += Words::tr(": reprojection error %1 px rms").arg(fixed(view.calibrated->reprojection_rms_px));
     if (view.found && view.found->mirrored) caption += Words::tr(", stored mirrored");
     figures.push_back({print_svg(figure), caption});
   }
   if (figures.empty()) return;
-  layout.heading(Words::tr("The X-rays, rectified"));
+  layout.heading(Words::tr("Rectified X-ray images"));
   layout.figures(figures);
   layout.paragraph(
-      Words::tr("Green: balls used, with their residuals as orange arrows. Red crosses: false blobs. Blue: "
+      Words::tr("Green: used fiducials, with their residuals as orange arrows. Red crosses: outliers. Blue: "
                 "plate. Violet: points. Yellow: planned tunnels. Red lines: tool."),
       PdfLayout::Tone::soft);
 }
@@ -100,7 +99,7 @@ void draw_points(const Result& result, PdfLayout& layout) {
                     fixed(sigma.z()), fixed(length_at_95(covariance)), fixed(point.ray_gap_mm)});
   }
   if (rows.empty() && missing.empty()) return;
-  layout.heading(Words::tr("Points in the calibrator, mm"));
+  layout.heading(Words::tr("Points in the calibrator frame, mm"));
   if (!rows.empty())
     layout.table({Words::tr("Point"), Words::tr("Kind"), "#x", "#y", "#z", "#σ x", "#σ y", "#σ z",
                   "#" + Words::tr("within (95 %)"), "#" + Words::tr("ray gap")},
@@ -110,8 +109,8 @@ void draw_points(const Result& result, PdfLayout& layout) {
 
 void draw_accuracy(const Accuracy& accuracy, PdfLayout& layout) {
   std::vector<QStringList> rows;
-  for (const auto& [what, s] : {std::pair{Words::tr("FRE, the balls themselves (Eq. 11)"), accuracy.fre_mm},
-                                {Words::tr("TRE, the check targets (Eq. 12)"), accuracy.tre_mm}})
+  for (const auto& [what, s] : {std::pair{Words::tr("FRE of the fiducials (Eq. 11)"), accuracy.fre_mm},
+                                {Words::tr("TRE of the check targets (Eq. 12)"), accuracy.tre_mm}})
     if (s.n > 0)
       rows.push_back({what, fixed(s.mean), fixed(s.rms), fixed(s.max), fixed(s.min), QString::number(s.n)});
   if (rows.empty()) return;
@@ -169,14 +168,14 @@ void draw_rectification(const Result& result, PdfLayout& layout) {
     if (const std::string figure = distortion_figure(view); !figure.empty())
       figures.push_back(
           {print_svg(figure, true),
-           Words::tr("Distortion in %1: from the rectified to the raw place").arg(text_of(view.name))});
+           Words::tr("Distortion in %1: from the rectified to the raw position").arg(text_of(view.name))});
   }
   if (rows.empty()) return;
   layout.heading(Words::tr("Rectification"));
-  layout.table(
-      {Words::tr("View"), Words::tr("plate dots"), "#" + Words::tr("residual, px"),
-       "#" + Words::tr("held out, px"), "#" + Words::tr("distortion, px"), "#" + Words::tr("largest, px")},
-      rows);
+  layout.table({Words::tr("View"), Words::tr("plate dots"), "#" + Words::tr("residual, px"),
+                "#" + Words::tr("cross-validated, px"), "#" + Words::tr("distortion, px"),
+                "#" + Words::tr("largest, px")},
+               rows);
   layout.figures(figures);
 }
 

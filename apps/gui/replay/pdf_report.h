@@ -7,9 +7,9 @@
 
 namespace helicarm::gui {
 
-/// The report on A4 pages: figures of merit, views, points, tunnels, verification, rectification; or the
-/// refusal and what was known until then. No identity of the patient; written whole or not at all. Refuses
-/// cannot_write. Needs an application (for its fonts).
+/// The report on A4 pages: key figures, views, points, tunnels, verification, rectification; or the refusal
+/// with the results up to it. No patient identity; written completely or not at all. Refuses cannot_write.
+/// Needs a QApplication (for its fonts).
 Expected<void> write_pdf_report(const Result& result, const std::filesystem::path& path);
 
 }  // namespace helicarm::gui

@@ -68,7 +68,7 @@ class Pdf : public testing::Test {
   const fs::path path_ = fs::path(root_.path().toStdString()) / "report.pdf";
 };
 
-TEST_F(Pdf, IsWholeAndGrowsByPages) {
+TEST_F(Pdf, IsCompleteAndGrowsByPages) {
   ASSERT_TRUE(write_pdf_report(result_of_two_views(5), path_));
   EXPECT_TRUE(bytes().starts_with("%PDF-"));
   EXPECT_THAT(bytes().substr(bytes().size() - 8), testing::HasSubstr("%%EOF"));
@@ -77,14 +77,14 @@ TEST_F(Pdf, IsWholeAndGrowsByPages) {
   EXPECT_GT(pages(), few + 2);
 }
 
-TEST_F(Pdf, RefusedResultHasItsReport) {
+TEST_F(Pdf, RefusedResultHasAReport) {
   Result refused;
   refused.failure = Failure{Reason::views_too_close, "AP and LAT are 3 degrees apart, limit 30", "", {}};
   ASSERT_TRUE(write_pdf_report(refused, path_));
   EXPECT_EQ(pages(), 1);
 }
 
-TEST_F(Pdf, IsWrittenWholeOrNotAtAll) {
+TEST_F(Pdf, IsWrittenCompletelyOrNotAtAll) {
   fs::create_directory(path_);
   const auto written = write_pdf_report(result_of_two_views(1), path_);
   ASSERT_FALSE(written);
@@ -92,7 +92,7 @@ TEST_F(Pdf, IsWrittenWholeOrNotAtAll) {
   EXPECT_EQ(std::distance(fs::directory_iterator(path_.parent_path()), {}), 1);
 }
 
-TEST_F(Pdf, FigureBringsItsImageAndItsColours) {
+TEST_F(Pdf, FigureContainsItsImageAndColours) {
   const Result result = result_of_two_views(1);
   QSvgRenderer svg(print_svg(view_figure(result, 1)));
   ASSERT_TRUE(svg.isValid());
@@ -102,7 +102,7 @@ TEST_F(Pdf, FigureBringsItsImageAndItsColours) {
   QPainter painter(&page);
   svg.render(&painter, QRectF(0, 0, 640, 480));
   painter.end();
-  EXPECT_LT(qRed(page.pixel(20, 100)), 80);  // the ramp, not the page
+  EXPECT_LT(qRed(page.pixel(20, 100)), 80);  // the grey ramp, not the page
   EXPECT_GT(qGreen(page.pixel(600, 100)), 180);
   int green = 0;
   for (int u = 300; u < 340; ++u)

@@ -12,7 +12,7 @@ struct Look {
   const char* attributes;
 };
 
-/// Half a page is less than a screen: letters and lines are drawn so much larger.
+/// Half a page is smaller than a screen: letters and lines are enlarged by this factor.
 constexpr double letters = 1.9, lines = 1.5;
 
 constexpr Look looks[] = {{"ball", R"(stroke="#4ade80")"},
@@ -26,7 +26,7 @@ constexpr Look looks[] = {{"ball", R"(stroke="#4ade80")"},
                           {"field", R"(stroke="#0b6e75")"},
                           {"frame", R"(stroke="#dcd8cf")"}};
 
-/// All numbers of an attribute times a factor.
+/// Multiplies all numbers of an attribute by a factor.
 void enlarge(QString& svg, const QString& attribute, double factor) {
   const QRegularExpression pattern(attribute + "=\"([0-9.]+)\"");
   qsizetype from = 0;
@@ -52,7 +52,7 @@ QByteArray print_svg(const std::string& figure, bool on_page) {
   svg.replace("class=\"bar\"",
               on_page ? R"(stroke="#1d2326" stroke-width="3")" : R"(stroke="#fff" stroke-width="3")");
   static const QRegularExpression text(R"(<text class="[^"]*" ([^>]*)>([^<]*)</text>)");
-  // QtSvg knows no halo about letters: a shadow keeps white ones legible on white bone
+  // QtSvg has no paint-order for outlined letters: a shadow keeps white ones legible on white bone.
   svg.replace(text, on_page
                         ? R"x(<text fill="#1d2326" stroke="none" \1>\2</text>)x"
                         : R"x(<text fill="#000" stroke="none" transform="translate(1.7 1.7)" \1>\2</text>)x"

@@ -6,8 +6,8 @@
 
 namespace helicarm::gui {
 
-/// The report's figures leave their looks to the page's style sheet: the same as a document of its own, with
-/// its looks within, as QtSvg draws it. `on_page`: on white, not on an X-ray.
+/// The report's figures take their style from the page's style sheet; this returns a separate document with
+/// inline style for QtSvg. `on_page`: on white, not on an X-ray image.
 QByteArray print_svg(const std::string& figure, bool on_page = false);
 
 }  // namespace helicarm::gui

@@ -11,11 +11,10 @@ enum class Folder { cases, sessions };
 
 inline constexpr int most_recent = 10;
 
-/// Folders that were opened, the newest first; those that are no more are left out. Paths alone are kept:
-/// nothing of what lies in them.
+/// Recently opened folders, newest first; missing ones are left out. Only paths are stored, no content.
 std::vector<std::filesystem::path> recent_folders(const QSettings& settings, Folder kind);
 
-/// Puts a folder first; the eleventh is forgotten.
+/// Puts a folder first; at most ten are kept.
 void remember_folder(QSettings& settings, Folder kind, const std::filesystem::path& folder);
 
 void forget_folders(QSettings& settings, Folder kind);

@@ -22,7 +22,7 @@ class Recent : public testing::Test {
   QSettings settings_{root_.filePath("settings.ini"), QSettings::IniFormat};
 };
 
-TEST_F(Recent, NewestIsFirstAndOnce) {
+TEST_F(Recent, NewestIsFirstWithoutDuplicates) {
   const fs::path a = made("a"), b = made("b b");
   for (const fs::path& folder : {a, b, a / "", b / ".." / "a"})
     remember_folder(settings_, Folder::cases, folder);
@@ -38,7 +38,7 @@ TEST_F(Recent, TenAreKept) {
   EXPECT_EQ(folders.back().filename(), "2");
 }
 
-TEST_F(Recent, VanishedIsDropped) {
+TEST_F(Recent, MissingFolderIsDropped) {
   const fs::path a = made("a"), b = made("b");
   remember_folder(settings_, Folder::cases, a);
   remember_folder(settings_, Folder::cases, b);
@@ -46,7 +46,7 @@ TEST_F(Recent, VanishedIsDropped) {
   EXPECT_THAT(recent_folders(settings_, Folder::cases), testing::ElementsAre(b));
 }
 
-TEST_F(Recent, OutlivesTheProgramUntilForgotten) {
+TEST_F(Recent, PersistsUntilCleared) {
   const fs::path a = made("a");
   remember_folder(settings_, Folder::cases, a);
   settings_.sync();

@@ -21,7 +21,7 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int tick_ms = 40;
-/// A look at the tracker holds hundreds of samples: nobody reads them all here.
+/// A poses record holds hundreds of samples; only the first ones are displayed.
 constexpr qsizetype longest_detail = 100'000;
 
 QString clock_time(double seconds) {
@@ -29,7 +29,7 @@ QString clock_time(double seconds) {
   return QString("%1:%2.%3").arg(tenths / 600).arg(tenths / 10 % 60, 2, 10, QChar('0')).arg(tenths % 10);
 }
 
-/// A click leads where it was.
+/// A click moves the slider to its position.
 class TimeSlider : public QSlider {
  public:
   using QSlider::QSlider;
@@ -41,7 +41,7 @@ class TimeSlider : public QSlider {
   }
 };
 
-/// Never takes the focus: the space bar is not its key.
+/// Never takes the focus: the space bar stops the robot.
 QPushButton* button(const QString& text, const QString& tip, QWidget* parent) {
   auto* made = new QPushButton(text, parent);
   made->setToolTip(tip);
@@ -80,9 +80,9 @@ void ReplayPanel::build() {
   middle->addWidget(list_);
   middle->addWidget(detail_);
 
-  back_ = button(tr("◀"), tr("One moment back (J or comma)"), this);
-  play_ = button(tr("Play"), tr("Play and halt (K)"), this);
-  forward_ = button(tr("▶"), tr("One moment on (L or period)"), this);
+  back_ = button(tr("◀"), tr("Previous record (J or comma)"), this);
+  play_ = button(tr("Play"), tr("Play and pause (K)"), this);
+  forward_ = button(tr("▶"), tr("Next record (L or period)"), this);
   slider_ = new TimeSlider(Qt::Horizontal, this);
   slider_->setAccessibleName(tr("Time"));
   time_ = new QLabel(clock_time(0), this);
@@ -95,7 +95,7 @@ void ReplayPanel::build() {
   controls->addWidget(time_);
   controls->addWidget(speed_);
 
-  verify_ = button(tr("Verify"), tr("Recompute everything from the record"), this);
+  verify_ = button(tr("Verify"), tr("Recompute the operation from its record"), this);
   progress_ = new QProgressBar(this);
   progress_->hide();
   verdict_ = new QLabel(this);
@@ -137,9 +137,9 @@ Expected<void> ReplayPanel::open(const std::filesystem::path& session) {
   moment_ = -1;
   verdict_->clear();
   progress_->hide();
-  const QString end = timeline_->torn       ? tr("broken off while it was written")
+  const QString end = timeline_->torn       ? tr("incomplete: interrupted while writing")
                       : timeline_->finished ? tr("complete")
-                                            : tr("without the operation's end");
+                                            : tr("operation not ended");
   about_->setText(tr("%1: %2 records, %3")
                       .arg(QString::fromStdString(session.filename().string()))
                       .arg(timeline_->moments.size())
@@ -228,13 +228,13 @@ void ReplayPanel::show_verdict(const Expected<ReplayReport>& report) {
   progress_->hide();
   verify_->setEnabled(true);
   const bool same = report && report->differences.empty();
-  QString text = tr("Replayed to the last bit: exposures %1, pictures %2, results %3, registrations %4");
+  QString text = tr("Reproduced bit for bit: acquisitions %1, images %2, results %3, registrations %4");
   if (!report) {
     text = tr("Cannot be replayed: %1").arg(QString::fromStdString(report.error().message));
   } else if (same) {
     text = text.arg(report->exposures).arg(report->images).arg(report->results).arg(report->hand_eyes);
   } else {
-    text = tr("These came out otherwise:");
+    text = tr("These values differ on recomputation:");
     for (const std::string& difference : report->differences)
       text += "\n" + QString::fromStdString(difference);
   }

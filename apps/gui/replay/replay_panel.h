@@ -21,17 +21,17 @@ class QSlider;
 
 namespace helicarm::gui {
 
-/// An operation's record to leaf through: J and comma step back, L and period forward, K plays and halts. The
-/// space bar stays free: it stops the robot.
+/// Steps through an operation's record: J and comma back, L and period forward, K plays and pauses. The space
+/// bar stays reserved for stopping the robot.
 class ReplayPanel : public QWidget {
   Q_OBJECT
 
  public:
   explicit ReplayPanel(QWidget* parent = nullptr);
-  /// Stops a verification, which may take as long as one measurement.
+  /// Stops a running verification, which may take as long as one measurement.
   ~ReplayPanel() override = default;
 
-  /// Shows a session's record from its first moment. Refuses as `read_timeline` and then shows what it did.
+  /// Shows a session's record from its first moment. Refuses as `read_timeline`; the previous one then stays.
   Expected<void> open(const std::filesystem::path& session);
 
   const std::optional<Timeline>& timeline() const { return timeline_; }
@@ -43,12 +43,12 @@ class ReplayPanel : public QWidget {
   void set_moment(int index);
   void step(int by);
   void set_playing(bool playing);
-  /// Recomputes the operation aside; `verified` tells the end.
+  /// Recomputes the operation in the background; `verified` signals the end.
   void verify();
 
  Q_SIGNALS:
   void moment_changed(int index);
-  /// Whether all came out the same, to the last bit.
+  /// Whether all values were reproduced bit for bit.
   void verified(bool same);
 
  private:
@@ -72,7 +72,7 @@ class ReplayPanel : public QWidget {
   QComboBox* speed_;
   QProgressBar* progress_;
   QLabel* verdict_;
-  std::jthread worker_;  ///< last: it ends before what it tells is gone
+  std::jthread worker_;  ///< last: ends before the members that it notifies
 };
 
 }  // namespace helicarm::gui

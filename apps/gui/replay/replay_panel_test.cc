@@ -49,7 +49,7 @@ TEST_F(Panel, KeysStepAndPlay) {
   EXPECT_EQ(panel_->moment(), int(session_kinds.size()) - 1);
 }
 
-TEST_F(Panel, SpaceIsNotItsKey) {
+TEST_F(Panel, SpaceBarIsNotHandled) {
   for (QWidget* widget : panel_->findChildren<QWidget*>()) {
     if (widget->focusPolicy() == Qt::NoFocus || !widget->isVisible()) continue;
     widget->setFocus();
@@ -59,7 +59,7 @@ TEST_F(Panel, SpaceIsNotItsKey) {
   EXPECT_FALSE(panel_->is_playing());
 }
 
-TEST_F(Panel, SliderLeadsToTheLastMomentNotLater) {
+TEST_F(Panel, SliderSelectsTheLastMomentNotLater) {
   auto* slider = panel_->findChild<QSlider*>();
   slider->setValue(slider->maximum());
   EXPECT_EQ(panel_->moment(), int(session_kinds.size()) - 1);
@@ -75,7 +75,7 @@ TEST_F(Panel, VerificationReportsWhatItCannotReplay) {
   EXPECT_THAT(panel_->verdict().toStdString(), testing::HasSubstr("record"));
 }
 
-TEST_F(Panel, DamagedSessionLeavesTheOpenOne) {
+TEST_F(Panel, DamagedSessionKeepsTheOpenOne) {
   EXPECT_EQ(panel_->open(folder_ / "nowhere").error().reason, Reason::missing_file);
   EXPECT_EQ(panel_->timeline()->moments.size(), session_kinds.size());
 }

@@ -10,7 +10,7 @@
 #include "helicarm/operation/seen_poses.h"
 #include "helicarm/session/session_log.h"
 
-/// A short operation's record, one of each kind, for tests.
+/// A short operation's record for tests, with one record of each kind.
 namespace helicarm::gui {
 
 inline constexpr std::array<std::string_view, 15> session_kinds{

@@ -31,7 +31,7 @@ class SettingsDialog : public QDialog {
  public:
   explicit SettingsDialog(Settings settings, QWidget* parent = nullptr);
 
-  /// As given, with what stands in the boxes; always within the fields' limits.
+  /// The options with the values of the boxes; always within the fields' limits.
   Settings settings() const;
 
  private:

@@ -28,7 +28,7 @@ class Dialog : public testing::Test {
   }
 };
 
-TEST_F(Dialog, GivesBackWhatNoOneChanged) {
+TEST_F(Dialog, ReturnsUneditedValuesUnchanged) {
   Settings given;
   given.run.method = Method::paper;
   given.run.max_error_mm = 0.123456789;  // more digits than the box shows
@@ -72,7 +72,7 @@ TEST_F(Dialog, NumberSnapsToItsSteps) {
 TEST_F(Dialog, LimitMayBeLeftUnset) {
   SettingsDialog dialog({});
   const auto limits =
-      dialog.findChildren<FieldBox*>("max_error_mm");  // the plan's must be set, the run's may
+      dialog.findChildren<FieldBox*>("max_error_mm");  // required in the plan, optional in the run
   const auto found =
       std::ranges::find_if(limits, [](FieldBox* each) { return each->findChild<QCheckBox*>() != nullptr; });
   ASSERT_NE(found, limits.end());
@@ -83,7 +83,7 @@ TEST_F(Dialog, LimitMayBeLeftUnset) {
   EXPECT_EQ(dialog.settings().run.max_error_mm, 1.5);
 }
 
-TEST_F(Dialog, DefaultsComeBack) {
+TEST_F(Dialog, RestoresDefaults) {
   Settings given;
   given.run.max_error_mm = 3;
   given.virtual_or.seed = 77;

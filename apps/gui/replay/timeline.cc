@@ -29,15 +29,15 @@ QString count_of(const Json& list) { return QString::number(list.size()); }
 
 QString exposure_summary(const Json& content) {
   const QString view = text_of(content, "view");
-  return content.at("poses").is_null() ? Words::tr("Exposure %1, without poses").arg(view)
-                                       : Words::tr("Exposure %1").arg(view);
+  return content.at("poses").is_null() ? Words::tr("Acquisition %1, without poses").arg(view)
+                                       : Words::tr("Acquisition %1").arg(view);
 }
 
 QString loop_summary(const Json& content) {
   const Json& loop = content.at("loop");
   const QString tunnel = text_of(content, "tunnel");
   if (loop.empty()) return Words::tr("Tool at %1").arg(tunnel);
-  return Words::tr("Tool at %1: off by %2 mm, looks: %3")
+  return Words::tr("Tool at %1: error %2 mm, measurements: %3")
       .arg(tunnel, millimetres(loop.back().at("distance_mm")), count_of(loop));
 }
 
@@ -51,8 +51,8 @@ QString poses_summary(const Json& content) {
   QStringList seen;
   for (const auto& [tool, samples] : content.at("window").at("tools").items())
     if (!samples.empty()) seen << QString::fromStdString(tool);
-  return Words::tr("Look at the tracker (%1): %2")
-      .arg(text_of(content, "why"), seen.isEmpty() ? Words::tr("nothing seen") : seen.join(", "));
+  return Words::tr("Tracker poses (%1): %2")
+      .arg(text_of(content, "why"), seen.isEmpty() ? Words::tr("none visible") : seen.join(", "));
 }
 
 QString summary_of(const std::string& kind, const Json& content) {
@@ -60,12 +60,12 @@ QString summary_of(const std::string& kind, const Json& content) {
   if (kind == "plan") return Words::tr("Plan, tunnels: %1").arg(count_of(content.at("tunnels")));
   if (kind == "exposure") return exposure_summary(content);
   if (kind == "refused")
-    return Words::tr("Picture for %1 refused: %2").arg(text_of(content, "view"), text_of(content, "why"));
+    return Words::tr("Image for %1 refused: %2").arg(text_of(content, "view"), text_of(content, "why"));
   if (kind == "case") return Words::tr("Measurement %1 begins").arg(text_of(content, "folder"));
   if (kind == "result") return Words::tr("Measurement %1 done").arg(text_of(content, "folder"));
   if (kind == "poses") return poses_summary(content);
   if (kind == "hand_eye")
-    return Words::tr("Robot registered within %1 mm rms, poses: %2")
+    return Words::tr("Robot registered, %1 mm rms, poses: %2")
         .arg(millimetres(content.at("found").at("rms_mm")), count_of(content.at("pairs")));
   if (kind == "order")
     return Words::tr("Order %1, waypoints: %2")
@@ -80,13 +80,14 @@ QString summary_of(const std::string& kind, const Json& content) {
   return QString::fromStdString(kind);
 }
 
-/// Runs `read`; a record that is not as its kind should be is bad_value.
+/// Runs `read`; a record without the fields of its kind is bad_value.
 template <class Read>
 auto of_record(std::size_t number, Read&& read) {
   try {
     return read();
   } catch (const Json::exception&) {
-    throw BadInput(Reason::bad_value, fmt::format("record {}: lacks what its kind needs", number));
+    throw BadInput(Reason::bad_value,
+                   fmt::format("record {}: a field that its kind requires is missing", number));
   }
 }
 
@@ -143,7 +144,7 @@ Expected<Timeline> read_timeline(const std::filesystem::path& session) {
     double seconds = 0;
     const double begin = history.records.front().time_s;
     for (SessionRecord& record : history.records) {
-      seconds = std::max(seconds, record.time_s - begin);  // a clock may be set back
+      seconds = std::max(seconds, record.time_s - begin);  // the clock may be set back
       QString summary = of_record(record.number, [&] { return summary_of(record.kind, record.content); });
       timeline.finished = timeline.finished || record.kind == "end";
       timeline.moments.push_back({seconds, record.kind, std::move(summary), std::move(record.content)});
@@ -164,13 +165,13 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
 Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result) {
   return guarded([&] {
     if (!state.measured || !state.registered_at)
-      throw BadInput(Reason::usage, "nothing was measured or registered by then");
+      throw BadInput(Reason::usage, "no measurement or no registration before this moment");
     const OperationPlan plan = plan_of(timeline);
     std::vector<Poses> exposures;
     for (const ViewResult& view : result.views) {
       const auto at = state.exposed_at.find(view.name);
       if (at == state.exposed_at.end())
-        throw BadInput(Reason::usage, fmt::format("{}: no picture was taken by then", view.name));
+        throw BadInput(Reason::usage, fmt::format("{}: no image before this moment", view.name));
       const std::string origin = fmt::format("record {}", at->second);
       const Json& window = timeline.moments[at->second].content.at("window");
       exposures.push_back(

@@ -14,7 +14,7 @@
 
 namespace helicarm::gui {
 
-/// One record of an operation, for a person to look at.
+/// One record of an operation, for display.
 struct Moment {
   double seconds;  ///< since the record began
   std::string kind;
@@ -27,44 +27,44 @@ struct Moment {
 struct Timeline {
   std::filesystem::path session;
   std::vector<Moment> moments;
-  bool torn = false;      ///< the program was killed while it wrote the next record
-  bool finished = false;  ///< the operation came to its end
+  bool torn = false;      ///< an incomplete record follows: the program was killed while writing
+  bool finished = false;  ///< the operation was ended
 
   double length_s() const { return moments.empty() ? 0 : moments.back().seconds; }
-  /// The last moment that is not later; 0 where all are.
+  /// The last moment that is not later; 0 if all are.
   std::size_t at(double seconds) const;
 };
 
-/// How far a tool was off its place when the tracker looked.
+/// Position error of a tool at one measurement of the tracker.
 struct LoopMiss {
   double distance_mm;
   double turn_deg;
 };
 
-/// What was known once a moment had passed.
+/// State of the operation after a moment.
 struct SessionState {
-  std::vector<std::string> exposures;                   ///< views whose image was taken, in that order
+  std::vector<std::string> exposures;                   ///< views in order of acquisition
   std::optional<std::filesystem::path> case_folder;     ///< the newest case: images and case.json
-  bool measured = false;                                ///< that case has its result
+  bool measured = false;                                ///< the newest case has a result
   std::map<std::string, RigidTransform> tracker_from;   ///< the newest pose of each tool
   std::map<std::string, std::vector<LoopMiss>> misses;  ///< of the closed loop, by tunnel
-  std::map<std::string, std::size_t> exposed_at;        ///< the moment of each view's image
-  std::optional<std::size_t> registered_at;             ///< the moment of the robot's newest registration
-  std::string tunnel;                                   ///< to which the newest order goes
+  std::map<std::string, std::size_t> exposed_at;        ///< moment of each view's acquisition
+  std::optional<std::size_t> registered_at;             ///< moment of the latest registration
+  std::string tunnel;                                   ///< target of the newest order
 };
 
-/// Reads session.log in a session's folder. A torn end is left out and told; refuses as `read_session`, and
-/// a record that lacks what its kind needs (bad_value).
+/// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as
+/// `read_session`, and a record without the fields of its kind (bad_value).
 Expected<Timeline> read_timeline(const std::filesystem::path& session);
 
-/// After the moment with this index and all before it. Refuses as `read_timeline`.
+/// State after the moment with this index and all before it. Refuses as `read_timeline`.
 Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);
 
-/// What follows the tool in that state's case, whose measurement is `result`. Refuses (usage) a state before
+/// Follows the tool in that state's case, whose measurement is `result`. Refuses (usage) a state before
 /// measurement or registration.
 Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result);
 
-/// The tool at the newest poses, against the bone of the state's tunnel. Refuses as `LiveTool::overlay`.
+/// The tool at the newest poses, relative to the bone of the state's tunnel. Refuses as `LiveTool::overlay`.
 Expected<ToolOverlay> overlay_of(const LiveTool& tool, const Timeline& timeline, const SessionState& state);
 
 }  // namespace helicarm::gui

@@ -21,19 +21,19 @@ class TimelineTest : public testing::Test {
   const std::filesystem::path folder_ = root_.path().toStdString();
 };
 
-TEST_F(TimelineTest, EveryKindHasALine) {
+TEST_F(TimelineTest, EveryKindHasASummary) {
   const Timeline timeline = read();
   ASSERT_EQ(timeline.moments.size(), session_kinds.size());
   for (std::size_t i = 0; i < timeline.moments.size(); ++i) {
     EXPECT_EQ(timeline.moments[i].kind, session_kinds[i]);
-    EXPECT_NE(timeline.moments[i].summary.toStdString(), session_kinds[i]) << "no line of its own";
+    EXPECT_NE(timeline.moments[i].summary.toStdString(), session_kinds[i]) << "no summary of its own";
     EXPECT_EQ(parse_json(timeline.moments[i].detail().toStdString(), "detail").value(),
               timeline.moments[i].content);
   }
   EXPECT_TRUE(timeline.finished);
   EXPECT_FALSE(timeline.torn);
-  EXPECT_EQ(timeline.moments[3].summary, "Exposure AP");
-  EXPECT_THAT(timeline.moments[11].summary.toStdString(), testing::HasSubstr("off by 0.25 mm"));
+  EXPECT_EQ(timeline.moments[3].summary, "Acquisition AP");
+  EXPECT_THAT(timeline.moments[11].summary.toStdString(), testing::HasSubstr("error 0.25 mm"));
 }
 
 TEST_F(TimelineTest, TimeRunsForwardFromZero) {
@@ -45,7 +45,7 @@ TEST_F(TimelineTest, TimeRunsForwardFromZero) {
   EXPECT_EQ(timeline.at(timeline.length_s() + 1), timeline.moments.size() - 1);
 }
 
-TEST_F(TimelineTest, StateGrowsWithTheMoments) {
+TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   const Timeline timeline = read();
   const SessionState begin = state_at(timeline, 1).value();
   EXPECT_TRUE(begin.exposures.empty());
@@ -64,7 +64,7 @@ TEST_F(TimelineTest, StateGrowsWithTheMoments) {
   EXPECT_EQ(end.tracker_from.at("femur").translation.x(), 3);
 }
 
-TEST_F(TimelineTest, TornLogIsReadUpToItsTear) {
+TEST_F(TimelineTest, TornLogIsReadUpToTheIncompleteRecord) {
   const auto log = folder_ / "session.log";
   std::filesystem::resize_file(log, std::filesystem::file_size(log) - 5);
   const Timeline timeline = read();
@@ -73,7 +73,7 @@ TEST_F(TimelineTest, TornLogIsReadUpToItsTear) {
   EXPECT_EQ(timeline.moments.size(), session_kinds.size() - 1);
 }
 
-TEST_F(TimelineTest, DamageIsReportedAsTheFailureItIs) {
+TEST_F(TimelineTest, DamageIsReportedWithItsReason) {
   EXPECT_EQ(read_timeline(folder_ / "nowhere").error().reason, Reason::missing_file);
   std::fstream log(folder_ / "session.log", std::ios::in | std::ios::out | std::ios::binary);
   log.seekp(200);
@@ -82,7 +82,7 @@ TEST_F(TimelineTest, DamageIsReportedAsTheFailureItIs) {
   EXPECT_EQ(read_timeline(folder_).error().reason, Reason::bad_value);
 }
 
-TEST_F(TimelineTest, RecordWithoutItsContentIsNamed) {
+TEST_F(TimelineTest, RecordWithoutContentIsNamedInTheMessage) {
   const auto session = SessionLog::open(folder_ / "session.log").value();
   ASSERT_TRUE(session->append("exposure", {{"view", 7}}));
   const auto timeline = read_timeline(folder_);

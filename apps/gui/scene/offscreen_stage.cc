@@ -9,7 +9,7 @@ namespace {
 
 QString tr(const char* text) { return QCoreApplication::translate("OffscreenStage", text); }
 
-/// As VTK needs it.
+/// The surface format that VTK requires.
 QSurfaceFormat wanted_format() {
   QSurfaceFormat format;
   format.setRenderableType(QSurfaceFormat::OpenGL);
@@ -25,13 +25,14 @@ OffscreenStage::OffscreenStage() {
   surface_.create();
   context_.setFormat(wanted_format());
   if (!context_.create() || !context_.makeCurrent(&surface_)) {
-    obstacle_ = tr("There is no OpenGL here.");
+    obstacle_ = tr("OpenGL is not available.");
     return;
   }
   const QSurfaceFormat format = context_.format();
   if (format.renderableType() == QSurfaceFormat::OpenGLES || format.version() < qMakePair(3, 2))
-    obstacle_ =
-        tr("OpenGL 3.2 is needed; here is %1.%2.").arg(format.majorVersion()).arg(format.minorVersion());
+    obstacle_ = tr("OpenGL 3.2 is required; %1.%2 is available.")
+                    .arg(format.majorVersion())
+                    .arg(format.minorVersion());
   else
     stage_ = std::make_unique<Stage>();
 }
@@ -47,7 +48,7 @@ OffscreenStage::~OffscreenStage() {
 bool OffscreenStage::begin(const QSize& pixels) {
   if (obstacle_) return false;
   if (!context_.makeCurrent(&surface_)) {
-    obstacle_ = tr("The graphics were lost.");
+    obstacle_ = tr("The OpenGL context was lost.");
     return false;
   }
   if (!target_ || target_->size() != pixels) {

@@ -12,17 +12,16 @@
 
 namespace helicarm::gui {
 
-/// A stage in an OpenGL context that no window sees, drawn into images. A QOpenGLWidget would have Qt
-/// compose its whole window by OpenGL whenever anything in it changes: in software, as a rule here, that
-/// takes longer than the scene itself.
+/// A stage in an offscreen OpenGL context, rendered to images. A QOpenGLWidget would make Qt compose the
+/// whole window by OpenGL at every change, which in software rendering takes longer than the scene.
 class OffscreenStage {
  public:
   OffscreenStage();
   ~OffscreenStage();
 
-  /// Why nothing can be drawn here; nothing: it can.
+  /// Why rendering is impossible; empty if it is possible.
   const std::optional<QString>& obstacle() const { return obstacle_; }
-  /// Lets `prepare` change the stage, then draws it; null where there is an obstacle.
+  /// Lets `prepare` change the stage, then renders it; a null image if rendering is impossible.
   template <class Prepare>
   QImage draw(const QSize& pixels, const SceneCamera& camera, Prepare prepare) {
     if (!begin(pixels)) return {};

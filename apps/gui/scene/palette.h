@@ -3,7 +3,7 @@
 
 #include "gui/scene/tre_slice.h"
 
-/// The scene's colours on its dark ground; views by Okabe and Ito, told apart by colour-blind eyes too.
+/// The scene's colours on a dark background; views in the colour-blind safe palette of Okabe and Ito.
 namespace helicarm::gui::palette {
 
 inline constexpr Colour background{20, 24, 29}, text{225, 230, 236}, steel{190, 198, 208},
@@ -15,7 +15,7 @@ inline constexpr std::array<Colour, 4> views{{{230, 159, 0}, {0, 178, 135}, {204
 
 inline Colour of_view(std::size_t number) { return views[number % views.size()]; }
 
-/// Half way to the ground.
+/// Blended halfway with the background.
 inline Colour dim(const Colour& colour) {
   Colour dimmed{};
   for (std::size_t c = 0; c < 3; ++c) dimmed[c] = std::uint8_t((colour[c] + background[c]) / 2);

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double margin = 1.06;  // around what fills the window
+constexpr double margin = 1.06;  // around the content of the window
 constexpr double overview_height_deg = 28;
 
 double half_height(const SceneCamera& camera) { return std::tan(camera.height_deg * degree / 2); }
@@ -38,7 +38,7 @@ SceneCamera overview_of(std::span<const Vector3d> places, double aspect) {
   const Vector3d forward = Vector3d(-0.85, 0.42, -0.36).normalized();
   const Vector3d right = forward.cross(Vector3d::UnitZ()).normalized();
   SceneCamera camera{middle, middle + forward, right.cross(forward), overview_height_deg};
-  // Back until each place lies within the window's sides.
+  // Moves the camera back until each position lies within the window.
   const double half = half_height(camera) / margin;
   double back = 200;
   for (const Vector3d& place : places) {

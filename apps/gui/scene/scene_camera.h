@@ -8,33 +8,33 @@
 
 namespace helicarm::gui {
 
-/// From where the scene is looked at.
+/// Viewpoint of the scene.
 struct SceneCamera {
   Eigen::Vector3d position;
   Eigen::Vector3d focal_point;
   Eigen::Vector3d up;  ///< unit, across the line of sight
-  double height_deg;   ///< angle that the view's height takes
+  double height_deg;   ///< vertical field of view
 
   Eigen::Vector3d forward() const { return (focal_point - position).normalized(); }
   Eigen::Vector3d right() const { return forward().cross(up).normalized(); }
   double distance() const { return (focal_point - position).norm(); }
 };
 
-/// At the view's source along its central ray, up as in the image, all of which fits into the window.
-/// `aspect`: the window's width over its height. A mirrored image is seen as it would be unmirrored.
+/// At the view's source along its central ray, up as in the image, with the whole image in the window.
+/// `aspect`: the window's width over its height. A mirrored image is shown unmirrored.
 SceneCamera camera_through(const ViewShape& view, const Eigen::Vector3d& middle, double aspect);
 
-/// From above, obliquely, so that all these places fit.
+/// Obliquely from above, with all these positions in the window.
 SceneCamera overview_of(std::span<const Eigen::Vector3d> places, double aspect);
 
-/// Turned about the focal point: to the right and up as seen in the image, rad.
+/// Rotated about the focal point: to the right and up in the image, rad.
 SceneCamera turned(const SceneCamera& camera, double right_rad, double up_rad);
 /// Nearer (factor > 1) or farther.
 SceneCamera zoomed(const SceneCamera& camera, double factor);
-/// What is seen at the focal point goes right and up by parts of the window's height.
+/// Moves the content at the focal point right and up by fractions of the window's height.
 SceneCamera shifted(const SceneCamera& camera, double right, double up);
 
-/// Where a place is seen: x right and y up, both within [-1, 1] in the window; nothing behind the camera.
+/// Projection of a position: x right and y up, both within [-1, 1] in the window; empty behind the camera.
 std::optional<Eigen::Vector2d> seen_at(const SceneCamera& camera, double aspect,
                                        const Eigen::Vector3d& place);
 

@@ -19,7 +19,7 @@ void expect_inside(const SceneCamera& camera, double aspect, const Vector3d& pla
   EXPECT_LE(seen->cwiseAbs().maxCoeff(), 1);
 }
 
-TEST(SceneCamera, EachViewsCameraSeesTheCalibratorAndTheWholeImage) {
+TEST(SceneCamera, EachViewsCameraContainsTheCalibratorAndTheWholeImage) {
   const ResultScene shown = scene();
   for (const ViewShape& view : shown.views)
     for (const double aspect : {0.5, 1.0, 2.5}) {
@@ -29,7 +29,7 @@ TEST(SceneCamera, EachViewsCameraSeesTheCalibratorAndTheWholeImage) {
     }
 }
 
-TEST(SceneCamera, EachViewsCameraSeesWhatItsImageShows) {
+TEST(SceneCamera, EachViewsCameraAgreesWithItsImage) {
   for (const ViewShape& view : scene().views) {
     const SceneCamera camera = camera_through(view, {0, 0, 40}, 1);
     const Intrinsics& k = view.view.intrinsics;
@@ -42,7 +42,7 @@ TEST(SceneCamera, EachViewsCameraSeesWhatItsImageShows) {
   }
 }
 
-TEST(SceneCamera, OverviewSeesAll) {
+TEST(SceneCamera, OverviewContainsAllPositions) {
   std::vector<Vector3d> places{{0, 0, -900}, {500, 400, 0}, {-300, 800, 100}};
   for (const double aspect : {0.6, 1.0, 3.0}) {
     const SceneCamera camera = overview_of(places, aspect);
@@ -52,7 +52,7 @@ TEST(SceneCamera, OverviewSeesAll) {
   expect_inside(overview_of({}, 1), 1, {0, 0, 0});
 }
 
-TEST(SceneCamera, HandsMoveWhatIsSeenTheWayTheyGo) {
+TEST(SceneCamera, ContentFollowsTheMouse) {
   const SceneCamera camera = overview_of(std::vector<Vector3d>{{0, 0, 0}, {100, 100, 100}}, 1);
   const Vector3d near = camera.focal_point - 20 * camera.forward();
   const Vector2d before = *seen_at(camera, 1, near);
@@ -67,12 +67,12 @@ TEST(SceneCamera, HandsMoveWhatIsSeenTheWayTheyGo) {
   EXPECT_GT(zoomed(camera, 1e9).distance(), 1);
 }
 
-TEST(SceneCamera, WhatLiesBehindIsNotSeen) {
+TEST(SceneCamera, PositionBehindTheCameraHasNoProjection) {
   const SceneCamera camera = overview_of({}, 1);
   EXPECT_FALSE(seen_at(camera, 1, camera.position - camera.forward()));
 }
 
-TEST(SceneCamera, ThousandTurnsKeepItUpright) {
+TEST(SceneCamera, ThousandRotationsKeepItUpright) {
   SceneCamera camera = overview_of({}, 1);
   for (int i = 0; i < 1000; ++i) camera = turned(camera, 0.3, 0.2);
   EXPECT_NEAR(camera.up.norm(), 1, 1e-9);

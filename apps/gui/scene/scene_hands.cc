@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How SceneView is looked around in: presets, mouse and keys.
+// SceneView navigation: presets, mouse and keys.
 #include <QKeyEvent>
 #include <QMouseEvent>
 #include <QWheelEvent>

@@ -15,7 +15,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-/// Where no pixel size tells the focal length, the image is drawn this much farther than the calibrator.
+/// Without a pixel size the focal length in mm is unknown; the image is drawn this much farther than the
+/// calibrator.
 constexpr double beyond_calibrator = 1.5;
 
 double detector_depth(const ViewResult& view, const Vector3d& middle) {

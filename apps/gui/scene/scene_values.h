@@ -11,7 +11,7 @@
 #include "helicarm/phantom/mesh.h"
 #include "helicarm/pipeline/result.h"
 
-/// What is to be seen of an operation, as plain values in the calibrator's frame, mm.
+/// The displayed parts of an operation as plain values in the calibrator's frame, mm.
 namespace helicarm::gui {
 
 struct Segment {
@@ -19,7 +19,7 @@ struct Segment {
   Eigen::Vector3d to;
 };
 
-/// Where a point lies with a given probability.
+/// Confidence region of a point.
 struct Ellipsoid {
   Eigen::Vector3d centre;
   Eigen::Matrix3d axes;   ///< columns, a proper rotation
@@ -31,7 +31,7 @@ inline constexpr double chi2_95 = 7.815;
 
 Ellipsoid ellipsoid_95(const Eigen::Vector3d& centre, const Eigen::Matrix3d& covariance);
 
-/// A calibrated X-ray: its source, the edge of its image and its central ray.
+/// A calibrated view: source, edge of the image and central ray.
 struct ViewShape {
   std::string name;
   View view;
@@ -44,7 +44,7 @@ struct PointShape {
   std::string name;
   PointSource source;
   std::optional<Bone> moves_with;
-  Ellipsoid error;            ///< about its place
+  Ellipsoid error;            ///< about its position
   std::vector<Segment> rays;  ///< from the sources to the detectors
 };
 
@@ -55,10 +55,10 @@ struct TunnelShape {
   double radius_mm = 4;
 };
 
-/// All that a result shows; what was not reached is absent.
+/// The displayed parts of a result; missing ones are absent.
 struct ResultScene {
   std::vector<CalibratorBall> balls;
-  std::optional<TriangleMesh> body;  ///< of the calibrator, where its balls lie on a cone
+  std::optional<TriangleMesh> body;  ///< of the calibrator, if its balls lie on a cone
   std::vector<ViewShape> views;
   std::vector<PointShape> points;
   std::vector<TunnelShape> tunnels;
@@ -66,15 +66,15 @@ struct ResultScene {
 
 ResultScene scene_of(const Result& result, const Calibrator& calibrator);
 
-/// The outer wall of the cone that bears the balls; nothing where they lie on no cone.
+/// The outer wall of the cone that carries the balls; empty if they do not lie on a cone.
 std::optional<TriangleMesh> cone_of(const Calibrator& calibrator);
 
-/// What moves. Absent: not known now, so not shown.
+/// The moving parts. Absent: unknown at present and not drawn.
 struct LiveScene {
   std::optional<RigidTransform> calibrator_from_tip;  ///< z along the tool, out of its tip
-  /// Motion of the bones since the xray_image.
+  /// Motion of the bones since the acquisition.
   std::optional<RigidTransform> calibrator_from_femur_now, calibrator_from_tibia_now;
-  /// Where the bones' markers are.
+  /// Present poses of the bones' markers.
   std::optional<RigidTransform> calibrator_from_femur_marker, calibrator_from_tibia_marker;
   std::optional<RigidTransform> calibrator_from_base;
   std::string robot_model = "UR5";
@@ -82,7 +82,7 @@ struct LiveScene {
   std::vector<Eigen::Vector3d> path;  ///< of the tool's tip
 };
 
-/// The links of the arm from the base to the flange; empty where base, joints or model are not known.
+/// The links of the arm from the base to the flange; empty if base, joints or model are unknown.
 std::vector<Segment> robot_links(const LiveScene& live);
 
 }  // namespace helicarm::gui

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-TEST(SceneValues, EllipsoidHoldsNineteenOfTwentySamples) {
+TEST(SceneValues, EllipsoidContains95PercentOfSamples) {
   const Matrix3d root = (Matrix3d() << 3, 0, 0, 1, 0.5, 0, -0.4, 0.2, 1).finished();
   const Vector3d centre(5, -3, 40);
   const Ellipsoid ellipsoid = ellipsoid_95(centre, root * root.transpose());
@@ -54,7 +54,7 @@ TEST(SceneValues, RaysPassThroughTheirPointsAndEndOnTheDetectors) {
   }
 }
 
-TEST(SceneValues, DetectorIsAsLargeAndAsFarAsTheSimulatedOne) {
+TEST(SceneValues, DetectorAgreesWithTheSimulatedOne) {
   const ResultScene scene = scene_of(*simulated().result, simulated().given.calibrator);
   for (std::size_t i = 0; i < 2; ++i) {
     const simulation::TrueView& true_view = simulated().truth.views[i].true_view;
@@ -73,18 +73,18 @@ TEST(SceneValues, TunnelsRunBetweenTheirPoints) {
   EXPECT_EQ(scene.tunnels[0].axis.to, scene.points[1].error.centre);
 }
 
-TEST(SceneValues, RefusedResultShowsTheCalibratorAlone) {
+TEST(SceneValues, RefusedResultShowsOnlyTheCalibrator) {
   const ResultScene scene = scene_of({}, udcsc());
   EXPECT_EQ(scene.balls.size(), 12u);
   EXPECT_TRUE(scene.views.empty());
   EXPECT_TRUE(scene.points.empty());
 }
 
-TEST(SceneValues, ConeIsDrawnOnlyUnderBallsOfACone) {
+TEST(SceneValues, ConeIsDrawnOnlyForBallsOnACone) {
   Calibrator calibrator = udcsc();
   const auto cone = cone_of(calibrator);
   ASSERT_TRUE(cone);
-  for (const auto& [a, b, c] : cone->triangles) {  // outside is outside
+  for (const auto& [a, b, c] : cone->triangles) {  // outward orientation
     const Vector3d normal = (cone->corners[b] - cone->corners[a]).cross(cone->corners[c] - cone->corners[a]);
     EXPECT_GT(normal.head<2>().dot(cone->corners[a].head<2>()), 0);
   }
@@ -92,7 +92,7 @@ TEST(SceneValues, ConeIsDrawnOnlyUnderBallsOfACone) {
   EXPECT_FALSE(cone_of(calibrator));
 }
 
-TEST(SceneValues, RobotsLinksEndInItsFlange) {
+TEST(SceneValues, RobotLinksEndAtTheFlange) {
   LiveScene live;
   EXPECT_TRUE(robot_links(live).empty());
   live.calibrator_from_base = RigidTransform{Matrix3d::Identity(), {60, 520, -160}};

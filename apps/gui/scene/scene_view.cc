@@ -133,7 +133,7 @@ void SceneView::paint_overlay(QPainter& painter) {
         painter, 0, tr("From the source of %1").arg(QString::fromStdString(view->name)), palette::text));
   if (!scene_.points.empty() && error_scale_ != 1)
     taken.push_back(paint_note(painter, int(taken.size()),
-                               tr("95 % ellipsoids, %1 times as large").arg(error_scale_), palette::point));
+                               tr("95 % ellipsoids, enlarged %1 times").arg(error_scale_), palette::point));
   if (tre_) taken.push_back(paint_colour_bar(painter, size(), tr("TRE, mm rms"), tre_scale_));
   paint_triad(painter, size(), camera_);
   paint_labels(painter, size(), camera_, labels(), taken);

@@ -16,8 +16,9 @@ namespace helicarm::gui {
 class OffscreenStage;
 using simulation::BoneMeshes;
 
-/// Calibrator, X-rays, points, bones, tool and robot in space. The left button turns, the right one and the
-/// wheel zoom, the middle one shifts; 1 AP, 2 lateral, 3 overview, 4 near, R back, arrows turn, + and - zoom.
+/// Calibrator, views, points, bones, tool and robot in 3-D. The left button rotates, the right one and the
+/// wheel zoom, the middle one pans; keys: 1 AP, 2 lateral, 3 overview, 4 near, R resets, arrows rotate, + and
+/// - zoom.
 class SceneView : public QWidget {
   Q_OBJECT
 
@@ -28,27 +29,27 @@ class SceneView : public QWidget {
   explicit SceneView(QWidget* parent = nullptr);
   ~SceneView() override;
 
-  /// Why there is no scene; shown in its place.
+  /// Why there is no scene; displayed instead of it.
   const std::optional<QString>& obstacle() const;
 
-  /// Nothing empties the scene. The live part stays.
+  /// Null clears the scene. The live part stays.
   void show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator);
-  /// In the calibrator's frame, as they lay at the exposure.
+  /// In the calibrator's frame, at the acquisition.
   void show_bones(std::optional<BoneMeshes> bones);
   void show_live(const LiveScene& live);
-  /// The slice across an axis of the calibrator; nothing takes it away.
+  /// The slice perpendicular to an axis of the calibrator; empty removes it.
   void show_tre(std::optional<TreVolume> volume, SliceAxis axis, double place_mm);
 
-  /// `ap` and `lateral` look through the view of that name (AP, LAT...), else the first and the second;
-  /// without such a view it is the overview.
+  /// `ap` and `lateral` take the view of that name (AP, LAT...), else the first and the second view; without
+  /// such a view the overview.
   void set_preset(Preset preset);
   Preset preset() const { return preset_; }
-  /// Near at the knee, from outside.
+  /// Close to the knee, from outside.
   void look_near();
-  /// How many times larger than true the 95 % ellipsoids are drawn; 10 at first.
+  /// Scale of the drawn 95 % ellipsoids; initially 10.
   void set_error_scale(double scale);
 
-  /// What the last drawing took, until its image was there, ms.
+  /// Duration of the last rendering up to its image, ms.
   double last_render_ms() const { return last_render_ms_; }
   QSize sizeHint() const override { return {420, 420}; }
 
@@ -85,12 +86,12 @@ class SceneView : public QWidget {
   double error_scale_ = 10;
 
   Preset preset_ = Preset::free;
-  bool moved_ = false;  ///< by hand, away from the preset
+  bool moved_ = false;  ///< by the user, away from the preset
   SceneCamera camera_;
   QPointF mouse_;
   std::unique_ptr<OffscreenStage> stage_;
   bool result_changed_ = true, bones_changed_ = true, slice_changed_ = true, live_changed_ = true;
-  QImage drawn_;  ///< null: to be drawn anew
+  QImage drawn_;  ///< null: to be redrawn
   double last_render_ms_ = 0;
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Needs a display with OpenGL: CTest runs it under Xvfb. HELICARM_SHOTS=folder keeps what it saw.
+// Needs a display with OpenGL: CTest runs it under Xvfb. HELICARM_SHOTS=folder saves the images.
 #include "gui/scene/scene_view.h"
 
 #include <QApplication>
@@ -83,7 +83,7 @@ int pixels_apart(const QImage& a, const QImage& b) {
   return apart;
 }
 
-TEST_F(ShownScene, EachPresetShowsAnotherImage) {
+TEST_F(ShownScene, EachPresetGivesAnotherImage) {
   const QImage overview = acquired_view("overview");
   EXPECT_GT(colours_in(overview), 50u);
   view_.set_preset(SceneView::Preset::ap);
@@ -169,7 +169,7 @@ TEST_F(ShownScene, SurvivesTwoHundredRandomEvents) {
   EXPECT_GT(colours_in(acquired_view("after_events")), 50u);
 }
 
-TEST_F(ShownScene, LivesOnInAnotherWindow) {
+TEST_F(ShownScene, SurvivesAChangeOfWindow) {
   view_.set_preset(SceneView::Preset::ap);
   const QImage before = acquired_view("before_move");
   {
@@ -188,7 +188,7 @@ TEST_F(ShownScene, LivesOnInAnotherWindow) {
   EXPECT_GT(colours_in(acquired_view("after_return")), 50u);
 }
 
-TEST_F(ShownScene, RedrawIsQuick) {
+TEST_F(ShownScene, RedrawIsFast) {
   view_.show_bones(bones());
   view_.show_tre(tre(), SliceAxis::z, 40);
   view_.show_live(live());
@@ -208,10 +208,10 @@ TEST_F(ShownScene, RedrawIsQuick) {
   }
   std::ranges::sort(times);
   std::printf("redraw: median %.2f ms, 95 %% %.2f ms\n", times[50], times[95]);
-  EXPECT_LT(times[50], 60);  // a busy machine may be slow; a calm one takes a tenth
+  EXPECT_LT(times[50], 60);  // limit for a busy machine; an idle one needs a tenth
 }
 
-TEST(WithoutOpenGL, TheViewSaysSo) {
+TEST(WithoutOpenGL, MessageIsShown) {
   if (QGuiApplication::platformName() != "offscreen") GTEST_SKIP();
   SceneView view;
   ASSERT_TRUE(view.obstacle());

@@ -95,8 +95,8 @@ void ShapeBuilder::add_mesh(const TriangleMesh& mesh, const Colour& colour) {
   std::vector<Vector3d> normals(mesh.corners.size(), Vector3d::Zero());
   const vtkIdType first = data_->GetNumberOfPoints();
   for (const auto& [a, b, c] : mesh.triangles) {
-    const Vector3d normal =
-        (mesh.corners[b] - mesh.corners[a]).cross(mesh.corners[c] - mesh.corners[a]);  // as long as large
+    const Vector3d normal = (mesh.corners[b] - mesh.corners[a])
+                                .cross(mesh.corners[c] - mesh.corners[a]);  // length proportional to the area
     for (const std::uint32_t corner : {a, b, c}) normals[corner] += normal;
     add_triangle(first + a, first + b, first + c);
   }

@@ -11,7 +11,7 @@
 
 namespace helicarm::gui {
 
-/// Collects coloured shapes into one VTK surface, so that many are drawn by one call.
+/// Collects coloured shapes into one VTK surface, to draw many by one call.
 class ShapeBuilder {
  public:
   ShapeBuilder();
@@ -20,10 +20,10 @@ class ShapeBuilder {
   void add_ball(const Eigen::Vector3d& centre, double radius_mm, const Colour& colour);
   /// A truncated cone along the segment with closed ends.
   void add_tube(const Segment& axis, double from_radius_mm, double to_radius_mm, const Colour& colour);
-  /// Shaded smoothly: normals are the means over the triangles around.
+  /// Smoothly shaded: normals are means over the adjacent triangles.
   void add_mesh(const TriangleMesh& mesh, const Colour& colour);
   void add_line(std::span<const Eigen::Vector3d> places, const Colour& colour, bool closed = false);
-  /// Squares with a corner of unknown error stay open.
+  /// Cells with a corner of unknown error are left out.
   void add_slice(const TreSlice& slice, const TreScale& scale);
 
   vtkSmartPointer<vtkPolyData> build() const { return data_; }

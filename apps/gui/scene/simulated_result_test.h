@@ -12,7 +12,7 @@
 
 namespace helicarm::gui {
 
-/// A simulated navigation and what is measured of it, made once for all tests of a program.
+/// A simulated navigation case and its measurement, made once for all tests of a program.
 struct Simulated {
   simulation::SimulatedCase truth;
   Case given;

@@ -25,7 +25,7 @@ void give(vtkActor* actor, const ShapeBuilder& shapes) {
   actor->SetVisibility(shapes.build()->GetNumberOfCells() > 0);
 }
 
-/// Blended over what was drawn before, front faces only: no sorting, no second pass.
+/// Blended over the previous content, front faces only: no sorting, no second pass.
 void make_glass(vtkActor* actor, double opacity) {
   actor->GetProperty()->SetOpacity(opacity);
   actor->ForceOpaqueOn();
@@ -37,7 +37,7 @@ void add_triad(ShapeBuilder& shapes, double length_mm) {
                     palette::axes[std::size_t(axis)]);
 }
 
-/// Carries the unit tube along z onto a link.
+/// Maps the unit tube along z onto a link.
 RigidTransform along(const Segment& link) {
   const Vector3d way = link.to - link.from;
   return {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix(), link.from};
@@ -47,7 +47,7 @@ RigidTransform along(const Segment& link) {
 
 Stage::Stage() {
   window_->SetOwnContext(0);
-  window_->SetIsCurrent(true);  // as Stage demands
+  window_->SetIsCurrent(true);  // required by Stage
   window_->SetSupportsOpenGL(1);
   window_->SetIsDirect(1);
   window_->SetMultiSamples(0);
@@ -97,7 +97,8 @@ vtkActor* Stage::add(bool lit) {
   vtkNew<vtkActor> actor;
   actor->SetMapper(mapper);
   actor->GetProperty()->SetLighting(lit);
-  actor->GetProperty()->SetBackfaceCulling(lit);  // a camera within a source's ball sees through it
+  actor->GetProperty()->SetBackfaceCulling(
+      lit);  // transparent from inside: the camera may be in a source's sphere
   actor->GetProperty()->SetAmbient(lit ? 0.25 : 1);
   actor->GetProperty()->SetDiffuse(lit ? 0.8 : 0);
   actor->SetVisibility(false);
@@ -142,7 +143,7 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     group(tunnel.moves_with).add_tube(tunnel.axis, tunnel.radius_mm, tunnel.radius_mm, palette::tunnel);
   if (scene.body) {
     cone.add_mesh(*scene.body, palette::plastic);
-    std::array<std::vector<Vector3d>, 2> rims;  // as cone_of lays them, base and top in turn
+    std::array<std::vector<Vector3d>, 2> rims;  // in the order of cone_of: base and top alternate
     for (std::size_t i = 0; i < scene.body->corners.size(); ++i)
       rims[i % 2].push_back(scene.body->corners[i]);
     for (const auto& rim : rims) lines.add_line(rim, palette::dim(palette::plastic), true);
@@ -189,7 +190,7 @@ void Stage::set_live(const LiveScene& live) {
   }
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const bool shown = i < links.size() && (links[i].to - links[i].from).norm() > 1;
-    if (shown && !filled(links_[i])) {  // the arm's lengths never change
+    if (shown && !filled(links_[i])) {  // the link lengths are constant
       const double length = (links[i].to - links[i].from).norm();
       const double radius = i == 6 ? 60 : i < 3 ? 38 : 26;
       ShapeBuilder link;
@@ -214,7 +215,7 @@ void Stage::render_upside_down(const SceneCamera& camera, unsigned framebuffer) 
   vtk->SetViewAngle(camera.height_deg);
   renderer_->ResetCameraClippingRange();
   vtkOpenGLState* state = window_->GetState();
-  state->Reset();  // Qt has been at work since
+  state->Reset();  // Qt has changed the OpenGL state
   state->Push();
   state->vtkglDepthFunc(GL_LEQUAL);
   window_->Render();

@@ -16,21 +16,21 @@ namespace helicarm::gui {
 
 using simulation::BoneMeshes;
 
-/// The scene in VTK's hands. Lives as long as one OpenGL context, which must be current in every call.
+/// The scene in VTK. Lives as long as one OpenGL context, which must be current in every call.
 class Stage {
  public:
   Stage();
   ~Stage();
 
-  /// Ellipsoids are drawn `error_scale` times as large as they are.
+  /// Ellipsoids are drawn enlarged by `error_scale`.
   void set_result(const ResultScene& scene, double error_scale);
   void set_bones(const std::optional<BoneMeshes>& bones);
   void set_slice(const std::optional<TreSlice>& slice, const TreScale& scale);
-  /// Moves what is there already; only a new path is built.
+  /// Moves existing parts; only a new path is built.
   void set_live(const LiveScene& live);
 
   void resize(int width, int height) { window_->SetSize(width, height); }
-  /// Draws into the framebuffer of this number, the image's first row first as QImage has it.
+  /// Renders into the framebuffer of this number, with the image's first row first, as in QImage.
   void render_upside_down(const SceneCamera& camera, unsigned framebuffer);
 
  private:

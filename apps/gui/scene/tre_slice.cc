@@ -45,7 +45,7 @@ TreScale scale_of(const TreVolume& volume) {
 }
 
 Colour colour_of(double share) {
-  // CIELAB: lightness 24 to 90, hue 305 to 100 degrees, chroma as far as the screen has it.
+  // CIELAB: lightness 24 to 90, hue 305 to 100 degrees, maximum chroma within sRGB.
   static constexpr std::array<Colour, 11> colours{{{59, 40, 132},
                                                    {0, 70, 145},
                                                    {3, 92, 142},

@@ -31,13 +31,13 @@ TEST(TreSlice, InterpolatesBetweenLayersOnEveryAxis) {
   }
 }
 
-TEST(TreSlice, BeyondTheVolumeItsLastLayerStands) {
+TEST(TreSlice, BeyondTheVolumeItsLastLayerIsUsed) {
   const TreVolume volume = ramp(5);
   EXPECT_NEAR(slice_of(volume, SliceAxis::y, 77).places[3].y(), 2, 1e-12);
   EXPECT_NEAR(slice_of(volume, SliceAxis::y, -77).places[3].y(), -2, 1e-12);
 }
 
-TEST(TreSlice, UnknownStaysUnknownAndOutOfTheScale) {
+TEST(TreSlice, UnknownValuesStayUnknownAndOutOfTheScale) {
   TreVolume volume = ramp(3);
   volume.rms_mm[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(std::isnan(slice_of(volume, SliceAxis::z, -2).rms_mm[0]));
@@ -50,7 +50,7 @@ TEST(TreSlice, UnknownStaysUnknownAndOutOfTheScale) {
     }
 }
 
-TEST(TreSlice, ScaleOfNothingAndOfOneValueIsUsable) {
+TEST(TreSlice, ScaleOfNoOrOneValueIsUsable) {
   const TreVolume nothing{{0, 0, 0}, 1, 1, {std::numeric_limits<double>::quiet_NaN()}};
   const TreVolume one{{0, 0, 0}, 1, 1, {0.2}};
   EXPECT_GT(scale_of(nothing).high, scale_of(nothing).low);
@@ -66,7 +66,7 @@ double lightness(const Colour& colour) {
   return 116 * std::cbrt(y) - 16;
 }
 
-TEST(TreSlice, ColoursGrowLighterInEqualSteps) {
+TEST(TreSlice, ColoursBecomeLighterInEqualSteps) {
   const double step = (lightness(colour_of(1)) - lightness(colour_of(0))) / 10;
   EXPECT_GT(step, 6);
   for (int i = 0; i < 10; ++i)

@@ -5,8 +5,8 @@
 
 namespace helicarm::gui {
 
-/// Images come and go in many threads for hours: their memory goes back to the system at once, and threads
-/// share their heaps. To be called before the first of them.
+/// Returns freed memory to the system at once and lets threads share their heaps, because images are
+/// allocated in many threads for hours. Call before the first thread.
 inline void keep_memory_flat() {
 #ifdef __GLIBC__
   mallopt(M_ARENA_MAX, 2);

@@ -7,7 +7,7 @@
 
 namespace helicarm::gui {
 
-/// What moves a robot cannot be clicked by accident: the button (or Enter) must be held until it is full.
+/// Prevents accidental clicks on robot motion: the button (or Enter) must be held until it is full.
 class HoldButton : public QPushButton {
   Q_OBJECT
 

@@ -12,9 +12,9 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int least_lamp = 88, beside_lamp = 46;
-/// The depth bar shows so much before the tunnel's entry.
+/// Part of the depth bar before the tunnel's entry, mm.
 constexpr double before_entry_mm = 60;
-/// Farther from the axis the depth says little, and is drawn without colour.
+/// At a larger distance from the axis the depth is drawn without colour.
 constexpr double near_axis_mm = 5;
 
 QColor colour_of(Light light) {
@@ -36,7 +36,7 @@ void paint_lamp(QPainter& painter, const QRectF& box, const Lamp& lamp) {
   painter.setBrush(colour_of(lamp.light));
   const QRectF disc(box.left() + 4, box.center().y() - 9, 18, 18);
   if (lamp.light == Light::red)
-    painter.drawRect(disc);  // a shape of its own, for eyes that do not tell the colours apart
+    painter.drawRect(disc);  // a distinct shape, for colour-blind users
   else
     painter.drawEllipse(disc);
   painter.setPen(style::quiet);
@@ -101,7 +101,7 @@ void LiveBar::paintEvent(QPaintEvent*) {
     const int words = std::max(painter.fontMetrics().horizontalAdvance(lamp.name),
                                painter.fontMetrics().horizontalAdvance(lamp.text));
     const double width =
-        std::max(least_lamp, words / 20 * 20 + beside_lamp + 20);  // in steps: it must not dance
+        std::max(least_lamp, words / 20 * 20 + beside_lamp + 20);  // in steps, for a stable layout
     paint_lamp(painter, {left, 0, width, double(height())}, lamp);
     left += width;
   }

@@ -7,14 +7,14 @@
 
 namespace helicarm::gui {
 
-/// What the devices say now: a lamp each with the age in ms, and how the tool stands to its tunnel.
+/// State of the devices, each with its age in ms, and the tool's position relative to its tunnel.
 class LiveBar : public QWidget {
   Q_OBJECT
 
  public:
   explicit LiveBar(QWidget* parent = nullptr);
   void show_live(const LiveState& live);
-  /// What is on the screen, in words.
+  /// The displayed content as text.
   QString words() const;
 
  protected:

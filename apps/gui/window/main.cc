@@ -29,16 +29,16 @@ int main(int argc, char** argv) {
 
   QCommandLineParser words;
   words.setApplicationDescription(
-      "The desktop application of helicarm. Without arguments it opens a virtual operating room, so that a "
-      "whole "
-      "operation can be rehearsed with no device. Research instrument, not a medical device.");
+      "The desktop application of helicarm. Without arguments it starts virtual devices, so that a whole "
+      "operation can be rehearsed without hardware. Research instrument, not a medical device.");
   words.addHelpOption();
   words.addVersionOption();
   const QCommandLineOption plan("plan", "Connect the devices of this plan instead (docs/formats.md).",
                                 "FILE");
-  const QCommandLineOption sessions("sessions", "Keep the records of operations below this folder.", "DIR");
+  const QCommandLineOption sessions("sessions", "Folder for the records of operations.", "DIR");
   words.addOptions({plan, sessions});
-  words.addPositionalArgument("paths", "A case folder, a session's folder, or X-rays to open.", "[PATH...]");
+  words.addPositionalArgument("paths", "A case folder, a session folder, or X-ray images to open.",
+                              "[PATH...]");
   if (!words.parse(QApplication::arguments())) {
     std::fprintf(stderr, "%s\n", qPrintable(words.errorText()));
     return 2;

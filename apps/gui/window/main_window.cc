@@ -22,9 +22,9 @@ namespace helicarm::gui {
 namespace {
 
 constexpr int live_ms = 20;
-/// The scene is drawn by software as a rule, and needs less haste than the images.
+/// The scene is usually rendered in software and updated less often than the images.
 constexpr unsigned scene_every = 4;
-/// Of the calibrator's middle: where an end may lie along its ray.
+/// Range about the calibrator's centre in which an end may lie along its ray.
 constexpr double epipolar_reach_mm = 150;
 
 QString text(const std::string& words) { return QString::fromStdString(words); }
@@ -34,7 +34,7 @@ Phase open_phase(const std::array<StepCard, phases.size()>& cards, bool register
   for (const StepCard& card : cards) {
     if (card.mood == StepMood::good || (card.mood == StepMood::warning && card.phase != Phase::plan))
       continue;
-    // A plan to be doubted is looked at before anything moves.
+    // A plan with warnings is inspected before any motion.
     if (card.mood != StepMood::warning || !registered) return card.phase;
   }
   return Phase::verify;
@@ -205,15 +205,15 @@ void MainWindow::show_images() {
   if (shown_ == state.result && shown_source_ == state.source) return;
   shown_ = state.result;
   shown_source_ = state.source;
-  show_recorded();  // of a case that is open now, never over other images
+  show_recorded();  // only over the images of its own case
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     const bool has = shown_ && i < shown_->views.size();
     if (has && shown_->views[i].xray_image)
       xrays_[i]->show_view(shown_, i);
     else
-      xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-rays here")
-                       : has ? tr("%1: no picture yet").arg(text(shown_->views[i].name))
-                             : tr("No second view"));
+      xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-ray images here")
+                       : has                        ? tr("%1: no image yet").arg(text(shown_->views[i].name))
+                                                    : tr("No second view"));
   }
   if (std::exchange(shown_bones_, state.bones) != state.bones)
     scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
@@ -304,7 +304,7 @@ bool MainWindow::eventFilter(QObject* watched, QEvent* event) {
   if (event->type() == QEvent::KeyPress || event->type() == QEvent::ShortcutOverride) {
     const auto* key = static_cast<QKeyEvent*>(event);
     const Source source = controller_.state().source;
-    // The space bar belongs to the robot's stop; Enter presses buttons instead.
+    // The space bar is reserved for stopping the robot; Enter presses buttons instead.
     if (key->key() == Qt::Key_Space && (source == Source::virtual_or || source == Source::devices)) {
       if (event->type() == QEvent::KeyPress && !key->isAutoRepeat()) controller_.stop();
       event->accept();

@@ -19,13 +19,12 @@
 
 namespace helicarm::gui {
 
-/// The strip of steps, two X-rays, the scene, the page of the step, and what is live; all of it shows the
-/// desk's state.
+/// Steps, two X-ray images, the scene, the page of the step, and the live data; shows the controller's state.
 class MainWindow : public QMainWindow {
   Q_OBJECT
 
  public:
-  /// Sessions are kept below `sessions`.
+  /// Sessions are stored below `sessions`.
   explicit MainWindow(std::filesystem::path sessions, QWidget* parent = nullptr);
   ~MainWindow() override;
 
@@ -37,13 +36,13 @@ class MainWindow : public QMainWindow {
 
   void open_rehearsal();
   void open_plan(const std::filesystem::path& plan);
-  /// A case folder, a session's folder, or X-rays.
+  /// A case folder, a session's folder, or X-ray images.
   void open_paths(const std::vector<std::filesystem::path>& paths);
-  /// Shows what the devices say now; a timer does so 50 times a second.
+  /// Displays the devices' present state; called by a timer 50 times a second.
   void show_live();
-  /// What is shown of it.
+  /// The displayed live data.
   const LiveState& live() const { return live_; }
-  /// The tool at the replayed moment; nothing where no case with one is replayed.
+  /// The tool at the replayed moment; empty if no case with a tool is replayed.
   const std::optional<ToolOverlay>& recorded() const { return recorded_; }
 
  protected:
@@ -108,7 +107,7 @@ class MainWindow : public QMainWindow {
   std::optional<TreVolume> tre_;
   std::shared_ptr<const Result> tre_of_;
   std::optional<LiveTool> recorded_tool_;   ///< of the replayed session's case
-  std::optional<std::size_t> recorded_at_;  ///< the registration it is of
+  std::optional<std::size_t> recorded_at_;  ///< its registration
   std::shared_ptr<const Result> recorded_of_;
   std::optional<ToolOverlay> recorded_;  ///< at the replayed moment
   std::shared_ptr<const Result> shown_;
@@ -116,7 +115,7 @@ class MainWindow : public QMainWindow {
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;
   unsigned looks_ = 0;
-  bool moved_on_ = false;  ///< the person chose a step; until the next success it stays
+  bool moved_on_ = false;  ///< the user chose a step; it stays until the next success
 };
 
 }  // namespace helicarm::gui

@@ -25,7 +25,7 @@ constexpr double tre_step_mm = 10;
 QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
 fs::path path_of(const QString& words) { return words.toStdString(); }
 
-/// X-rays that lie in a folder without a case.json, by name.
+/// X-ray images in a folder without a case.json, by name.
 std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> images;
   std::error_code unreadable;
@@ -37,7 +37,7 @@ std::vector<fs::path> images_in(const fs::path& folder) {
   return images;
 }
 
-/// A dialog that leaves the window, and STOP in it, in reach.
+/// A dialog that keeps the window, and STOP in it, accessible.
 void show_beside(QDialog* dialog) {
   dialog->setAttribute(Qt::WA_DeleteOnClose);
   dialog->setModal(false);
@@ -61,14 +61,14 @@ void ask_files(QWidget* parent, const QString& title, QFileDialog::FileMode mode
 
 void MainWindow::build_menus() {
   QMenu* file = menuBar()->addMenu(tr("&File"));
-  file->addAction(tr("&New rehearsal in a virtual operating room"), QKeySequence::New, this,
+  file->addAction(tr("&New rehearsal with virtual devices"), QKeySequence::New, this,
                   &MainWindow::ask_rehearsal);
   file->addAction(tr("&Connect the devices of a plan..."), this, [this] {
     ask_files(this, tr("Plan"), QFileDialog::ExistingFile, tr("Plan (*.json)"),
               [this](const std::vector<fs::path>& chosen) { open_plan(chosen.front()); });
   });
   file->addAction(tr("&Open a case or session folder..."), QKeySequence::Open, this, &MainWindow::ask_folder);
-  file->addAction(tr("Open &X-rays..."), this, [this] {
+  file->addAction(tr("Open &X-ray images..."), this, [this] {
     ask_files(this, tr("X-rays"), QFileDialog::ExistingFiles, {},
               [this](const std::vector<fs::path>& chosen) { open_paths(chosen); });
   });
@@ -97,14 +97,15 @@ void MainWindow::build_menus() {
     show_beside(new QMessageBox(QMessageBox::Information, title, words, QMessageBox::Close, this));
   };
   help->addAction(tr("&Keys"), QKeySequence::HelpContents, this, [notify] {
-    notify(tr("Keys"),
-           tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: from one thing to the next\n"
-              "Enter: press; hold it on a yellow button\n"
-              "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
-              "On an X-ray: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
-              "M magnifier, W contrast, H marks\n\n"
-              "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R back\n\n"
-              "Replay: J and L step, K plays"));
+    notify(
+        tr("Keys"),
+        tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: next control\n"
+           "Enter: press; hold it on a yellow button\n"
+           "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
+           "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
+           "M magnifier, W contrast, H marks\n\n"
+           "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R resets\n\n"
+           "Replay: J and L step, K plays"));
   });
   help->addAction(tr("&About"), this, [notify] {
     notify(tr("About helicarm"),
@@ -117,12 +118,12 @@ void MainWindow::build_rehearsal_menu() {
   for (const auto& [words, fault] : {std::pair(tr("Hide the &tool's marker"), "hide:tool"),
                                      {tr("Hide the &femur's marker"), "hide:femur"},
                                      {tr("Hide the t&ibia's marker"), "hide:tibia"},
-                                     {tr("Tracker repeats itself (f&rozen)"), "frozen"},
-                                     {tr("Tracker falls &silent"), "silent"},
+                                     {tr("Tracker repeats its last pose (f&rozen)"), "frozen"},
+                                     {tr("Tracker stops &sending"), "silent"},
                                      {tr("Tracker's &clock jumps"), "time_jump"},
-                                     {tr("&Robot's cable is pulled"), "cut_cable"},
-                                     {tr("C-arm hangs &up before the picture"), "breaks_off"},
-                                     {tr("C-arm &sends another patient's picture"), "other_patient"}}) {
+                                     {tr("&Robot's cable is disconnected"), "cut_cable"},
+                                     {tr("C-arm disconnects &before the image"), "breaks_off"},
+                                     {tr("C-arm sends another &patient's image"), "other_patient"}}) {
     QAction* action = rehearsal_menu_->addAction(words);
     action->setCheckable(true);
     action->setObjectName(fault);
@@ -130,7 +131,7 @@ void MainWindow::build_rehearsal_menu() {
             [this, name = std::string(fault)](bool on) { controller_.set_fault(name, on); });
   }
   rehearsal_menu_->addSeparator();
-  rehearsal_menu_->addAction(tr("&Move the leg by some millimetres"), this, [this] {
+  rehearsal_menu_->addAction(tr("&Move the leg by a few millimetres"), this, [this] {
     controller_.move_bone("femur", {2, -1.5, 1});
     controller_.move_bone("tibia", {-1, 2, 1.5});
   });
@@ -248,7 +249,8 @@ void MainWindow::ask_settings() {
     settings_ = dialog->settings();
     controller_.set_options(settings_.run);
     statusBar()->showMessage(
-        tr("Measurement: from the next one on. The rest: from the next rehearsal or connection on."));
+        tr("Measurement settings apply to the next measurement; the others to the next rehearsal or "
+           "connection."));
   });
   show_beside(dialog);
 }

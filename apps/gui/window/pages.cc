@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pages of what is measured.
+// Pages of the measurement steps.
 #include "gui/window/pages.h"
 
 #include <QButtonGroup>
@@ -55,7 +55,8 @@ QTableWidget* Page::add_table(const QStringList& columns, const char* name) {
 }
 
 AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
-    : Page(tr("Take an AP and a lateral X-ray of the knee with the calibrator on it."), controller, parent) {
+    : Page(tr("Acquire an AP and a lateral X-ray image of the knee with the calibrator."), controller,
+           parent) {
   acquisitions_ = new QWidget;
   new QVBoxLayout(acquisitions_);
   acquisitions_->layout()->setContentsMargins(0, 0, 0, 0);
@@ -82,13 +83,13 @@ void AcquirePage::show_state(const ApplicationState& state) {
     qDeleteAll(acquisitions_->findChildren<QPushButton*>());
     for (const std::string& point : state.check_points) {
       auto* button = new QPushButton(tr("The pointer is on check point %1").arg(text(point)));
-      button->setToolTip(tr("Before the first X-ray, and again before the robot goes to this bone"));
+      button->setToolTip(tr("Before the first X-ray image, and again before the robot moves to this bone"));
       acquisitions_->layout()->addWidget(button);
       connect(button, &QPushButton::clicked, this, [this, point] { controller_.touch(point); });
     }
     for (const std::string& view : views_) {
       const bool own = state.source == Source::virtual_or;
-      auto* button = new QPushButton((own ? tr("Shoot %1") : tr("The next X-ray is %1")).arg(text(view)));
+      auto* button = new QPushButton((own ? tr("Acquire %1") : tr("The next image is %1")).arg(text(view)));
       button->setObjectName("shoot" + text(view));
       acquisitions_->layout()->addWidget(button);
       connect(button, &QPushButton::clicked, this,
@@ -99,13 +100,13 @@ void AcquirePage::show_state(const ApplicationState& state) {
   ways_in_->setVisible(state.source == Source::none && !state.busy);
   where_->setText(state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
                   : state.source == Source::devices
-                      ? tr("Expecting %1 from the C-arm.").arg(text(state.next_view))
+                      ? tr("Waiting for %1 from the C-arm.").arg(text(state.next_view))
                       : QString());
 }
 
 RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
-    : Page(tr("The intensifier bends the picture; the plate's dots tell how. The map is right where little "
-              "is left over."),
+    : Page(tr("Corrects the intensifier's distortion by the plate's dots. Check that the residuals are "
+              "small."),
            controller, parent) {
   auto* row = new QHBoxLayout;
   auto* group = new QButtonGroup(this);
@@ -120,7 +121,8 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
     connect(choice, &QRadioButton::clicked, this, [this, wanted = layer] { emit layer_wanted(wanted); });
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
-  table_ = add_table({tr("View"), tr("Dots"), tr("Bent px"), tr("Left px"), tr("Held out")}, "rectifyTable");
+  table_ = add_table({tr("View"), tr("Dots"), tr("Distortion px"), tr("Residual px"), tr("Cross-val. px")},
+                     "rectifyTable");
 }
 
 void RectifyPage::show_state(const ApplicationState& state) {
@@ -137,11 +139,12 @@ void RectifyPage::show_state(const ApplicationState& state) {
 }
 
 CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
-    : Page(tr("The twelve balls, named without a click, tell where each X-ray was taken from."), controller,
-           parent) {
-  views_ = add_table({tr("View"), tr("Balls"), tr("Residual px"), tr("fx px"), tr("Source mm")}, "viewTable");
+    : Page(tr("Labels the twelve fiducials and calibrates each view from them."), controller, parent) {
+  views_ =
+      add_table({tr("View"), tr("Fiducials"), tr("Residual px"), tr("fx px"), tr("Source mm")}, "viewTable");
   views_->setFixedHeight(104);
-  balls_ = add_table({tr("Ball"), tr("View"), tr("State"), tr("Sigma px"), tr("Residual px")}, "ballTable");
+  balls_ =
+      add_table({tr("Fiducial"), tr("View"), tr("State"), tr("Sigma px"), tr("Residual px")}, "ballTable");
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {

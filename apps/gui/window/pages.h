@@ -14,8 +14,7 @@
 
 namespace helicarm::gui {
 
-/// What can be done in a step: a page each beside the images. Pages ask the desk; they hold nothing that
-/// the desk does not know.
+/// The actions of each step, one page per step. Pages use the controller and hold no state of their own.
 class Page : public QWidget {
   Q_OBJECT
 
@@ -49,7 +48,7 @@ class AcquirePage : public Page {
   QLabel* where_;
 };
 
-/// Figures of stage 1 by view, and which layer of the image is shown.
+/// Results of rectification by view, and the displayed layer of the image.
 class RectifyPage : public Page {
   Q_OBJECT
 
@@ -76,12 +75,12 @@ class CalibratePage : public Page {
   QTableWidget* balls_;
 };
 
-/// Where the map of the expected error is cut.
+/// Position of the slice through the map of the predicted error.
 struct TreCut {
   SliceAxis axis;
   double from_middle_mm;  ///< of the calibrator
 };
-/// As far from the calibrator's middle the map reaches.
+/// Extent of the map from the calibrator's centre.
 inline constexpr double tre_half_mm = 80;
 
 class PlanPage : public Page {
@@ -90,10 +89,10 @@ class PlanPage : public Page {
  public:
   PlanPage(Controller& controller, QWidget* parent);
   void show_state(const ApplicationState& state) override;
-  /// The end that the next click places; the next one to come, or the one chosen in the table.
+  /// The end that the next click places: the next missing one, or the one chosen in the table.
   std::optional<WantedPick> target() const;
   bool snaps() const { return snap_->isChecked(); }
-  /// Lets go of an end chosen in the table once it has been placed in every view.
+  /// Deselects an end chosen in the table once it is placed in every view.
   void placed(const std::string& point);
 
  signals:

@@ -13,7 +13,7 @@ namespace {
 
 struct Look {
   QColor colour;
-  QString sign;  ///< for eyes that do not tell the colours apart
+  QString sign;  ///< for colour-blind users
   QString word;
 };
 

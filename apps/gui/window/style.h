@@ -4,7 +4,7 @@
 #include <QColor>
 #include <QString>
 
-/// Dark, and to be read from two metres.
+/// Dark, legible from 2 m.
 namespace helicarm::gui::style {
 
 inline const QColor ground{20, 24, 29}, panel{30, 36, 43}, raised{42, 50, 60}, line{70, 80, 92},

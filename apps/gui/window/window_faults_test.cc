@@ -21,7 +21,7 @@ void drop(QWidget& onto, const std::vector<fs::path>& paths) {
   QApplication::sendEvent(&onto, &event);
 }
 
-TEST_F(Window, SilentTrackerIsShownUntilItSpeaksAgain) {
+TEST_F(Window, SilentTrackerIsShownUntilItSendsAgain) {
   open_rehearsal();
   const auto light = [&](const char* name) { return lamp(name).light; };
   ASSERT_TRUE(wait("tool is green and the robot locked",
@@ -33,7 +33,7 @@ TEST_F(Window, SilentTrackerIsShownUntilItSpeaksAgain) {
   EXPECT_TRUE(wait("femur is green", [&] { return light("femur") == Light::green; }));
 }
 
-TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
+TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
   window_->controller().set_virtual_freshness({});
   ASSERT_NO_FATAL_FAILURE(
       stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); }, "no robot state received"));
@@ -44,12 +44,12 @@ TEST_F(Window, RobotsCablePulledInMotionEndsItAndIsShown) {
   for (const char* forbidden : {"register", "planWay", "go", "withdraw"})
     EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
   window_->controller().set_fault("cut_cable", false);
-  // Connected again it is still locked: only a person frees it.
+  // Reconnected it is still locked: only a person unlocks it.
   ASSERT_TRUE(wait_for_phase(LinkPhase::idle));
   EXPECT_TRUE(unlock());
 }
 
-TEST_F(Window, CArmThatDisconnectsIsShownAndTheNextImageIsTaken) {
+TEST_F(Window, CArmThatDisconnectsIsShownAndTheNextImageIsAccepted) {
   open_rehearsal();
   EXPECT_EQ(lamp("C-arm").light, Light::off);
   window_->controller().set_fault("breaks_off", true);
@@ -57,16 +57,16 @@ TEST_F(Window, CArmThatDisconnectsIsShownAndTheNextImageIsTaken) {
   ASSERT_TRUE(wait_idle());
   EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
   EXPECT_TRUE(wait("the C-arm is red", [&] { return lamp("C-arm").light == Light::red; }));
-  EXPECT_EQ(lamp("C-arm").text, "broke off");
+  EXPECT_EQ(lamp("C-arm").text, "disconnected");
   window_->controller().set_fault("breaks_off", false);
   ASSERT_TRUE(attempt(
-      "AP is taken", [&] { click("shootAP"); },
+      "AP is acquired", [&] { click("shootAP"); },
       [&] { return state().result->views[0].xray_image != nullptr; }));
   EXPECT_EQ(lamp("C-arm").light, Light::green);
   EXPECT_NE(card(Phase::acquire).mood, StepMood::refused);
 }
 
-TEST_F(Window, TrackerThatFallsSilentInMotionStopsTheRobot) {
+TEST_F(Window, TrackerThatStopsSendingInMotionStopsTheRobot) {
   window_->controller().set_virtual_freshness({});
   ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->controller().set_fault("silent", true); },
                                          "the newest pose of \"tool\""));
@@ -81,7 +81,7 @@ TEST_F(Window, StopWorksBesideEveryDialog) {
     ASSERT_TRUE(
         wait("the settings are open", [&] { return window_->findChild<SettingsDialog*>() != nullptr; }));
     auto* stop = find("stop");
-    // Through the screen's own way in, where a modal dialog would be in between.
+    // Through the screen's input path, where a modal dialog would intercept.
     QTest::mouseClick(window_->windowHandle(), Qt::LeftButton, Qt::NoModifier,
                       stop->mapTo(window_.get(), stop->rect().center()));
     wait_idle();
@@ -90,7 +90,7 @@ TEST_F(Window, StopWorksBesideEveryDialog) {
   stop_in_motion(stop_beside_settings, "stopped by the user");
 }
 
-TEST_F(Window, CancelEndsTheWaitForAImage) {
+TEST_F(Window, CancelEndsTheWaitForAnImage) {
   open_rehearsal();
   auto* cancel = find("cancel");
   EXPECT_FALSE(cancel->isVisible());
@@ -101,7 +101,7 @@ TEST_F(Window, CancelEndsTheWaitForAImage) {
   EXPECT_FALSE(cancel->isVisible());
 }
 
-TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
+TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNoNextStep) {
   simulation::SimulationOptions options;
   options.size = 512;
   auto simulated = simulation::simulate_case(options).value();
@@ -117,9 +117,9 @@ TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNothingIsOffered) {
   EXPECT_FALSE(fs::exists(folder_ / "export"));
 }
 
-TEST_F(Window, BadFilesDroppedOnItAreRefusedByName) {
-  std::ofstream(folder_ / "a.dcm") << "no picture";
-  std::ofstream(folder_ / "b.dcm") << "nor this";
+TEST_F(Window, InvalidDroppedFilesAreRefusedByName) {
+  std::ofstream(folder_ / "a.dcm") << "not an image";
+  std::ofstream(folder_ / "b.dcm") << "not an image either";
   for (const auto& paths : {std::vector<fs::path>{folder_ / "a.dcm", folder_ / "b.dcm"},
                             {folder_ / "a.dcm"},
                             {folder_ / "gone"},
@@ -131,14 +131,14 @@ TEST_F(Window, BadFilesDroppedOnItAreRefusedByName) {
   }
 }
 
-TEST_F(Window, ThousandRandomClicksAndKeysFreezeNothing) {
+TEST_F(Window, ThousandRandomClicksAndKeysDoNotFreezeTheWindow) {
   open_rehearsal();
   std::srand(7);
   const std::array keys{Qt::Key_Tab, Qt::Key_Return, Qt::Key_Space, Qt::Key_L,    Qt::Key_M, Qt::Key_Plus,
                         Qt::Key_0,   Qt::Key_Up,     Qt::Key_1,     Qt::Key_2,    Qt::Key_R, Qt::Key_Escape,
                         Qt::Key_W,   Qt::Key_Minus,  Qt::Key_Left,  Qt::Key_Down, Qt::Key_H, Qt::Key_3};
   qint64 longest = 0;
-  // A dialog runs a loop of its own: somebody puts it away.
+  // A dialog runs its own event loop: close it.
   QTimer away;
   QObject::connect(&away, &QTimer::timeout, [] {
     if (QWidget* dialog = QApplication::activeModalWidget()) dialog->close();

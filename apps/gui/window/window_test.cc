@@ -9,7 +9,7 @@
 namespace helicarm::gui {
 namespace {
 
-TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
+TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
   screenshot("0-start");
   open_rehearsal();
   EXPECT_EQ(card(Phase::acquire).mood, StepMood::waiting);
@@ -43,7 +43,8 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
         EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
                   fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
       }
-  EXPECT_GE(state().measurements, 2) << "one for the pictures; ends picked while it measures go together";
+  EXPECT_GE(state().measurements, 2)
+      << "one for the images; ends picked during a measurement are measured together";
   EXPECT_LE(state().measurements, 5);
   screenshot("4-plan");
 
@@ -68,7 +69,8 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
                    [&] { return window_->strip().button(Phase::verify)->isChecked(); }));
   auto* table = find<QTableWidget>("outcomeTable");
   ASSERT_EQ(table->rowCount(), 4);
-  // Checks followed the measurement of the picks, one at least for each tunnel; the last one is of the last.
+  // Checks followed the measurement of the picks, at least one for each tunnel; the last one belongs to the
+  // last tunnel.
   int last = state().measurements + 2;
   while (fs::exists(case_folder(last + 1))) ++last;
   const Json checked = read_json(case_folder(last) / "result.json").value();
@@ -79,7 +81,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   window_->scene().set_preset(SceneView::Preset::lateral);
   screenshot("7-verify");
 
-  std::printf("longest hold-up of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
+  std::printf("longest blocking of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
               WatchedApplication::longest_what.c_str());
   window_->controller().export_to(folder_ / "export");
   ASSERT_TRUE(wait_idle());
@@ -94,7 +96,7 @@ TEST_F(Window, GoesThroughAllSixStepsByMouseAndKeyboard) {
   EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
   screenshot("8-replay");
   open_rehearsal();
-  EXPECT_FALSE(window_->recorded()) << "a tool of former pictures";
+  EXPECT_FALSE(window_->recorded()) << "a tool of previous images";
 }
 
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
@@ -104,7 +106,7 @@ TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
   EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
 }
 
-TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
+TEST_F(Window, DisplayedPathIsWithdrawnWhenTheBoneMovesAndCannotBeConfirmed) {
   ASSERT_NO_FATAL_FAILURE(register_in_rehearsal());
   find<QComboBox>("tunnel")->setCurrentText("femur");
   ASSERT_TRUE(with_robot(
@@ -113,7 +115,7 @@ TEST_F(Window, PathOnShowGoesWhenTheBoneMovesAndCannotBeConfirmed) {
   ASSERT_TRUE(go->isEnabled());
   QTest::keyPress(go, Qt::Key_Return);  // and held
   window_->controller().move_bone("femur", {3, 0, 0});
-  ASSERT_TRUE(wait("the path is taken away", [&] { return !state().order && !state().busy; }));
+  ASSERT_TRUE(wait("the path is withdrawn", [&] { return !state().order && !state().busy; }));
   EXPECT_FALSE(go->isEnabled());
   EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
   EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));

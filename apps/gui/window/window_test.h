@@ -12,20 +12,20 @@
 #include "gui/window/main_window.h"
 #include "helicarm/core/files.h"
 
-/// The window for real: events of mouse and keyboard, on a screen, against the virtual operating room.
+/// The complete window: mouse and keyboard events, on a screen, with virtual devices.
 namespace helicarm::gui {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-/// A wait for a state ends in vain only after this: longer than anything takes with every core busy.
+/// Timeout of a wait: longer than any step takes with every core busy.
 constexpr int patience_ms = 180000;
-/// A busy machine makes the tracker stutter or the robot stop: so often a person tries again.
+/// Number of attempts: a busy machine may delay the tracker or stop the robot.
 constexpr int most_attempts = 10;
-/// The window's steps do not depend on how late a busy machine's poses and states come.
+/// The window's steps do not depend on the delay of poses and states on a busy machine.
 constexpr FreshnessLimits patient{.pose_s = 3, .state_s = 3, .heartbeat_s = 3};
 
-/// Which event held the interface up longest, and for how long. Loops within an event (a dialog's) count as
+/// The event that blocked the interface longest, and its duration. Nested event loops (a dialog's) count as
 /// theirs.
 class WatchedApplication : public QApplication {
  public:
@@ -46,7 +46,7 @@ class WatchedApplication : public QApplication {
   static inline std::string longest_what;
 };
 
-/// A window on the screen, and a folder that goes with it.
+/// A window on the screen with a folder.
 class Window : public testing::Test {
  protected:
   Window() : folder_(fs::temp_directory_path() / ("helicarm_window_" + std::to_string(::getpid()))) {
@@ -58,7 +58,7 @@ class Window : public testing::Test {
     window_->resize(1280, 800);
     window_->show();
     EXPECT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
-    QApplication::setActiveWindow(window_.get());  // a bare screen has no manager that would
+    QApplication::setActiveWindow(window_.get());  // without a window manager no window becomes active
   }
   ~Window() override {
     window_.reset();
@@ -74,7 +74,7 @@ class Window : public testing::Test {
     ADD_FAILURE() << "no lamp " << name.toStdString();
     return {};
   }
-  /// What the window knows at this moment, for a wait that ended in vain.
+  /// The window's state for the message of a failed wait.
   std::string seen() {
     const ApplicationState& now = state();
     const LiveState devices = live();
@@ -89,14 +89,14 @@ class Window : public testing::Test {
     return text + fmt::format("; {} measurements, {} picks, {} outcomes, tool {}", now.measurements,
                               now.picks.size(), now.outcomes.size(), now.tool_is_out ? "out" : "at rest");
   }
-  /// For a state, `what` in words. In vain it fails with the state as seen.
+  /// Waits for a state, described by `what`; a timeout fails with the observed state.
   template <class Done>
   bool wait(const char* what, const Done& done) {
     if (QTest::qWaitFor(done, patience_ms)) return true;
-    ADD_FAILURE() << "waited " << patience_ms / 1000 << " s in vain until " << what << "; seen: " << seen();
+    ADD_FAILURE() << "waited " << patience_ms / 1000 << " s until " << what << "; observed: " << seen();
     return false;
   }
-  /// Acts, waits until nothing is being done, and acts again where the virtual devices refused.
+  /// Acts, waits until idle, and repeats if the virtual devices refused.
   template <class Act, class Done>
   bool attempt(const char* what, const Act& act, const Done& done) {
     for (int left = most_attempts; left > 0 && !done(); --left) {
@@ -104,11 +104,11 @@ class Window : public testing::Test {
       if (!wait_idle()) return false;
     }
     if (done()) return true;
-    ADD_FAILURE() << "tried " << most_attempts << " times in vain until " << what << "; seen: " << seen();
+    ADD_FAILURE() << "tried " << most_attempts << " times until " << what << "; observed: " << seen();
     return false;
   }
   bool wait_idle() {
-    return wait("nothing is being done", [&] { return !state().busy; });
+    return wait("the controller is idle", [&] { return !state().busy; });
   }
   bool wait_for_phase(LinkPhase phase) {
     return wait(fmt::format("the robot is {}", name(phase)).c_str(),
@@ -121,7 +121,7 @@ class Window : public testing::Test {
     return found;
   }
   void click(const char* name) { QTest::mouseClick(find(name), Qt::LeftButton); }
-  /// With the mouse, or with Enter, until the button is full or may not be pressed any more.
+  /// With the mouse, or with Enter, until the button is full or disabled.
   void hold(const char* name, bool by_key = false) {
     auto* button = find<HoldButton>(name);
     if (!wait(fmt::format("{} is enabled", name).c_str(), [&] { return button->isEnabled(); })) return;
@@ -147,14 +147,14 @@ class Window : public testing::Test {
         "the robot is unlocked", [&] { hold("unlock"); },
         [&] { return live().robot.phase == LinkPhase::ready; });
   }
-  /// Unlocked, and with the tool out of the knee.
+  /// Unlocked, with the tool withdrawn from the knee.
   bool make_ready() {
     return attempt(
         "the robot is unlocked and the tool withdrawn",
         [&] { hold(live().robot.phase == LinkPhase::ready ? "withdraw" : "unlock"); },
         [&] { return live().robot.phase == LinkPhase::ready && !state().tool_is_out; });
   }
-  /// What the robot is to do, from its rest.
+  /// The robot's actions from its rest position.
   template <class Act, class Done>
   bool with_robot(const char* what, const Act& act, const Done& done) {
     return attempt(
@@ -164,8 +164,8 @@ class Window : public testing::Test {
         },
         done);
   }
-  /// Acts while the robot moves, until that is why it stopped: a busy machine may stop it before, or the move
-  /// be over too soon; then once more, from a rehearsal of its own.
+  /// Acts while the robot moves, until that action is why it stopped: a busy machine may stop it before, or
+  /// the move may end too soon; then repeats with a new rehearsal.
   template <class Act>
   void stop_in_motion(const Act& act, const std::string& why) {
     for (int left = most_attempts; left > 0; --left) {
@@ -182,7 +182,7 @@ class Window : public testing::Test {
       if (!moves() && refused != refusals.end() && refused->second.message.find(why) != std::string::npos)
         return;
     }
-    FAIL() << "the robot was not stopped by \"" << why << "\"; seen: " << seen();
+    FAIL() << "the robot was not stopped by \"" << why << "\"; observed: " << seen();
   }
   void register_robot(bool by_key = false) {
     ASSERT_TRUE(with_robot(
@@ -197,7 +197,7 @@ class Window : public testing::Test {
         wait("the picks are located", [&] { return state().result->points.size() > 3 && !state().busy; }));
     register_robot();
   }
-  /// Kept where HELICARM_SCREENSHOTS says.
+  /// Saves to the folder HELICARM_SCREENSHOTS.
   void screenshot(const char* name) {
     QTest::qWait(100);
     if (const char* place = std::getenv("HELICARM_SCREENSHOTS"))
@@ -211,11 +211,11 @@ class Window : public testing::Test {
   }
   void shoot_both() {
     ASSERT_TRUE(attempt(
-        "AP is taken", [&] { click("shootAP"); },
+        "AP is acquired", [&] { click("shootAP"); },
         [&] { return state().result->views[0].xray_image != nullptr; }));
     auto* lateral = find("shootLAT");
     ASSERT_TRUE(attempt(
-        "LAT is taken",
+        "LAT is acquired",
         [&] {
           lateral->setFocus();
           QTest::keyClick(lateral, Qt::Key_Return);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Times and memory, for a person.
+// Response times and memory, printed.
 #include <fstream>
 
 #include "gui/window/window_test.h"
@@ -14,7 +14,7 @@ double resident_mb() {
   return resident * double(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
-/// How old each new pose is when the tool's line by it stands on the screen.
+/// Delay from each new pose to its display as the tool's line.
 class PoseToPixels : public QObject {
  public:
   explicit PoseToPixels(MainWindow& window) : window_(window) { window.xray(1).installEventFilter(this); }
@@ -27,7 +27,7 @@ class PoseToPixels : public QObject {
     const double taken_s = shown.at_s - (*shown.tool)->age_s;
     if (taken_s - newest_s_ < 1e-4) return false;
     newest_s_ = taken_s;
-    // Once this paint and its flush are over.
+    // After this paint event and its flush.
     QTimer::singleShot(0, this,
                        [this, taken_s] { latencies_ms.push_back((monotonic_seconds() - taken_s) * 1000); });
     return false;
@@ -38,7 +38,7 @@ class PoseToPixels : public QObject {
   double newest_s_ = 0;
 };
 
-/// Times, for a person: HELICARM_TIMING=1.
+/// Prints times: HELICARM_TIMING=1.
 TEST_F(Window, ReportsItsTimes) {
   if (std::getenv("HELICARM_TIMING") == nullptr) GTEST_SKIP() << "only with HELICARM_TIMING";
   QElapsedTimer since;
@@ -69,7 +69,7 @@ TEST_F(Window, ReportsItsTimes) {
     QTest::qWait(7);
     since.restart();
     window_->scene().show_live({});
-    for (int look = 0; look < 4; ++look) window_->show_live();  // the scene comes every fourth time
+    for (int look = 0; look < 4; ++look) window_->show_live();  // every fourth call updates the scene
     QApplication::processEvents();
     whole.push_back(double(since.nsecsElapsed()) / 1e6);
   }
@@ -80,15 +80,15 @@ TEST_F(Window, ReportsItsTimes) {
     std::printf("%s: median %.1f ms, 95 %% below %.1f, worst %.1f (%zu)\n", what, ms[ms.size() / 2],
                 ms[ms.size() * 95 / 100], ms.back(), ms.size());
   };
-  notify("all that is live shown anew, the scene every fourth time", redraw);
-  notify("both X-rays and the scene redrawn", whole);
+  notify("live data updated, the scene every fourth time", redraw);
+  notify("both X-ray images and the scene redrawn", whole);
   notify("scene drawn", scene);
   notify("from the tracker's pose to the tool's line on the screen", pixels.latencies_ms);
-  std::printf("longest hold-up of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
+  std::printf("longest blocking of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
               WatchedApplication::longest_what.c_str());
 }
 
-/// Operations one after the other for so many minutes: HELICARM_SOAK=30.
+/// Operations in sequence for the given minutes: HELICARM_SOAK=30.
 TEST_F(Window, KeepsItsMemoryOverManyOperations) {
   const char* minutes = std::getenv("HELICARM_SOAK");
   if (minutes == nullptr) GTEST_SKIP() << "only with HELICARM_SOAK";

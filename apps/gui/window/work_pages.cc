@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pages of what is done with it.
+// Pages of the planning, navigation and verification steps.
 #include <QHBoxLayout>
 #include <QVBoxLayout>
 #include <algorithm>
@@ -12,16 +12,16 @@
 namespace helicarm::gui {
 
 PlanPage::PlanPage(Controller& controller, QWidget* parent)
-    : Page(
-          tr("Click each tunnel end in both X-rays; the dashed line in the second one says where it can be."),
-          controller, parent) {
+    : Page(tr("Click each tunnel end in both X-ray images; the dashed line in the second one is its epipolar "
+              "line."),
+           controller, parent) {
   next_ = new QLabel;
   next_->setObjectName("nextPick");
   next_->setWordWrap(true);
   next_->setStyleSheet("color: #ffc400; font-weight: bold;");
   layout()->addWidget(next_);
   ends_ =
-      add_table({tr("End"), tr("Drill"), tr("Clicked in"), tr("±mm (95 %)"), tr("Rays miss mm")}, "endTable");
+      add_table({tr("End"), tr("Drill"), tr("Clicked in"), tr("±mm (95 %)"), tr("Ray gap mm")}, "endTable");
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
     chosen_.reset();
@@ -36,7 +36,7 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   layout()->addWidget(snap_);
   auto* row = new QHBoxLayout;
   offered_ =
-      add_button(tr("Take the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
+      add_button(tr("Use the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
   auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
     ends_->clearSelection();
     controller_.clear_picks();
@@ -48,17 +48,17 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
 
 void PlanPage::add_map() {
   auto* row = new QHBoxLayout;
-  auto* map = new QCheckBox(tr("Expected error (&TRE) in 3-D"));
+  auto* map = new QCheckBox(tr("Predicted error (&TRE) in 3-D"));
   map->setObjectName("treMap");
   auto* axis = new QComboBox;
   axis->setObjectName("treAxis");
   axis->addItems({"x", "y", "z"});
   axis->setCurrentIndex(2);
-  axis->setToolTip(tr("The slice lies across this axis of the calibrator"));
+  axis->setToolTip(tr("The slice is perpendicular to this axis of the calibrator"));
   auto* place = new QSlider(Qt::Horizontal);
   place->setObjectName("trePlace");
   place->setRange(-int(tre_half_mm), int(tre_half_mm));
-  place->setAccessibleName(tr("Place of the slice"));
+  place->setAccessibleName(tr("Position of the slice"));
   auto* words = new QLabel;
   for (QWidget* part : std::initializer_list<QWidget*>{map, axis, place, words}) row->addWidget(part);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
@@ -111,12 +111,13 @@ void PlanPage::show_state(const ApplicationState& state) {
 
 void PlanPage::tell_next() {
   const ApplicationState& state = controller_.state();
-  if (!state.measured) return next_->setText(tr("The X-rays come first."));
+  if (!state.measured) return next_->setText(tr("Acquire the X-ray images first."));
   if (chosen_)
-    return next_->setText(tr("%1 is chosen: click its new place in each X-ray.").arg(text(*chosen_)));
+    return next_->setText(
+        tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_)));
   const auto wanted = next_pick(state);
   if (!wanted)
-    return next_->setText(tr("All ends are placed. To move one, choose it in the table and click."));
+    return next_->setText(tr("All ends are placed. To move one, select it in the table and click."));
   for (const PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
       const bool enters = (tunnel.enter_at == TunnelEnd::start) == (wanted->point == tunnel.start);
@@ -139,9 +140,9 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   says_->setObjectName("robotSays");
   says_->setWordWrap(true);
   layout()->addWidget(says_);
-  unlock_ = add_hold(tr("1  &Unlock the robot: I have looked, nobody is near"), "unlock",
+  unlock_ = add_hold(tr("1  &Unlock the robot: no person is near it"), "unlock",
                      [this] { controller_.unlock("the person at the screen"); });
-  register_ = add_hold(tr("2  &Register it: about a dozen small moves about its tip"), "register",
+  register_ = add_hold(tr("2  &Register the robot: about twelve small moves about its tip"), "register",
                        [this] { controller_.register_robot(); });
   tour_ = new QLabel;
   tour_->setWordWrap(true);
@@ -153,9 +154,9 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   layout()->addWidget(tunnel_);
   connect(tunnel_, &QComboBox::currentTextChanged, this,
           [this](const QString& name) { controller_.follow(name.toStdString()); });
-  plan_ = add_button(tr("3  Plan the &way and show it in both X-rays"), "planWay",
+  plan_ = add_button(tr("3  &Plan the approach path and show it in both images"), "planWay",
                      [this] { controller_.plan_tunnel(tunnel_->currentText().toStdString()); });
-  go_ = add_hold(tr("4  &Go there"), "go", [this] { controller_.go(); });
+  go_ = add_hold(tr("4  &Move to the tunnel"), "go", [this] { controller_.go(); });
   withdraw_ = add_hold(tr("5  With&draw the tool"), "withdraw", [this] { controller_.withdraw(); });
   static_cast<QVBoxLayout*>(layout())->addStretch();
 }
@@ -184,31 +185,31 @@ void NavigatePage::show_live(const LiveState& live) {
 QString NavigatePage::next_step() const {
   const ApplicationState& state = controller_.state();
   if (state.source == Source::files || state.source == Source::none)
-    return tr("Pictures from files: there is no robot to steer.");
+    return tr("Images from files: no robot is connected.");
   if (state.busy) return text(state.doing);
   const QString why = why_ ? sentence_of(*why_) + ". " : QString();
   switch (phase_) {
     case LinkPhase::disconnected:
-      return why + tr("Check the robot's power and cable: it is called again and again.");
+      return why + tr("Check the robot's power and cable; the connection is retried.");
     case LinkPhase::idle:
-      return tr("The robot is locked. Hold 1 when nobody is near it.");
+      return tr("The robot is locked. Hold 1 when no person is near it.");
     case LinkPhase::stopped:
-      return why + tr("It rests until you have looked at it and hold 1.");
+      return why + tr("It stays stopped until you have checked it and hold 1.");
     case LinkPhase::starting:
     case LinkPhase::moving:
       return tr("The robot moves.");
     case LinkPhase::ready:
       break;
   }
-  if (state.tool_is_out) return tr("The tool is out: withdraw it (5) before anything else.");
-  if (state.order) return tr("Look at the way in both X-rays; then hold 4.");
-  if (!state.measured) return tr("The X-rays come first (Alt+1).");
+  if (state.tool_is_out) return tr("The tool is at a tunnel: withdraw it (5) first.");
+  if (state.order) return tr("Inspect the path in both X-ray images, then hold 4.");
+  if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
   if (!state.hand_eye_rms_mm) return tr("Hold 2 to register the robot.");
-  if (next_pick(state)) return tr("The tunnels' ends come first (Alt+4).");
+  if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
   if (const auto refusal = state.refusals.find(Phase::navigate);
       refusal != state.refusals.end() && refusal->second.reason == Reason::plan_stale)
-    return sentence_of(refusal->second) + tr(". Nothing moves by that path.");
-  return tr("Choose a tunnel and plan the way (3).");
+    return sentence_of(refusal->second) + tr(". The robot does not move along this path.");
+  return tr("Select a tunnel and plan the path (3).");
 }
 
 void NavigatePage::allow() {
@@ -225,10 +226,10 @@ void NavigatePage::allow() {
 }
 
 VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
-    : Page(tr("How far (mm) the tool's axis runs from each end by tracker and X-rays, and how far it may be; "
-              "then "
-              "in the X-rays alone: Eq. 17 in px and mm, and in space."),
-           controller, parent) {
+    : Page(
+          tr("Distance (mm) of each end from the tool's axis by tracker and X-ray images, with the predicted "
+             "value; then in the X-ray images only: Eq. 17 in px and mm, and in space."),
+          controller, parent) {
   table_ = add_table({tr("Tunnel, end"), tr("Off"), tr("Expect"), tr("px"), tr("mm"), tr("Space")},
                      "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",

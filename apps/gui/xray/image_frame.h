@@ -10,7 +10,7 @@
 
 namespace helicarm::gui {
 
-/// Where an image lies in a widget: widget = origin + scale * pixel. Pixel (0, 0) is the centre of the
+/// Position of an image in a widget: widget = origin + scale * pixel. Pixel (0, 0) is the centre of the
 /// top-left one.
 struct ImageFrame {
   double scale = 1;
@@ -26,7 +26,7 @@ struct ImageFrame {
     return {pixel.x(), pixel.y()};
   }
 
-  /// The whole image in the middle of the widget.
+  /// The whole image, centred in the widget.
   static ImageFrame fitted(const QSizeF& image, const QSizeF& widget) {
     const double scale = std::clamp(std::min(widget.width() / std::max(1.0, image.width()),
                                              widget.height() / std::max(1.0, image.height())),
@@ -35,13 +35,13 @@ struct ImageFrame {
     return {scale, 0.5 * corner + QPointF(0.5 * scale, 0.5 * scale)};
   }
 
-  /// Enlarged about a place of the widget, which keeps its pixel.
+  /// Enlarged about a widget position, whose pixel stays.
   ImageFrame zoomed(double factor, const QPointF& about, double smallest_scale) const {
     const double to = std::clamp(scale * factor, smallest_scale, largest_scale);
     return {to, about + to / scale * (origin - about)};
   }
 
-  /// Shifted back until a strip of the image shows.
+  /// Shifted back until part of the image is visible.
   ImageFrame within(const QSizeF& image, const QSizeF& widget) const {
     constexpr double strip = 48;
     ImageFrame held = *this;

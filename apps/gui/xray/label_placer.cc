@@ -7,7 +7,7 @@
 namespace helicarm::gui {
 
 void outlined_text(QPainter& painter, const QPointF& at, const QString& words, const QColor& colour) {
-  // Drawn letters come from a cache: ten times as fast as the outline of their path.
+  // Glyphs from the font cache: ten times as fast as outlined paths.
   painter.setPen(QColor(0, 0, 0, 200));
   for (int y = -1; y <= 1; ++y)
     for (int x = -1; x <= 1; ++x) painter.drawText(at + QPointF(x, y), words);

@@ -8,20 +8,20 @@ namespace helicarm::gui {
 
 inline constexpr int label_font_px = 13;
 
-/// Writes text on any ground: dark edge, bright fill, baseline at `at`.
+/// Text legible on any background: dark edge, bright fill, baseline at `at`.
 void outlined_text(QPainter& painter, const QPointF& at, const QString& words, const QColor& colour);
 
 /// A few lines in a dark box beside `at`, kept within `bounds`.
 void text_box(QPainter& painter, const QPointF& at, const QString& words, const QRectF& bounds);
 
-/// Puts labels beside their marks, where they hide neither marks nor each other as far as there is room.
+/// Places labels beside their marks without overlap of marks or labels where space permits.
 class LabelPlacer {
  public:
   explicit LabelPlacer(const QRectF& bounds) : bounds_(bounds) {}
 
-  /// A place that no label should hide.
+  /// An area to keep free of labels.
   void keep_free(const QRectF& area) { taken_.push_back(area); }
-  /// Writes the label of a mark of this radius; one out of sight is left out.
+  /// Draws the label of a mark of this radius; marks outside the visible area are left out.
   void place(QPainter& painter, const QPointF& mark, double radius, const QString& words,
              const QColor& colour);
 

@@ -19,7 +19,7 @@ std::shared_ptr<const LoadedLayer> computed(const ViewResult& view, Layer layer)
   return nullptr;
 }
 
-/// One request: a sender of its own, so that a queued answer cannot reach a receiver that is gone.
+/// One request with its own sender, so that a queued answer cannot reach a deleted receiver.
 class LayerJob : public QObject, public QRunnable {
   Q_OBJECT
  public:

@@ -10,14 +10,14 @@
 
 namespace helicarm::gui {
 
-/// A layer's image and the window that suits it.
+/// A layer's image and its default grey window.
 struct LoadedLayer {
   Layer layer;
   Image<float> pixels;
   GreyWindow usual;
 };
 
-/// Computes layers in a thread of its own. Only the newest request is answered.
+/// Computes layers in a separate thread. Only the newest request is answered.
 class LayerLoader : public QObject {
   Q_OBJECT
  public:
@@ -25,11 +25,11 @@ class LayerLoader : public QObject {
   ~LayerLoader() override;
 
   void load(std::shared_ptr<const Result> result, std::size_t view, Layer layer);
-  /// Whatever was asked for is no longer wanted.
+  /// Cancels the pending request.
   void cancel();
 
  Q_SIGNALS:
-  /// Null where it could not be computed.
+  /// Null if it could not be computed.
   void loaded(std::shared_ptr<const LoadedLayer> layer);
 
  private:

@@ -8,13 +8,13 @@
 
 namespace helicarm::gui {
 
-/// What can be shown of one exposure: as stored, freed of the distortion, and that without the plate's dots.
+/// Display layers of an X-ray image: raw, rectified, and rectified without the plate's dots.
 enum class Layer { raw, rectified, inpainted };
 
-/// The layer that is there to show: the raw one where the view is not rectified.
+/// The available layer: raw if the view is not rectified.
 Layer layer_at_hand(const ViewResult& view, Layer wanted);
 
-/// The layer's image; empty where there is no exposure. May take a tenth of a second.
+/// The layer's image; empty without an X-ray image. Takes up to 0.1 s.
 Image<float> layer_of(const ViewResult& view, Layer layer);
 
 /// The image through a grey window. The window itself comes from `usual_window`

@@ -8,7 +8,7 @@
 namespace helicarm::gui {
 namespace {
 
-/// Mean grey value within two pixels of a place.
+/// Mean grey value within two pixels of a position.
 double grey_at(const Image<float>& view_image, const Eigen::Vector2d& place) {
   double sum = 0;
   for (int dv = -2; dv <= 2; ++dv)
@@ -17,13 +17,13 @@ double grey_at(const Image<float>& view_image, const Eigen::Vector2d& place) {
   return sum / 25;
 }
 
-TEST(LayerOf, RawIsTheExposureItself) {
+TEST(LayerOf, RawIsTheImageItself) {
   const ViewResult& view = simulated_result()->views[0];
   const Image<float> raw = layer_of(view, Layer::raw);
   EXPECT_TRUE(std::ranges::equal(raw.pixels(), view.xray_image->pixels.pixels()));
 }
 
-TEST(LayerOf, RectifiedShowsTheBallsWhereTheyWereMeasured) {
+TEST(LayerOf, RectifiedShowsTheFiducialsAtTheirMeasuredPositions) {
   const ViewResult& view = simulated_result()->views[0];
   const Image<float> rectified = layer_of(view, Layer::rectified);
   for (const Fiducial& ball : view.found->fiducials) {
@@ -34,7 +34,7 @@ TEST(LayerOf, RectifiedShowsTheBallsWhereTheyWereMeasured) {
   }
 }
 
-TEST(LayerOf, InpaintedHidesThePlateAndLeavesTheBalls) {
+TEST(LayerOf, InpaintedRemovesThePlateAndKeepsTheFiducials) {
   const ViewResult& view = simulated_result()->views[0];
   const Image<float> rectified = layer_of(view, Layer::rectified), bare = layer_of(view, Layer::inpainted);
   ASSERT_FALSE(view.rectification->plate_dots.empty());
@@ -56,7 +56,7 @@ TEST(LayerOf, InpaintedHidesThePlateAndLeavesTheBalls) {
   EXPECT_GT(untouched, 3);
 }
 
-TEST(LayerOf, AViewThatIsNotRectifiedHasOnlyItsRawLayer) {
+TEST(LayerOf, ViewThatIsNotRectifiedHasOnlyItsRawLayer) {
   XrayImage xray_image;
   xray_image.pixels = Image<float>(4, 3, 7);
   const ViewResult view{"AP", std::make_shared<const XrayImage>(std::move(xray_image)), {}, {}, {}};
@@ -67,7 +67,7 @@ TEST(LayerOf, AViewThatIsNotRectifiedHasOnlyItsRawLayer) {
   EXPECT_TRUE(layer_of(ViewResult{}, Layer::rectified).empty());
 }
 
-TEST(Windowed, HoldsThePixelsAtAnyWidth) {
+TEST(Windowed, KeepsThePixelsAtAnyWidth) {
   Image<float> view_image(5, 2);
   for (int u = 0; u < 5; ++u) view_image(u, 1) = float(u);
   const QImage image = windowed(view_image, {0, 4});

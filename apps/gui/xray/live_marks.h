@@ -9,14 +9,13 @@
 
 namespace helicarm::gui {
 
-/// A place that somebody has picked and that no result holds yet, raw pixels.
+/// A picked point that is not in a result yet, raw px.
 struct FreshPick {
   QString name;
   Eigen::Vector2d raw;
 };
 
-/// What comes and goes over the image: as it was given (picks raw, the rest rectified) and in the layer's
-/// pixels.
+/// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.
 class LiveMarks {
  public:
   void set_epipolar(PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
@@ -25,9 +24,9 @@ class LiveMarks {
   void set_tool(const std::optional<ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
-  /// Another layer: what was carried into the former one is so no longer.
+  /// Changes the layer; converted positions become invalid.
   void forget_layer();
-  /// Carries into the layer what is not yet; to be called after a change.
+  /// Converts the remaining positions to the layer; call it after a change.
   void carry(const ViewResult& view, Layer layer);
   void paint(QPainter& painter, const ImageFrame& frame) const;
 

@@ -23,7 +23,7 @@ void cross(QPainter& painter, const QPointF& at, double arm) {
   painter.drawLine(at + QPointF(-arm, arm), at + QPointF(arm, -arm));
 }
 
-/// Draws twice: a dark edge, then the line itself.
+/// Draws twice: a dark edge, then the line.
 template <class Shape>
 void edged(QPainter& painter, QPen pen, const Shape& shape) {
   painter.setBrush(Qt::NoBrush);
@@ -52,7 +52,7 @@ void arrow(QPainter& painter, const QPointF& from, const QPointF& way) {
   });
 }
 
-/// Marks that are drawn at the same size however the image is zoomed, unless it is zoomed far in.
+/// Marks of constant screen size, except at very large zoom.
 double ball_radius(const ImageFrame& frame, int image_width) {
   return std::max(8.0, 15 / 1024.0 * image_width * frame.scale);
 }
@@ -70,7 +70,7 @@ void paint_balls(QPainter& painter, const ViewMarks& marks, const ImageFrame& fr
   }
 }
 
-/// Arrows from the balls and a bar that says how long they are.
+/// Residual arrows of the fiducials and their scale bar.
 void paint_residuals(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, const QRectF& bounds,
                      LabelPlacer& labels) {
   constexpr double longest_arrow = 45;

@@ -9,18 +9,19 @@
 
 namespace helicarm::gui {
 
-/// The colours of the marks: as in the report, told apart by shape too.
+/// Colours of the marks as in the report; marks also differ in shape.
 namespace ink {
 inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197, 253, 150),
     point(240, 171, 252), tunnel(250, 204, 21), residual(251, 146, 60), tool(239, 68, 68),
     epipolar(94, 234, 242), quiet(200, 208, 220);
 }  // namespace ink
 
-/// Draws what the stages found. Lines keep their width at any zoom; `image_width` sets the balls' circles.
+/// Draws the detections. Line widths do not depend on zoom; `image_width` sets the radius of the fiducials'
+/// circles.
 void paint_marks(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, int image_width,
                  const QRectF& bounds);
 
-/// A line with a dark edge, so that it shows on bright ground too.
+/// A line with a dark edge, visible on a bright background.
 void paint_path(QPainter& painter, const PixelPath& path, const ImageFrame& frame, const QPen& pen);
 
 }  // namespace helicarm::gui

@@ -84,7 +84,7 @@ std::optional<MarkUnderCursor> mark_near(const ViewMarks& marks, const Vector2d&
 
 QString described(const ViewMarks& marks) {
   const auto used = std::ranges::count(marks.balls, true, &BallMark::used);
-  QString words = QObject::tr("%1 balls used, %2 rejected, %3 false blobs, %4 points.")
+  QString words = QObject::tr("%1 fiducials used, %2 rejected, %3 outliers, %4 points.")
                       .arg(used)
                       .arg(marks.balls.size() - static_cast<std::size_t>(used))
                       .arg(marks.false_blobs.size())

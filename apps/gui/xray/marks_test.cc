@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-TEST(MarksOf, ASimulatedCaseHasAllKinds) {
+TEST(MarksOf, SimulatedCaseHasAllKinds) {
   const ViewMarks marks = marks_of(*simulated_result(), 0, Layer::rectified);
   EXPECT_EQ(marks.balls.size(), 12u);
   EXPECT_EQ(marks.false_blobs.empty(), false);
@@ -22,7 +22,7 @@ TEST(MarksOf, ASimulatedCaseHasAllKinds) {
   for (const BallMark& ball : marks.balls) EXPECT_TRUE(ball.residual) << ball.label;
 }
 
-TEST(MarksOf, RawLayerHasThePlacesThatWereMeasuredRaw) {
+TEST(MarksOf, RawLayerHasTheRawPositions) {
   const Result& result = *simulated_result();
   const ViewMarks raw = marks_of(result, 1, Layer::raw);
   for (const BallMark& ball : raw.balls) {
@@ -36,7 +36,7 @@ TEST(MarksOf, RawLayerHasThePlacesThatWereMeasuredRaw) {
     EXPECT_LT((raw.plate_dots[i].place - dots[i].centre_px).norm(), 1e-6);
 }
 
-TEST(InLayer, ThereAndBackIsTheSamePixel) {
+TEST(InLayer, RoundTripReturnsTheSamePixel) {
   const ViewResult& view = simulated_result()->views[0];
   const Vector2d place(300, 220);
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
@@ -49,7 +49,7 @@ TEST(InLayer, ThereAndBackIsTheSamePixel) {
   EXPECT_EQ(in_layer(view, Layer::rectified, place), place);
 }
 
-TEST(InLayer, PathsEndAtTheImage) {
+TEST(InLayer, PathsEndAtTheImageBorder) {
   const ViewResult& view = simulated_result()->views[0];
   for (const Layer layer : {Layer::raw, Layer::rectified}) {
     const auto paths = in_layer(view, layer, PixelPath{{-9000, 256}, {9000, 256}});
@@ -59,7 +59,7 @@ TEST(InLayer, PathsEndAtTheImage) {
   }
 }
 
-TEST(MarkNear, IsTheNearestWithinReach) {
+TEST(MarkNear, NearestWithinReachIsFound) {
   ViewMarks marks;
   marks.balls = {{"P1", {10, 10}, true, 0.02, Vector2d(0.3, 0.4)}, {"P2", {14, 10}, false}};
   marks.points = {{"T1", {40, 40}, PointSource::target, 0.25},

@@ -10,7 +10,7 @@
 
 namespace helicarm::gui {
 
-/// A case with tunnels, stray balls and 512 pixels a side, measured from its files; measured once.
+/// A case with tunnels, decoy balls and 512 px per side, measured once from its files.
 inline std::shared_ptr<const Result> simulated_result() {
   static const auto result = [] {
     simulation::SimulationOptions options;

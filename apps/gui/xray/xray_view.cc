@@ -7,7 +7,7 @@
 namespace helicarm::gui {
 namespace {
 
-/// Whether two views show the same pixels, so that zoom and window may stay.
+/// Whether two views show the same pixels, so that zoom and window are kept.
 bool same_image(const ViewResult& a, const ViewResult& b) {
   return a.xray_image && b.xray_image && a.name == b.name &&
          a.xray_image->acquisition.instance_key == b.xray_image->acquisition.instance_key &&
@@ -22,19 +22,19 @@ XrayView::XrayView(QWidget* parent) : QWidget(parent) {
   setMouseTracking(true);
   setAttribute(Qt::WA_OpaquePaintEvent);
   connect(&loader_, &LayerLoader::loaded, this, &XrayView::take);
-  clear(tr("No picture yet"));
+  clear(tr("No image yet"));
 }
 
 XrayView::~XrayView() = default;
 
 void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index) {
-  if (!result || index >= result->views.size()) return clear(tr("No picture yet"));
+  if (!result || index >= result->views.size()) return clear(tr("No image yet"));
   const ViewResult& next = result->views[index];
   const QString name = QString::fromStdString(next.name);
   if (!next.xray_image || next.xray_image->pixels.empty())
-    return clear(name.isEmpty() ? tr("No picture yet") : tr("No picture yet: shoot %1").arg(name));
+    return clear(name.isEmpty() ? tr("No image yet") : tr("No image yet: acquire %1").arg(name));
   const bool stays = result_ && same_image(view(), next);
-  // Until the same image's layer is there anew, the former one stands: nothing flickers.
+  // The previous layer stays until the new one is ready, to avoid flicker.
   const bool stands = stays && shown_ && layer_at_hand(next, shown_->layer) == shown_->layer;
   auto layer = stands ? shown_ : nullptr;
   QImage grey = stands ? grey_ : QImage();
@@ -50,7 +50,7 @@ void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index
     window_.reset();
     fits_ = true;
   }
-  setAccessibleName(tr("X-ray %1").arg(name));
+  setAccessibleName(tr("X-ray image %1").arg(name));
   computing_ = true;
   loader_.load(result_, view_, wanted_);
 }

@@ -12,43 +12,43 @@
 
 namespace helicarm::gui {
 
-/// One X-ray with all that the program found in it. Wheel: zoom about the cursor; middle or left drag: pan;
-/// right drag: contrast and brightness; double click: fit. Keys: + - 0 zoom, arrows pan, Shift+arrows (with
-/// Ctrl: finer) move a cursor and Enter picks there, L next layer, H hides the marks, M magnifier, W usual
-/// window, Esc puts the cursor away.
+/// One X-ray image with all detections. Wheel: zoom about the cursor; middle or left drag: pan; right drag:
+/// contrast and brightness; double click: fit. Keys: + - 0 zoom, arrows pan, Shift+arrows (with Ctrl: finer)
+/// move a cursor and Enter picks there, L next layer, H hides the marks, M magnifier, W default window, Esc
+/// hides the cursor.
 class XrayView : public QWidget {
   Q_OBJECT
  public:
   explicit XrayView(QWidget* parent = nullptr);
   ~XrayView() override;
 
-  /// Shows a view of a result, or what there is of it yet. What was drawn over the former one goes: picks,
-  /// epipolar line, path and tool.
+  /// Shows a view of a result, also an incomplete one. Removes picks, epipolar line, path and tool of the
+  /// previous view.
   void show_view(std::shared_ptr<const Result> result, std::size_t view);
   void clear(const QString& why);
 
   void set_layer(Layer layer);
   Layer layer() const { return wanted_; }
-  /// Held until another exposure is shown or the usual window is asked for.
+  /// Kept until another image is shown or the default window is requested.
   void set_window(GreyWindow window);
   void set_usual_window();
   std::optional<GreyWindow> window() const;
 
   void set_picking(bool picking);
   void set_magnifier(bool on);
-  /// Whether what the stages found is drawn; what is live is drawn anyway.
+  /// Whether the detections are drawn; live marks are always drawn.
   void set_marks_visible(bool visible);
   void fit();
 
-  /// What is drawn over the view: rectified pixels, but for picks.
+  /// Marks over the view: rectified pixels, except picks.
   void set_epipolar(std::vector<Eigen::Vector2d> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
   void set_tool(std::optional<ImageLine> rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
-  /// Whether the wanted layer is still being computed; until then the former one is shown.
+  /// Whether the requested layer is still being computed; until then the previous one is displayed.
   bool is_computing() const { return computing_; }
-  /// Raw pixel at a place of the widget and back; nothing off the image.
+  /// Raw pixel at a widget position and back; empty outside the image.
   std::optional<QPointF> raw_at(const QPointF& place) const;
   std::optional<QPointF> place_of(const QPointF& raw_pixel) const;
 
@@ -61,7 +61,7 @@ class XrayView : public QWidget {
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
   void layer_changed(helicarm::gui::Layer layer);
   void window_changed(helicarm::GreyWindow window);
-  /// The wanted layer is on the screen.
+  /// The requested layer is displayed.
   void shown();
 
  protected:
@@ -105,7 +105,7 @@ class XrayView : public QWidget {
   std::size_t view_ = 0;
   QString why_empty_;
   Layer wanted_ = Layer::rectified;
-  std::optional<GreyWindow> window_;  ///< nothing: the usual one
+  std::optional<GreyWindow> window_;  ///< empty: the default one
   bool picking_ = false, magnifier_ = false, marks_visible_ = true, computing_ = false, fits_ = true;
 
   LayerLoader loader_;
@@ -114,7 +114,7 @@ class XrayView : public QWidget {
   ViewMarks marks_;
   LiveMarks live_;
   ImageFrame frame_;
-  QPixmap still_;  ///< image and marks as they stand; null: to be drawn anew
+  QPixmap still_;  ///< image and marks; null: to be redrawn
 
   Drag drag_;
   std::optional<QPointF> mouse_;

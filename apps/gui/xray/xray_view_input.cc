@@ -87,7 +87,7 @@ void XrayView::mouseReleaseEvent(QMouseEvent* event) {
   if (event->button() != drag_.button) return;
   const bool picks = drag_.may_pick && !drag_.moved;
   drag_ = {};
-  // The middle of the screen's pixel that was hit.
+  // Centre of the screen pixel under the cursor.
   const double half = 0.5 / devicePixelRatioF();
   if (picks) pick_at(event->position() + QPointF(half, half));
 }
@@ -158,7 +158,7 @@ void XrayView::pick_at(const QPointF& place) {
 }
 
 void XrayView::hover_at(const QPointF& place) {
-  constexpr double reach = 14;  // on the screen
+  constexpr double reach = 14;  // screen px
   if (shown_) hover_over(mark_near(marks_, frame_.to_image(place), reach / frame_.scale));
 }
 

@@ -25,7 +25,7 @@ QFont label_font(QFont font) {
   return font;
 }
 
-/// A cross with a gap, so that it does not hide what it points at.
+/// A cross with a central gap, which keeps its target visible.
 void open_cross(QPainter& painter, const QPointF& at, double gap, double arm, const QColor& colour) {
   for (const QPen& pen : {QPen(QColor(0, 0, 0, 180), 3), QPen(colour, 1.2)}) {
     painter.setPen(pen);
@@ -97,7 +97,7 @@ void XrayView::paint_words(QPainter& painter) const {
   }
   const QString layer = shown_->layer == Layer::raw         ? tr("raw")
                         : shown_->layer == Layer::rectified ? tr("rectified")
-                                                            : tr("rectified, plate hidden");
+                                                            : tr("rectified, plate removed");
   QString caption = QString::fromStdString(view().name) + "  ·  " + layer;
   if (!marks_visible_) caption += tr("  ·  marks hidden");
   if (computing_) caption += tr("  ·  computing …");

@@ -45,7 +45,7 @@ class XrayViewTest : public testing::Test {
   XrayView view;
 };
 
-TEST_F(XrayViewTest, AClickArrivesAsARawPixelInEveryLayerAtAnyZoom) {
+TEST_F(XrayViewTest, ClickGivesARawPixelInEveryLayerAtAnyZoom) {
   const Fiducial& ball = shown().found->fiducials[3];
   const QPointF raw(ball.uv_raw.x(), ball.uv_raw.y());
   view.set_picking(true);
@@ -65,7 +65,7 @@ TEST_F(XrayViewTest, AClickArrivesAsARawPixelInEveryLayerAtAnyZoom) {
   }
 }
 
-TEST_F(XrayViewTest, WhatIsDrawnStandsWhereAClickOnItGoes) {
+TEST_F(XrayViewTest, MarksAreDrawnWhereAClickGivesTheirPixel) {
   Result bare;
   XrayImage dot;
   dot.pixels = Image<float>(33, 33, 1);
@@ -90,7 +90,7 @@ TEST_F(XrayViewTest, WhatIsDrawnStandsWhereAClickOnItGoes) {
   EXPECT_NEAR(sum.y() / weight, expected.y(), 0.3);
 }
 
-TEST_F(XrayViewTest, ADragIsNoPickAndAClickIsNoneUnlessPicking) {
+TEST_F(XrayViewTest, DragIsNotAPickAndAClickOnlyWhilePicking) {
   QSignalSpy spy(&view, &XrayView::picked);
   QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
   view.set_picking(true);
@@ -99,7 +99,7 @@ TEST_F(XrayViewTest, ADragIsNoPickAndAClickIsNoneUnlessPicking) {
   EXPECT_EQ(spy.count(), 0);
 }
 
-TEST_F(XrayViewTest, ADoubleClickWhilePickingIsOnePick) {
+TEST_F(XrayViewTest, DoubleClickWhilePickingIsOnePick) {
   QSignalSpy spy(&view, &XrayView::picked);
   view.set_picking(true);
   QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
@@ -146,7 +146,7 @@ TEST_F(XrayViewTest, KeysZoomPanAndCycleTheLayers) {
   EXPECT_LT((*view.place_of({100, 100}) - before).manhattanLength(), 1e-6);
 }
 
-TEST_F(XrayViewTest, PicksByKeyboardAlone) {
+TEST_F(XrayViewTest, PicksByKeyboard) {
   view.set_picking(true);
   QSignalSpy spy(&view, &XrayView::picked);
   key(Qt::Key_Return);
@@ -163,7 +163,7 @@ TEST_F(XrayViewTest, PicksByKeyboardAlone) {
   EXPECT_LE(spy.count(), 1);
 }
 
-TEST_F(XrayViewTest, HoveringNamesTheBall) {
+TEST_F(XrayViewTest, TooltipNamesTheFiducial) {
   std::vector<std::string> names;
   QObject::connect(&view, &XrayView::hovered, [&](const std::optional<MarkUnderCursor>& mark) {
     names.push_back(mark ? mark->name.toStdString() : "");
@@ -183,8 +183,8 @@ TEST_F(XrayViewTest, HoveringNamesTheBall) {
   EXPECT_EQ(names.back(), "");
 }
 
-TEST_F(XrayViewTest, ClearForgetsEverything) {
-  view.clear("No picture yet: shoot AP");
+TEST_F(XrayViewTest, ClearRemovesEverything) {
+  view.clear("No image yet: acquire AP");
   EXPECT_FALSE(view.raw_at({300, 300}));
   EXPECT_FALSE(view.window());
   view.set_picking(true);
@@ -196,11 +196,11 @@ TEST_F(XrayViewTest, ClearForgetsEverything) {
   EXPECT_EQ(spy.count(), 0);
 }
 
-TEST_F(XrayViewTest, AnOldRequestIsDroppedAndAClearedViewStaysClear) {
+TEST_F(XrayViewTest, OldRequestIsDroppedAndAClearedViewStaysClear) {
   for (int i = 0; i < 7; ++i) key(Qt::Key_L);
   view.show_view(simulated_result(), 1);
   settle();
-  EXPECT_EQ(view.accessibleName(), "X-ray LAT");
+  EXPECT_EQ(view.accessibleName(), "X-ray image LAT");
   view.set_layer(Layer::raw);
   view.set_layer(Layer::inpainted);
   view.clear("gone");
@@ -208,7 +208,7 @@ TEST_F(XrayViewTest, AnOldRequestIsDroppedAndAClearedViewStaysClear) {
   EXPECT_FALSE(view.raw_at({300, 300}));
 }
 
-TEST_F(XrayViewTest, MayGoWhileALayerIsComputed) {
+TEST_F(XrayViewTest, MayBeDeletedWhileALayerIsComputed) {
   for (int i = 0; i < 10; ++i) {
     auto other = std::make_unique<XrayView>();
     other->show_view(simulated_result(), 0);
@@ -216,12 +216,12 @@ TEST_F(XrayViewTest, MayGoWhileALayerIsComputed) {
   }
 }
 
-TEST_F(XrayViewTest, AViewThatIsNotThereSaysWhatToDo) {
+TEST_F(XrayViewTest, MissingViewShowsTheNextAction) {
   Result empty;
   empty.views.push_back({"AP", {}, {}, {}, {}});
   const auto result = std::make_shared<const Result>(std::move(empty));
   view.show_view(result, 0);
-  EXPECT_EQ(view.accessibleDescription(), "No picture yet: shoot AP");
+  EXPECT_EQ(view.accessibleDescription(), "No image yet: acquire AP");
   view.show_view(result, 5);
   view.show_view(nullptr, 0);
   EXPECT_FALSE(view.is_computing());
