@@ -10,7 +10,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-/// As the socket's side cuts the stream into PDUs; a length beyond the input means its rest.
+/// Splits the stream into PDUs as the socket does; a length beyond the input takes the rest.
 void converse(Association& association, std::string_view bytes) {
   while (!association.over() && bytes.size() >= dicom::pdu_header_bytes) {
     Choices choices(bytes);
@@ -22,7 +22,7 @@ void converse(Association& association, std::string_view bytes) {
     for (answers = sent; !answers.empty();) {
       check(answers.size() >= dicom::pdu_header_bytes, "an answer is a PDU");
       const auto header = dicom::read_pdu_header(answers.substr(0, dicom::pdu_header_bytes));
-      check(header.length <= answers.size() - dicom::pdu_header_bytes, "an answer is a whole PDU");
+      check(header.length <= answers.size() - dicom::pdu_header_bytes, "an answer is a complete PDU");
       answers.remove_prefix(dicom::pdu_header_bytes + header.length);
     }
   }
@@ -33,7 +33,7 @@ void converse(Association& association, std::string_view bytes) {
 void run(std::string_view bytes) {
   static const auto inbox = Inbox::open(folder() / "inbox").value();
   ReceiverOptions options;
-  options.most_object_bytes = 4096;  // so that the limit is met
+  options.most_object_bytes = 4096;  // so that inputs reach the limit
   ReceiverShared shared(options, *inbox, {});
   const auto id = shared.admission
                       .connect(
@@ -44,12 +44,12 @@ void run(std::string_view bytes) {
     try {
       converse(association, bytes);
     } catch (const Breach& breach) {
-      check(!breach.why.empty(), "a breach is explained");
+      check(!breach.why.empty(), "a protocol violation has a reason");
     }
     check(!association.peer().empty(), "the peer has a name");
   }
   shared.admission.leave(id);
-  check(shared.counters.bytes_on_the_way == 0, "all memory is given back");
+  check(shared.counters.bytes_on_the_way == 0, "all memory is released");
   std::uint64_t images = 0;
   for (const auto& entry : std::filesystem::directory_iterator(inbox->folder())) {
     if (entry.path().extension() != ".dcm") continue;
@@ -58,7 +58,7 @@ void run(std::string_view bytes) {
           "stored images are readable");
     std::filesystem::remove(entry.path());
   }
-  check(images == shared.counters.stored, "as many images are stored as were acknowledged");
+  check(images == shared.counters.stored, "the number of stored images equals that of acknowledgements");
 }
 
 std::vector<std::string> seeds() {

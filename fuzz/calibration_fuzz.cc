@@ -10,15 +10,15 @@ void run(std::string_view bytes) {
   if (!json) return;
   const auto saved = saved_calibration_from_json(*json, "result.json");
   if (!saved) return;
-  check(saved->maps.size() == saved->views.size(), "each view has its map or none");
+  check(saved->maps.size() == saved->views.size(), "each view has one map or none");
   for (const CalibratedView& view : saved->views) {
     const View& camera = view.view;
-    check(camera.camera_from_world.matrix().allFinite(), "the camera's place is finite");
+    check(camera.camera_from_world.matrix().allFinite(), "the camera's position is finite");
     check(
         (camera.camera_from_world.rotation.transpose() * camera.camera_from_world.rotation).isIdentity(1e-6),
-        "its rotation is one");
+        "the rotation is orthonormal");
     check(std::isfinite(camera.intrinsics.fx) && std::isfinite(camera.intrinsics.fy),
-          "its lengths are finite");
+          "focal lengths are finite");
   }
   check(saved->joint_covariance.allFinite(), "the covariance is finite");
 }

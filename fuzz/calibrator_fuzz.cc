@@ -15,12 +15,12 @@ void run(std::string_view bytes) {
   const auto calibrator = calibrator_from_json(*json, "calibrator.json");
   if (!calibrator) return;
   const Json written = write(*calibrator);
-  check(all_finite(written) && calibrator->balls.size() >= 6, "a calibrator has balls at finite places");
+  check(all_finite(written) && calibrator->balls.size() >= 6, "a calibrator has balls at finite positions");
   for (const CalibratorTarget& target : calibrator->targets)
     for (const auto& direction : target.directions)
       check(std::abs(direction.norm() - 1) < 1e-9, "directions have unit length");
   const auto again = calibrator_from_json(written, "written.json");
-  check(again.has_value() && same_places(*again, *calibrator), "what is written is read as the same");
+  check(again.has_value() && same_places(*again, *calibrator), "written data read back equal");
 }
 
 std::vector<std::string> seeds() {

@@ -25,14 +25,14 @@ void run(std::string_view bytes) {
   check(read->views.size() >= 2 && read->calibrator.balls.size() >= 6, "a case has views and a calibrator");
   std::set<std::string> names;
   for (const CaseView& view : read->views) {
-    check(names.insert(view.name).second, "names are given once");
+    check(names.insert(view.name).second, "names are unique");
     check(view.image.lexically_relative(folder()).begin()->string() != "..", "images lie in the folder");
     check_pose(view.poses.tracker_from_calibrator);
     check_pose(view.poses.tracker_from_femur);
   }
   check_pose(read->poses_now.tracker_from_tool);
   for (const Pick& pick : read->picks)
-    check(pick.uv_raw.allFinite() && names.contains(pick.view), "picks are places in views");
+    check(pick.uv_raw.allFinite() && names.contains(pick.view), "picks are positions in views");
   for (const ToolLine& line : read->tool_lines)
     check((line.p2_in_calibrator - line.p1_in_calibrator).norm() >= 1, "lines have a direction");
   check(std::isfinite(read->tracker.sigma_mm), "the tracker's noise is finite");

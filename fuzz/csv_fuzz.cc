@@ -8,14 +8,15 @@
 namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
-  // As `solve` reads its points and `locate` its picks.
+  // The columns that `solve` reads as points and `locate` as picks.
   const bool points = Choices(bytes).byte() % 2 == 0;
   const auto path = put_file("input.csv", bytes);
   const auto table = points ? read_csv(path, {"label", "x_mm", "y_mm", "z_mm", "u_px", "v_px"}, {"sigma_px"})
                             : read_csv(path, {"name", "view", "u_px", "v_px"}, {"sigma_px"});
   if (!table) return;
   for (std::size_t row = 0; row < table->rows(); ++row) {
-    check(!holds_control_character(table->text(row, points ? "label" : "name")), "a text can be shown");
+    check(!holds_control_character(table->text(row, points ? "label" : "name")),
+          "a text has no control characters");
     const auto read = guarded([&] {
       check(std::isfinite(table->number(row, "u_px")) && std::isfinite(table->number(row, "v_px")),
             "numbers are finite");

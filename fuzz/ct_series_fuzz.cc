@@ -19,7 +19,7 @@ DicomBuilder slice(double z, const std::string& series = "2.25.7") {
   return builder.text(0x00281052, "DS", "-1000").text(0x00281053, "DS", "2");
 }
 
-/// Files one after the other, each with its length before it.
+/// Files in sequence, each preceded by its length.
 std::string joined(const std::vector<DicomBuilder>& slices) {
   std::string bytes;
   for (const DicomBuilder& one : slices) {

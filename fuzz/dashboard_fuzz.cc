@@ -22,12 +22,13 @@ void run(std::string_view bytes) {
       const auto line = take_dashboard_line(received);
       if (!line) return;
       if (!*line) break;
-      check((*line)->size() <= 1000 && !holds_control_character(**line), "a line is short and can be shown");
+      check((*line)->size() <= 1000 && !holds_control_character(**line),
+            "a line is short and has no control characters");
       const auto answer = checked_answer(command, **line);
-      check(!answer || *answer == **line, "an answer is given as it came");
+      check(!answer || *answer == **line, "an answer is passed on unchanged");
       check(!controller.dashboard(**line).empty(), "the virtual robot answers each command");
     }
-    check(received.size() <= 1000 + segment, "no more than a line is held");
+    check(received.size() <= 1000 + segment, "at most one line is buffered");
   }
 }
 

@@ -10,7 +10,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-/// Written as an image of 16 bits, its values come back as they were.
+/// Written as an image of 16 bits, the values read back equal.
 void check_written_again(const XrayImage& xray_image) {
   DerivedImage image;
   image.pixels = Image<std::uint16_t>(xray_image.pixels.width(), xray_image.pixels.height());
@@ -46,7 +46,7 @@ void run(std::string_view bytes) {
           "the spacing is in range");
   if (acquisition.acquired)
     check(std::isfinite(acquisition.acquired->seconds) && acquisition.acquired->resolution_s > 0,
-          "the time is a time");
+          "the time is valid");
   check(acquisition.uid_key.size() == 32 && acquisition.instance_key.size() == 32, "an image has its keys");
   constexpr std::size_t small = 4096;
   if (pixels.size() <= small) check_written_again(*xray_image);

@@ -20,7 +20,7 @@ void run(std::string_view bytes) {
   unknown.focal = IntrinsicsVariation{40, 5};
   unknown.principal = IntrinsicsVariation{10, 2};
   check(learn_intrinsics(history->entries, {1000, 0, 0}, unknown).mean_mm.allFinite(),
-        "what is known is finite");
+        "accepted values are finite");
 }
 
 std::vector<std::string> seeds() {

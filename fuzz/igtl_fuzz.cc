@@ -9,7 +9,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-/// Gives each message the check sum of its body, which nothing finds by chance.
+/// Sets the checksum of each message, which mutations do not find by chance.
 std::string with_check_sums(std::string bytes) {
   for (std::size_t at = 0; bytes.size() >= at + IgtlHeader::size;) {
     BigEndianReader size(std::string_view(bytes).substr(at + 42, 8));
@@ -41,14 +41,14 @@ void run(std::string_view bytes) {
     check(header.has_value(), "the header of an encoded message can be decoded");
     const auto again = decode(*header, std::string_view(once).substr(IgtlHeader::size));
     check(again.has_value(), "an encoded message can be decoded");
-    check(encode(*again) == once, "a message is encoded as before");
+    check(encode(*again) == once, "encoding is reproducible");
   };
   std::string_view rest = stream_bytes;
   while (!rest.empty()) {
     if (!stream.feed(rest.substr(0, segment), sink)) break;
     rest.remove_prefix(std::min(segment, rest.size()));
   }
-  check(stream.held() <= stream_bytes.size(), "no more is held than came");
+  check(stream.held() <= stream_bytes.size(), "the buffer does not exceed the input");
   for (const ToolState& tool : board.tools(now_s)) {
     if (!tool.tracker_from_tool) continue;
     const Eigen::Matrix3d& rotation = tool.tracker_from_tool->rotation;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int width = 24, height = 16;
 
-/// The compressed bytes of an image, by DCMTK's encoder.
+/// The image compressed by DCMTK's encoder.
 std::string compressed(int bits, E_TransferSyntax syntax, const DcmRepresentationParameter& how) {
   std::string pixels;
   for (int i = 0; i < width * height; ++i)
@@ -58,7 +58,7 @@ void run(std::string_view bytes) {
   const int high = own_size ? 1 + static_cast<int>(choices.byte() % 64) : height;
   const auto decoded = decode_jpeg(std::string(bytes), lossless, wide, high, word_bytes, "input");
   if (decoded)
-    check(decoded->size() == std::size_t(wide * high * word_bytes), "as many bytes as pixels need");
+    check(decoded->size() == std::size_t(wide * high * word_bytes), "the byte count matches the pixels");
 }
 
 std::vector<std::string> seeds() {

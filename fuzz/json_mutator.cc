@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mutates JSON as a tree: bytes that change at random are nearly always refused by the parser alone.
+// Mutates JSON as a tree; random changes of bytes rarely pass the parser.
 #include <cstdint>
 #include <cstring>
 #include <random>

@@ -11,11 +11,11 @@
 
 namespace helicarm::fuzz {
 
-/// Every number in it is finite.
+/// Whether all numbers are finite.
 bool all_finite(const Json& json);
 
-/// Parses an input, reads it with `read(json)`, and checks the promise of every reader that has a writer:
-/// what was accepted is written so that it is read as the same. `write` gives Json.
+/// Parses an input, reads it with `read(json)`, and checks the round trip: accepted data, written by `write`
+/// as JSON, read back equal.
 template <class Read, class Write>
 void run_round_trip(std::string_view bytes, const Read& read, const Write& write) {
   const auto json = parse_json(bytes, "input.json");
@@ -25,10 +25,10 @@ void run_round_trip(std::string_view bytes, const Read& read, const Write& write
   const Json written = write(*value);
   check(all_finite(written), "accepted numbers are finite");
   const auto parsed = parse_json(to_text(written), "written.json");
-  check(parsed.has_value(), "what is written is JSON that can be parsed");
+  check(parsed.has_value(), "written data are valid JSON");
   const auto again = read(*parsed);
-  check(again.has_value(), "what is written is accepted");
-  check(write(*again) == written, "what is written is read as the same");
+  check(again.has_value(), "written data are accepted");
+  check(write(*again) == written, "written data read back equal");
 }
 
 }  // namespace helicarm::fuzz

@@ -18,7 +18,7 @@ void run(std::string_view bytes) {
   if (!map) return;
   for (const Eigen::Vector2d& at : {Eigen::Vector2d(0, 0), Eigen::Vector2d(100, 200), map->centre}) {
     const auto rectified = map->rectified_from_raw(at);
-    check(!rectified || rectified->allFinite(), "a place that is found is finite");
+    check(!rectified || rectified->allFinite(), "a rectified position is finite");
     (void)raw_in_image(*map, at);
     check(!(map->sigma_px(at) < 0), "a standard deviation is not negative");
     (void)map->covariance_px2(std::vector{at, map->centre});

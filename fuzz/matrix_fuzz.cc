@@ -7,11 +7,12 @@ namespace helicarm::fuzz {
 void run(std::string_view bytes) {
   const auto matrix = import_matrix(put_file("input.txt", bytes), 10);
   if (!matrix) return;
-  check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's place is finite");
+  check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's position is finite");
   check(std::isfinite(matrix->view.intrinsics.fx) && std::isfinite(matrix->view.intrinsics.fy),
-        "its lengths are finite");
+        "focal lengths are finite");
   const Eigen::Matrix3d& rotation = matrix->view.camera_from_world.rotation;
-  check((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() < 0.01, "its rotation is one");
+  check((rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm() < 0.01,
+        "the rotation is orthonormal");
 }
 
 std::vector<std::string> seeds() {

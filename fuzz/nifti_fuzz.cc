@@ -12,7 +12,7 @@ void set(std::string& bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-/// 2 x 1 x 2 voxels of 16 bits, placed by the sform (1), the qform (2) or neither (0).
+/// 2 x 1 x 2 voxels of 16 bits, positioned by the sform (1), the qform (2) or neither (0).
 std::string volume(int form) {
   std::string bytes(352, '\0');
   set<std::int32_t>(bytes, 0, 348);
@@ -40,7 +40,7 @@ std::string volume(int form) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  // Half of the inputs are packed here: hardly any change of packed bytes can be unpacked.
+  // Half of the inputs are compressed here: mutated compressed bytes rarely decompress.
   const bool pack = Choices(bytes).byte() % 2 == 1;
   run_volume(pack ? gzipped(std::string(bytes)) : std::string(bytes));
 }

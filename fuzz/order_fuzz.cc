@@ -18,8 +18,8 @@ void run(std::string_view bytes) {
   const auto order = read(*json);
   if (!order) return;
   check(all_finite(write(*order)), "accepted numbers are finite");
-  // Angles go through degrees: a second reading may differ in the last bit.
-  check(read(write(*order)).has_value(), "what is written is accepted");
+  // Angles are converted through degrees: a second reading may differ in the last bit.
+  check(read(write(*order)).has_value(), "written data are accepted");
   (void)check_order(*order, resting_state());
 }
 

@@ -11,7 +11,7 @@ namespace {
 void run_request(std::string_view body) {
   const auto request = dicom::read_association_request(body);
   if (!request) return;
-  check(dicom::is_title(request->called) && dicom::is_title(request->calling), "titles are titles");
+  check(dicom::is_title(request->called) && dicom::is_title(request->calling), "titles are valid");
   check(request->contexts.size() <= 128, "no more contexts than can be numbered");
   for (const auto& context : request->contexts) {
     check(context.id % 2 == 1 && dicom::is_uid(context.abstract_syntax),
@@ -24,7 +24,7 @@ void run_request(std::string_view body) {
   const std::string accept = dicom::associate_accept(*request, *answers, 1 << 17);
   const auto header = dicom::read_pdu_header(accept);
   check(header.type == 2 && header.length == accept.size() - dicom::pdu_header_bytes,
-        "the answer says its length");
+        "the answer has the right length");
 }
 
 void run_fragments(std::string_view body) {

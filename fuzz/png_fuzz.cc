@@ -10,7 +10,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-/// Gives each chunk the check sum of its content, which nothing finds by chance.
+/// Sets the checksum of each chunk, which mutations do not find by chance.
 std::string with_check_sums(std::string bytes) {
   for (std::size_t at = 8; bytes.size() >= at + 12;) {
     BigEndianReader length(std::string_view(bytes).substr(at, 4));
@@ -46,8 +46,7 @@ void run(std::string_view bytes) {
   const std::string written = grey_image->bits == 8 ? encode_png(as<std::uint8_t>(grey_image->pixels))
                                                     : encode_png(as<std::uint16_t>(grey_image->pixels));
   const auto again = decode_png(written, "written.png");
-  check(again.has_value() && std::ranges::equal(again->pixels.pixels(), pixels),
-        "an image comes back as written");
+  check(again.has_value() && std::ranges::equal(again->pixels.pixels(), pixels), "an image reads back equal");
 }
 
 std::vector<std::string> seeds() {

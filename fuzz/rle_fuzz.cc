@@ -13,7 +13,8 @@ void run(std::string_view bytes) {
   const std::size_t pixels = 1 + choices.byte() * 16;
   const auto decoded = decode_rle(bytes, pixels, word_bytes, "input");
   if (decoded)
-    check(decoded->size() == pixels * static_cast<std::size_t>(word_bytes), "as many bytes as pixels need");
+    check(decoded->size() == pixels * static_cast<std::size_t>(word_bytes),
+          "the byte count matches the pixels");
 }
 
 std::vector<std::string> seeds() {

@@ -10,8 +10,7 @@ namespace {
 constexpr std::uint8_t recipe = 1;
 
 void run_message(const RtdeMessage& message) {
-  if (const auto text = read_text(message))
-    check(text->size() <= 255, "a text is as long as its length says");
+  if (const auto text = read_text(message)) check(text->size() <= 255, "a text has at most 255 bytes");
   (void)read_granted(message, message.kind);
   (void)read_controller_version(message);
   (void)read_recipe(message, state_names, state_types);
@@ -26,7 +25,7 @@ void run_message(const RtdeMessage& message) {
   (void)to_json(*state).dump();
   const auto again = read_state(state_message(recipe, *state), recipe);
   check(again.has_value() && again->joints == state->joints && again->safety_mode == state->safety_mode,
-        "a state is written as it was read");
+        "a state is written unchanged");
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-/// The log whose records are the lines of `texts`: each gets the check sum that belongs to it.
+/// The log whose records are the lines of `texts`, each with its checksum.
 std::string with_chain(std::string_view texts) {
   std::string log, chain;
   while (!texts.empty()) {
@@ -32,14 +32,14 @@ void run(std::string_view bytes) {
   const auto path = put_file("session.log", as_it_is ? std::string(bytes) : with_chain(bytes));
   const auto history = read_session(path);
   auto session = SessionLog::open(path);
-  check(history.has_value() == session.has_value(), "what can be read can be continued");
+  check(history.has_value() == session.has_value(), "a readable log can be continued");
   if (!history) return;
   for (std::size_t i = 0; i < history->records.size(); ++i)
     check(history->records[i].number == i && std::isfinite(history->records[i].time_s),
           "records are in order");
   check((*session)->append("more", {{"x_mm", 1}}).has_value(), "a record can be added");
   const auto again = read_session(path);
-  check(again.has_value() && !again->torn, "the log is whole again");
+  check(again.has_value() && !again->torn, "the log is complete again");
   check(again->records.size() == std::max<std::size_t>(history->records.size(), 1) + 1, "no record is lost");
 }
 

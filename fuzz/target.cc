@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all fuzz targets share: the entry points of libFuzzer, and `TARGET --seeds FOLDER DICTIONARY`.
+// Entry points of libFuzzer for all targets, and `TARGET --seeds FOLDER DICTIONARY`.
 #include "target.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ bool in_word(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' || c == ' ';
 }
 
-/// Words of the seeds as libFuzzer reads a dictionary: so it finds keys and keywords sooner.
+/// Words of the seeds as a libFuzzer dictionary, for faster discovery of keys and keywords.
 std::string dictionary(const std::vector<std::string>& texts) {
   constexpr std::size_t shortest = 3, longest = 40;
   std::set<std::string> words;
@@ -49,9 +49,9 @@ void write_seeds(const fs::path& into, const fs::path& words) {
 
 }  // namespace
 
-void check(bool holds, const char* promise) {
+void check(bool holds, const char* condition) {
   if (holds) return;
-  std::fprintf(stderr, "broken promise: %s\n", promise);
+  std::fprintf(stderr, "broken promise: %s\n", condition);
   std::abort();
 }
 

@@ -14,11 +14,11 @@ void check_volume(const Expected<Volume>& volume) {
   if (!volume) return;
   check(volume->size.minCoeff() >= 1, "a volume has voxels");
   check(volume->voxels.size() == std::size_t(volume->size.cast<std::int64_t>().prod()),
-        "as many voxels as its size says");
+        "the voxel count matches the size");
   for (const float voxel : volume->voxels) check(std::isfinite(voxel), "voxels are finite");
-  check(volume->patient_from_voxel.matrix().allFinite(), "places are finite");
+  check(volume->patient_from_voxel.matrix().allFinite(), "positions are finite");
   const Eigen::Matrix3d cell = volume->patient_from_voxel.linear();
-  check(std::abs(cell.determinant()) > 1e-10, "places are apart");
+  check(std::abs(cell.determinant()) > 1e-10, "the voxel-to-patient transform is not singular");
 }
 
 void run_volume(std::string_view bytes) { check_volume(read_volume(put_file("input", bytes))); }

@@ -9,7 +9,7 @@
 
 namespace helicarm::fuzz {
 
-/// Reads a file of voxels and checks what was accepted.
+/// Reads a volume file and checks what was accepted.
 void run_volume(std::string_view bytes);
 void check_volume(const Expected<Volume>& volume);
 
