@@ -45,8 +45,8 @@ void read_poses(NavigationTruth& truth, const std::map<std::string, TrackedBody>
   truth.sigma_mm = std::sqrt(shift2);
 }
 
-/// A drilled line: misses the tunnel by a normal 0.5 mm per axis, 40 mm before its start and at half its
-/// length.
+/// A drilled line: normal deviation from the tunnel of 0.5 mm per axis, 40 mm before its start and at half
+/// its length.
 ToolLine missed(const std::string& name, const TunnelPoint& start, const TunnelPoint& end,
                 RandomStream& random) {
   const Vector3d axis = (end.in_calibrator - start.in_calibrator).normalized();

@@ -10,7 +10,7 @@
 #include "helicarm/simulation/simulate_case.h"
 #include "helicarm/simulation/tracker_model.h"
 
-/// The virtual operating room: C-arm, tracker and robot that share one ground truth and use their real
+/// Virtual devices: C-arm, tracker and robot that share one ground truth and use their real
 /// protocols.
 namespace helicarm::virtual_devices {
 

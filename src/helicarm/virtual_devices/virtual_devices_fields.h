@@ -8,7 +8,7 @@
 
 namespace helicarm::virtual_devices {
 
-/// User options of the virtual operating room. `--seed` is an option of all commands.
+/// User options of the virtual devices. `--seed` is an option of all commands.
 inline constexpr std::array<Field<VirtualDevicesOptions>, 3> virtual_devices_fields{
     bound<&VirtualDevicesOptions::seed>({.name = "seed",
                                          .range = {0, 4294967295.0},
