@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Renews the tables of docs/accuracy.md: the estimators against the statistical limit, and what wrong assumptions about
-a ball's picture cost.
+"""Renews the tables of docs/accuracy.md: the estimators against the statistical bound, and the effect of wrong
+assumptions about a ball's image.
 
     tools/accuracy.py [--groups 10000] [--balls 1000] [--seed 1] [--only limit|centres]
 """
@@ -82,8 +82,8 @@ def centres(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", type=int, default=10000, help="trials of each setting of the limit")
-    parser.add_argument("--balls", type=int, default=1000, help="of each situation of the centres")
+    parser.add_argument("--groups", type=int, default=10000, help="trials of each setting of the limit study")
+    parser.add_argument("--balls", type=int, default=1000, help="balls of each situation of the centres study")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=["limit", "centres"])
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))

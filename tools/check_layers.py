@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Holds the source to its layers: which module may include which, nothing below includes apps, every file has its licence.
+"""Checks the layers of the source: which module may include which, no include of apps below apps, a licence in every file.
 
 Run from anywhere; prints each breach as file:line and exits 1 if there is one.
 """
@@ -11,7 +11,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# Bottom to top: each module with the modules it may include beside itself.
+# Bottom to top: each module with the other modules it may include.
 MODULES = {
     "core": "",
     "geometry": "core",
@@ -65,7 +65,7 @@ def breaches_of_layers(module, path):
         elif parts[0] == "helicarm" and parts[1] not in allowed:
             yield f"{path.relative_to(ROOT)}:{number}: {module} must not include {parts[1]} ({included})"
         elif ".." in parts:
-            yield f"{path.relative_to(ROOT)}:{number}: includes go from src/, not by .. ({included})"
+            yield f"{path.relative_to(ROOT)}:{number}: includes are relative to src/, without .. ({included})"
 
 
 def breaches():

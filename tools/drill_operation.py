@@ -72,7 +72,7 @@ def drill_pictures(program, folder):
     with VirtualDevices(program, folder / "order") as devices:
         devices.shoot("LAT", "waiting for AP")
         check("lateral picture first is taken as such",
-              any("LAT: came in place of AP" in line for line in devices.navigation.heard))
+              any("LAT: assigned instead of AP" in line for line in devices.navigation.heard))
         devices.shoot("AP", "^measure: ")
     with VirtualDevices(program, folder / "hidden") as devices:
         devices.say("fault hide:femur on", "hide:femur on")
@@ -86,7 +86,7 @@ def drill_checks(program, folder):
     """A marker that is bumped between the X-rays and the robot's first order to its bone."""
     with VirtualDevices(program, folder / "checks", room=["--check-points"], begins="touch \"femur notch\"") as devices:
         for bone in ("femur", "tibia"):
-            devices.touch(bone, f"{bone} notch: taken, 0.00 mm off")
+            devices.touch(bone, f"{bone} notch: recorded, deviation 0.00 mm")
         devices.navigation.wait_for("waiting for AP")
         devices.say("touch nothing", "touching nothing")
         devices.expose()
@@ -162,7 +162,7 @@ def drill_stale(program, folder):
             for pose in range(1, 10):
                 devices.confirm()
                 devices.navigation.wait_for(f"register: pose {pose}")
-            devices.navigation.wait_for("^look at")
+            devices.navigation.wait_for("^preview: ")
             rest = devices.say("where", "^tip ").split(",")[0]
             if words:
                 devices.say(words, "moved")
@@ -246,7 +246,7 @@ def drill_soak(program, folder, minutes):
     room = Program(program, "virtual-or", "--size", 512, "--receiver-port", port, "--tracker-port", 0, "--rtde-port", 0,
                    "--dashboard-port", 0, "--script-port", 0)
     tracker = room.wait_for("^tracker").split()[-1]
-    room.wait_for("^say:")
+    room.wait_for("^commands: ")
     watch = Program(program, "tracker", "watch", f"127.0.0.1:{tracker}", "--ask")
     programs = {"virtual-or": room, "tracker watch": watch, "receive": receive}
     looks, begun, shots = {name: [] for name in programs}, time.monotonic(), 0

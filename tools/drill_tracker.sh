@@ -30,11 +30,11 @@ start() { "$@" >"$folder/log" 2>&1 & children+=($!); }
 
 start "$folder/TrackerServer" 18951 20
 "$program" tracker watch 127.0.0.1:18951 --seconds 4 --json >"$folder/watch.json" 2>/dev/null
-check "poses of TrackerServer are taken" "d['tools'][0]['accepted'] > 50 and not d['counters'].get('malformed')" "$folder/watch.json"
+check "poses of TrackerServer are accepted" "d['tools'][0]['accepted'] > 50 and not d['counters'].get('malformed')" "$folder/watch.json"
 
 start "$folder/TrackingDataServer" 18952
 "$program" tracker watch 127.0.0.1:18952 --seconds 4 --ask --json >"$folder/watch.json" 2>/dev/null
-check "TDATA of TrackingDataServer is taken" "len(d['tools']) >= 3 and sum(t['accepted'] for t in d['tools']) > 50" "$folder/watch.json"
+check "TDATA of TrackingDataServer is accepted" "len(d['tools']) >= 3 and sum(t['accepted'] for t in d['tools']) > 50" "$folder/watch.json"
 
 start "$folder/TrackerServer" 18955 20
 "$program" tracker record 127.0.0.1:18955 "$folder/poses.mha" --seconds 4 --json >"$folder/record.json" 2>/dev/null
@@ -56,5 +56,5 @@ check "poses that TrackerClient sends are read" "d['counters']['messages'] > 50 
 sleep 1
 timeout 2 "$folder/TrackingDataClient" 127.0.0.1 18954 20 >"$folder/received" 2>&1 || true
 sleep 2
-check "TrackingDataClient asks for TDATA and gets it" "d['counters']['messages'] >= 1 and d['counters']['sent'] > 10" "$folder/replay.json"
+check "TrackingDataClient requests and receives TDATA" "d['counters']['messages'] >= 1 and d['counters']['sent'] > 10" "$folder/replay.json"
 echo "TrackingDataClient read $(grep -ci 'type\|name' "$folder/received") lines of tools"

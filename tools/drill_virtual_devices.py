@@ -82,7 +82,7 @@ class VirtualDevices:
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
         self.room = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan, "--receiver-port",
                             self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0, *room)
-        self.room.wait_for("^say:")
+        self.room.wait_for("^commands: ")
         if plan:
             self.plan.write_text(json.dumps(json.loads(self.plan.read_text()) | plan))
         self.terminal = pty.openpty() if terminal else None

@@ -6,9 +6,9 @@
   tools/evaluate.py --simulate 4 --readme README.md     simulates cases first, and renews the README's tables
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
-points (T1, T2, ...) from their true places; of the tunnels' balls FS, FE, TS, TE where there are no such points or the
-case's name begins with n. Folders of kind grid have a table of their own: the crossings' distance from the ideal grid,
-raw and rectified by the plate's own picture."""
+points (T1, T2, ...) from their true positions; of the tunnels' balls FS, FE, TS, TE if there are no such points or the
+case's name begins with n. Folders of kind grid have a separate table: the distance of the crossings from the ideal grid,
+raw and rectified by the image of the plate."""
 import argparse
 import json
 import math
@@ -24,14 +24,14 @@ def distance(a, b):
 
 
 def places_of(truth):
-    """Name -> true place in the calibrator's frame, from either layout of truth.json."""
+    """Name -> true position in the calibrator's frame, from either layout of truth.json."""
     pair = truth.get("pair", truth)
     places = {}
     for key in ("targets_world", "click_points_world", "targets_in_calibrator", "points_in_calibrator"):
         value = pair.get(key) or {}
         if isinstance(value, dict):
             places.update({k: v for k, v in value.items() if isinstance(v, list)})
-    for view in truth.get("views", []):  # our own simulation's
+    for view in truth.get("views", []):  # layout of helicarm simulate
         for point in view["targets"] + view["tunnel_points"]:
             places[point["name"]] = point["xyz_mm"]
     return places
@@ -44,7 +44,7 @@ def balls_of(truth, view):
 
 
 def is_covered(error, covariance):
-    """Whether the 95 % ellipsoid of a covariance holds an error (chi-square, three degrees of freedom)."""
+    """Whether the 95 % ellipsoid of a covariance contains an error (chi-square, three degrees of freedom)."""
     a, b, c = covariance
     cross = lambda p, q: [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
     dot = lambda p, q: sum(x * y for x, y in zip(p, q))
@@ -103,7 +103,7 @@ def simulate(helicarm, folder, count):
 
 
 def evaluate(helicarm, cases, method):
-    """Rows of the cases, and a table of the groups."""
+    """Rows of the cases, and their results by group."""
     lines = ["| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | in 95 % | ms |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     groups = defaultdict(list)
@@ -121,8 +121,8 @@ def evaluate(helicarm, cases, method):
 
 
 def evaluate_grids(helicarm, grids):
-    """Rows of the grid pictures: distance of the crossings from the ideal grid, raw and rectified (Eq. 15)."""
-    yield "| grid | picture | crossings | raw px mean | raw px max | rectified px mean | rectified px max |"
+    """Rows of the grid images: distance of the crossings from the ideal grid, raw and rectified (Eq. 15)."""
+    yield "| grid | image | crossings | raw px mean | raw px max | rectified px mean | rectified px max |"
     yield "| --- | --- | --- | --- | --- | --- | --- |"
     call = lambda *arguments: subprocess.run([helicarm, "rectify", *map(str, arguments)],  # noqa: E731
                                              capture_output=True, text=True)
@@ -133,11 +133,11 @@ def evaluate_grids(helicarm, grids):
             images = [view["name"] for view in truth["views"]] if "views" in truth else list(truth)
             for name in (name for name in images if name != "PLATE"):
                 if done.returncode == 0:
-                    told = call(grid / f"{name}.dcm", "--map", Path(out) / "map.json", "--test-grid", "20", "--json")
-                if done.returncode or told.returncode:
-                    yield f"| {grid.name} | {name} | refused: {(done if done.returncode else told).stderr.strip()} | | | | |"
+                    measured = call(grid / f"{name}.dcm", "--map", Path(out) / "map.json", "--test-grid", "20", "--json")
+                if done.returncode or measured.returncode:
+                    yield f"| {grid.name} | {name} | refused: {(done if done.returncode else measured).stderr.strip()} | | | | |"
                     continue
-                answer = json.loads(told.stdout)
+                answer = json.loads(measured.stdout)
                 raw, rectified = answer["raw"], answer["rectified"]
                 yield (f"| {grid.name} | {name} | {answer['n']} | {raw['mean_px']:.3f} | {raw['max_px']:.3f} | "
                        f"{rectified['mean_px']:.3f} | {rectified['max_px']:.3f} |")
@@ -166,7 +166,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--simulate", type=int, metavar="N", help="simulate N cases of each kind instead of a folder")
-    parser.add_argument("--readme", type=Path, help="file whose tables between the accuracy and speed marks are renewed")
+    parser.add_argument("--readme", type=Path, help="file whose tables between the accuracy and speed markers are renewed")
     parser.add_argument("--method", action="append", choices=["best", "paper"])
     parser.add_argument("--helicarm", default=str(Path(__file__).resolve().parent.parent / "build/bin/helicarm"))
     options = parser.parse_args()

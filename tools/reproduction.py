@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Renews the tables of docs/reproduction.md: the paper's experiments, rerun.
+"""Renews the tables of docs/reproduction.md, the paper's experiments.
 
     tools/reproduction.py [--seed 1] [--only operation]
 """
@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def study(options, name, *more):
-    """What the command writes: its table and its JSON."""
+    """The table and the JSON that the command writes."""
     return written(options.helicarm, options.seed, name, *more)
 
 
@@ -82,17 +82,17 @@ def calibration(options):
     yield "| points | by | max | min | mean | RMS |"
     yield "| --- | --- | ---: | ---: | ---: | ---: |"
     for row in result["rows"]:
-        for key, name in (("printed_mm", "the print"), ("paper_mm", "the printed recipe"), ("best_mm", "the best recipe")):
+        for key, name in (("printed_mm", "published"), ("paper_mm", "paper method"), ("best_mm", "best method")):
             yield f"| {row['points']} | {name} | " + " | ".join(f"{row[key][kind]:.2f}" for kind in ("max", "min", "mean", "rms")) + " |"
 
 
 def rectification(options):
     _, result = study(options, "rectification")
-    yield "| mm from the receiver | raw: mean | largest | printed recipe: mean | largest | best recipe: mean | largest |"
+    yield "| mm from the receiver | raw: mean | largest | paper method: mean | largest | best method: mean | largest |"
     yield "| --- |" + " ---: |" * 6
     for row in result["rows"]:
         if row["similarity"] == "nine":
-            values = [row[picture][figure] for picture in ("raw", "paper", "best") for figure in ("mean_px", "max_px")]
+            values = [row[image][figure] for image in ("raw", "paper", "best") for figure in ("mean_px", "max_px")]
             yield f"| {row['distance_mm']:g} | " + " | ".join(f"{v['mean']:.2f} ± {v['sd']:.2f}" for v in values) + " |"
 
 
@@ -100,7 +100,7 @@ def rectification_ratios(options):
     _, result = study(options, "rectification")
     yield "| ideal grid, raw | ideal grid, rectified | rectified by | mean error | largest error |"
     yield "| --- | --- | --- | ---: | ---: |"
-    words = {"nine": "nine crosses", "all": "all crosses", "paper": "the printed recipe", "best": "the best recipe"}
+    words = {"nine": "nine crosses", "all": "all crosses", "paper": "paper method", "best": "best method"}
     for row in result["ratios"]:
         names = [words[row[key]] for key in ("raw_similarity", "rectified_similarity", "picture")]
         values = [f"{row[kind]['mean']:.2f} ({row[kind]['least']:.2f} to {row[kind]['most']:.2f})" for kind in ("mean", "max")]
@@ -119,14 +119,14 @@ def design(options):
 
 
 def operation(options):
-    """Over sockets and in real time: two runs differ by some hundredths of a mm."""
+    """Over sockets and in real time: two runs differ by a few 0.01 mm."""
     with tempfile.TemporaryDirectory() as out:
         subprocess.run([options.helicarm, "operate", "--cases", "4", "--seed", str(options.seed), "--out", out, "--quiet"],
                        check=True)
         result = json.loads((Path(out) / "operate.json").read_text())
     paper = {"max": (1.55, 1.89), "min": (0.34, 0.19), "mean": (0.81, 0.88), "sd": (0.45, 0.55), "rms": (0.93, 1.04)}
     start, end = result["table"]["start"], result["table"]["end"]
-    yield "| mm | start points | end points | printed: start | end |"
+    yield "| mm | start points | end points | published: start | end |"
     yield "| --- | ---: | ---: | ---: | ---: |"
     for name, (printed_start, printed_end) in paper.items():
         yield f"| {name} | {start[name]:.2f} | {end[name]:.2f} | {printed_start} | {printed_end} |"

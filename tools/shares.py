@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What each stage costs, in mm at the check targets: the truth is put in place of all stages but one.
+"""Error of each stage, in mm at the check targets: all other stages are replaced by the ground truth.
 
   tools/shares.py FOLDER [--helicarm build/bin/helicarm]
   tools/shares.py --simulate 4 --document docs/accuracy.md    simulates cases first, and renews the document's table
 
-Every case of FOLDER with a truth.json is run. Then both views are calibrated and the targets located anew, by a solver
-of this script's own (pinhole cameras, the pictures' nominal intrinsics as priors), with
-  centres   the run's ball centres on a true map,
-  map       the run's map at the true places of balls and targets,
-  picks     the run's target places on a true map and true balls,
+Every case of FOLDER with a truth.json is run. Then both views are calibrated and the targets located again by an
+independent solver (pinhole cameras, the images' nominal intrinsics as priors), with
+  centres   the run's ball centres and the true map,
+  map       the run's map at the true positions of balls and targets,
+  picks     the run's target positions, the true map and true balls,
   all       everything from the run,
-each with the truth for all else. Groups go by the first letter of a case's name. Needs NumPy and SciPy."""
+and ground truth for the rest. Groups go by the first letter of a case's name. Needs NumPy and SciPy."""
 import argparse
 import json
 import subprocess
@@ -34,7 +34,7 @@ def ran(helicarm, folder, out):
 
 
 def rectified(helicarm, view, raw, scratch):
-    """Raw pixels across the run's own map."""
+    """Raw pixels rectified by the run's map."""
     (scratch / "map.json").write_text(json.dumps(view["rectification"]["map"]))
     rows = "\n".join(f"{u!r},{v!r}" for u, v in np.asarray(raw).tolist())
     (scratch / "raw.csv").write_text("u_px,v_px\n" + rows + "\n")
@@ -44,7 +44,7 @@ def rectified(helicarm, view, raw, scratch):
 
 
 def similarity(source, target):
-    """The similarity that takes points to others best, as a function."""
+    """The least-squares similarity from `source` to `target`, as a function."""
     a, b = source.mean(0), target.mean(0)
     z, w = (source - a) @ [1, 1j], (target - b) @ [1, 1j]
     turn = np.vdot(z, w) / np.vdot(z, z)
@@ -71,7 +71,7 @@ def located(cameras, pixels, start):
 
 
 def truth_of(truth, name):
-    """One view's truth: camera (K, R, t), and name -> (place, ideal, raw) of balls, targets and plate."""
+    """Ground truth of one view: camera (K, R, t), and name -> (position, ideal, raw) of balls, targets and plate."""
     of_view = truth.get(name) or next(v for v in truth["views"] if v["name"] == name)
     marks = lambda key, named="name": {str(m[named]): (m.get("world", m.get("xyz_mm")), m["ideal"], m["raw"])
                                        for m in of_view.get(key) or [] if m.get("present", True)}
@@ -86,7 +86,7 @@ def truth_of(truth, name):
 
 
 def errors_of(helicarm, result, truth, scratch):
-    """For each variant the distances of the located targets from their true places."""
+    """Distances of the located targets from their true positions, by variant."""
     views = []
     for view in result["views"]:
         true = truth_of(truth, view["name"])
@@ -103,7 +103,7 @@ def errors_of(helicarm, result, truth, scratch):
             across = lambda p: into_ideal(rectified(helicarm, view, p, scratch)) if len(p) else p
         own_raw = np.array([f["uv_raw"] for f in seen.values()])
         own_target = np.array([p["uv_raw"] for p in points.values()]).reshape(-1, 2)
-        side = np.array([np.sign(true["K"][0, 0]), 1])  # a mirrored picture is turned back
+        side = np.array([np.sign(true["K"][0, 0]), 1])  # undo the mirroring
         camera = np.r_[true["K"][1, 1], side * true["K"][:2, 2], Rotation.from_matrix(true["R"]).as_rotvec(), true["t"]]
         width, height = view["image_size"]
         prior = (np.array([camera[0], side[0] * (width - 1) / 2, (height - 1) / 2]),
@@ -148,11 +148,11 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--simulate", type=int, metavar="N", help="simulate N cases of each kind instead of a folder")
-    parser.add_argument("--document", type=Path, help="file whose table between the shares marks is renewed")
+    parser.add_argument("--document", type=Path, help="file whose table between the shares markers is renewed")
     parser.add_argument("--helicarm", default="build/bin/helicarm")
     given = parser.parse_args()
     if not given.folder and not given.simulate:
-        parser.error("a folder or --simulate is needed")
+        parser.error("give a folder, or --simulate N")
     with tempfile.TemporaryDirectory() as scratch:
         cases = given.folder
         if given.simulate:
@@ -166,7 +166,7 @@ def main():
     document = given.document.read_text()
     start, end = "<!-- shares -->\n", "<!-- /shares -->"
     if start not in document or end not in document:
-        sys.exit(f"{given.document} has no shares marks")
+        sys.exit(f"{given.document} has no shares markers")
     given.document.write_text(document[:document.index(start) + len(start)] + text + "\n" + document[document.index(end):])
 
 
