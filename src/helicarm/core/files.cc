@@ -3,12 +3,13 @@
 
 #include <atomic>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
+
+#include "helicarm/core/system_message.h"
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -38,7 +39,7 @@ Expected<void> write_bytes(const fs::path& aside, const fs::path& path, std::str
   std::ofstream out(aside, std::ios::binary | std::ios::trunc);
   out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   out.close();
-  if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)));
+  if (!out) return fail(Reason::cannot_write, fmt::format("{}: {}", path.string(), system_message(errno)));
   return {};
 }
 
@@ -53,7 +54,8 @@ Expected<void> replace_file(const fs::path& path, const Write& write) {
   };
   if (!written) return refuse(written.error());
   if (!sync_to_disk(aside, O_RDONLY) || ::rename(aside.c_str(), path.c_str()) != 0)
-    return refuse({Reason::cannot_write, fmt::format("{}: {}", path.string(), std::strerror(errno)), {}, {}});
+    return refuse(
+        {Reason::cannot_write, fmt::format("{}: {}", path.string(), system_message(errno)), {}, {}});
   sync_to_disk(folder_of(path), O_RDONLY | O_DIRECTORY);
   return {};
 }

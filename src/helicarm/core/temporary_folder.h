@@ -3,11 +3,11 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <string>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/core/system_message.h"
 
 namespace helicarm {
 
@@ -18,7 +18,7 @@ class TemporaryFolder {
   TemporaryFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "helicarm_XXXXXX").string();
     if (!::mkdtemp(name.data()))
-      throw BadInput(Reason::cannot_write, name + ": cannot be created: " + std::strerror(errno));
+      throw BadInput(Reason::cannot_write, name + ": cannot be created: " + system_message(errno));
     path_ = name;
   }
   ~TemporaryFolder() {

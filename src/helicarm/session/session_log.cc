@@ -4,7 +4,6 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <stdexcept>
 
 #include <fcntl.h>
@@ -15,6 +14,7 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/system_message.h"
 
 namespace helicarm {
 namespace fs = std::filesystem;
@@ -101,7 +101,7 @@ Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
     if (log.has_parent_path()) fs::create_directories(log.parent_path(), ec);
     const int file = ::open(log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
     if (file < 0)
-      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), std::strerror(errno)));
+      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), system_message(errno)));
     std::unique_ptr<SessionLog> session(new SessionLog(log, file));
     if (::flock(file, LOCK_EX | LOCK_NB) != 0)
       throw BadInput(Reason::cannot_write, fmt::format("{}: is open in another program", log.string()));
@@ -111,7 +111,7 @@ Expected<std::unique_ptr<SessionLog>> SessionLog::open(const fs::path& log) {
     session->next_ = session->history_.records.size();
     session->size_ = session->history_.whole_bytes;
     if (session->history_.torn && ::ftruncate(file, static_cast<off_t>(session->size_)) != 0)
-      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), std::strerror(errno)));
+      throw BadInput(Reason::cannot_write, fmt::format("{}: {}", log.string(), system_message(errno)));
     if (session->next_ == 0)
       value_or_throw(session->append("session", {{"format", format_name}, {"version", HELICARM_VERSION}}));
     return session;
@@ -133,7 +133,7 @@ Expected<void> SessionLog::append(const std::string& kind, Json content) {
   if (written != static_cast<ssize_t>(line.size()) || ::fdatasync(file_) != 0) {
     const int error = written < 0 ? errno : ENOSPC;
     [[maybe_unused]] const int cut = ::ftruncate(file_, static_cast<off_t>(size_));
-    return fail(Reason::cannot_write, fmt::format("{}: {}", log_.string(), std::strerror(error)));
+    return fail(Reason::cannot_write, fmt::format("{}: {}", log_.string(), system_message(error)));
   }
   chain_ = std::move(chain);
   size_ += line.size();

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/system_message.h"
 
 namespace helicarm {
 namespace {
@@ -94,7 +95,7 @@ Expected<void> Journal::write(const JournalContent& content) {
   if (auto done = write_file(path_, bytes); !done) return done;
   file_ = ::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file_ < 0)
-    return fail(Reason::cannot_write, fmt::format("{}: {}", path_.string(), std::strerror(errno)));
+    return fail(Reason::cannot_write, fmt::format("{}: {}", path_.string(), system_message(errno)));
   return {};
 }
 
@@ -104,7 +105,7 @@ Expected<void> Journal::append(std::size_t block, std::span<const double> values
     const ssize_t written = ::write(file_, bytes.data() + done, bytes.size() - done);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0)
-      return fail(Reason::cannot_write, fmt::format("{}: {}", path_.string(), std::strerror(errno)));
+      return fail(Reason::cannot_write, fmt::format("{}: {}", path_.string(), system_message(errno)));
     done += std::size_t(written);
   }
   return {};

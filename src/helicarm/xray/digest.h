@@ -20,7 +20,7 @@ inline std::string digest(std::string_view bytes) {
   std::array<std::uint64_t, 4> state = primes;
   const auto mix = [&](std::string_view block) {
     for (std::size_t i = 0; i < 4; ++i) {
-      std::uint64_t word;
+      std::uint64_t word = 0;
       std::memcpy(&word, block.data() + 8 * i, 8);
       state[i] = std::rotl((state[i] ^ word) * primes[i], 29);
     }

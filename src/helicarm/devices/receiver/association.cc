@@ -19,7 +19,7 @@ constexpr std::size_t most_command_bytes = std::size_t{64} << 10;
 constexpr unsigned max_lines_per_s = 20;
 
 template <class T>
-T or_breach(Expected<T> value) {
+T or_breach(Expected<T>&& value) {
   if (!value) throw Breach{AbortReason::bad_value, value.error().message};
   return *std::move(value);
 }

@@ -2,7 +2,6 @@
 #include "helicarm/devices/receiver/inbox.h"
 
 #include <cerrno>
-#include <cstring>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,6 +10,7 @@
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/core/system_message.h"
 #include "helicarm/devices/receiver/pdu.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/digest.h"
@@ -56,7 +56,7 @@ Expected<std::unique_ptr<Inbox>> Inbox::open(const fs::path& folder) {
   if (made) fs::permissions(folder, fs::perms::owner_all, ec);
   const int lock = ::open((folder / lock_name).c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock < 0)
-    return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), std::strerror(errno)));
+    return fail(Reason::cannot_write, fmt::format("{}: {}", folder.string(), system_message(errno)));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0) {
     ::close(lock);
     return fail(
