@@ -155,23 +155,66 @@ def drill_stale(program, folder):
             check(f"{name} on the way: at rest after {stop_s * 1000:.0f} ms, {number} of {times} motions", stop_s <= 0.5)
             devices.expect_end(name, "plan_stale")
             devices.expect_replay(name)
-    for name, plan, words in (("femur 40 mm off", {}, "move femur 40 0 0"), ("plan too old", {"plan_stale_s": 10}, None)):
-        with VirtualDevices(program, folder / name.split()[-1], terminal=True, plan=plan) as devices:
-            devices.expose()
-            devices.navigation.wait_for("^ *9: tip", 120)
-            for pose in range(1, 10):
-                devices.confirm()
-                devices.navigation.wait_for(f"register: pose {pose}")
+    for name, options, words in (("femur 40 mm off", (), "move femur 40 0 0"), ("plan too old", ("--plan-age", 10), None)):
+        with VirtualDevices(program, folder / name.split()[-1], *options, terminal=True) as devices:
+            devices.register()
             devices.navigation.wait_for("^preview: ")
+            devices.navigation.wait_for("Type \"go\"")
             rest = devices.say("where", "^tip ").split(",")[0]
             if words:
                 devices.say(words, "moved")
             begun = time.monotonic()
-            devices.navigation.process.wait(30)
-            check(f"{name} while the confirmation is open: told after {time.monotonic() - begun:.1f} s", True)
-            devices.expect_end(name, "plan_stale")
+            devices.navigation.wait_for("^plan_stale: ", 30)
+            told_s = time.monotonic() - begun
+            check(f"{name} while the confirmation is open: told after {told_s:.1f} s", told_s <= 15)
+            devices.navigation.wait_for("press Enter")
             check("     the robot has not moved", devices.say("where", "^tip ").split(",")[0] == rest)
+            if words:
+                devices.plan_again("     planned again, the femur where it is now")
+            else:
+                devices.type("\x04")
+                devices.expect_end("     at the end of the input", "plan_stale")
             devices.expect_replay(name)
+    with VirtualDevices(program, folder / "again", terminal=True) as devices:
+        devices.register()
+        devices.navigation.wait_for("^preview: ")
+        devices.confirm()
+        devices.navigation.wait_for("navigate: femur", 120)
+        devices.wait_moving()
+        devices.say("move femur 3 0 0", "moved")
+        devices.navigation.wait_for("^plan_stale: ", 30)
+        devices.navigation.wait_for("press Enter")
+        devices.plan_again("jump on the way, at a terminal: unlocked, withdrawn, planned again", withdrawn=True)
+        devices.expect_replay("jump on the way, at a terminal")
+
+
+def drill_scripts(program, folder):
+    """A controller that starts a script 0.3 s after it came, or once more 0.3 s later."""
+    with VirtualDevices(program, folder / "late", terminal=True) as devices:
+        devices.expose()
+        devices.say("fault late_script on", "late_script on")
+        for pose in (1, 2):
+            devices.confirm()
+            check(f"order whose script starts late: {devices.navigation.wait_for(f'register: pose {pose}')}", True)
+        devices.navigation.wait_for("Type \"go\"")
+        rest = devices.say("where", "^tip ").split(",")[0]
+        devices.type("go\n")
+        time.sleep(0.15)
+        before = devices.say("where", "^tip ")
+        devices.navigation.end()
+        time.sleep(1.5)
+        after = devices.say("where", "^tip ")
+        check("SIGTERM while the controller holds the script: the robot never moves",
+              before.split(",")[0] == after.split(",")[0] == rest and "moving" not in after, f"{rest}; {before}; {after}")
+        devices.expect_replay("script that starts late")
+    with VirtualDevices(program, folder / "twice") as devices:
+        devices.expose()
+        devices.navigation.wait_for("register: pose 1")
+        devices.say("fault script_twice on", "script_twice on")
+        devices.expect_end("script that is started again during its motion", "robot_stopped")
+        time.sleep(0.5)
+        check("     the robot is at rest", "moving" not in devices.say("where", "^tip "))
+        devices.expect_replay("     script that is started again")
 
 
 def drill_ends(program, folder):
@@ -286,7 +329,7 @@ def footprint(process):
 
 def main():
     drills = {"whole": drill_whole, "pictures": drill_pictures, "checks": drill_checks, "motion": drill_motion,
-              "stale": drill_stale, "ends": drill_ends, "system": drill_system}
+              "stale": drill_stale, "scripts": drill_scripts, "ends": drill_ends, "system": drill_system}
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", default=ROOT / "build", type=pathlib.Path)
     parser.add_argument("--only", choices=drills)

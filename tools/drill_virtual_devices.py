@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """For drill_operation.py: programs whose lines can be waited for, and a virtual room with a navigation in it."""
 
-import json
 import os
 import pty
 import queue
@@ -76,15 +75,13 @@ class Program:
 class VirtualDevices:
     """A virtual room and a navigation in it; at a terminal where orders are to be confirmed by typing."""
 
-    def __init__(self, program, folder, *options, room=(), begins="waiting for AP", terminal=False, plan=None):
+    def __init__(self, program, folder, *options, room=(), begins="waiting for AP", terminal=False):
         self.program, self.folder = program, folder
         folder.mkdir()
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
         self.room = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan, "--receiver-port",
                             self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0, *room)
         self.room.wait_for("^commands: ")
-        if plan:
-            self.plan.write_text(json.dumps(json.loads(self.plan.read_text()) | plan))
         self.terminal = pty.openpty() if terminal else None
         self.navigation = self.navigate(*options)
         self.navigation.wait_for(begins)
@@ -97,8 +94,33 @@ class VirtualDevices:
             return Program(self.program, *words, stdin=self.terminal[1], restore_signals=False)
         return Program(self.program, *words, "--yes", restore_signals=False)
 
+    def type(self, words):
+        os.write(self.terminal[0], words.encode())
+
     def confirm(self):
-        os.write(self.terminal[0], b"go\n")
+        """Types "go" once it is asked for: what is typed before is discarded."""
+        self.navigation.wait_for("Type \"go\"", 120)
+        self.type("go\n")
+
+    def register(self):
+        """Both X-rays, and each motion of the robot's registration confirmed."""
+        self.expose()
+        self.navigation.wait_for("^ *9: tip", 120)
+        for pose in range(1, 10):
+            self.confirm()
+            self.navigation.wait_for(f"register: pose {pose}")
+
+    def plan_again(self, name, withdrawn=False):
+        """After a refusal at the terminal, which waits for Enter: until the tool is at the femur's tunnel."""
+        time.sleep(EXPOSURE_S)
+        self.type("\n")
+        if withdrawn:
+            self.navigation.wait_for("femur: withdraw")
+            self.confirm()
+        self.navigation.wait_for("^preview: ", 120)
+        self.confirm()
+        check(f"{name}: {self.navigation.wait_for('femur: distance from', 120)}", True)
+        self.navigation.end(signal.SIGKILL)
 
     def __enter__(self):
         return self

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line.h"
 #include "helicarm/devices/receiver/receiver_fields.h"
+#include "helicarm/operation/plan_fields.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
 #include "navigate_command.h"
 #include "operate_command.h"
@@ -125,6 +126,11 @@ void add_navigate(CLI::App& app, Action& action) {
   command->add_option("--picks", a.picks, "JSON with \"picks\" as in case.json; awaited after the images");
   command->add_option("--address", a.receiver.address, "Address to listen on for images")
       ->capture_default_str();
+  constexpr auto& age = field_named<OperationPlan>(plan_fields, "plan_stale_s");
+  command
+      ->add_option("--plan-age", a.plan_age_s,
+                   "Age in s at which an unconfirmed plan expires; overrides the plan's plan_stale_s")
+      ->check(within(age.range.low, age.range.high));
   add_fields(command, a.receiver, receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
       ->capture_default_str();

@@ -2,25 +2,21 @@
 #include "navigate_command.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
-#include <iostream>
 #include <numbers>
 #include <thread>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <poll.h>
 #include <unistd.h>
 
+#include "consent.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/operation/connections.h"
-#include "helicarm/operation/operation.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
 #include "line_input.h"
-#include "stop_signal.h"
 
 namespace helicarm::cli {
 namespace {
@@ -28,82 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::seconds robot_patience{10};
-
-/// Stops the robot and every wait for the tracker on a stop signal, at any time.
-class Ending {
- public:
-  Ending(StopSignal& signal, RobotLink& robot, Operation& operation)
-      : thread_([this, &signal, &robot, &operation](const std::stop_token& over) {
-          while (!over.stop_requested())
-            if (signal.wait(glance_s)) {
-              reported_ = true;
-              operation.interrupt();
-              return robot.stop();
-            }
-        }) {}
-
-  void check() const {
-    if (reported_) throw BadInput(Reason::interrupted, "stopped by signal");
-  }
-  /// Polls until the condition holds.
-  template <class Holds>
-  void wait_until(const Holds& holds) const {
-    for (check(); !holds(); check()) std::this_thread::sleep_for(std::chrono::duration<double>(glance_s));
-  }
-
- private:
-  static constexpr double glance_s = 0.05;
-  std::atomic<bool> reported_{false};
-  std::jthread thread_;
-};
-
-bool input_waits() {
-  pollfd input{STDIN_FILENO, POLLIN, 0};
-  return ::poll(&input, 1, 0) > 0;
-}
-
-/// Asks for confirmation at the terminal; without a terminal the answer is no.
-class Consent {
- public:
-  Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
-      : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
-
-  /// Throws BadInput (plan_stale) once the plan no longer holds, without waiting for the answer.
-  Expected<std::string> operator()(
-      const RobotOrder& order,
-      const std::function<Expected<void>()>& holds = [] { return Expected<void>(); }) {
-    ending_.check();
-    if (!yes_ && !agreed(order, holds))
-      return fail(Reason::order_not_confirmed, fmt::format("{}: not confirmed", order.name));
-    return robot_.confirm(order);
-  }
-
- private:
-  bool agreed(const RobotOrder& order, const std::function<Expected<void>()>& holds) {
-    if (!::isatty(STDIN_FILENO)) return false;
-    const RigidTransform& last = order.waypoints.back().base_from_tcp;
-    console_.progress
-        << fmt::format(
-               "order \"{}\": {} moves, tip to {:.0f} {:.0f} {:.0f} mm in the robot's base frame; keep "
-               "clear of the robot. Type \"go\" to confirm: ",
-               without_control_characters(order.name), order.waypoints.size(), last.translation.x(),
-               last.translation.y(), last.translation.z())
-        << std::flush;
-    ending_.wait_until([&] {
-      // Poses may be missing temporarily, for example when the line of sight is blocked.
-      if (const auto held = holds(); !held && held.error().reason == Reason::plan_stale)
-        throw BadInput(held.error());
-      return input_waits();
-    });
-    std::string answer;
-    return std::getline(std::cin, answer) && answer == "go";
-  }
-
-  RobotLink& robot_;
-  const Ending& ending_;
-  bool yes_;
-  Console& console_;
-};
 
 /// Checks for errors that can be detected before the first X-ray image.
 void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
@@ -197,6 +117,12 @@ void print_tour(const std::vector<RobotOrder>& orders, Console& console) {
   console.progress << std::flush;
 }
 
+/// Repeating the reading may help.
+bool is_of_poses(const Failure& failure) {
+  return failure.reason == Reason::no_pose || failure.reason == Reason::stale_pose ||
+         failure.reason == Reason::pose_spread;
+}
+
 /// Waits until the pointer is held still in view of the tracker.
 void touch(Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
            Console& console) {
@@ -212,9 +138,7 @@ void touch(Operation& operation, const std::string& name, LineInput& input, cons
                        << std::flush;
       return;
     }
-    if (off.error().reason != Reason::no_pose && off.error().reason != Reason::stale_pose &&
-        off.error().reason != Reason::pose_spread)
-      throw BadInput(off.error());
+    if (!is_of_poses(off.error())) throw BadInput(off.error());
     console.progress << fmt::format("{}: {}; again\n", code(off.error().reason),
                                     without_control_characters(off.error().message))
                      << std::flush;
@@ -229,12 +153,52 @@ void print_outcome(const TunnelOutcome& outcome, Console& console) {
       outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1);
 }
 
+bool is_near(const RobotLink& robot, const RobotState& rest) {
+  constexpr double near_mm = 1;
+  const auto state = robot.status().state;
+  return state && (state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() <= near_mm;
+}
+
+/// To a tunnel and back to where the tool was. Once the plan is stale or poses are missing, the person at the
+/// terminal may unlock the robot, bring the tool back and have the tunnel planned again.
+void go_to(const PlannedTunnel& tunnel, Operation& operation, RobotLink& robot, const fs::path& out,
+           Consent& consent, LineInput& input, const Ending& ending, Console& console) {
+  const RobotState rest = value_or_throw(robot.wait_connected(std::chrono::seconds(5)));
+  std::optional<RobotOrder> begun;  // the tool is on its way by this order, or there
+  bool reached = false;
+  const auto withdraw = [&] {
+    value_or_throw(operation.withdraw(*begun, rest, [&](const RobotOrder& order) { return consent(order); }));
+    begun.reset();
+  };
+  const auto approach = [&] {
+    for (const std::string& name : operation.checks_to_come(tunnel.bone))
+      touch(operation, name, input, ending, console);
+    const RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+    console.progress << fmt::format("preview: {}\n", (out / ("preview-" + tunnel.name + "-*.png")).string())
+                     << std::flush;
+    const std::string token = value_or_throw(consent(order, [&] { return operation.check_plan(order); }));
+    begun = order;
+    print_outcome(value_or_throw(operation.go(order, token)), console);
+    reached = true;
+  };
+  while (!reached || begun) {
+    const auto done = guarded([&] { begun ? withdraw() : approach(); });
+    if (done) continue;
+    const Failure& why = done.error();
+    if ((why.reason != Reason::plan_stale && !is_of_poses(why)) || !consent.plans_again(why))
+      throw BadInput(why);
+    value_or_throw(robot.unlock("the operator at the terminal"));
+    if (begun && is_near(robot, rest)) begun.reset();
+  }
+}
+
 }  // namespace
 
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console) {
   return guarded([&] {
-    const OperationPlan plan =
+    OperationPlan plan =
         value_or_throw(plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
+    if (arguments.plan_age_s) plan.limits.age_s = *arguments.plan_age_s;
     check_plan(plan, arguments);
     StopSignal stop;
     Connections devices(plan, value_or_throw(Inbox::open(arguments.out / "inbox")));
@@ -271,25 +235,14 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     print_points(operation->result(), console);
 
     Consent consent(devices.robot(), ending, arguments.yes, console);
-    const Operation::Confirm confirm = [&](const RobotOrder& order) { return consent(order); };
     const auto until = std::chrono::steady_clock::now() + robot_patience;
     ending.wait_until(
         [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
     value_or_throw(devices.robot().unlock("the operator at the terminal"));
     print_tour(value_or_throw(operation->preview_tour()), console);
-    value_or_throw(operation->register_robot(confirm));
-    for (const PlannedTunnel& tunnel : plan.tunnels) {
-      const RobotState rest = value_or_throw(devices.robot().wait_connected(std::chrono::seconds(5)));
-      for (const std::string& name : operation->checks_to_come(tunnel.bone))
-        touch(*operation, name, input, ending, console);
-      const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
-      console.progress << fmt::format("preview: {}\n",
-                                      (arguments.out / ("preview-" + tunnel.name + "-*.png")).string())
-                       << std::flush;
-      const std::string token = value_or_throw(consent(order, [&] { return operation->check_plan(order); }));
-      print_outcome(value_or_throw(operation->go(order, token)), console);
-      value_or_throw(operation->withdraw(order, rest, confirm));
-    }
+    value_or_throw(operation->register_robot([&](const RobotOrder& order) { return consent(order); }));
+    for (const PlannedTunnel& tunnel : plan.tunnels)
+      go_to(tunnel, *operation, devices.robot(), arguments.out, consent, input, ending, console);
     value_or_throw(operation->finish());
   });
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "command.h"
 #include "helicarm/devices/receiver/receiver.h"
@@ -11,7 +12,8 @@ namespace helicarm::cli {
 struct NavigateArguments {
   std::filesystem::path plan;
   std::filesystem::path out = "session";
-  std::filesystem::path picks;  ///< awaited after the images; empty: those of the plan
+  std::filesystem::path picks;       ///< awaited after the images; empty: those of the plan
+  std::optional<double> plan_age_s;  ///< overrides the plan's plan_stale_s
   ReceiverOptions receiver;
   bool yes = false;  ///< confirm every order automatically: for rehearsals
 };

@@ -73,6 +73,7 @@ Expected<void> Operation::check_plan(const RobotOrder& order) {
     const auto holds = plan.watch.holds(board_, robot_.track(), monotonic_seconds());
     if (!holds && holds.error().reason == Reason::plan_stale) {
       planned_.at(order.name).stale = holds.error();
+      in_place_.clear();  // what moved may be a marker on its bone
       record_halt(order, holds.error());
     }
     value_or_throw(holds);

@@ -109,7 +109,7 @@ class Operation {
   Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
   /// Whether this order may be carried out at the newest poses; poll it while the confirmation is open.
   /// Refuses as `PlanWatch::holds`, and (plan_stale) an order that is not the last plan to its tunnel. A plan
-  /// once found stale stays stale.
+  /// once found stale stays stale, and its check points must be touched again.
   Expected<void> check_plan(const RobotOrder& order);
   /// Performs the same check from any thread, without a record. Refuses (usage) an order that was not
   /// planned.

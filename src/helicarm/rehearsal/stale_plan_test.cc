@@ -33,17 +33,22 @@ class StalePlan : public testing::Test {
     options.tracker_port = options.rtde_port = options.dashboard_port = options.script_port = 0;
     virtual_or_ = VirtualDevices::open(options).value();
     plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
+    plan_.check_points = check_points();
     devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_.path() / "inbox").value());
     ReceiverOptions receiving;
     receiving.port = 0;
     ASSERT_TRUE(devices_->listen(receiving));
     operation_ = Operation::begin(plan_, folder_.path() / "session", devices_->board(), robot()).value();
+    if (!plan_.check_points.empty()) {
+      ASSERT_TRUE(touch());
+    }
     for (const std::string& view : plan_.views) expose(view);
     ASSERT_TRUE(operation_->measure());
     ASSERT_TRUE(robot().wait_connected(20s));
     try_to([&] { return operation_->register_robot(nod_); });
   }
   void TearDown() override { operation_.reset(); }
+  virtual std::vector<PlannedCheck> check_points() const { return {}; }
 
   RobotLink& robot() { return devices_->robot(); }
 
@@ -57,6 +62,17 @@ class StalePlan : public testing::Test {
       taken = operation_->take(view, image.arrival, image.time_s);
     }
     ASSERT_TRUE(taken) << taken.error().message;
+  }
+  Expected<double> touch() {
+    virtual_or_->touch("femur");
+    Expected<double> off = fail(Reason::usage, "not tried");
+    for (int i = 0; i < most_attempts && !off; ++i) {
+      std::this_thread::sleep_for(1s);  // until the gate takes the pointer's new place
+      off = operation_->touch("femur notch");
+      if (!off && off.error().reason == Reason::residual_too_large) break;
+    }
+    virtual_or_->lift_pointer();
+    return off;
   }
   template <class Act>
   void try_to(const Act& act) {
@@ -226,6 +242,22 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
     return;
   }
   FAIL() << "the machine is too busy for this test";
+}
+
+class StalePlanToACheckedBone : public StalePlan {
+ protected:
+  std::vector<PlannedCheck> check_points() const override { return {{"femur notch", Bone::femur, 1.5}}; }
+};
+
+TEST_F(StalePlanToACheckedBone, IsMadeAgainOnlyAfterTouchingTheCheckPointAgain) {
+  ASSERT_TRUE(touch());
+  const RobotOrder order = plan();
+  EXPECT_TRUE(operation_->checks_to_come(Bone::femur).empty());
+  virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
+  EXPECT_EQ(wait_until_stale(order).reason, Reason::plan_stale);
+  EXPECT_EQ(operation_->checks_to_come(Bone::femur), std::vector<std::string>{"femur notch"});
+  EXPECT_EQ(operation_->plan_tunnel("femur").error().reason, Reason::usage);
+  EXPECT_EQ(touch().error().reason, Reason::residual_too_large);
 }
 
 }  // namespace

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "command.h"
+#include "helicarm/operation/operation.h"
+#include "stop_signal.h"
+
+namespace helicarm::cli {
+
+/// Stops the robot and every wait for the tracker on a stop signal, at any time.
+class Ending {
+ public:
+  Ending(StopSignal& signal, RobotLink& robot, Operation& operation);
+
+  /// Throws BadInput (interrupted) after a stop signal.
+  void check() const;
+  /// Polls until the condition holds; throws as `check`.
+  template <class Holds>
+  void wait_until(const Holds& holds) const {
+    for (check(); !holds(); check()) std::this_thread::sleep_for(std::chrono::duration<double>(glance_s));
+  }
+
+ private:
+  static constexpr double glance_s = 0.05;
+  std::atomic<bool> reported_{false};
+  std::jthread thread_;
+};
+
+/// Asks at the terminal; without a terminal the answer is no. Input typed before a question is discarded.
+class Consent {
+ public:
+  /// `yes`: every order is confirmed without a question.
+  Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
+      : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
+
+  /// The order's token. Throws BadInput (plan_stale) once the plan no longer holds, without waiting for the
+  /// answer.
+  Expected<std::string> operator()(
+      const RobotOrder& order,
+      const std::function<Expected<void>()>& holds = [] { return Expected<void>(); });
+
+  /// Whether to unlock the robot and plan again after this refusal.
+  bool plans_again(const Failure& why);
+
+ private:
+  bool agreed(const RobotOrder& order, const std::function<Expected<void>()>& holds);
+
+  RobotLink& robot_;
+  const Ending& ending_;
+  bool yes_;
+  Console& console_;
+};
+
+}  // namespace helicarm::cli
