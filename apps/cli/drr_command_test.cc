@@ -51,7 +51,7 @@ TEST(DrrCommand, LeftAndHeadAgreeWithTheHelp) {
   EXPECT_NEAR(parse_json(out.str(), "out")->at("maximum").get<double>(), 100, 0.1);
   ASSERT_EQ(raw.size(), 81 * sizeof(float));
   const auto pixel = [&](int u, int v) {
-    float value;
+    float value = 0;
     std::memcpy(&value, raw.data() + sizeof value * static_cast<std::size_t>(u + 9 * v), sizeof value);
     return value;
   };

@@ -3,6 +3,7 @@
 #include <QMenu>
 #include <QMimeData>
 #include <fstream>
+#include <random>
 
 #include "gui/window/window_test.h"
 #include "helicarm/simulation/write_case.h"
@@ -133,7 +134,8 @@ TEST_F(Window, InvalidDroppedFilesAreRefusedByName) {
 
 TEST_F(Window, ThousandRandomClicksAndKeysDoNotFreezeTheWindow) {
   open_rehearsal();
-  std::srand(7);
+  std::minstd_rand random(7);
+  const auto below = [&](int limit) { return int(random() % std::minstd_rand::result_type(limit)); };
   const std::array keys{Qt::Key_Tab, Qt::Key_Return, Qt::Key_Space, Qt::Key_L,    Qt::Key_M, Qt::Key_Plus,
                         Qt::Key_0,   Qt::Key_Up,     Qt::Key_1,     Qt::Key_2,    Qt::Key_R, Qt::Key_Escape,
                         Qt::Key_W,   Qt::Key_Minus,  Qt::Key_Left,  Qt::Key_Down, Qt::Key_H, Qt::Key_3};
@@ -148,14 +150,14 @@ TEST_F(Window, ThousandRandomClicksAndKeysDoNotFreezeTheWindow) {
   for (int i = 0; i < 1000; ++i) {
     QElapsedTimer since;
     since.start();
-    const QPoint place(std::rand() % window_->width(), 30 + std::rand() % (window_->height() - 30));
+    const QPoint place(below(window_->width()), 30 + below(window_->height() - 30));
     QWidget* widget = window_->childAt(place);
     if (widget == nullptr) widget = window_.get();
-    if (std::rand() % 2 == 0)
-      QTest::mouseClick(widget, std::rand() % 4 == 0 ? Qt::RightButton : Qt::LeftButton, Qt::NoModifier,
+    if (below(2) == 0)
+      QTest::mouseClick(widget, below(4) == 0 ? Qt::RightButton : Qt::LeftButton, Qt::NoModifier,
                         widget->mapFrom(window_.get(), place));
     else
-      QTest::keyClick(widget, keys[std::size_t(std::rand()) % keys.size()]);
+      QTest::keyClick(widget, keys[std::size_t(below(int(keys.size())))]);
     QApplication::processEvents();
     longest = std::max(longest, since.elapsed());
   }

@@ -200,7 +200,7 @@ class Window : public testing::Test {
   /// Saves to the folder HELICARM_SCREENSHOTS.
   void screenshot(const char* name) {
     QTest::qWait(100);
-    if (const char* place = std::getenv("HELICARM_SCREENSHOTS"))
+    if (const QString place = qEnvironmentVariable("HELICARM_SCREENSHOTS"); !place.isEmpty())
       window_->grab().save(QString("%1/%2.png").arg(place, name));
   }
 

@@ -20,6 +20,7 @@ namespace {
 /// MPI takes 0.3 s to initialise, so only on request.
 bool started_by_mpi() {
   return std::ranges::any_of(std::array{"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK"},
+                             // Nothing here changes the environment. NOLINTNEXTLINE(concurrency-mt-unsafe)
                              [](const char* name) { return std::getenv(name) != nullptr; });
 }
 

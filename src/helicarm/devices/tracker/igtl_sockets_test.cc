@@ -77,7 +77,7 @@ struct RawPeer {
   void write(std::string_view bytes) { asio::write(socket, asio::buffer(bytes)); }
   bool is_disconnected() {
     asio::error_code error;
-    char byte;
+    char byte = 0;
     while (!error) socket.read_some(asio::buffer(&byte, 1), error);
     return true;
   }
