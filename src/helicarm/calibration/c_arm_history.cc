@@ -53,8 +53,13 @@ LearnedIntrinsics learn_intrinsics(std::span<const HistoryEntry> entries, const 
     const Vector3d sag = squares(known.prior.focal->of_view, known.prior.principal->of_view);
     Matrix3d information = assumed;
     Vector3d pull = assumed * nominal_mm;
+    const Matrix3d of_sag = sag.cwiseInverse().asDiagonal();
+    const auto posterior_of = [&](const HistoryEntry& entry) -> Matrix3d {
+      return (entry.information + of_sag).inverse();
+    };
     for (const HistoryEntry& entry : entries) {
-      const Matrix3d of_mean = (entry.information.inverse() + Matrix3d(sag.asDiagonal())).inverse();
+      // The inverse of information^-1 + sag; the information itself may be too small to be inverted.
+      const Matrix3d of_mean = entry.information * posterior_of(entry) * of_sag;
       information += of_mean;
       pull += of_mean * entry.estimate_mm;
     }
@@ -62,7 +67,7 @@ LearnedIntrinsics learn_intrinsics(std::span<const HistoryEntry> entries, const 
     known.mean_mm = covariance * pull;
     Vector3d observed = Vector3d::Zero();
     for (const HistoryEntry& entry : entries) {
-      const Matrix3d posterior = (entry.information + Matrix3d(sag.cwiseInverse().asDiagonal())).inverse();
+      const Matrix3d posterior = posterior_of(entry);
       const Matrix3d gain = posterior * entry.information;
       const Vector3d variation = gain * (entry.estimate_mm - known.mean_mm);
       observed += (posterior + gain * covariance * gain.transpose()).diagonal() + variation.cwiseAbs2();

@@ -50,6 +50,11 @@ TEST(KnowledgeOf, NoHistoryReportsNothing) {
   EXPECT_EQ(known.prior.focal->common, unknown.focal->common);
 }
 
+TEST(KnowledgeOf, InformationTooSmallToBeInvertedChangesNothing) {
+  const std::vector<HistoryEntry> entries{{"a", "AP", {950, 5, 5}, 1e-200 * Eigen::Matrix3d::Identity()}};
+  EXPECT_TRUE(learn_intrinsics(entries, nominal, unknown).mean_mm.isApprox(nominal, 1e-12));
+}
+
 TEST(KnowledgeOf, PredictsTheNextShotAsWidelyAsItMust) {
   double distance2 = 0, focal_sigma = 0;
   const int trials = 100;
