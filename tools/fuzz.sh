@@ -25,12 +25,12 @@ mkdir -p "$work" build/fuzz/findings
 export UBSAN_OPTIONS=print_stacktrace=1
 
 found=0
-echo "| target | executions | edges | findings |"
-echo "| --- | --- | --- | --- |"
+echo "| target | seconds | executions | edges | findings |"
+echo "| --- | --- | --- | --- | --- |"
 for target in "${targets[@]}"; do
   program=build/fuzz/bin/fuzz_$target corpus=$work/$target log=$work/$target.log words=$work/$target.words
   "$program" --seeds "$corpus" "$words"
-  finding=none dictionary=()
+  finding=none dictionary=() begun=$SECONDS
   [ -s "$words" ] && dictionary=(-dict="$words")
   nice -n 10 "$program" "$corpus" "${dictionary[@]}" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 \
     -malloc_limit_mb=1024 -max_len=65536 -print_funcs=0 -print_final_stats=1 -artifact_prefix="build/fuzz/findings/$target-" \
@@ -40,6 +40,6 @@ for target in "${targets[@]}"; do
   }
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
   edges=$(sed -n 's/.* cov: \([0-9]*\) .*/\1/p' "$log" | tail -1)
-  echo "| $target | ${executions:-0} | ${edges:-0} | $finding |"
+  echo "| $target | $((SECONDS - begun)) | ${executions:-0} | ${edges:-0} | $finding |"
 done
 exit $found
