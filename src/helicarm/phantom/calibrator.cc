@@ -46,11 +46,12 @@ Eigen::Matrix3d covariance_from(JsonReader& reader) {
   const double size = given.cwiseAbs().maxCoeff();
   if ((given - given.transpose()).cwiseAbs().maxCoeff() > rounding * size)
     reader.refuse(Reason::bad_value, "covariance_mm2", "is not symmetric");
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(given);
+  const Eigen::Matrix3d symmetric = (given + given.transpose()) / 2;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(symmetric);
   if (eigen.eigenvalues()[0] < -rounding * size)
     reader.refuse(Reason::bad_value, "covariance_mm2",
                   fmt::format("has the negative eigenvalue {:g}", eigen.eigenvalues()[0]));
-  return (given + given.transpose()) / 2;
+  return symmetric;
 }
 
 CalibratorBall ball_from(JsonReader reader) {
