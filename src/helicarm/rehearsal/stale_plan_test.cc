@@ -178,7 +178,7 @@ TEST_F(StalePlan, TwoTunnelsAreCarriedOutOnOneCalibration) {
       const auto gone = operation_->go(order, robot().confirm(order));
       done = gone.has_value();
       if (!done) {
-        ASSERT_TRUE(came_late(gone.error())) << gone.error().message;
+        ASSERT_TRUE(is_timing_failure(gone.error())) << gone.error().message;
       }
       try_to([&] { return operation_->withdraw(order, rest, nod_); });
     }
