@@ -12,6 +12,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
+#include "helicarm/pipeline/result.h"
 
 namespace helicarm::cli {
 namespace {
@@ -66,6 +67,7 @@ std::vector<PickedPoint> picked_points(const CsvTable& table, const SavedCalibra
   return points;
 }
 
+/// {"points", "warnings", "notes"}.
 Json located(const LocateArguments& arguments, std::ostream& progress) {
   const Json result = value_or_throw(read_json(arguments.calibration));
   const auto calibration =
@@ -73,17 +75,28 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   Json points = Json::array();
+  std::vector<Warning> warnings, notes;
   for (const auto& [name, images, unseen] : picked_points(table, calibration, arguments.raw)) {
-    const auto point = locate(name, PointSource::pick, images, calibration);
-    const auto why = point ? point->doubt : unseen ? unseen : std::optional(point.error());
+    const double motion = arguments.motion_sigma_mm;
+    const auto point = locate(name, PointSource::pick, images, calibration, motion);
+    const auto why = point ? point->missing_rays : unseen ? unseen : std::optional(point.error());
     points.push_back(point ? point_json(*point) : point_json(name, PointSource::pick, why->reason));
     if (why) progress << fmt::format("{}: {}\n", name, why->message);
+    std::vector<Warning> own_warnings, own_notes;
+    if (point && why) own_warnings.push_back(*why);
+    if (point)
+      own_notes.push_back(
+          unobservable_motion(name, point->point_in_anchor, calibration.views[images.front().view], motion));
+    points.back()["warnings"] = json_list_of(own_warnings);
+    points.back()["notes"] = json_list_of(own_notes);
+    warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
+    notes.insert(notes.end(), own_notes.begin(), own_notes.end());
   }
-  return points;
+  return {{"points", points}, {"warnings", json_list_of(warnings)}, {"notes", json_list_of(notes)}};
 }
 
 void print_table(const Json& points, std::ostream& out) {
-  out << fmt::format("{:<16} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "point", "x mm", "y mm", "z mm", "+- mm",
+  out << fmt::format("{:<16} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "point", "x mm", "y mm", "z mm", "95 % mm",
                      "gap mm");
   for (const Json& point : points) {
     const auto name = point["name"].get<std::string>();
@@ -93,19 +106,19 @@ void print_table(const Json& points, std::ostream& out) {
     }
     const auto xyz = point["xyz_mm"].get<std::vector<double>>();
     out << fmt::format("{:<16} {:10.3f} {:10.3f} {:10.3f} {:9.3f} {:9.3f}\n", name, xyz[0], xyz[1], xyz[2],
-                       point["predicted_mm"].get<double>(), point["ray_gap_mm"].get<double>());
+                       point["error_95_mm"].get<double>(), point["ray_gap_mm"].get<double>());
   }
 }
 
 }  // namespace
 
 CommandResult locate_command(const LocateArguments& arguments, Console& console) {
-  const auto points = guarded([&] { return located(arguments, console.progress); });
-  if (!points) return tl::unexpected<Failure>(points.error());
+  const auto answer = guarded([&] { return located(arguments, console.progress); });
+  if (!answer) return tl::unexpected<Failure>(answer.error());
   if (console.json)
-    console.out << to_text(Json{{"points", *points}}) << '\n';
+    console.out << to_text(*answer) << '\n';
   else
-    print_table(*points, console.out);
+    print_table((*answer)["points"], console.out);
   return {};
 }
 

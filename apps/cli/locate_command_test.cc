@@ -70,6 +70,27 @@ TEST(LocateCommand, PointsAndReasonsKeepTheOrderOfThePicks) {
   }
 }
 
+TEST(LocateCommand, RaysThatMissAreWarnedOfAtThePointAlsoWithImportedCameras) {
+  const Eigen::Vector2d a = view_at(0).project({10, 20, 30}), b = view_at(1.5).project({10, 20, 30});
+  const Answer answer = locate_in(result_json(), fmt::format("name,view,u_px,v_px\nT,AP,{},{}\nT,LAT,{},{}\n",
+                                                             a.x() + 120, a.y(), b.x(), b.y()));
+  ASSERT_TRUE(answer.result.has_value());
+  const Json& point = answer.json["points"][0];
+  ASSERT_EQ(point["warnings"].size(), 1u);
+  EXPECT_EQ(point["warnings"][0]["code"], "residual_too_large");
+  EXPECT_EQ(answer.json["warnings"], point["warnings"]);
+  EXPECT_GT(point["ray_gap_mm"].get<double>(), 10);
+  EXPECT_GE(point["error_95_mm"].get<double>(), 0.5 * point["ray_gap_mm"].get<double>());
+}
+
+TEST(LocateCommand, EachPointHasTheNoteOfUnobservableMotion) {
+  const Answer answer = locate_in(result_json(), picks_of({10, 20, 30}));
+  ASSERT_EQ(answer.json["notes"].size(), 1u);  // not the point that is not located
+  EXPECT_EQ(answer.json["notes"][0]["code"], "unobservable_motion");
+  EXPECT_EQ(answer.json["points"][0]["notes"], answer.json["notes"]);
+  EXPECT_TRUE(answer.json["points"][1]["notes"].empty());
+}
+
 TEST(LocateCommand, CovarianceOfTheCalibrationAddsToThatOfThePoint) {
   Json calibrated = result_json();
   calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(22, 22));

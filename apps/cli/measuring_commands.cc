@@ -14,6 +14,13 @@
 namespace helicarm::cli {
 namespace {
 
+void add_motion(CLI::App* command, double& motion_sigma_mm) {
+  constexpr Field<RunOptions> field = field_named<RunOptions>(run_fields, "motion_sigma_mm");
+  command->add_option(std::string(field.flag), motion_sigma_mm, std::string(field.help))
+      ->check(within(field.range.low, field.range.high))
+      ->capture_default_str();
+}
+
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
@@ -54,6 +61,7 @@ void add_predict(CLI::App& app, Action& action) {
   command->add_option("--sigma-px", a.sigma_px, "Noise of a pick, per axis")
       ->check(within(0, 100))
       ->capture_default_str();
+  add_motion(command, a.motion_sigma_mm);
   command->add_option("--max-error", a.max_error_mm, "Limit of the decision, mm (95 %)")
       ->check(within(1e-6, 1000))
       ->capture_default_str();
@@ -84,6 +92,7 @@ void add_locate(CLI::App& app, Action& action) {
   command->add_option("--picks", a.picks, "CSV: name,view,u_px,v_px[,sigma_px], rectified pixels")
       ->required();
   command->add_flag("--raw", a.raw, "The picks are raw pixels");
+  add_motion(command, a.motion_sigma_mm);
 }
 
 void add_rectify(CLI::App& app, Action& action) {

@@ -9,9 +9,9 @@
 #include "helicarm/calibration/c_arm_history.h"
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/localization/error_bound.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/localization/tre_volume.h"
-#include "helicarm/pipeline/accuracy.h"
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/report/tre_figure.h"
@@ -39,7 +39,8 @@ Eigen::Vector3d place_from(const std::string& word) {
 Json prediction(const Eigen::Vector3d& place, const Calibration& calibration,
                 const PredictArguments& arguments) {
   Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
-  const auto covariance = predict_covariance(place, arguments.sigma_px, calibration);
+  const auto covariance =
+      predict_covariance(place, arguments.sigma_px, calibration, arguments.motion_sigma_mm);
   if (!covariance) {
     json["decision"] = "refuse";
     json["reason"] = code(covariance.error().reason);
@@ -81,14 +82,25 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
     const Calibration& calibration = *calibrated;
 
     Json points = Json::array();
-    for (const Eigen::Vector3d& place : places) points.push_back(prediction(place, calibration, arguments));
+    std::vector<Warning> notes;
+    for (const Eigen::Vector3d& place : places) {
+      points.push_back(prediction(place, calibration, arguments));
+      notes.push_back(unobservable_motion(fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()),
+                                          place, calibration.views.front(), arguments.motion_sigma_mm));
+    }
+    if (!console.quiet)
+      for (const Warning& warning : calibrated->warnings)
+        console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
     if (arguments.map)
       write_map(predict_tre(calibration, middle, arguments.half_mm, arguments.step_mm, arguments.sigma_px,
-                            console.threads),
+                            console.threads, arguments.motion_sigma_mm),
                 *arguments.map);
     if (console.json) {
       console.out << to_text(Json{{"sigma_px", arguments.sigma_px},
+                                  {"motion_sigma_mm", arguments.motion_sigma_mm},
                                   {"max_error_mm", arguments.max_error_mm},
+                                  {"warnings", json_list_of(calibrated->warnings)},
+                                  {"notes", json_list_of(notes)},
                                   {"points", points}})
                   << '\n';
       return;

@@ -2,6 +2,7 @@
 #include "run_command.h"
 
 #include <algorithm>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -22,6 +23,23 @@ std::string statistics_line(std::string_view what, const Statistics& s) {
   if (s.n == 0) return {};
   return fmt::format("  {:<8} mean {:7.3f}   rms {:7.3f}   max {:7.3f}   n {}\n", what, s.mean, s.rms, s.max,
                      s.n);
+}
+
+/// The codes of a point's warnings, for the end of its line.
+std::string marks_of(const PointResult& point) {
+  std::string marks;
+  for (const Warning& warning : point.warnings) marks += fmt::format("   {}", code(warning.reason));
+  return marks;
+}
+
+/// Each kind once, with the number of further points.
+void print_notes(const std::vector<Warning>& notes, std::ostream& out) {
+  std::map<Reason, std::size_t> more;
+  for (const Warning& note : notes) ++more[note.reason];
+  for (const Warning& note : notes)
+    if (const auto of_kind = more.extract(note.reason))
+      out << fmt::format("helicarm: note: {}: {}{}\n", code(note.reason), note.message,
+                         of_kind.mapped() > 1 ? fmt::format(" (and {} more)", of_kind.mapped() - 1) : "");
 }
 
 /// Removes files of an earlier or incomplete run, which could be taken for an answer.
@@ -90,9 +108,9 @@ std::string summary_of(const Result& result) {
     text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm, calibrator frame\n", "point", "x", "y", "z");
   for (const PointResult& point : result.points)
     text += point.place
-                ? fmt::format("  {:<12} {}   within {:.3f} (95 %)\n", point.name,
+                ? fmt::format("  {:<12} {}   within {:.3f} (95 %){}\n", point.name,
                               coordinates(point.place->in_calibrator),
-                              length_at_95(point.place->covariance_in_calibrator))
+                              length_at_95(point.place->covariance_in_calibrator), marks_of(point))
                 : fmt::format("  {:<12} {}\n", point.name, point.reason ? code(point.reason->reason) : "");
   for (const Tunnel& tunnel : result.tunnels)
     if (tunnel.start_in_tool && tunnel.end_in_tool)
@@ -116,10 +134,12 @@ Expected<Result> measure(const RunArguments& arguments, Console& console) {
     options.threads = console.threads;
     options.history = value_or_throw(history_at(arguments.history));
     Result result = value_or_throw(result_of(arguments.folder, options));
-    if (!console.quiet)
+    if (!console.quiet) {
       for (const Warning& warning : result.warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
                                         warning.view.empty() ? "" : ": ", warning.message);
+      print_notes(result.notes, console.progress);
+    }
     return result;
   });
 }

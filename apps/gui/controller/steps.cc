@@ -4,7 +4,7 @@
 #include <QCoreApplication>
 #include <algorithm>
 
-#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/localization/error_bound.h"
 
 namespace helicarm::gui {
 namespace {
@@ -21,7 +21,9 @@ QString doubts(const std::vector<Warning>& warnings) {
 }
 
 /// Warnings about a point concern the plan, not the calibration.
-bool is_of_a_point(const Warning& warning) { return warning.figures.contains("ray_gap_mm"); }
+bool is_of_a_point(const Warning& warning) {
+  return warning.figures.contains("ray_gap_mm") || warning.reason == Reason::pick_on_fiducial;
+}
 
 std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points) {
   std::vector<Warning> of_them;

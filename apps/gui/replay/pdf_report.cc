@@ -58,6 +58,8 @@ void draw_summary(const Result& result, PdfLayout& layout) {
   layout.cards(cards);
   if (!result.warnings.empty()) layout.heading(Words::tr("Warnings"));
   for (const Warning& warning : result.warnings) layout.paragraph("• " + message_of(warning));
+  if (!result.notes.empty()) layout.heading(Words::tr("Notes: what these data cannot show"));
+  for (const Warning& note : result.notes) layout.paragraph("• " + message_of(note));
 }
 
 void draw_views(const Result& result, PdfLayout& layout) {

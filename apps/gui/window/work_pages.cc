@@ -7,7 +7,7 @@
 #include "gui/controller/steps.h"
 #include "gui/window/page_parts.h"
 #include "gui/window/pages.h"
-#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/localization/error_bound.h"
 
 namespace helicarm::gui {
 

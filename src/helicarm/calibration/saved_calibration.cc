@@ -25,6 +25,8 @@ CalibratedView view_from(JsonReader& reader) {
   if (!decomposed) reader.refuse(Reason::bad_value, "projection", decomposed.error().message);
   view.view = *decomposed;
   view.dlt = factors_from_projection(projection);
+  view.reprojection_rms_px = reader.optional_number("reprojection_rms_px", any_number).value_or(0);
+  view.dof = int(reader.optional_number("dof", {0, 1e6}).value_or(0));
   return view;
 }
 

@@ -119,6 +119,14 @@ std::string_view code(Reason reason) {
       return "few_fiducials";
     case Reason::rules_broken:
       return "rules_broken";
+    case Reason::unobservable_motion:
+      return "unobservable_motion";
+    case Reason::pick_on_fiducial:
+      return "pick_on_fiducial";
+    case Reason::intrinsics_inconsistent:
+      return "intrinsics_inconsistent";
+    case Reason::residual_distortion:
+      return "residual_distortion";
   }
   return "internal";
 }

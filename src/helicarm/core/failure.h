@@ -75,6 +75,10 @@ enum class Reason {
   uid_reused,
   few_fiducials,
   rules_broken,
+  unobservable_motion,
+  pick_on_fiducial,
+  intrinsics_inconsistent,
+  residual_distortion,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

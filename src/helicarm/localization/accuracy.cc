@@ -38,7 +38,8 @@ Statistics fiducial_localization_error(const CalibrationResult& calibration) {
 
 Statistics fiducial_registration_error(const CalibrationResult& calibration) {
   std::vector<double> errors;
-  const Calibration exact{calibration.views, {}};
+  Calibration exact{calibration.views, {}};
+  for (CalibratedView& view : exact.views) view.reprojection_rms_px = 0;
   for (const Fiducial& ball : calibration.fiducials.front()) {
     std::vector<PointObservation> observations;
     for (std::size_t i = 0; i < calibration.views.size(); ++i)

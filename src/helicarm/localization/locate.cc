@@ -7,6 +7,7 @@
 
 #include "helicarm/calibration/centred_view.h"
 #include "helicarm/geometry/triangulation.h"
+#include "helicarm/localization/error_bound.h"
 
 namespace helicarm {
 namespace {
@@ -42,18 +43,58 @@ Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
   return noise;
 }
 
-void enlarge_if_rays_miss(LocatedPoint& located) {
+/// What motion between the first acquisition and the others adds to the noise of a point's images, px^2.
+Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
+                                std::span<const PointObservation> observations,
+                                const Calibration& calibration, double motion_sigma_mm) {
+  const auto n = 2 * Eigen::Index(observations.size());
+  Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 1; 2 * i < n; ++i) {
+    const PointObservation& observation = observations[std::size_t(i)];
+    const auto slope = projection_jacobian(calibration.views[observation.view].view,
+                                           observation.calibrator_from_anchor * point_in_anchor);
+    noise.block<2, 2>(2 * i, 2 * i) = motion_sigma_mm * motion_sigma_mm * slope * slope.transpose();
+  }
+  return noise;
+}
+
+/// Stands for a calibration without a covariance: its error at a point is about as large as its residuals at
+/// the fiducials, corrected for degrees of freedom. Imported views have no residuals.
+Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
+                               const Calibration& calibration) {
+  constexpr double least_px = 0.05;  // rounding of a matrix or a pixel in a text file
+  const auto n = 2 * Eigen::Index(observations.size());
+  Eigen::MatrixXd noise = least_px * least_px * Eigen::MatrixXd::Identity(n, n);
+  for (Eigen::Index i = 0; 2 * i < n; ++i) {
+    const CalibratedView& view = calibration.views[observations[std::size_t(i)].view];
+    const double share = view.dof > 0 ? (view.dof + view_parameters) / double(view.dof) : 1;
+    const double variance = share * view.reprojection_rms_px * view.reprojection_rms_px / 2;
+    noise.block<2, 2>(2 * i, 2 * i) += variance * Eigen::Matrix2d::Identity();
+  }
+  return noise;
+}
+
+void inflate_if_rays_miss(LocatedPoint& located) {
   constexpr double largest_excess = 9;  // three standard deviations
   const double excess = located.chi2 / double(2 * located.views.size() - 3);
   if (!(excess > largest_excess)) return;
   located.covariance_in_anchor *= excess;
   located.by_calibration *= std::sqrt(excess);
-  located.doubt = Warning{
+  located.missing_rays = Warning{
       Reason::residual_too_large,
-      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain",
+      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain: "
+                  "check its picks, or whether the bone moved between the acquisitions",
                   located.name, located.ray_gap_mm, std::sqrt(excess)),
       {},
       {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
+}
+
+/// The point lies between the rays, so half their distance is an error that is seen.
+void bound_by_ray_gap(LocatedPoint& located) {
+  const double length = length_at_95(located.covariance_in_anchor), half = 0.5 * located.ray_gap_mm;
+  if (length >= half) return;
+  const double sigma = half / length_at_95(Eigen::Matrix3d::Identity());
+  located.covariance_in_anchor += sigma * sigma * Eigen::Matrix3d::Identity();
 }
 
 }  // namespace
@@ -61,8 +102,8 @@ void enlarge_if_rays_miss(LocatedPoint& located) {
 double LocatedPoint::predicted_rms_mm() const { return std::sqrt(covariance_in_anchor.trace()); }
 
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
-                              std::span<const PointObservation> observations,
-                              const Calibration& calibration) {
+                              std::span<const PointObservation> observations, const Calibration& calibration,
+                              double motion_sigma_mm) {
   std::vector<RayObservation> ray_observations;
   LocatedPoint located{.name = name, .source = source, .point_in_anchor = {}, .covariance_in_anchor = {}};
   const auto n = 2 * Eigen::Index(observations.size());
@@ -77,27 +118,53 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
     located.views.push_back(seen.name);
   }
   auto found = intersect(ray_observations, noise);
+  if (found && motion_sigma_mm > 0)
+    noise += noise_of_motion(found->point, observations, calibration, motion_sigma_mm);
   if (found && calibration.joint_covariance.size() > 0) {
     const Eigen::MatrixXd slopes = images_by_calibration(found->point, observations, calibration);
     noise += slopes * calibration.joint_covariance * slopes.transpose();
     found = intersect(ray_observations, noise);
     if (found) located.by_calibration = -found->by_pixels * slopes;
+  } else if (found) {
+    const Eigen::Vector3d point = found->point;  // that of Eq. 8: the residuals weigh no ray
+    noise += noise_of_views(observations, calibration);
+    found = intersect(ray_observations, noise);
+    if (found && motion_sigma_mm == 0) found->point = point;
   }
   if (!found) return tl::unexpected<Failure>(found.error());
   located.point_in_anchor = found->point;
   located.covariance_in_anchor = found->covariance;
   located.ray_gap_mm = found->ray_gap_mm;
   located.chi2 = found->chi2;
-  if (calibration.joint_covariance.size() == 0) return located;
   const Eigen::MatrixXd by_anchors = noise_of_anchors(found->point, observations, calibration);
   if (!by_anchors.isZero(0))
     if (const auto met = intersect(ray_observations, noise + by_anchors)) located.chi2 = met->chi2;
-  enlarge_if_rays_miss(located);
+  inflate_if_rays_miss(located);
+  bound_by_ray_gap(located);
   return located;
 }
 
+Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
+                            const CalibratedView& first, double motion_sigma_mm) {
+  const Eigen::Vector3d direction = (point_in_calibrator - first.view.source_in_world()).normalized();
+  return {
+      Reason::unobservable_motion,
+      fmt::format("\"{}\": motion between the acquisitions along {:.3f}, {:.3f}, {:.3f} (calibrator), the "
+                  "ray of {}, moves the located point by as much and leaves no ray gap; {}",
+                  name, direction.x(), direction.y(), direction.z(), first.name,
+                  motion_sigma_mm > 0
+                      ? fmt::format("{:g} mm per axis is in its covariance", motion_sigma_mm)
+                      : std::string("give the bone's poses and \"moves_with\", or --motion-sigma")),
+      first.name,
+      {{"direction_x", direction.x()},
+       {"direction_y", direction.y()},
+       {"direction_z", direction.z()},
+       {"mm_per_mm", 1},
+       {"motion_sigma_mm", motion_sigma_mm}}};
+}
+
 Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
-                                             const Calibration& calibration) {
+                                             const Calibration& calibration, double motion_sigma_mm) {
   std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const View& view = calibration.views[i].view;
@@ -106,9 +173,8 @@ Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_cal
     observations.push_back(
         {i, view.project(point_in_calibrator), sigma_px * sigma_px * Eigen::Matrix2d::Identity()});
   }
-  return locate("", PointSource::pick, observations, calibration).map([](const LocatedPoint& point) {
-    return point.covariance_in_anchor;
-  });
+  return locate("", PointSource::pick, observations, calibration, motion_sigma_mm)
+      .map([](const LocatedPoint& point) { return point.covariance_in_anchor; });
 }
 
 }  // namespace helicarm

@@ -38,20 +38,29 @@ struct LocatedPoint {
   double ray_gap_mm = 0;
   double chi2 = 0;  ///< 2n - 3 degrees of freedom
   std::vector<std::string> views = {};
-  std::optional<Warning> doubt = {};  ///< residual_too_large: the covariance has been enlarged
+  std::optional<Warning> missing_rays = {};  ///< residual_too_large: the covariance has been inflated
 
   double predicted_rms_mm() const;
 };
 
 /// Least reprojection error over n >= 2 views, each pixel weighted by its own noise and by the calibration's.
-/// Rays that miss each other by more than their errors allow show that one of them is not of this point: its
-/// covariance is then enlarged until they do. Refuses as `intersect`.
+/// A calibration without a covariance enters the point's covariance by the views' reprojection errors.
+/// `motion_sigma_mm` (per axis): motion of the point between the first view's acquisition and each later one.
+/// Rays that miss each other by over three standard deviations show that one of them is not of this point:
+/// the covariance is inflated until they meet. The 95 % length is never below half the ray gap. Refuses as
+/// `intersect`.
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
-                              std::span<const PointObservation> observations, const Calibration& calibration);
+                              std::span<const PointObservation> observations, const Calibration& calibration,
+                              double motion_sigma_mm = 0);
+
+/// A note: motion between the acquisitions along the first view's ray moves the located point by as much and
+/// leaves no ray gap. The direction is a unit vector in the calibrator's frame.
+Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
+                            const CalibratedView& first, double motion_sigma_mm);
 
 /// Covariance (mm^2) of a point that would be seen in all views with a given noise per axis: the predicted
 /// TRE is the root of its trace. Refuses as `locate`, `behind_source` where a view cannot see it.
 Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
-                                             const Calibration& calibration);
+                                             const Calibration& calibration, double motion_sigma_mm = 0);
 
 }  // namespace helicarm

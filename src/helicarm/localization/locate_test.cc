@@ -11,6 +11,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/localization/error_bound.h"
 
 namespace helicarm {
 namespace {
@@ -98,6 +99,77 @@ TEST(Locate, PointThatMovesWithABoneIsFoundInTheBone) {
   const auto point = locate("T", PointSource::pick, observations, exact_calibration());
   ASSERT_TRUE(point.has_value());
   EXPECT_LT((point->point_in_anchor - in_bone).norm(), 1e-9);
+}
+
+/// The lateral image moved by `off` px.
+std::vector<PointObservation> wrong_images(const Eigen::Vector2d& off, double sigma) {
+  RandomStream random(26, 0);
+  auto observations = images_of(target, 0, random);
+  for (PointObservation& observation : observations)
+    observation.covariance_px2 = sigma * sigma * Eigen::Matrix2d::Identity();
+  observations[1].uv += off;
+  return observations;
+}
+
+TEST(Locate, LengthAt95IsNeverBelowHalfTheRayGap) {
+  RandomStream random(25, 0);
+  const auto calibrated = noisy_calibration(0.05, random);
+  ASSERT_TRUE(calibrated.has_value());
+  Calibration paper = exact_calibration();
+  for (CalibratedView& view : paper.views) view.reprojection_rms_px = 0.5;
+  for (const Calibration& calibration : {Calibration(*calibrated), exact_calibration(), paper})
+    for (const double sigma : {0.0, 0.5, 5.0})
+      for (const double off : {0.0, 0.3, 5.0, 150.0}) {
+        const auto point = locate("T", PointSource::pick, wrong_images({off, off}, sigma), calibration);
+        ASSERT_TRUE(point.has_value());
+        EXPECT_GE(length_at_95(point->covariance_in_anchor), 0.5 * point->ray_gap_mm * (1 - 1e-9))
+            << sigma << " " << off;
+      }
+}
+
+TEST(Locate, RaysThatMissAreNamedWithAndWithoutACovarianceOfTheCalibration) {
+  RandomStream random(25, 0);
+  const auto calibrated = noisy_calibration(0.05, random);
+  ASSERT_TRUE(calibrated.has_value());
+  for (const Calibration& calibration : {Calibration(*calibrated), exact_calibration()}) {
+    const auto wrong = locate("T", PointSource::pick, wrong_images({60, 60}, 0.5), calibration);
+    ASSERT_TRUE(wrong && wrong->missing_rays);
+    EXPECT_EQ(wrong->missing_rays->reason, Reason::residual_too_large);
+    EXPECT_GT(wrong->missing_rays->figures.at("ray_gap_mm"), 3);
+    const auto right = locate("T", PointSource::pick, wrong_images({0.3, 0.3}, 0.5), calibration);
+    EXPECT_FALSE(right->missing_rays);
+  }
+}
+
+TEST(Locate, ResidualsOfAPublishedCalibrationWidenThePointAndLeaveItsPlace) {
+  Calibration paper = exact_calibration();
+  const auto before = locate("T", PointSource::pick, wrong_images({0.4, 0.2}, 0.1), paper);
+  paper.views[0].reprojection_rms_px = 0.7;
+  paper.views[1].reprojection_rms_px = 0.2;
+  const auto after = locate("T", PointSource::pick, wrong_images({0.4, 0.2}, 0.1), paper);
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(before->point_in_anchor, after->point_in_anchor);
+  EXPECT_GT(after->predicted_rms_mm(), 2 * before->predicted_rms_mm());
+}
+
+TEST(Locate, MotionAlongTheFirstRayLeavesNoGapAndIsInTheCovarianceThatItIsGiven) {
+  const Calibration calibration = exact_calibration();
+  const Warning note = unobservable_motion("T", target, calibration.views[0], 0);
+  const Eigen::Vector3d along(note.figures.at("direction_x"), note.figures.at("direction_y"),
+                              note.figures.at("direction_z"));
+  EXPECT_NEAR(along.norm(), 1, 1e-12);
+  RandomStream random(27, 0);
+  auto observations = images_of(target, 0, random);
+  observations[0].covariance_px2 = observations[1].covariance_px2 = 0.25 * Eigen::Matrix2d::Identity();
+  observations[1].uv = truth[1].project(target + 3 * along);
+  const auto still = locate("T", PointSource::pick, observations, calibration);
+  const auto moving = locate("T", PointSource::pick, observations, calibration, 2);
+  ASSERT_TRUE(still && moving);
+  EXPECT_NEAR((still->point_in_anchor - target).norm(), 3, 0.01);
+  EXPECT_LT(still->ray_gap_mm, 1e-6);
+  EXPECT_LT(length_at_95(still->covariance_in_anchor), 1);
+  EXPECT_NEAR(std::sqrt(along.dot(moving->covariance_in_anchor * along)), 2, 0.1);
+  EXPECT_GT(length_at_95(moving->covariance_in_anchor), 3);
 }
 
 TEST(Locate, OneViewIsNotEnough) {

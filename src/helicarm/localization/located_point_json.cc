@@ -2,6 +2,7 @@
 #include "helicarm/localization/located_point_json.h"
 
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/localization/error_bound.h"
 
 namespace helicarm {
 
@@ -11,7 +12,7 @@ Json point_json(const std::string& name, PointSource source, Reason reason) {
   json["source"] = source == PointSource::pick ? "pick" : "target";
   json["xyz_mm"] = nullptr;
   json["frame"] = "calibrator";
-  for (const char* key : {"covariance_mm2", "ray_gap_mm", "predicted_mm"}) json[key] = nullptr;
+  for (const char* key : {"covariance_mm2", "ray_gap_mm", "predicted_mm", "error_95_mm"}) json[key] = nullptr;
   json["views"] = Json::array();
   json["reason"] = code(reason);
   for (const char* key : {"in_femur", "in_tibia", "in_tool"}) json[key] = nullptr;
@@ -24,6 +25,7 @@ Json point_json(const LocatedPoint& point) {
   json["covariance_mm2"] = json_rows(point.covariance_in_anchor);
   json["ray_gap_mm"] = point.ray_gap_mm;
   json["predicted_mm"] = point.predicted_rms_mm();
+  json["error_95_mm"] = length_at_95(point.covariance_in_anchor);
   json["views"] = point.views;
   json["reason"] = nullptr;
   return json;

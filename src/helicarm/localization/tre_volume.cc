@@ -12,7 +12,7 @@
 namespace helicarm {
 
 TreVolume predict_tre(const Calibration& calibration, const Eigen::Vector3d& centre, double half_mm,
-                      double step_mm, double sigma_px, unsigned threads) {
+                      double step_mm, double sigma_px, unsigned threads, double motion_sigma_mm) {
   const int arm = int(std::floor(half_mm / step_mm + 1e-9));
   TreVolume volume{centre - Eigen::Vector3d::Constant(arm * step_mm), step_mm, 2 * arm + 1, {}};
   const auto side = std::size_t(volume.side);
@@ -21,7 +21,7 @@ TreVolume predict_tre(const Calibration& calibration, const Eigen::Vector3d& cen
     for (std::size_t j = 0; j < side; ++j)
       for (std::size_t i = 0; i < side; ++i) {
         const auto covariance =
-            predict_covariance(volume.place(int(i), int(j), int(k)), sigma_px, calibration);
+            predict_covariance(volume.place(int(i), int(j), int(k)), sigma_px, calibration, motion_sigma_mm);
         volume.rms_mm[(k * side + j) * side + i] =
             covariance ? std::sqrt(covariance->trace()) : std::numeric_limits<double>::quiet_NaN();
       }

@@ -26,7 +26,7 @@ struct TreVolume {
 
 /// Within `half_mm` of a centre, for points picked with the given noise in every view.
 TreVolume predict_tre(const Calibration& calibration, const Eigen::Vector3d& centre, double half_mm,
-                      double step_mm, double sigma_px, unsigned threads);
+                      double step_mm, double sigma_px, unsigned threads, double motion_sigma_mm = 0);
 
 /// x_mm,y_mm,z_mm,tre_mm: a line for each point; tre_mm is empty where no point can be located.
 std::string to_csv(const TreVolume& volume);

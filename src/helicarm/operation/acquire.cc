@@ -6,8 +6,8 @@
 
 #include "helicarm/operation/operation.h"
 #include "helicarm/operation/records.h"
-#include "helicarm/operation/view_of.h"
 #include "helicarm/xray/read_xray_image.h"
+#include "helicarm/xray/view_of.h"
 
 namespace helicarm {
 namespace {

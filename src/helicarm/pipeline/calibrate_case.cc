@@ -4,22 +4,15 @@
 #include <algorithm>
 #include <iterator>
 
+#include "helicarm/pipeline/causes.h"
 #include "helicarm/pipeline/prior.h"
+#include "helicarm/pipeline/residuals.h"
 #include "helicarm/pipeline/stopwatch.h"
 
 namespace helicarm {
 namespace {
 
 using LabelledViews = std::vector<LabelledView>;
-
-ViewFiducials fiducials_of(const LabelledView& view) {
-  const DistortionMap& map = view.rectification.map;
-  std::vector<Eigen::Vector2d> used;
-  for (const Fiducial& ball : view.fiducials.fiducials)
-    if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
-  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.xray_image, map), view.fiducials.view,
-          map.covariance_px2(used)};
-}
 
 CommonPrior common_prior(const Calibrator& calibrator) {
   return {unknown_c_arm(), ball_covariances(calibrator), calibrator.scale_sigma};
@@ -102,6 +95,9 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
     for (const LabelledView& view : views) refusal.views.push_back(reported(view));
     return tl::unexpected(std::move(refusal));
   }
+  if (options.method == Method::best)
+    for (Warning& warning : explain_residuals(views, *calibration, common_prior(given.calibrator)))
+      calibration->warnings.push_back(std::move(warning));
   calibration->images = std::move(views);
   if (options.history) calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
   return *std::move(calibration);
@@ -127,6 +123,7 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
         return calibration;
       })
       .map_error([&](Refusal refusal) {
+        refusal.failure = with_cause(refusal, given, options);
         refusal.timing_ms = time;
         return refusal;
       });

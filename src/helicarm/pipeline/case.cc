@@ -72,6 +72,27 @@ std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs:
   return value_or_throw(path_inside(folder, *name));
 }
 
+/// A tracker sees no marker within 10 mm of its origin; in metres all of them lie within 10 of it.
+void refuse_metres(const Case& read) {
+  constexpr double least_mm = 10;
+  double farthest = 0;
+  const auto look = [&](const Poses& poses) {
+    for (const auto* pose : {&poses.tracker_from_calibrator, &poses.tracker_from_femur,
+                             &poses.tracker_from_tibia, &poses.tracker_from_tool})
+      if (*pose) farthest = std::max(farthest, (*pose)->translation.norm());
+  };
+  for (const CaseView& view : read.views) look(view.poses);
+  look(read.poses_now);
+  if (farthest == 0 || farthest >= least_mm) return;
+  throw BadInput(
+      {Reason::bad_value,
+       fmt::format("case.json: poses: no marker is more than {:.3g} from the tracker's origin, where "
+                   "at least {:g} mm are expected: translations are in mm, not in metres",
+                   farthest, least_mm),
+       {},
+       {{"farthest_mm", farthest}, {"limit_mm", least_mm}}});
+}
+
 CaseView view_from(JsonReader reader, const fs::path& folder) {
   CaseView view;
   view.name = name_from(reader, "name");
@@ -212,6 +233,7 @@ Case case_from(const fs::path& path) {
   read.tunnels = tunnels_from(reader, read.picks);
   read.tool_lines = tool_lines_from(reader, read.tunnels);
   reader.finish();
+  refuse_metres(read);
   warn_of_borrowed_name(read);
   return read;
 }

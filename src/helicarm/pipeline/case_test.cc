@@ -61,6 +61,20 @@ TEST_F(CaseFile, NotesAreIgnoredAndAKnownHandednessIsKept) {
 
 const char* const identity = "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]";
 
+TEST_F(CaseFile, PosesInMetresAreRefused) {
+  for (const char* in_metres :
+       {"[[0,-1,0,-0.08],[1,0,0,0.1],[0,0,1,0.75]]", "[[1,0,0,2.1],[0,1,0,0],[0,0,1,3]]"}) {
+    json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse(in_metres);
+    EXPECT_EQ(failure().reason, Reason::bad_value);
+    EXPECT_NE(failure().message.find("metres"), std::string::npos) << failure().message;
+  }
+  // A tracker whose frame is a marker's own: all of its translations may be zero, or others far.
+  json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse(identity);
+  EXPECT_TRUE(read().has_value());
+  json_["views"][0]["poses"]["tracker_from_femur"] = Json::parse("[[1,0,0,80],[0,1,0,0],[0,0,1,0]]");
+  EXPECT_TRUE(read().has_value());
+}
+
 TEST_F(CaseFile, GivesWhatItHolds) {
   json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse("[[0,-1,0,5],[1,0,0,6],[0,0,1,7]]");
   json_["tracker"] = Json::parse(R"({"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"})");

@@ -36,6 +36,7 @@ Result begun(const Case& given, const RunOptions& options, std::vector<ViewResul
   result.warnings = given.warnings;
   append(result.warnings, warnings_of(result.views));
   append(result.warnings, reused_uids(result.views));
+  append(result.warnings, exchanged_views(result.views));
   return result;
 }
 
@@ -62,7 +63,10 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   Result result = begun(given, calibration, options);
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
-      append(result.warnings, locate_points(given, calibration, points));  // Eq. 8, Eq. 16
+      append(result.warnings,
+             locate_points(given, calibration, points, options.motion_sigma_mm));  // Eq. 8, Eq. 16
+      append(result.warnings, picks_on_fiducials(given, calibration, points));
+      append(result.notes, note_motion(given, calibration, points, options.motion_sigma_mm));
       result.points = std::move(points);
     });
   });

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/xray/view_of.h"
+
 namespace helicarm {
 namespace {
 
@@ -92,6 +94,26 @@ std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
         warnings.push_back({Reason::uid_reused,
                             fmt::format("{} and {} differ, but bear the same SOP Instance UID (0008,0018)",
                                         views[j].name, views[i].name)});
+  return warnings;
+}
+
+std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
+  std::vector<std::string> names;
+  for (const ViewResult& view : views) names.push_back(view.name);
+  std::vector<Warning> warnings;
+  for (const ViewResult& view : views) {
+    if (!view.xray_image) continue;
+    const std::string other = view_of(view.xray_image->acquisition, view.name, names);
+    if (other == view.name) continue;
+    const double angle = *view.xray_image->acquisition.primary_angle_deg;
+    warnings.push_back(
+        {Reason::tag_disagrees,
+         fmt::format("the positioner's primary angle (0018,1510) is {:g} degrees, that of a view "
+                     "{}: are the images of {} and {} exchanged?",
+                     angle, other, view.name, other),
+         view.name,
+         {{"primary_angle_deg", angle}}});
+  }
   return warnings;
 }
 

@@ -29,6 +29,9 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
 /// Different images with one SOP Instance UID (uid_reused).
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
 
+/// Views whose positioner angle is that of another view of the case (tag_disagrees).
+std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views);
+
 /// Diagnostics of a calibrated case: check targets far from their places, balls out of place in several
 /// views, a calibrator's file that may be mirrored.
 std::vector<Warning> diagnose(const Case& given, const Result& result);

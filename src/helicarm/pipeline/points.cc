@@ -51,6 +51,18 @@ std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
   return discs;
 }
 
+/// Label of the calibrator's ball on whose image an image point lies.
+std::optional<std::string> fiducial_at(const ImagePoint& seen, const View& camera,
+                                       const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
+  for (std::size_t k = 0; k < fiducials.size(); ++k) {
+    const Fiducial& ball = fiducials[k];
+    const double radius_px = 0.5 * calibrator.balls[k].diameter_mm * std::abs(camera.intrinsics.fy) /
+                             camera.depth(ball.centre_in_calibrator);
+    if ((camera.project(ball.centre_in_calibrator) - seen.uv).norm() < radius_px) return ball.label;
+  }
+  return std::nullopt;
+}
+
 /// One thing to be seen in one view.
 struct Task {
   std::size_t point;
@@ -79,6 +91,11 @@ std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) 
   return tasks;
 }
 
+void warn_at(PointResult& point, std::vector<Warning>& warnings, const Warning& warning) {
+  point.warnings.push_back(warning);
+  warnings.push_back(warning);
+}
+
 struct Located {
   LocatedPoint point;
   std::optional<Bone> anchor;
@@ -93,9 +110,15 @@ std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
   return point.moves_with;
 }
 
-Expected<Located> intersect_rays(const PointResult& point, const Case& given,
-                                 const Calibration& calibration) {
+/// Check targets are part of the calibrator, a tracked bone's motion is in its poses.
+bool may_move(const PointResult& point, std::optional<Bone> anchor) {
+  return point.source == PointSource::pick && !anchor;
+}
+
+Expected<Located> intersect_rays(const PointResult& point, const Case& given, const Calibration& calibration,
+                                 double motion_sigma_mm) {
   const auto anchor = anchor_of(point, given);
+  const double motion = may_move(point, anchor) ? motion_sigma_mm : 0;
   std::vector<PointObservation> observations;
   std::vector<DatedView> views;
   for (std::size_t i = 0; i < point.seen.size(); ++i) {
@@ -106,7 +129,7 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given,
                             anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
     views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
   }
-  auto located = locate(point.name, point.source, observations, calibration);
+  auto located = locate(point.name, point.source, observations, calibration, motion);
   // Readings of their own move each exposure's ray by itself; shared ones move all rays alike.
   if (located && anchor && given.tracker.samples == Samples::independent) {
     for (PointObservation& observation : observations)
@@ -154,28 +177,69 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
 }
 
 std::vector<Warning> locate_points(const Case& given, const Calibration& calibration,
-                                   std::vector<PointResult>& points) {
+                                   std::vector<PointResult>& points, double motion_sigma_mm) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
-    auto located = intersect_rays(point, given, calibration);
+    auto located = intersect_rays(point, given, calibration, motion_sigma_mm);
     if (!located) {
       if (!point.reason) point.reason = located.error();
       continue;
     }
     point.reason.reset();
-    if (located->point.doubt) warnings.push_back(*located->point.doubt);
+    if (located->point.missing_rays) warn_at(point, warnings, *located->point.missing_rays);
+    point.rays_miss = located->point.missing_rays.has_value();
     point.ray_gap_mm = located->point.ray_gap_mm;
     point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
                          located->views, located->point.by_calibration},
                         given.poses_now, given.tracker);
     if (point.moves_with && !located->anchor)
-      warnings.push_back(
-          {Reason::bone_taken_as_fixed,
-           fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
-                       "is taken as fixed to the calibrator",
-                       point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
-           {},
-           {}});
+      warn_at(point, warnings,
+              {Reason::bone_taken_as_fixed,
+               fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
+                           "is taken as fixed to the calibrator",
+                           point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
+               {},
+               {}});
+  }
+  return warnings;
+}
+
+std::vector<Warning> note_motion(const Case& given, const Calibration& calibration,
+                                 std::vector<PointResult>& points, double motion_sigma_mm) {
+  std::vector<Warning> notes;
+  for (PointResult& point : points) {
+    if (!point.place || !may_move(point, anchor_of(point, given))) continue;
+    const auto first = std::ranges::find_if(point.seen, [](const auto& seen) { return seen.has_value(); });
+    point.notes.push_back(unobservable_motion(point.name, point.place->in_calibrator,
+                                              calibration.views[std::size_t(first - point.seen.begin())],
+                                              motion_sigma_mm));
+    notes.push_back(point.notes.back());
+  }
+  return notes;
+}
+
+std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration& calibration,
+                                        std::vector<PointResult>& points) {
+  std::vector<Warning> warnings;
+  for (PointResult& point : points) {
+    if (point.source != PointSource::pick || !point.place) continue;
+    std::vector<std::string> hits;
+    std::size_t views = 0;
+    for (std::size_t i = 0; i < point.seen.size(); ++i) {
+      if (!point.seen[i]) continue;
+      ++views;
+      const CalibratedView& view = calibration.views[i];
+      if (const auto label =
+              fiducial_at(*point.seen[i], view.view, calibration.fiducials[i], given.calibrator))
+        hits.push_back(fmt::format("{} in {}", *label, view.name));
+    }
+    if (hits.empty() || (hits.size() < views && !point.rays_miss)) continue;
+    warn_at(point, warnings,
+            {Reason::pick_on_fiducial,
+             fmt::format("\"{}\" lies on the calibrator's ball {}: pick the bone's own point", point.name,
+                         fmt::join(hits, " and on ")),
+             {},
+             {{"views", double(hits.size())}}});
   }
   return warnings;
 }

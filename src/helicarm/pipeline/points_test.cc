@@ -91,6 +91,62 @@ TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
   EXPECT_TRUE(points[0].place);
 }
 
+TEST_F(TwoViews, UntrackedPointHasANoteOfTheMotionThatItsRaysDoNotShow) {
+  given.views[1].poses = given.views[0].poses;
+  std::vector<PointResult> points = {image_point(Bone::femur), image_point(std::nullopt)};
+  points[1].name = "bare";
+  locate_points(given, calibration, points);
+  const auto notes = note_motion(given, calibration, points, 0);
+  ASSERT_EQ(notes.size(), 1u);  // the tracked bone's poses state its motion
+  EXPECT_EQ(notes[0].reason, Reason::unobservable_motion);
+  EXPECT_TRUE(points[0].notes.empty());
+  ASSERT_EQ(points[1].notes.size(), 1u);
+  // The first view looks along z.
+  EXPECT_GT(notes[0].figures.at("direction_z"), 0.99);
+  EXPECT_EQ(notes[0].figures.at("mm_per_mm"), 1);
+}
+
+TEST_F(TwoViews, MotionSigmaIsForUntrackedPointsOnly) {
+  given.views[1].poses = given.views[0].poses;
+  const auto variance = [&](std::optional<Bone> moves_with, double sigma) {
+    std::vector<PointResult> points = {image_point(moves_with)};
+    locate_points(given, calibration, points, sigma);
+    return points[0].place->covariance_in_calibrator.trace();
+  };
+  EXPECT_EQ(variance(Bone::femur, 2), variance(Bone::femur, 0));
+  EXPECT_GT(variance(std::nullopt, 2), 3.9);
+}
+
+TEST_F(TwoViews, WarningsOfAPointAreAtThePointToo) {
+  std::vector<PointResult> points = {image_point(std::nullopt)};
+  locate_points(given, calibration, points);
+  ASSERT_EQ(points[0].warnings.size(), 1u);
+  EXPECT_EQ(points[0].warnings[0].reason, Reason::residual_too_large);
+  EXPECT_TRUE(points[0].rays_miss);
+}
+
+TEST_F(TwoViews, PickOnAFiducialInAllViewsIsNamed) {
+  given.views[1].poses = given.views[0].poses;
+  CaseCalibration calibrated;
+  static_cast<Calibration&>(calibrated) = calibration;
+  const Eigen::Vector3d place = in_calibrator(0);
+  given.calibrator.balls = {{"P1", place + Eigen::Vector3d(40, 0, 0), 4}, {"P2", place, 4}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    calibrated.fiducials.emplace_back();
+    for (const CalibratorBall& ball : given.calibrator.balls)
+      calibrated.fiducials.back().push_back({ball.label, ball.centre_in_calibrator});
+  }
+  std::vector<PointResult> points = {image_point(std::nullopt)};
+  locate_points(given, calibrated, points);
+  const auto warnings = picks_on_fiducials(given, calibrated, points);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].reason, Reason::pick_on_fiducial);
+  EXPECT_NE(warnings[0].message.find("P2"), std::string::npos);
+  // In front of a ball in one view alone a pick may well lie.
+  calibrated.fiducials[0][1].centre_in_calibrator.x() += 30;
+  EXPECT_TRUE(picks_on_fiducials(given, calibrated, points).empty());
+}
+
 TEST_F(TwoViews, PointSeenOnceIsNotLocated) {
   std::vector<PointResult> points = {image_point(Bone::femur)};
   points[0].seen[1].reset();

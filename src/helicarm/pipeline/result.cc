@@ -138,6 +138,8 @@ Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
     }
   json["reason"] = point.reason ? Json(code(point.reason->reason)) : Json(nullptr);
   json["message"] = point.reason ? Json(point.reason->message) : Json(nullptr);
+  json["warnings"] = json_list_of(point.warnings);
+  json["notes"] = json_list_of(point.notes);
   json["in_femur"] = place ? optional_vector(place->in_femur) : Json(nullptr);
   json["in_tibia"] = place ? optional_vector(place->in_tibia) : Json(nullptr);
   json["in_tool"] = place ? optional_vector(place->in_tool) : Json(nullptr);
@@ -239,13 +241,17 @@ Json json_of(const std::optional<LearnedIntrinsics>& history) {
 
 }  // namespace
 
+Json json_list_of(std::span<const Failure> failures) {
+  Json list = Json::array();
+  for (const Failure& failure : failures) list.push_back(to_json(failure));
+  return list;
+}
+
 Json to_json(const Result& result) {
   Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
   json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
-  json["warnings"] = Json::array();
-  for (const Warning& warning : result.warnings) json["warnings"].push_back(to_json(warning));
-  json["notes"] = Json::array();
-  for (const Warning& note : result.notes) json["notes"].push_back(to_json(note));
+  json["warnings"] = json_list_of(result.warnings);
+  json["notes"] = json_list_of(result.notes);
   json["calibrator"] = {
       {"name", result.calibrator.name},
       {"tolerance_mm", result.calibrator.tolerance_mm},
@@ -265,6 +271,7 @@ Json to_json(const Result& result) {
   json["version"] = HELICARM_VERSION;
   json["options"] = {{"method", result.options.method == Method::paper ? "paper" : "best"},
                      {"max_error_mm", optional_number(result.options.max_error_mm)},
+                     {"motion_sigma_mm", result.options.motion_sigma_mm},
                      {"threads", result.options.threads}};
   return json;
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,7 @@
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
-#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/localization/error_bound.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/verification/verify.h"
 #include "helicarm/xray/xray_image.h"
@@ -29,6 +30,8 @@ struct RunOptions {
       max_error_mm;      ///< refuse (uncertain) a point whose error exceeds this in more than 5 % of cases
   unsigned threads = 0;  ///< 0: all cores
   std::optional<CArmHistory> history = {};  ///< the C-arm's history, which then serves as a prior
+  /// Motion of an untracked bone between the acquisitions, per axis; enters the covariance of its points.
+  double motion_sigma_mm = 0;
 };
 
 /// All that the stages made of one exposure; what was not reached is absent.
@@ -48,7 +51,9 @@ struct PointResult {
   std::vector<std::optional<ImagePoint>> seen;  ///< one per view
   std::optional<PointInFrames> place;
   double ray_gap_mm = 0;
-  std::optional<Failure> reason;  ///< of an absent place
+  std::optional<Failure> reason;                   ///< of an absent place
+  bool rays_miss = false;                          ///< by more than their errors explain
+  std::vector<Warning> warnings = {}, notes = {};  ///< that concern this point
 };
 
 /// A planned tunnel's start and end, as indices among the points.
@@ -95,5 +100,8 @@ Json to_json(const Result& result);
 
 /// As the key of result.json: code, message, view and figures.
 Json to_json(const Failure& failure);
+
+/// A list of them.
+Json json_list_of(std::span<const Failure> failures);
 
 }  // namespace helicarm

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "helicarm/pipeline/calibration_cache.h"
+#include "helicarm/pipeline/causes.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/simulation/write_case.h"
@@ -162,6 +163,66 @@ TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::plate_mismatch) << result->failure->message;
+}
+
+TEST_F(SimulatedNavigation, ExchangedImagesAreNamedByTheirAngles) {
+  const auto named = [](const Result& result) {
+    return std::ranges::count(result.warnings, Reason::tag_disagrees, &Warning::reason);
+  };
+  EXPECT_EQ(named(*run_case(given_, {})), 0);
+  std::swap(given_.views[0].image, given_.views[1].image);
+  given_.picks.clear();
+  given_.tunnels.clear();
+  given_.tool_lines.clear();
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(named(*result), 2);
+}
+
+TEST_F(SimulatedNavigation, WrongSourceDistanceIsRefusedWithTheOneThatFits) {
+  auto read = read_views(given_, {});
+  ASSERT_TRUE(read.has_value());
+  double right_mm = 0;
+  for (ReadView& view : *read) {
+    XrayImage changed = *view.xray_image;
+    right_mm = *changed.acquisition.source_detector_mm;
+    *changed.acquisition.source_detector_mm *= 1.3;
+    view.xray_image = std::make_shared<const XrayImage>(std::move(changed));
+  }
+  const auto labelled =
+      rectify_views(*read, given_, {})
+          .and_then([&](auto views) { return detect_in_views(std::move(views), given_, {}); })
+          .and_then([&](auto views) { return label_views(std::move(views), given_, {}); });
+  ASSERT_FALSE(labelled.has_value());
+  const Failure failure = with_cause(labelled.error(), given_, {});
+  EXPECT_EQ(failure.reason, labelled.error().failure.reason);
+  ASSERT_TRUE(failure.figures.contains("fitting_source_detector_mm")) << failure.message;
+  EXPECT_NEAR(failure.figures.at("fitting_source_detector_mm") / right_mm, 1, 0.03);
+  EXPECT_NEAR(failure.figures.at("file_source_detector_mm") / right_mm, 1.3, 1e-9);
+}
+
+TEST_F(SimulatedNavigation, WrongPixelSizeIsRefusedWithTheOneThatFits) {
+  auto read = read_views(given_, {});
+  ASSERT_TRUE(read.has_value());
+  XrayImage changed = *read->front().xray_image;
+  const double right_mm = changed.acquisition.pixel_mm->mean();
+  *changed.acquisition.pixel_mm *= 1.15;
+  read->front().xray_image = std::make_shared<const XrayImage>(std::move(changed));
+  const auto rectified = rectify_views(*read, given_, {});
+  ASSERT_FALSE(rectified.has_value());
+  EXPECT_EQ(rectified.error().failure.reason, Reason::plate_mismatch);
+  const Failure failure = with_cause(rectified.error(), given_, {});
+  ASSERT_TRUE(failure.figures.contains("fitting_pixel_mm")) << failure.message;
+  EXPECT_NEAR(failure.figures.at("fitting_pixel_mm") / right_mm, 1, 0.01);
+}
+
+TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsStaysAsItIs) {
+  given_.calibrator = *calibrator_named("udcsc", folder_);
+  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  for (CaseView& view : given_.views) view.mirrored = false;
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result && result->failure);
+  EXPECT_FALSE(result->failure->figures.contains("fitting_source_detector_mm")) << result->failure->message;
 }
 
 TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {

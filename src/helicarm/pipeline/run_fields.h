@@ -11,7 +11,7 @@ namespace helicarm {
 inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
 
 /// What a person may set of a measurement. `--threads` is a flag of all commands.
-inline constexpr std::array<Field<RunOptions>, 3> run_fields{
+inline constexpr std::array<Field<RunOptions>, 4> run_fields{
     bound<&RunOptions::method>({.name = "method",
                                 .flag = "--method",
                                 .range = {0, 1},
@@ -24,6 +24,14 @@ inline constexpr std::array<Field<RunOptions>, 3> run_fields{
                                       .unit = "mm",
                                       .range = {1e-6, 1000},
                                       .help = "Refuse when a point may be off by more, mm (95 %)"}),
+    bound<&RunOptions::motion_sigma_mm>({.name = "motion_sigma_mm",
+                                         .label = "Motion of an untracked bone",
+                                         .flag = "--motion-sigma",
+                                         .unit = "mm",
+                                         .range = {0, 100},
+                                         .help =
+                                             "Standard deviation per axis of the motion of a bone without "
+                                             "poses between the acquisitions, mm"}),
     bound<&RunOptions::threads>(
         {.name = "threads", .range = {0, 1024}, .step = 1, .help = "Threads to use; 0: all cores"})};
 

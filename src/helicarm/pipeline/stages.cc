@@ -7,6 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
+#include "helicarm/pipeline/prior.h"
 #include "helicarm/rectification/usable.h"
 #include "helicarm/xray/read_xray_image.h"
 
@@ -150,6 +151,15 @@ OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> 
     return detect_candidates(*views[i].xray_image, views[i].rectification);
   });
   return joined<DetectedView>(std::move(views), std::move(candidates));
+}
+
+ViewFiducials fiducials_of(const LabelledView& view) {
+  const DistortionMap& map = view.rectification.map;
+  std::vector<Eigen::Vector2d> used;
+  for (const Fiducial& ball : view.fiducials.fiducials)
+    if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
+  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.xray_image, map), view.fiducials.view,
+          map.covariance_px2(used)};
 }
 
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/calibration/calibrate.h"
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
@@ -59,6 +60,9 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
 /// 2.1: each image is searched once.
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
                                                      const RunOptions& options);
+
+/// What the calibration takes of a labelled view.
+ViewFiducials fiducials_of(const LabelledView& view);
 
 /// 2.3.4. Where one view alone leaves its labels ambiguous, the size of the balls in the surest other view
 /// decides.

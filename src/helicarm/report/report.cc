@@ -19,7 +19,7 @@ std::string report_html(const Result& result) {
   html += "<p class=\"notice\">Research instrument, not a medical device.</p>\n</header>\n<main>\n";
   for (const auto section :
        {summary_section, warnings_section, views_section, accuracy_section, points_section, guidance_section,
-        fiducials_section, rectification_section, timing_section})
+        fiducials_section, rectification_section, notes_section, timing_section})
     html += section(result);
   html += fmt::format(
       "</main>\n<footer><p class=\"soft\">helicarm {}, method {}. Units: mm and px; pixel (0, 0) is the "

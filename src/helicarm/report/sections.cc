@@ -117,9 +117,10 @@ std::string points_section(const Result& result) {
     const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
     const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
     const double error = length_at_95(covariance);
+    const std::string gap = fixed(point.ray_gap_mm, 3);
     table.row({escaped(point.name), kind, coordinates(point.place->in_calibrator), fixed(sigma.x(), 3),
                fixed(sigma.y(), 3), fixed(sigma.z(), 3), fixed(error, 3), error_bar(error, largest),
-               fixed(point.ray_gap_mm, 3)});
+               point.rays_miss ? "<span class=\"bad\">" + gap + "</span>" : gap});
   }
   return table.empty() ? std::string{} : headed("Points", table.html());
 }
@@ -215,6 +216,12 @@ std::string timing_section(const Result& result) {
                                     {"total", t.total}})
     if (time) table.row({stage, fixed(time, 1)});
   return table.empty() ? std::string{} : headed("Time", table.html());
+}
+
+std::string notes_section(const Result& result) {
+  std::string html;
+  for (const Warning& note : result.notes) html += "<li>" + message_of(note) + "</li>\n";
+  return html.empty() ? html : headed("Notes: what these data cannot show", "<ul>\n" + html + "</ul>\n");
 }
 
 std::string warnings_section(const Result& result) {

@@ -16,6 +16,7 @@ std::string guidance_section(const Result& result);
 std::string fiducials_section(const Result& result);
 std::string rectification_section(const Result& result);
 std::string timing_section(const Result& result);
+std::string notes_section(const Result& result);
 std::string warnings_section(const Result& result);
 
 }  // namespace helicarm

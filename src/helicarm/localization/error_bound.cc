@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/localization/error_bound.h"
 
 #include <cmath>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/operation/view_of.h"
+#include "helicarm/xray/view_of.h"
 
 #include <algorithm>
 #include <numbers>

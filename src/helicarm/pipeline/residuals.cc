@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/residuals.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace helicarm {
+namespace {
+
+using Kind = ImageChange::Kind;
+
+/// Where an image point would lie without the change.
+Eigen::Vector2d without(const Eigen::Vector2d& uv, Kind kind, double amount, const Eigen::Vector2d& size_px) {
+  const Eigen::Vector2d centre = (size_px - Eigen::Vector2d::Ones()) / 2, from = uv - centre;
+  switch (kind) {
+    case Kind::radial:
+      return centre + from * (1 + amount * from.squaredNorm() / std::pow(size_px.x() / 2, 2));
+    case Kind::scale:
+      return centre + from / (1 + amount);
+    case Kind::aspect:
+      return centre + Eigen::Vector2d(from.x(), from.y() / (1 + amount));
+  }
+  return uv;
+}
+
+std::vector<ViewFiducials> without(std::vector<ViewFiducials> views, const ImageChange& change,
+                                   const std::vector<Eigen::Vector2d>& size_px) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (!change.view || *change.view == i)
+      for (Fiducial& ball : views[i].fiducials)
+        if (ball.status == FiducialStatus::used)
+          ball.uv = without(ball.uv, change.kind, change.amount, size_px[i]);
+  return views;
+}
+
+struct Fit {
+  double chi2;
+  int dof;
+};
+
+std::optional<Fit> fit_of(const std::vector<ViewFiducials>& views, const CommonPrior& common) {
+  CalibrationOptions options;
+  options.common = common;
+  options.rejection_probability = 0;
+  const auto fit = calibrate(views, options);
+  return fit ? std::optional(Fit{fit->chi2, fit->dof}) : std::nullopt;
+}
+
+/// Whether chi2 lies over three standard deviations above its degrees of freedom (Wilson and Hilferty 1931).
+bool is_excessive(double chi2, int dof) {
+  constexpr double most = 3;
+  const double width = 2.0 / (9 * dof);
+  return dof < 1 || (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width) > most;
+}
+
+/// The amount of least chi2, by parabolas through three fits.
+std::optional<ImageChange> fitted(ImageChange change, const std::vector<ViewFiducials>& views,
+                                  const std::vector<Eigen::Vector2d>& size_px, const CommonPrior& common) {
+  constexpr double step = 1e-3;
+  constexpr double most = 0.2;
+  const auto chi2_at = [&](double amount) {
+    ImageChange tried = change;
+    tried.amount = amount;
+    return fit_of(without(views, tried, size_px), common);
+  };
+  for (int round = 0; round < 3; ++round) {
+    const auto below = chi2_at(change.amount - step), at = chi2_at(change.amount),
+               above = chi2_at(change.amount + step);
+    if (!below || !at || !above) return std::nullopt;
+    const double slope = (above->chi2 - below->chi2) / (2 * step);
+    const double bend = (above->chi2 - 2 * at->chi2 + below->chi2) / (step * step);
+    if (!(bend > 0)) return std::nullopt;
+    change.amount -= slope / bend;
+    change.sigma = std::sqrt(2 / bend);
+    if (!(std::abs(change.amount) < most)) return std::nullopt;
+  }
+  const auto at = chi2_at(change.amount);
+  if (!at) return std::nullopt;
+  change.chi2_after = at->chi2;
+  change.dof = at->dof - 1;
+  return change;
+}
+
+Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& views) {
+  const std::string view = change.view ? views[*change.view].name : std::string();
+  const std::map<std::string, double> figures{{"amount", change.amount},
+                                              {"sigma", change.sigma},
+                                              {"chi2_before", change.chi2_before},
+                                              {"chi2_after", change.chi2_after},
+                                              {"dof", double(change.dof)}};
+  const double percent = 100 * change.amount, sigma = 100 * change.sigma;
+  if (change.kind == Kind::radial)
+    return {Reason::residual_distortion,
+            fmt::format(
+                "the fiducials' residuals imply a radial distortion of {:.2g} % (sigma {:.1g}) at half the "
+                "image's width: rectify by a plate or a map",
+                -percent, sigma),
+            view, figures};
+  if (change.kind == Kind::aspect)
+    return {
+        Reason::residual_distortion,
+        fmt::format("the fiducials' residuals imply rows {:.2g} % (sigma {:.1g}) farther apart than the file "
+                    "says: check the pixel spacing",
+                    percent, sigma),
+        view, figures};
+  return {
+      Reason::intrinsics_inconsistent,
+      fmt::format("the fiducials imply an image magnified by {:.4g} (sigma {:.1g}) against the other views: "
+                  "its pixel size or source distance is wrong, or it was resampled",
+                  1 + change.amount, change.sigma),
+      view, figures};
+}
+
+}  // namespace
+
+std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& views,
+                                             const std::vector<Eigen::Vector2d>& size_px,
+                                             const CommonPrior& common) {
+  constexpr double least_fall = 25;
+  const auto plain = fit_of(views, common);
+  if (!plain || !is_excessive(plain->chi2, plain->dof)) return std::nullopt;
+  std::vector<ImageChange> changes{{Kind::radial, {}}, {Kind::aspect, {}}};
+  for (std::size_t i = 0; i < views.size(); ++i) changes.push_back({Kind::scale, i});
+  std::optional<ImageChange> best;
+  for (const ImageChange& change : changes) {
+    auto found = fitted(change, views, size_px, common);
+    if (!found || plain->chi2 - found->chi2_after < least_fall ||
+        is_excessive(found->chi2_after, found->dof) || (best && best->chi2_after <= found->chi2_after))
+      continue;
+    found->chi2_before = plain->chi2;
+    best = found;
+  }
+  return best;
+}
+
+std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
+                                       const CalibrationResult& calibration, const CommonPrior& common) {
+  const bool rejected = std::ranges::any_of(calibration.fiducials, [](const auto& fiducials) {
+    return std::ranges::count(fiducials, FiducialStatus::rejected, &Fiducial::status) > 0;
+  });
+  if (calibration.variance_scale == 1 && !rejected) return {};
+  std::vector<ViewFiducials> fiducials;
+  std::vector<Eigen::Vector2d> size_px;
+  for (const LabelledView& view : views) {
+    fiducials.push_back(fiducials_of(view));
+    size_px.emplace_back(view.xray_image->pixels.width(), view.xray_image->pixels.height());
+  }
+  const auto change = best_image_change(fiducials, size_px, common);
+  return change ? std::vector<Warning>{warning_of(*change, views)} : std::vector<Warning>{};
+}
+
+}  // namespace helicarm

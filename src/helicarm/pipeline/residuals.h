@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/calibration/calibrate.h"
+#include "helicarm/pipeline/stages.h"
+
+namespace helicarm {
+
+/// A change of the images that would explain what the fiducials' residuals contradict.
+struct ImageChange {
+  enum class Kind { radial, scale, aspect } kind;
+  std::optional<std::size_t> view;  ///< nothing: all views alike
+  double amount = 0;                ///< radial: share at half the image's width; scale, aspect: factor - 1
+  double sigma = 0;
+  double chi2_before = 0;
+  double chi2_after = 0;
+  int dof = 0;  ///< after
+};
+
+/// The change of one number that lowers chi2 most, by at least 25 (five standard deviations), and leaves a
+/// chi2 within three standard deviations of its degrees of freedom. Nothing where all labelled fiducials
+/// already fit, or where no such change explains them. `size_px`: of each image (width, height).
+std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& views,
+                                             const std::vector<Eigen::Vector2d>& size_px,
+                                             const CommonPrior& common);
+
+/// Warnings `residual_distortion` (radial distortion, pixels not square) and `intrinsics_inconsistent` (the
+/// magnifications of two views contradict each other) where the residuals imply them.
+std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
+                                       const CalibrationResult& calibration, const CommonPrior& common);
+
+}  // namespace helicarm
