@@ -101,7 +101,7 @@ std::vector<int> pair_up(const Scene& scene, const View& view, double gate_px, c
       const auto& candidate = scene.candidates[i];
       const Eigen::Vector2d off = candidate.uv - uv;
       if (!(off.squaredNorm() < gate_px * gate_px)) continue;
-      const double cost = cost_of(k, candidate, off);
+      const double cost = cost_of(k, i, off);
       if (cost < infinity &&
           scale_by_radius(scene, candidate, scene.balls[k], radius_sigmas).holds(depth / view.intrinsics.fy))
         pairs.push_back({cost, static_cast<int>(k), static_cast<int>(i)});
@@ -123,13 +123,12 @@ std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
   std::vector<Eigen::Matrix2d> doubt(scene.balls.size(), Eigen::Matrix2d::Zero());
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
     if (h.candidate_of_ball[k] < 0) doubt[k] = prediction_covariance(h.fit, scene.balls[k].centre);
-  return pair_up(scene, h.fit.view, rough_gate_px(scene),
-                 [&](std::size_t k, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-                   const double noise = candidate.sigma_px * candidate.sigma_px;
-                   const double cost =
-                       off.dot((noise * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
-                   return cost < match_sigmas * match_sigmas ? cost : infinity;
-                 });
+  return pair_up(
+      scene, h.fit.view, rough_gate_px(scene), [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
+        const double sigma = match_sigma_px(scene, h.fit.view, k, i);
+        const double cost = off.dot((sigma * sigma * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
+        return cost < match_sigmas * match_sigmas ? cost : infinity;
+      });
 }
 
 /// Squared distance of a ball from where the others put it, in sigmas: its residual, studentised.
@@ -137,7 +136,8 @@ double variation2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
   const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
   const Eigen::Vector3d& centre = scene.balls[ball].centre;
   const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
-  const double noise = seen.sigma_px * seen.sigma_px;
+  const double sigma = match_sigma_px(scene, h.fit.view, ball, std::size_t(h.candidate_of_ball[ball]));
+  const double noise = sigma * sigma;
   constexpr double unchecked = 1e-3;  // a ball that alone holds the fit by one end is never off
   const Eigen::Matrix2d spread =
       (1 + unchecked) * noise * Eigen::Matrix2d::Identity() - prediction_covariance(h.fit, centre);
@@ -159,13 +159,22 @@ std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) 
 
 }  // namespace
 
+double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, std::size_t candidate) {
+  const double own = scene.candidates[candidate].sigma_px;
+  const double of_ball = scene.balls[ball].sigma_mm;
+  if (of_ball == 0) return own;
+  return std::hypot(own, of_ball * view.intrinsics.fy / view.camera_from_world.translation.z());
+}
+
 std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
-                                                       const std::vector<int>& candidate_of_ball) {
+                                                       const std::vector<int>& candidate_of_ball,
+                                                       const View& view) {
   std::vector<WeightedCorrespondence> correspondences;
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     if (candidate_of_ball[k] < 0) continue;
     const auto& seen = scene.candidates[candidate_of_ball[k]];
-    correspondences.push_back({scene.balls[k].centre, seen.uv, seen.sigma_px});
+    correspondences.push_back(
+        {scene.balls[k].centre, seen.uv, match_sigma_px(scene, view, k, std::size_t(candidate_of_ball[k]))});
   }
   return correspondences;
 }
@@ -179,10 +188,10 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
-  return pair_up(scene, view, gate_px,
-                 [](std::size_t, const BallCandidate& candidate, const Eigen::Vector2d& off) {
-                   return off.squaredNorm() / (candidate.sigma_px * candidate.sigma_px);
-                 });
+  return pair_up(scene, view, gate_px, [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
+    const double sigma = match_sigma_px(scene, view, k, i);
+    return off.squaredNorm() / (sigma * sigma);
+  });
 }
 
 Hypothesis settle(const Scene& scene, const View& rough, int least) {
@@ -197,7 +206,7 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
     auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
     if (turn > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
-    auto correspondences = correspondences_of(scene, h.candidate_of_ball);
+    auto correspondences = correspondences_of(scene, h.candidate_of_ball, h.fit.view);
     h.matched = static_cast<int>(correspondences.size());
     if (h.matched < least) return h;
     if (!narrow) test_the_far(correspondences, h.fit.view, gate_px);
@@ -214,7 +223,7 @@ Hypothesis settle(const Scene& scene, const View& rough, int least) {
 }
 
 void weigh(const Scene& scene, Hypothesis& h) {
-  const auto correspondences = correspondences_of(scene, h.candidate_of_ball);
+  const auto correspondences = correspondences_of(scene, h.candidate_of_ball, h.fit.view);
   h.matched = static_cast<int>(correspondences.size());
   h.residual2_px2 = 0;
   for (const auto& s : correspondences) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
@@ -227,7 +236,8 @@ std::vector<int> inflated(const Scene& scene, const Hypothesis& h) { return beyo
 
 Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
   h.candidate_of_ball[ball] = -1;
-  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
+  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, h.fit.view), scene.camera,
+                   fit_steps);
   return h;
 }
 
@@ -236,7 +246,8 @@ std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int b
   for (int& named : all.candidate_of_ball)
     if (named == candidate) named = -1;
   all.candidate_of_ball[ball] = candidate;
-  all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+  all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball, h.fit.view), scene.camera,
+                     fit_steps);
   std::vector<Hypothesis> rivals{all};
   for (const int other : inflated(scene, all)) {
     if (other == ball) continue;

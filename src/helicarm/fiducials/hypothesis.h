@@ -16,11 +16,15 @@ struct BallCandidate {
   double sigma_px;     ///< per axis
   double radius_px;
   double radius_sigma_px;  ///< without the bias common to all
+  /// Per axis, with what the distortion map is known to leave at this place; 0: only the general figure is
+  /// known.
+  double own_sigma_px = 0;
 };
 
 struct ModelBall {
   Eigen::Vector3d centre;  ///< mm, from the calibrator's centroid
   double radius_mm;
+  double sigma_mm = 0;  ///< of the centre, per axis
 };
 
 /// One X-ray as the labelling sees it.
@@ -65,9 +69,14 @@ std::vector<int> match(const Scene& scene, const View& view, double gate_px);
 
 constexpr int fit_steps = 10;  ///< at most
 
-/// The matched balls, as a fit wants them.
+/// Per axis, px: the candidate's own error and that of the ball's place in the file, seen at the calibrator's
+/// distance.
+double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, std::size_t candidate);
+
+/// The matched balls, as a fit near `view` wants them.
 std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
-                                                       const std::vector<int>& candidate_of_ball);
+                                                       const std::vector<int>& candidate_of_ball,
+                                                       const View& view);
 
 /// How far a pose from three points may err at the others.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }

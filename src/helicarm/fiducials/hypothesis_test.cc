@@ -49,7 +49,8 @@ TEST(Hypothesis, DoubtIsTheDistanceFromAFitToTheOthers) {
     ASSERT_EQ(h.matched, off_px > 2.5 ? 11 : 12);
     Hypothesis all = h;
     all.candidate_of_ball[4] = 4;
-    all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball), scene.camera, fit_steps);
+    all.fit =
+        fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball, view), scene.camera, fit_steps);
     const auto balls = inflated(scene, all);
     const PoseFit others = without(scene, all, 4).fit;
     const Eigen::Vector2d off = scene.candidates[4].uv - others.view.project(scene.balls[4].centre);
@@ -76,7 +77,7 @@ TEST(Hypothesis, AnOutlierInAHiddenBallsSteadIsARivalsLoss) {
   Hypothesis h = settle(scene, view);
   h.candidate_of_ball.assign(12, -1);
   for (const int k : {0, 2, 5, 7, 9, 11}) h.candidate_of_ball[k] = k;
-  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball), scene.camera, fit_steps);
+  h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, view), scene.camera, fit_steps);
   const auto rivals = with_pair(scene, h, 4, 4);
   EXPECT_TRUE(std::any_of(rivals.begin(), rivals.end(), [](const Hypothesis& rival) {
     return rival.candidate_of_ball[4] == 4 && rival.candidate_of_ball[7] == -1 && rival.matched == 6;

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/fiducials/rivals.h"
 #include "helicarm/fiducials/search.h"
 
 namespace helicarm {
@@ -15,15 +16,6 @@ namespace {
 
 constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
 constexpr std::size_t most_loose = 24;  // poses; a calibrator much like the file's supports the first of them
-constexpr std::size_t most_candidates = 16;  // that the search is measured by
-constexpr int many_balls = 8;
-
-/// So many that `balls` balls among the candidates escape with a chance below 1e-3.
-std::size_t triples_to_meet(int balls, std::size_t candidates) {
-  const double n = static_cast<double>(std::min(candidates, most_candidates));
-  return static_cast<std::size_t>(std::log(1e3) * n * (n - 1) * (n - 2) /
-                                  (balls * (balls - 1) * (balls - 2)));
-}
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -35,8 +27,12 @@ Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& c
                const LabellingPrior& prior, const LabellingOptions& options) {
   Scene scene;
   const Eigen::Vector3d centre = centroid(calibrator);
-  for (const auto& ball : calibrator.balls) {
-    scene.balls.push_back({ball.centre_in_calibrator - centre, ball.diameter_mm / 2});
+  const auto covariances = ball_covariances(calibrator);
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const CalibratorBall& ball = calibrator.balls[k];
+    const double stated = covariances.empty() ? 0 : std::sqrt(covariances[k].trace() / 3);
+    scene.balls.push_back(
+        {ball.centre_in_calibrator - centre, ball.diameter_mm / 2, std::hypot(stated, options.tolerance_mm)});
   }
   scene.candidates = candidates;
   for (auto& candidate : scene.candidates) {
@@ -87,7 +83,8 @@ void drop_covered(const Scene& scene, Hypothesis& h) {
     const Eigen::Vector2d uv = h.fit.view.project(scene.balls[k].centre);
     for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
       const auto& other = scene.candidates[i];
-      uncertain |= static_cast<int>(i) != named[k] && (other.uv - uv).norm() < 5 * other.sigma_px;
+      uncertain |= static_cast<int>(i) != named[k] &&
+                   (other.uv - uv).norm() < 5 * match_sigma_px(scene, h.fit.view, k, i);
     }
     if (uncertain) h.candidate_of_ball[k] = -1;
   }
@@ -191,11 +188,36 @@ std::optional<Failure> objection(const LabelSearch& search, const LabellingOptio
   return std::nullopt;
 }
 
+/// Rivals whose log odds are less by up to so many times what is asked for are compared by the candidates'
+/// own errors, too: one more ball that fits badly may outweigh a rival that fits well.
+constexpr double contest_width = 3;
+
+/// The best hypothesis, or one almost as good that contradicts it and is surely better by the candidates' own
+/// errors.
+Hypothesis finest(const LabelSearch& search, const LabellingOptions& options) {
+  const Hypothesis* best = &search.ranking().front();
+  for (const Hypothesis& rival : search.ranking()) {
+    if (search.ranking().front().log_odds - rival.log_odds >= contest_width * options.least_log_odds) break;
+    if (rival.matched < least_balls || !contradicts(rival, *best)) continue;
+    if (fine_margin(search.scene(), rival, *best).value_or(0) >= options.least_log_odds) best = &rival;
+  }
+  return *best;
+}
+
+/// Whether `rival` cannot be told from `h` for sure.
+bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double asked) {
+  const double margin = h.log_odds - rival.log_odds;
+  if (margin >= contest_width * asked) return false;
+  const auto fine = fine_margin(scene, h, rival);
+  if (!fine) return margin < asked;
+  return *fine < (margin < asked ? asked : 0);
+}
+
 /// The best hypothesis less the balls in doubt and whatever an almost as good one contradicts; refused when
 /// too little remains.
 Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& options) {
   const Scene& scene = search.scene();
-  Hypothesis best = search.ranking().front();
+  Hypothesis best = finest(search, options);
   const int dof = 2 * best.matched - 6;
   // Where chi2 is larger than chance makes it (by 1.5 sigma), the odds are less sure in the same measure.
   const double asked =
@@ -209,23 +231,24 @@ Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& opt
     weigh(scene, best);
     search.try_near_misses(best);
   }
-  const double log_odds = best.log_odds;
+  const Hypothesis full = best;
   drop_covered(scene, best);
   if (count_named(best) < least_balls) return too_few(count_named(best), n);
   for (const auto& rival : search.ranking()) {
-    if (log_odds - rival.log_odds >= asked) break;
+    if (full.log_odds - rival.log_odds >= contest_width * asked) break;
+    if (!contradicts(rival, best) || !is_close(scene, full, rival, asked)) continue;
     if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
     if (rival.mirrored() != best.mirrored() || count_named(best) < least_balls) {
       return fail(Reason::ambiguous_labels, "another labelling explains the image almost as well",
                   {{"matched", matched},
                    {"runner_up_matched", rival.matched},
                    {"mirror_differs", rival.mirrored() != best.mirrored()},
-                   {"margin", log_odds - rival.log_odds},
+                   {"margin", full.log_odds - rival.log_odds},
                    {"margin_needed", asked}});
     }
   }
-  best.fit =
-      fit_pose(best.fit.view, correspondences_of(scene, best.candidate_of_ball), scene.camera, fit_steps);
+  best.fit = fit_pose(best.fit.view, correspondences_of(scene, best.candidate_of_ball, best.fit.view),
+                      scene.camera, fit_steps);
   return best;
 }
 
@@ -237,12 +260,12 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
-  // A few balls may be part of many under other names: these are then met first.
-  explore(
-      search, triples_to_meet(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {
-        return surely(h, options) && (h.matched >= many_balls || h.log_odds >= 2 * options.least_log_odds ||
-                                      tried >= triples_to_meet(many_balls, candidates.size()));
-      });
+  // A labelling of as many balls, less one, would have been met.
+  explore(search, triples_to_meet(least_balls, candidates.size()),
+          [&](const Hypothesis& h, std::size_t tried) {
+            return surely(h, options) &&
+                   tried >= triples_to_meet(std::max(least_balls, h.matched - 1), candidates.size());
+          });
   if (!search.ranking().empty()) challenge(search);
   auto failure = objection(search, options);
   if (failure) return tl::unexpected(*std::move(failure));

@@ -28,6 +28,8 @@ struct LabellingPrior {
 };
 
 struct LabellingOptions {
+  double tolerance_mm =
+      0;  ///< of the balls' places, per axis, in addition to what the calibrator's file states
   double systematic_sigma =
       4e-4;                     ///< left by rectification, in field radii, per axis; adds to each candidate's
   double least_log_odds = 9.2;  ///< ln of the odds asked for, against chance and against any other labelling

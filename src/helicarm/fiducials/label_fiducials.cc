@@ -22,6 +22,8 @@ constexpr double paper_systematic = 2e-3;  // of the field radius: what a quadra
 constexpr double shared_bias_sigma = 0.008;
 constexpr double sigma_floor_px = 0.02;
 constexpr double rescue_reach_px = 4;
+constexpr double tolerance_sigmas = 3.3;      // as far as a labelled ball may lie off
+constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that was never measured
 
 /// Dots that may be balls of the calibrator, the clearest first.
 std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionMap& map,
@@ -51,6 +53,12 @@ LabellingPrior prior_of(const XrayImage& xray_image, const DistortionMap& map) {
   return prior;
 }
 
+/// Of a ball's image, rectified, per axis.
+double sigma_of(const Dot& dot, const DistortionMap& map, const Vector2d& uv) {
+  const double map_sigma = map.sigma_px(uv);
+  return std::sqrt(dot.error_px() * dot.error_px() + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
+}
+
 double predicted_radius(const View& view, const CalibratorBall& ball) {
   return 0.5 * ball.diameter_mm * std::abs(view.intrinsics.fy) / view.depth(ball.centre_in_calibrator);
 }
@@ -76,12 +84,12 @@ class BallFitter {
   }
 
   /// A ball at its predicted place, or nothing where the pixels do not show one.
-  std::optional<Dot> rescue(const Vector2d& raw, double radius) const {
+  std::optional<Dot> rescue(const Vector2d& raw, double radius, double reach_px) const {
     Dot start;
     start.centre_px = raw;
     start.radius_px = radius;
     const auto dot = fit(start);
-    return dot && is_plausible(*dot, start, typical_contrast_) ? dot : std::nullopt;
+    return dot && is_plausible(*dot, start, typical_contrast_, reach_px) ? dot : std::nullopt;
   }
 
   bool is_black(const Vector2d& raw) const {
@@ -121,9 +129,7 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
   fiducial.status = FiducialStatus::used;
   fiducial.uv_raw = raw;
   fiducial.uv = *uv;
-  const double map_sigma = map.sigma_px(*uv);
-  fiducial.sigma_px =
-      std::sqrt(dot.error_px() * dot.error_px() + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
+  fiducial.sigma_px = sigma_of(dot, map, *uv);
 }
 
 /// In the paper's mode a ball lies where the Hough transform sees its circle.
@@ -151,8 +157,8 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm) {
   return {1.03 * 0.5 * least / pixel_mm, 2.7 * 0.5 * most / pixel_mm};
 }
 
-bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast) {
-  return (fitted.centre_px - predicted.centre_px).norm() <= rescue_reach_px && fitted.sigma_px <= 0.4 &&
+bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast, double reach_px) {
+  return (fitted.centre_px - predicted.centre_px).norm() <= reach_px && fitted.sigma_px <= 0.4 &&
          std::abs(fitted.radius_px / predicted.radius_px - 1) <= 0.12 && fitted.misfit <= 0.35 &&
          fitted.contrast * typical_contrast >= 0 &&
          std::abs(fitted.contrast) >= 0.25 * std::abs(typical_contrast);
@@ -167,7 +173,8 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
   std::vector<BallCandidate> rectified;
   for (const Dot& ball : balls) {
     const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
-    rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1});
+    rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1,
+                         sigma_of(ball, map, uv)});
   }
   LabellingOptions labelling_options;
   if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
@@ -177,7 +184,15 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
     prior.radius_bias = *options.radius_bias;
     prior.radius_bias_sigma = shared_bias_sigma;
   }
-  const auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
+  auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
+  if (!labelling && labelling.error().reason == Reason::calibrator_mismatch &&
+      calibrator.tolerance_mm < printed_tolerance_mm) {
+    labelling_options.tolerance_mm = printed_tolerance_mm;
+    if (auto loose = label_balls(calibrator, rectified, prior, labelling_options))
+      labelling = std::move(loose);
+    else
+      labelling_options.tolerance_mm = 0;
+  }
   if (!labelling) return tl::unexpected<Failure>(labelling.error());
 
   LabelledFiducials found;
@@ -187,10 +202,12 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
   found.runner_up_matched = labelling->runner_up_matched;
   found.runner_up_rms_px = labelling->runner_up_rms_px;
   found.radius_bias = labelling->radius_bias;
+  found.assumed_tolerance_mm = labelling_options.tolerance_mm;
   std::vector<Dot> named;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
   const BallFitter fitter(xray_image, rectification, candidates, named);
+  const double tolerance_mm = std::hypot(calibrator.tolerance_mm, labelling_options.tolerance_mm);
   const std::vector<Dot> circles =
       method == Method::paper ? hough_circles(xray_image, named) : std::vector<Dot>{};
 
@@ -206,7 +223,8 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
     if (candidate >= 0)
       dot = fitter.fit(balls[static_cast<std::size_t>(candidate)]);
     else if (inside(xray_image, raw, 2))
-      dot = fitter.rescue(raw, radius);
+      dot = fitter.rescue(raw, radius,
+                          rescue_reach_px + tolerance_sigmas * tolerance_mm * 2 * radius / ball.diameter_mm);
     if (dot && method == Method::paper) dot = circle_near(circles, *dot);
     if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
     if (fiducial.status != FiducialStatus::used)

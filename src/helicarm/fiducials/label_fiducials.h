@@ -24,6 +24,9 @@ struct LabelledFiducials {
   int runner_up_matched = 0;  ///< balls that the best other one names; 0: there is none
   double runner_up_rms_px = 0;
   double radius_bias = 0;  ///< of the balls' radii in the image, relative
+  /// Per axis, that was assumed of the balls' places beyond what the file states, because the labels cannot
+  /// be found without.
+  double assumed_tolerance_mm = 0;
   std::vector<Warning> warnings;
 };
 
@@ -33,7 +36,7 @@ Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
 
 /// Whether what was fitted where a pose puts a ball is believed to be it: near the place, of the size, the
 /// polarity and a quarter of the contrast at least that the other balls have.
-bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast);
+bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast, double reach_px = 4);
 
 struct FiducialOptions {
   Method method = Method::best;

@@ -6,13 +6,22 @@
 #include <numeric>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/three_point.h"
 
 namespace helicarm {
 namespace {
 
-constexpr std::size_t most_kept = 24;  // hypotheses
+constexpr std::size_t most_kept = 24;        // hypotheses
+constexpr std::size_t most_candidates = 16;  // that the search is measured by
+
+Eigen::Matrix3d principal_axes_of(const std::vector<ModelBall>& balls) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const ModelBall& ball : balls) spread += ball.centre * ball.centre.transpose();
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+}
 
 /// Every item in turn, in random company, so that none is left out for long.
 class TripleDealer {
@@ -42,6 +51,7 @@ LabelSearch::LabelSearch(const Scene& scene, std::vector<double> focals_px)
     : scene_(scene),
       focals_px_(std::move(focals_px)),
       flat_px_(0.04 * scene.field_radius_px),
+      principal_axes_(principal_axes_of(scene.balls)),
       filter_(scene) {}
 
 bool LabelSearch::try_triple(std::array<int, 3> candidates) {
@@ -119,6 +129,26 @@ void LabelSearch::try_near_misses(const Hypothesis& h) {
   }
 }
 
+void LabelSearch::try_twins(const Hypothesis& h) {
+  const Eigen::Vector3d flip(-1, 1, 1);  // of a mirrored image
+  for (int which = 1; which < 16; ++which) {
+    const auto sign = [&](int bit) { return which >> bit & 1 ? -1.0 : 1.0; };
+    const Eigen::Vector3d along_axes(sign(0), sign(1), sign(2)), in_depth(1, 1, sign(3));
+    View twin = h.fit.view;
+    RigidTransform& pose = twin.camera_from_world;
+    pose.rotation = in_depth.asDiagonal() * pose.rotation * principal_axes_ * along_axes.asDiagonal() *
+                    principal_axes_.transpose();
+    const bool flips = along_axes.prod() * in_depth.z() < 0;
+    if (flips) {
+      twin.intrinsics.fx *= -1;
+      pose.rotation = flip.asDiagonal() * pose.rotation;
+      pose.translation = flip.asDiagonal() * pose.translation;
+    }
+    if (scene_.mirrored && *scene_.mirrored != (twin.intrinsics.fx < 0)) continue;
+    keep(settle(scene_, twin, wanted()));
+  }
+}
+
 void LabelSearch::keep(Hypothesis hypothesis) {
   if (!std::isfinite(hypothesis.log_odds)) return;
   const auto same = std::find_if(ranking_.begin(), ranking_.end(), [&](const Hypothesis& other) {
@@ -134,6 +164,12 @@ void LabelSearch::keep(Hypothesis hypothesis) {
                        [](const Hypothesis& p, const Hypothesis& q) { return p.log_odds > q.log_odds; });
   ranking_.insert(place, std::move(hypothesis));
   if (ranking_.size() > most_kept) ranking_.pop_back();
+}
+
+std::size_t triples_to_meet(int balls, std::size_t candidates) {
+  const double n = static_cast<double>(std::min(candidates, most_candidates));
+  const double b = std::min(static_cast<double>(balls), n);
+  return static_cast<std::size_t>(std::ceil(std::log(1e3) * n * (n - 1) * (n - 2) / (b * (b - 1) * (b - 2))));
 }
 
 void explore(LabelSearch& search, std::size_t triples,
@@ -159,6 +195,7 @@ void challenge(LabelSearch& search) {
       done += search.try_triple(dealer.deal()) ? 1 : 0;
     }
     search.try_near_misses(Hypothesis(search.ranking().front()));
+    search.try_twins(Hypothesis(search.ranking().front()));
   } while (search.ranking().front().candidate_of_ball != best);
 }
 

@@ -30,6 +30,11 @@ class LabelSearch {
   /// all. A false disc in a hidden ball's stead can bend the fit until a true one is missed.
   void try_near_misses(const Hypothesis& h);
 
+  /// Settles the poses that show nearly the same as `h` from afar, whatever the calibrator: turned back to
+  /// front in a mirrored image, and mirrored or turned about its principal axes, which keep a flat or
+  /// symmetric calibrator's balls about where they are.
+  void try_twins(const Hypothesis& h);
+
   const Ranking& ranking() const { return ranking_; }
 
   /// The poses met that have candidates near at least `wanted` balls, best supported first, up to `most`.
@@ -49,13 +54,17 @@ class LabelSearch {
 
   const Scene& scene_;
   std::vector<double> focals_px_;
-  double flat_px_;  ///< least height of an image triangle
+  double flat_px_;                  ///< least height of an image triangle
+  Eigen::Matrix3d principal_axes_;  ///< of the balls, columns
   HypothesisFilter filter_;
   std::set<std::array<int, 3>> triples_;  ///< tried
   std::set<std::vector<int>> tried_;      ///< matches of the poses settled
   std::vector<Rough> met_;
   Ranking ranking_;
 };
+
+/// So many random triples that `balls` balls among the candidates escape with a chance below 1e-3.
+std::size_t triples_to_meet(int balls, std::size_t candidates);
 
 /// Tries up to `triples` random triples of the candidates, until the best hypothesis will do after so many.
 void explore(LabelSearch& search, std::size_t triples,
