@@ -8,7 +8,9 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/outliers.h"
+#include "helicarm/calibration/strain.h"
 #include "helicarm/geometry/ray.h"
 
 namespace helicarm {
@@ -141,12 +143,6 @@ void warn_of_few(CalibrationResult& result) {
   }
 }
 
-/// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
-double excess_of(double chi2, int dof) {
-  const double width = 2.0 / (9 * dof);
-  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
-}
-
 void inflate_if_inconsistent(CalibrationResult& result) {
   if (result.dof < 1 || excess_of(result.chi2, result.dof) < inconsistent_sigmas) return;
   result.variance_scale = result.chi2 / result.dof;
@@ -179,6 +175,60 @@ void add_scale_error(CalibrationResult& result, double scale_sigma) {
     result.views[i].covariance = block_of(result.joint_covariance, i);
 }
 
+/// The stretching of the calibrator that the views imply, where it is more than chance: chi-square of five
+/// degrees of freedom at three sigma.
+void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
+  constexpr double chi2_at_3_sigma = 18.2;
+  if (clean.problems.size() < 2 || clean.fit.dof < 6) return;
+  const Strain strain = strain_of(clean.problems, clean.fit);
+  const double left = std::max(1.0, (clean.fit.chi2 - strain.chi2_gain) / (clean.fit.dof - 5));
+  if (strain.chi2_gain / left < chi2_at_3_sigma) return;
+  result.warnings.push_back(
+      {Reason::calibrator_strained,
+       fmt::format(
+           "the views fit a calibrator that is {:.2g} % {} along ({:.2f}, {:.2f}, {:.2f}) than in its file: "
+           "measure it, or check the image's pixel aspect",
+           100 * std::abs(strain.extension), strain.extension > 0 ? "longer" : "shorter", strain.axis.x(),
+           strain.axis.y(), strain.axis.z()),
+       {},
+       {{"per_cent", 100 * strain.extension},
+        {"x", strain.axis.x()},
+        {"y", strain.axis.y()},
+        {"z", strain.axis.z()},
+        {"chi2_gain", strain.chi2_gain / left}}});
+}
+
+/// How far the balls are from the file, as estimated.
+void tell_offsets(CalibrationResult& result, const CleanFit& clean) {
+  result.ball_rms_mm = rms_offset_mm(clean.problems, clean.fit);
+  constexpr double least_worth_telling_mm = 0.02;
+  if (result.ball_rms_mm < least_worth_telling_mm) return;
+  Warning told{Reason::calibrator_deviates,
+               fmt::format("the balls are {:.2g} mm rms from the calibrator's file: measure the phantom",
+                           result.ball_rms_mm),
+               {},
+               {{"rms_mm", result.ball_rms_mm}}};
+  if (result.found_tolerance_mm > 0) told.figures["tolerance_found_mm"] = result.found_tolerance_mm;
+  (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(told));
+}
+
+/// The fit without false balls; with the balls off their places where only that explains the residuals.
+Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const CalibrationOptions& options,
+                             double& found_tolerance_mm) {
+  auto clean =
+      refine_without_outliers(problems, options.common, options.rejection_probability, least_fiducials);
+  const bool as_in_file = options.common.ball_covariance_mm2.empty();
+  if (!clean || !as_in_file || problems.size() < 2 || options.rejection_probability <= 0 ||
+      clean->fit.dof < 1)
+    return clean;
+  if (excess_of(clean->fit.chi2, clean->fit.dof) < inconsistent_sigmas && !rejects_many(*clean, problems))
+    return clean;
+  auto offsets = fit_ball_offsets(problems, options.common, options.rejection_probability, least_fiducials);
+  if (!offsets) return clean;
+  found_tolerance_mm = offsets->tolerance_mm;
+  return std::move(offsets->clean);
+}
+
 /// A joint fit that failed names no view: a start that misses its own balls tells which one is at fault.
 tl::unexpected<Failure> blame(const std::vector<ViewFiducials>& views,
                               const std::vector<ViewProblem>& problems, const Failure& failure,
@@ -203,8 +253,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     problems.push_back(*std::move(problem));
     result.fiducials.push_back(view.fiducials);
   }
-  const auto clean =
-      refine_without_outliers(problems, options.common, options.rejection_probability, least_fiducials);
+  const auto clean = clean_fit(problems, options, result.found_tolerance_mm);
   if (!clean) return blame(views, problems, clean.error(), options);
   const Refinement& fit = clean->fit;
   result.chi2 = fit.chi2;
@@ -238,6 +287,8 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   inflate_if_inconsistent(result);
   add_scale_error(result, options.common.scale_sigma);
   warn_of_few(result);
+  warn_of_strain(result, *clean);
+  tell_offsets(result, *clean);
   return result;
 }
 

@@ -35,15 +35,21 @@ struct CalibrationResult : Calibration {
   std::vector<std::vector<Fiducial>> fiducials;  ///< per view, with residuals; false balls marked `rejected`
   double chi2 = 0;
   int dof = 0;
-  double variance_scale = 1;      ///< by which the covariance was enlarged as chi2 belies the balls' sigmas
-  std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (belied sigmas)
+  double variance_scale = 1;  ///< by which the covariance was enlarged as chi2 belies the balls' sigmas
+  /// Per axis, of the balls' places, where the residuals ask for more than the calibrator's file states.
+  double found_tolerance_mm = 0;
+  double ball_rms_mm = 0;  ///< of the balls' estimated distances from the file; 0: they are taken as exact
+  std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (belied sigmas), calibrator_strained,
+                                  ///< calibrator_deviates
+  std::vector<Warning> notes;     ///< calibrator_deviates, within the stated tolerance
 };
 
 /// Pinhole views without skew by maximum likelihood, all views at once, under the priors. False balls are
 /// found by peeling off the worst one by one and testing which removals mattered (Rosner 1983); at least 6
-/// are kept in each view. Refuses, naming the view: `too_few_fiducials`, `coplanar_fiducials`,
-/// `behind_source`, `uncertain` (the balls leave the view open), `residual_too_large`; `bad_value` for a
-/// sigma that is not positive.
+/// are kept in each view. Where the file states no tolerance and the residuals are inconsistent, the balls
+/// may lie off their places by the same amount in all views (`fit_ball_offsets`). Refuses, naming the view:
+/// `too_few_fiducials`, `coplanar_fiducials`, `behind_source`, `uncertain` (the balls leave the view open),
+/// `residual_too_large`; `bad_value` for a sigma that is not positive.
 Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
                                       const CalibrationOptions& options);
 

@@ -55,6 +55,10 @@ std::string_view code(Reason reason) {
       return "residual_too_large";
     case Reason::uncertain:
       return "uncertain";
+    case Reason::ambiguous_handedness:
+      return "ambiguous_handedness";
+    case Reason::scale_disagrees:
+      return "scale_disagrees";
     case Reason::patient_mismatch:
       return "patient_mismatch";
     case Reason::parallel_rays:
@@ -117,6 +121,14 @@ std::string_view code(Reason reason) {
       return "uid_reused";
     case Reason::few_fiducials:
       return "few_fiducials";
+    case Reason::calibrator_strained:
+      return "calibrator_strained";
+    case Reason::calibrator_deviates:
+      return "calibrator_deviates";
+    case Reason::ball_displaced:
+      return "ball_displaced";
+    case Reason::scale_unverified:
+      return "scale_unverified";
     case Reason::rules_broken:
       return "rules_broken";
     case Reason::unobservable_motion:

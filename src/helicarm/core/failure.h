@@ -42,6 +42,8 @@ enum class Reason {
   views_too_close,
   residual_too_large,
   uncertain,
+  ambiguous_handedness,
+  scale_disagrees,
   patient_mismatch,
   parallel_rays,
   point_at_infinity,
@@ -79,6 +81,10 @@ enum class Reason {
   pick_on_fiducial,
   intrinsics_inconsistent,
   residual_distortion,
+  calibrator_strained,
+  calibrator_deviates,
+  ball_displaced,
+  scale_unverified,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

@@ -20,6 +20,7 @@ struct Fiducial {
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< rectified
   double sigma_px = 0;                           ///< per axis, rectified
   double residual_px = 0;                        ///< distance to the calibrated view's projection
+  double radius_px = 0;                          ///< as seen, rectified
 };
 
 }  // namespace helicarm

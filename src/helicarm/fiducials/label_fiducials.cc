@@ -130,6 +130,7 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
   fiducial.uv_raw = raw;
   fiducial.uv = *uv;
   fiducial.sigma_px = sigma_of(dot, map, *uv);
+  fiducial.radius_px = dot.radius_px / std::sqrt(std::abs(map.jacobian(*uv).determinant()));
 }
 
 /// In the paper's mode a ball lies where the Hough transform sees its circle.

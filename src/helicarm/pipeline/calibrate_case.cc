@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "helicarm/pipeline/causes.h"
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/residuals.h"
 #include "helicarm/pipeline/stopwatch.h"
@@ -89,7 +90,9 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
 /// 2.2, Eq. 4-7: all views together, or each alone by the published recipe.
 OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
                                            const RunOptions& options) {
-  auto calibration = calibrated(views, given, options);
+  auto calibration = calibrated(views, given, options).and_then([&](CaseCalibration done) {
+    return check_calibrator(std::move(done), views, given);
+  });
   if (!calibration) {
     Refusal refusal{calibration.error(), {}};
     for (const LabelledView& view : views) refusal.views.push_back(reported(view));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/locate_case.h"
 
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/points.h"
 #include "helicarm/pipeline/stopwatch.h"
@@ -49,6 +50,7 @@ Result begun(const Case& given, const CaseCalibration& calibration, const RunOpt
   }
   Result result = begun(given, options, std::move(views));
   append(result.warnings, calibration.warnings);
+  append(result.notes, calibration.notes);
   result.joint_covariance = calibration.joint_covariance;
   result.history = calibration.history;
   result.entries = calibration.entries;
@@ -73,6 +75,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   if (!located) return tl::unexpected<Failure>(located.error());
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
   append(result.warnings, diagnose(given, result));
+  append(result.notes, scale_notes(given, calibration, result.points));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   const auto done =
       plan_tunnels(given, result)  // Eq. 16

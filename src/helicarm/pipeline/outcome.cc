@@ -143,15 +143,6 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
            {},
            {{"views", double(rejected)}}});
   }
-  bool all_mirrored = true;
-  for (std::size_t i = 0; i < result.views.size(); ++i)
-    all_mirrored &= result.views[i].found->mirrored && !given.views[i].mirrored &&
-                    !result.views[i].xray_image->acquisition.flip_hint;
-  if (all_mirrored)
-    warnings.push_back({Reason::tag_disagrees,
-                        "all images look mirrored and no file says so: is the calibrator's file mirrored?",
-                        {},
-                        {}});
   return warnings;
 }
 

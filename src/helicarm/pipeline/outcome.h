@@ -33,7 +33,7 @@ std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
 std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views);
 
 /// Diagnostics of a calibrated case: check targets far from their places, balls out of place in several
-/// views, a calibrator's file that may be mirrored.
+/// views.
 std::vector<Warning> diagnose(const Case& given, const Result& result);
 
 /// `uncertain` where more than 5 % of a located point's errors would exceed the limit: refused over a limit

@@ -64,6 +64,9 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
     a.pixel_mm = spacing(elements, read.warnings);
     a.source_detector_mm =
         one(elements, tags::source_detector, min_source_detector_mm, max_source_detector_mm);
+    // Only a check: a value that cannot be (0 is common) is the same as none.
+    a.source_patient_mm = one(elements, tags::source_patient, -1e6, 1e6);
+    if (a.source_patient_mm && !(*a.source_patient_mm >= min_source_patient_mm)) a.source_patient_mm.reset();
     a.primary_angle_deg = one(elements, tags::primary_angle, -360, 360);
     a.secondary_angle_deg = one(elements, tags::secondary_angle, -360, 360);
     a.acquired = acquisition_time(elements);

@@ -10,6 +10,7 @@ namespace helicarm {
 
 /// Limits within which a value from a file is accepted.
 inline constexpr double min_pixel_mm = 0.01, max_pixel_mm = 2;
+inline constexpr double min_source_patient_mm = 50;
 inline constexpr double min_source_detector_mm = 200, max_source_detector_mm = 3000;
 
 struct AcquisitionRead {

@@ -20,6 +20,7 @@ inline constexpr DicomTag timezone{0x00080201, "Timezone Offset From UTC"};
 inline constexpr DicomTag patient_name{0x00100010, "Patient's Name"};
 inline constexpr DicomTag patient_id{0x00100020, "Patient ID"};
 inline constexpr DicomTag source_detector{0x00181110, "Distance Source to Detector"};
+inline constexpr DicomTag source_patient{0x00181111, "Distance Source to Patient"};
 inline constexpr DicomTag imager_pixel_spacing{0x00181164, "Imager Pixel Spacing"};
 inline constexpr DicomTag primary_angle{0x00181510, "Positioner Primary Angle"};
 inline constexpr DicomTag secondary_angle{0x00181511, "Positioner Secondary Angle"};

@@ -25,6 +25,7 @@ struct AcquisitionTime {
 struct Acquisition {
   std::optional<Eigen::Vector2d> pixel_mm;  ///< detector plane; x: column spacing, y: row spacing
   std::optional<double> source_detector_mm;
+  std::optional<double> source_patient_mm;  ///< to the middle of the field, as the C-arm estimates it
   std::optional<double> primary_angle_deg;
   std::optional<double> secondary_angle_deg;
   std::optional<AcquisitionTime> acquired;

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/ball_offsets.h"
+
+#include <cmath>
+#include <map>
+
+#include <Eigen/Cholesky>
+
+namespace helicarm {
+namespace {
+
+constexpr double most_tolerance_mm = 0.5;  // beyond it the file is of another calibrator
+constexpr double least_tolerance_mm = 0.02;
+constexpr double tolerance_step = 1.3;
+constexpr double likely_excess = 0.5;  // standard deviations of chi2
+
+std::size_t count_of(const std::vector<ViewProblem>& problems) {
+  std::size_t count = 0;
+  for (const ViewProblem& problem : problems) count += problem.observations.size();
+  return count;
+}
+
+std::vector<ViewProblem> with_tolerance(std::vector<ViewProblem> problems, double tolerance_mm) {
+  for (ViewProblem& problem : problems)
+    for (Observation& seen : problem.observations)
+      seen.place_root = tolerance_mm * Eigen::Matrix3d::Identity();
+  return problems;
+}
+
+double log_determinant(const Eigen::MatrixXd& covariance) {
+  return 2 * covariance.llt().matrixLLT().diagonal().array().log().sum();
+}
+
+/// Laplace's approximation, without what both explanations share.
+double log_likelihood(const Refinement& fit) {
+  return -0.5 * fit.chi2 + 0.5 * log_determinant(fit.covariance);
+}
+
+/// Of every image point erring by itself, all by the same factor more than its sigma.
+std::optional<double> log_likelihood_enlarged(std::vector<ViewProblem> problems, const CommonPrior& common) {
+  problems = with_tolerance(std::move(problems), 0);
+  const auto exact = refine(problems, common);
+  if (!exact) return std::nullopt;
+  const double factor = std::sqrt(std::max(1.0, exact->chi2 / exact->dof));
+  for (ViewProblem& problem : problems)
+    for (Observation& seen : problem.observations) seen.sigma_px *= factor;
+  const auto enlarged = refine(problems, common);
+  if (!enlarged) return std::nullopt;
+  return log_likelihood(*enlarged) - 2.0 * double(count_of(problems)) * std::log(factor);
+}
+
+}  // namespace
+
+double excess_of(double chi2, int dof) {
+  const double width = 2.0 / (9 * dof);
+  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
+}
+
+bool rejects_many(const CleanFit& clean, const std::vector<ViewProblem>& problems) {
+  return clean.removed.size() > std::max(problems.size(), count_of(problems) / 10);
+}
+
+std::optional<OffsetFit> fit_ball_offsets(const std::vector<ViewProblem>& problems, const CommonPrior& common,
+                                          double probability, std::size_t least_kept) {
+  for (double tolerance = least_tolerance_mm; tolerance <= most_tolerance_mm; tolerance *= tolerance_step) {
+    auto clean =
+        refine_without_outliers(with_tolerance(problems, tolerance), common, probability, least_kept);
+    if (!clean || rejects_many(*clean, problems)) continue;
+    if (clean->fit.dof < 1 || excess_of(clean->fit.chi2, clean->fit.dof) > likely_excess) continue;
+    const auto enlarged = log_likelihood_enlarged(clean->problems, common);
+    if (!enlarged || log_likelihood(clean->fit) <= *enlarged) return std::nullopt;
+    return OffsetFit{*std::move(clean), tolerance};
+  }
+  return std::nullopt;
+}
+
+double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement& fit) {
+  std::map<std::size_t, double> squared;
+  for (const ViewProblem& problem : problems)
+    for (const Observation& seen : problem.observations)
+      if (!seen.place_root.isZero(0))
+        squared[seen.ball] =
+            (seen.place_root * fit.variations.segment<3>(3 * Eigen::Index(seen.ball))).squaredNorm();
+  double sum = 0;
+  for (const auto& [ball, squared_length] : squared) sum += squared_length / double(squared.size());
+  return std::sqrt(sum);
+}
+
+}  // namespace helicarm

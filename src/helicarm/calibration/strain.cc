@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/calibration/strain.h"
+
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+namespace helicarm {
+namespace {
+
+constexpr double prior_sigma = 0.05;  // no calibrator is believed to be stretched by more
+
+/// Orthonormal symmetric matrices without trace.
+std::array<Eigen::Matrix3d, 5> strain_modes() {
+  const double a = std::sqrt(0.5), b = std::sqrt(1.0 / 6);
+  std::array<Eigen::Matrix3d, 5> modes;
+  for (Eigen::Matrix3d& mode : modes) mode.setZero();
+  modes[0].diagonal() << a, -a, 0;
+  modes[1].diagonal() << -b, -b, 2 * b;
+  modes[2](0, 1) = modes[2](1, 0) = a;
+  modes[3](0, 2) = modes[3](2, 0) = a;
+  modes[4](1, 2) = modes[4](2, 1) = a;
+  return modes;
+}
+
+Eigen::Vector3d centre_of(const std::vector<ViewProblem>& problems) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0;
+  for (const ViewProblem& problem : problems)
+    for (const Observation& seen : problem.observations) {
+      sum += seen.point_in_world;
+      ++count;
+    }
+  return sum / std::max(1.0, count);
+}
+
+}  // namespace
+
+Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit) {
+  const auto modes = strain_modes();
+  const Eigen::Vector3d centre = centre_of(problems);
+  Eigen::MatrixXd by_strain = Eigen::MatrixXd::Zero(fit.jacobian.rows(), 5);
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < problems.size(); ++i)
+    for (const Observation& seen : problems[i].observations) {
+      const ImageCoordinates image = image_of(fit.views[i], seen.point_in_world);
+      for (std::size_t k = 0; k < modes.size(); ++k)
+        by_strain.block<2, 1>(row, Eigen::Index(k)) =
+            image.by_place * (modes[k] * (seen.point_in_world - centre)) / seen.sigma_px;
+      row += 2;
+    }
+  // What the views and the other unknowns can take up of a strain does not count.
+  const Eigen::MatrixXd own =
+      by_strain - fit.jacobian * (fit.covariance * (fit.jacobian.transpose() * by_strain));
+  Eigen::Matrix<double, 5, 5> information = by_strain.transpose() * own;
+  information.diagonal().array() += 1 / (prior_sigma * prior_sigma);
+  const Eigen::Vector<double, 5> slope = own.transpose() * fit.residuals;
+  const Eigen::Vector<double, 5> amounts = -information.ldlt().solve(slope);
+  Strain result;
+  for (std::size_t k = 0; k < modes.size(); ++k) result.strain += amounts[Eigen::Index(k)] * modes[k];
+  result.chi2_gain = -slope.dot(amounts);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(result.strain);
+  Eigen::Index largest = 0;
+  eigen.eigenvalues().cwiseAbs().maxCoeff(&largest);
+  result.extension = eigen.eigenvalues()[largest];
+  result.axis = eigen.eigenvectors().col(largest);
+  return result;
+}
+
+}  // namespace helicarm

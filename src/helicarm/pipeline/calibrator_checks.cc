@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/calibrator_checks.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/geometry/triangulation.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double diameter_sigma = 0.015;  // of all diameters together: edge model, tolerance of the balls
+constexpr double patient_sigma_mm = 60;   // the calibrator is beside the middle of the field
+constexpr double warn_sigmas = 3, refuse_sigmas = 10;
+constexpr double displaced_reach_mm = 6;  // around a ball's place where it is looked for
+constexpr double displaced_gap_mm = 0.4;  // between the rays of a displaced ball
+
+bool looks_mirrored_unasked(const LabelledView& image, const CaseView& view) {
+  return image.fiducials.mirrored && !view.mirrored && !image.xray_image->acquisition.flip_hint;
+}
+
+std::optional<Failure> doubt_of_hand(const std::vector<LabelledView>& images, const Case& given) {
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (!looks_mirrored_unasked(images[i], given.views[i])) return std::nullopt;
+  return Failure{
+      Reason::ambiguous_handedness,
+      "every image looks mirrored, and neither a tag nor the case says so. Either the C-arm stores "
+      "mirrored images: state \"mirrored\": true for each view. Or the calibrator's file is a mirror "
+      "image of the calibrator (the sign of one axis): correct the file. The two place points "
+      "differently",
+      {},
+      {{"views", double(images.size())}}};
+}
+
+/// Over all used balls, of ln(radius seen / radius expected at the ball's distance).
+std::optional<double> mean_log_radius(const CalibrationResult& calibration, const Calibrator& calibrator) {
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < calibration.views.size(); ++i)
+    for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+      const Fiducial& ball = calibration.fiducials[i][k];
+      if (ball.status != FiducialStatus::used || !(ball.radius_px > 0)) continue;
+      const View& view = calibration.views[i].view;
+      const double expected = 0.5 * calibrator.balls[k].diameter_mm * view.intrinsics.fy /
+                              view.depth(calibrator.balls[k].centre_in_calibrator);
+      sum += std::log(ball.radius_px / expected);
+      ++count;
+    }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
+/// A false disc near where each of two views should show a ball, and where the two rays meet.
+struct Displaced {
+  Vector3d place;
+  double gap_mm;
+};
+
+std::optional<Displaced> displaced_ball(const CaseCalibration& calibration,
+                                        const std::vector<LabelledView>& images, const CalibratorBall& ball) {
+  struct Near {
+    std::size_t view;
+    Eigen::Vector2d uv;
+  };
+  std::vector<Near> near;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const View& view = calibration.views[i].view;
+    const double per_mm = view.intrinsics.fy / view.depth(ball.centre_in_calibrator);
+    const Eigen::Vector2d expected = view.project(ball.centre_in_calibrator);
+    for (const Dot& dot : images[i].fiducials.false_blobs) {
+      const auto uv = images[i].rectification.map.rectified_from_raw(dot.centre_px);
+      if (uv && (*uv - expected).norm() < displaced_reach_mm * per_mm) near.push_back({i, *uv});
+    }
+  }
+  std::optional<Displaced> best;
+  for (const Near& a : near)
+    for (const Near& b : near) {
+      if (a.view >= b.view) continue;
+      const std::array<RayObservation, 2> ray_observations{
+          RayObservation{calibration.views[a.view].view, a.uv},
+          RayObservation{calibration.views[b.view].view, b.uv}};
+      const auto met = intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
+      if (!met || met->ray_gap_mm > displaced_gap_mm) continue;
+      if ((met->point - ball.centre_in_calibrator).norm() > displaced_reach_mm) continue;
+      if (!best || met->ray_gap_mm < best->gap_mm) best = Displaced{met->point, met->ray_gap_mm};
+    }
+  return best;
+}
+
+/// Balls that no view uses, though two show one near its place.
+std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
+                                       const std::vector<LabelledView>& images,
+                                       const Calibrator& calibrator) {
+  std::vector<Warning> warnings;
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const bool used = std::ranges::any_of(calibration.fiducials, [&](const auto& of_view) {
+      return of_view[k].status == FiducialStatus::used;
+    });
+    if (used) continue;
+    const CalibratorBall& ball = calibrator.balls[k];
+    const auto seen = displaced_ball(calibration, images, ball);
+    if (!seen) continue;
+    const double off = (seen->place - ball.centre_in_calibrator).norm();
+    warnings.push_back(
+        {Reason::ball_displaced,
+         fmt::format("ball {} is not at its place in the calibrator's file: a ball is seen {:.2g} mm "
+                     "from it, at ({:.2f}, {:.2f}, {:.2f}). It is not used; measure the phantom",
+                     ball.label, off, seen->place.x(), seen->place.y(), seen->place.z()),
+         {},
+         {{"distance_mm", off},
+          {"x_mm", seen->place.x()},
+          {"y_mm", seen->place.y()},
+          {"z_mm", seen->place.z()}}});
+  }
+  return warnings;
+}
+
+}  // namespace
+
+ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
+                             const Calibrator& calibrator) {
+  double weight = 0, sum = 0;
+  const auto add = [&](double excess, double sigma) {
+    weight += 1 / (sigma * sigma);
+    sum += excess / (sigma * sigma);
+  };
+  if (const auto radius = mean_log_radius(calibration, calibrator)) add(*radius, diameter_sigma);
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (const auto& stated = images[i].xray_image->acquisition.source_patient_mm)
+      add(calibration.views[i].view.depth(middle_of(calibrator)) / *stated - 1, patient_sigma_mm / *stated);
+  if (weight == 0) return {};
+  return {sum / weight, 1 / std::sqrt(weight)};
+}
+
+Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
+                                           const std::vector<LabelledView>& images, const Case& given) {
+  if (auto doubt = doubt_of_hand(images, given)) return tl::unexpected<Failure>(*std::move(doubt));
+  const bool assumed = std::ranges::any_of(
+      images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });
+  if (assumed && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
+    return fail(
+        Reason::calibrator_mismatch,
+        "the balls lie near the calibrator's places but not at them, and not by the same amount in all "
+        "views",
+        {{"variance_scale", calibration.variance_scale}});
+  const ScaleEvidence scale = scale_evidence(calibration, images, given.calibrator);
+  const double sigma = std::hypot(scale.sigma, given.calibrator.scale_sigma);
+  if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
+    Failure told{
+        Reason::scale_disagrees,
+        fmt::format("the balls' diameters as seen imply that the calibrator is {:.1f} % {} than in its file "
+                    "(+-{:.1f} %): check coordinates, diameters and pixel size",
+                    100 * std::abs(scale.excess), scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
+        {},
+        {{"file_over_true", 1 + scale.excess}, {"sigma", sigma}}};
+    if (std::abs(scale.excess) > refuse_sigmas * sigma) return tl::unexpected<Failure>(std::move(told));
+    calibration.warnings.push_back(std::move(told));
+  }
+  for (Warning& warning : warn_of_displaced(calibration, images, given.calibrator))
+    calibration.warnings.push_back(std::move(warning));
+  return calibration;
+}
+
+std::vector<Warning> scale_notes(const Case& given, const CalibrationResult& calibration,
+                                 const std::vector<PointResult>& points) {
+  if (given.calibrator.scale_sigma > 0) return {};
+  const Vector3d middle = middle_of(given.calibrator);
+  Warning note{Reason::scale_unverified, {}, {}, {}};
+  double most = 0;
+  for (const PointResult& point : points) {
+    if (!point.place) continue;
+    const double per_cent_mm = 0.01 * (point.place->in_calibrator - middle).norm();
+    note.figures["mm_per_per_cent " + point.name] = per_cent_mm;
+    most = std::max(most, per_cent_mm);
+  }
+  std::string distances;
+  for (const CalibratedView& view : calibration.views) {
+    const double distance = (view.view.camera_from_world * middle).norm();
+    note.figures["source_distance_mm " + view.name] = distance;
+    distances += fmt::format("{}{} {:.0f} mm", distances.empty() ? "" : ", ", view.name, distance);
+  }
+  note.message = fmt::format(
+      "images do not show the calibrator's absolute size: each per cent by which its file is too large moves "
+      "points "
+      "by up to {:.2g} mm. Measure it (scale_sigma), or compare the distances of the balls' middle from the "
+      "source with a tape: {}",
+      most, distances);
+  return {note};
+}
+
+}  // namespace helicarm
