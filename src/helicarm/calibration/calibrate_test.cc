@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/calibration/calibrate.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include <Eigen/Cholesky>
@@ -221,6 +223,88 @@ TEST(Calibrate, InconsistentSigmasInflateTheCovarianceAndWarn) {
   EXPECT_NEAR(result->variance_scale, 25, 15);
   ASSERT_EQ(result->warnings.size(), 1u);
   EXPECT_EQ(result->warnings[0].reason, Reason::residual_too_large);
+}
+
+/// The calibrator that is in the images differs from the file's.
+std::vector<ViewFiducials> views_of_other(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& place,
+                                          std::uint64_t trial, double sigma = 0.05) {
+  auto views = pair_of_views(sigma, trial);
+  RandomStream random(21, 0, trial);
+  std::vector<Eigen::Vector3d> places;
+  for (const Fiducial& ball : views[0].fiducials) places.push_back(place(ball.centre_in_calibrator));
+  for (std::size_t i = 0; i < 2; ++i) {
+    const View view = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
+    views[i].prior = {6000, Eigen::Vector2d(512, 512), 1 / 0.15, NormalPrior{1, 1e-3}, NormalPrior{0, 1e-12}};
+    for (std::size_t k = 0; k < places.size(); ++k)
+      views[i].fiducials[k].uv =
+          view.project(places[k]) + sigma * Eigen::Vector2d(random.normal(), random.normal());
+  }
+  return views;
+}
+
+CalibrationOptions c_arm_known_roughly() {
+  CalibrationOptions options;
+  options.common.c_arm = {IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
+  return options;
+}
+
+bool warns(const CalibrationResult& result, Reason reason) {
+  return std::ranges::any_of(result.warnings, [&](const Warning& w) { return w.reason == reason; });
+}
+
+TEST(Calibrate, ScatteredBallsNeedNoDeclaredTolerance) {
+  for (std::uint64_t trial = 0; trial < 10; ++trial) {
+    RandomStream random(22, 0, trial);
+    const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
+      return place + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    };
+    const auto result = calibrate(views_of_other(off, trial), c_arm_known_roughly());
+    ASSERT_TRUE(result.has_value()) << result.error().message;
+    EXPECT_GT(result->found_tolerance_mm, 0.04) << trial;
+    EXPECT_LT(result->found_tolerance_mm, 0.25) << trial;
+    EXPECT_TRUE(warns(*result, Reason::calibrator_deviates)) << trial;
+    EXPECT_EQ(result->variance_scale, 1) << trial;
+  }
+}
+
+TEST(Calibrate, ExactCalibratorIsNeitherOffsetNorStrained) {
+  for (std::uint64_t trial = 0; trial < 30; ++trial) {
+    const auto same = [](const Eigen::Vector3d& place) { return place; };
+    const auto result = calibrate(views_of_other(same, trial), c_arm_known_roughly());
+    ASSERT_TRUE(result.has_value());
+    EXPECT_EQ(result->found_tolerance_mm, 0) << trial;
+    EXPECT_EQ(result->ball_rms_mm, 0) << trial;
+    EXPECT_FALSE(warns(*result, Reason::calibrator_strained)) << trial;
+    EXPECT_TRUE(result->notes.empty());
+  }
+}
+
+TEST(Calibrate, StrainOfTheCalibratorIsNamedWithItsAxis) {
+  const auto longer = [](const Eigen::Vector3d& place) -> Eigen::Vector3d {
+    return place.cwiseProduct(Eigen::Vector3d(1, 1, 1.01));
+  };
+  const auto result = calibrate(views_of_other(longer, 0), c_arm_known_roughly());
+  ASSERT_TRUE(result.has_value());
+  ASSERT_TRUE(warns(*result, Reason::calibrator_strained));
+  const auto warning = std::ranges::find(result->warnings, Reason::calibrator_strained, &Warning::reason);
+  EXPECT_GT(std::abs(warning->figures.at("z")), 0.9);
+  EXPECT_NEAR(warning->figures.at("per_cent"), 0.67, 0.25);  // the change of volume is not seen
+}
+
+TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsDistances) {
+  RandomStream random(23, 0);
+  const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
+    return place + 0.3 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+  };
+  CalibrationOptions options = c_arm_known_roughly();
+  options.common.ball_covariance_mm2.assign(12, 0.09 * Eigen::Matrix3d::Identity());
+  const auto result = calibrate(views_of_other(off, 3), options);
+  ASSERT_TRUE(result.has_value());
+  for (const auto& of_view : result->fiducials)
+    for (const Fiducial& ball : of_view) EXPECT_EQ(ball.status, FiducialStatus::used) << ball.label;
+  ASSERT_EQ(result->notes.size(), 1u);
+  EXPECT_EQ(result->notes[0].reason, Reason::calibrator_deviates);
+  EXPECT_NEAR(result->ball_rms_mm, 0.3 * std::sqrt(3), 0.2);
 }
 
 TEST(Calibrate, SixBallsAreEnoughFiveAreNot) {

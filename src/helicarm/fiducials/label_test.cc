@@ -197,6 +197,78 @@ TEST(LabelBalls, PlaneOfBallsLeavesTheMirroringOpen) {
   }
 }
 
+/// A flat, nearly symmetric phantom like many that are sold: pairs of balls that mirror each other.
+Calibrator flat_and_symmetric(int balls, std::uint64_t seed) {
+  RandomStream random(seed, 8);
+  Calibrator calibrator{"flat", {}, {}};
+  for (int k = 0; k < balls; ++k) {
+    Eigen::Vector3d centre(random.uniform(5, 53), random.uniform(-34, 34), random.uniform(-4, 4));
+    if (k % 2 == 1)
+      centre = calibrator.balls.back().centre_in_calibrator.cwiseProduct(Eigen::Vector3d(-1, 1, 1));
+    centre += 0.4 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    calibrator.balls.push_back({fmt::format("B{}", k), centre, 3.2});
+  }
+  return calibrator;
+}
+
+TEST(LabelBalls, MoreOfFlatSymmetricPhantomIsFoundThanAFirstHypothesisNames) {
+  // Some balls of a larger phantom are the calibrator; the others are discs of the same size among them.
+  LabellingPrior prior = nominal;
+  prior.focal_px.reset();
+  int solved = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    RandomStream random(31, 1, trial);
+    const Calibrator phantom = flat_and_symmetric(18, std::uint64_t(trial));
+    const auto seen = image_of(phantom, {.noise_px = 0.05}, random);
+    Calibrator file = phantom;
+    file.balls.erase(file.balls.begin() + 10, file.balls.end());
+    const auto labelling = label_balls(file, seen.candidates, prior);
+    if (!labelling) continue;
+    ++solved;
+    EXPECT_TRUE(right(*labelling, seen, file)) << trial;
+  }
+  EXPECT_GE(solved, 20);
+}
+
+TEST(LabelBalls, CandidatesOwnErrorsTellMirrorTwinsApart) {
+  // By the general figure of the rectification's error alone, a flat phantom's mirrored image fits as well.
+  LabellingPrior prior = nominal;
+  int before = 0, after = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    RandomStream random(32, 1, trial);
+    const Calibrator file = flat_and_symmetric(10, std::uint64_t(trial));
+    auto seen = image_of(file, {.noise_px = 0.03}, random);
+    before += label_balls(file, seen.candidates, prior).has_value();
+    for (BallCandidate& candidate : seen.candidates) candidate.own_sigma_px = 0.04;
+    const auto labelling = label_balls(file, seen.candidates, prior);
+    after += labelling.has_value();
+    EXPECT_TRUE(!labelling || right(*labelling, seen, file)) << trial;
+  }
+  EXPECT_GT(after, before);
+}
+
+TEST(LabelBalls, PrintedPhantomWithDeclaredToleranceIsLabelled) {
+  for (const double tolerance_mm : {0.1, 0.3}) {
+    for (int trial = 0; trial < 20; ++trial) {
+      RandomStream random(33, 1, trial);
+      Calibrator file = helix();
+      file.tolerance_mm = tolerance_mm;
+      for (CalibratorBall& ball : file.balls)
+        ball.centre_in_calibrator +=
+            tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      SyntheticImage seen;
+      auto labelling = label_one(helix(), file, {.outliers = 2, .noise_px = 0.1}, 100 + trial, &seen);
+      if (seen.axis_deg() < 45) continue;
+      ASSERT_TRUE(labelling) << tolerance_mm << " " << trial << " " << labelling.error().message;
+      EXPECT_EQ(labelling->mirrored, seen.mirrored());
+      for (std::size_t k = 0; k < 12; ++k)
+        if (const int i = labelling->candidate_of_ball[k]; i >= 0) {
+          EXPECT_EQ(seen.detections[std::size_t(i)].ball, static_cast<int>(k)) << trial;
+        }
+    }
+  }
+}
+
 TEST(LabelBalls, RadiusBiasFoundInOneViewServesTheNext) {
   // Along the axis with an end ball hidden, a shift by one ball fits nearly as well, five per cent farther
   // away.
