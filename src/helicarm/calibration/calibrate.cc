@@ -181,6 +181,7 @@ void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
   constexpr double chi2_at_3_sigma = 18.2;
   if (clean.problems.size() < 2 || clean.fit.dof < 6) return;
   const Strain strain = strain_of(clean.problems, clean.fit);
+  result.strain_sigma = strain.sigma;
   const double left = std::max(1.0, (clean.fit.chi2 - strain.chi2_gain) / (clean.fit.dof - 5));
   if (strain.chi2_gain / left < chi2_at_3_sigma) return;
   result.warnings.push_back(

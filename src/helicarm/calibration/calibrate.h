@@ -38,7 +38,8 @@ struct CalibrationResult : Calibration {
   double variance_scale = 1;  ///< by which the covariance was enlarged as chi2 belies the balls' sigmas
   /// Per axis, of the balls' places, where the residuals ask for more than the calibrator's file states.
   double found_tolerance_mm = 0;
-  double ball_rms_mm = 0;  ///< of the balls' estimated distances from the file; 0: they are taken as exact
+  double strain_sigma = 0;  ///< relative, of the calibrator's strain that the views show least; 0: not known
+  double ball_rms_mm = 0;   ///< of the balls' estimated distances from the file; 0: they are taken as exact
   std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (belied sigmas), calibrator_strained,
                                   ///< calibrator_deviates
   std::vector<Warning> notes;     ///< calibrator_deviates, within the stated tolerance

@@ -17,6 +17,7 @@ struct Strain {
   double chi2_gain = 0;                             ///< what it takes from chi2, for five degrees of freedom
   double extension = 0;                             ///< its eigenvalue of largest amount, relative
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of that, in the calibrator
+  double sigma = 0;  ///< of an extension, relative, for the strain that the views show least
 };
 
 /// `problems` are those of `fit`. The change of volume is left out: a larger calibrator farther away looks

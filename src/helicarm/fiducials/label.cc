@@ -120,6 +120,7 @@ Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options
   for (auto& candidate : loose.candidates) {
     candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * loose.field_radius_px);
   }
+  for (auto& ball : loose.balls) ball.sigma_mm *= 3;  // well off, for a ball of stated tolerance
   Hypothesis found = settle(loose, best.fit.view);
   const auto could_match = static_cast<double>(std::min(loose.candidates.size(), loose.balls.size()));
   if (best.matched >= 0.75 * could_match) return found;
@@ -138,14 +139,18 @@ tl::unexpected<Failure> too_few(int balls, int candidates) {
       {{"n", balls}, {"candidates", candidates}, {"needed", least_balls}});
 }
 
+/// A stated tolerance is itself known to about 40 %; without one, 1.
+double variance_allowance(const Scene& scene) { return scene.balls.front().sigma_mm > 0 ? 2 : 1; }
+
 /// Chi-square beyond chance, and not for one false disc's sake that posed as a ball.
 bool misfits(const Scene& scene, const Hypothesis& h) {
-  if (deviate(h.fit.chi2, 2 * h.matched - 6) < most_deviation) return false;
+  const double allowance = variance_allowance(scene);
+  if (deviate(h.fit.chi2 / allowance, 2 * h.matched - 6) < most_deviation) return false;
   Hypothesis kept = h;
   if (const auto off = inflated(scene, h); !off.empty()) kept = without(scene, h, off.front());
   const int named = count_named(kept);
   return named < std::max(least_balls, h.matched - 1) ||
-         deviate(kept.fit.chi2, 2 * named - 6) > most_deviation;
+         deviate(kept.fit.chi2 / allowance, 2 * named - 6) > most_deviation;
 }
 
 /// Why not even the best hypothesis is to be believed, if so.

@@ -146,6 +146,14 @@ void LabelSearch::try_twins(const Hypothesis& h) {
     }
     if (scene_.mirrored && *scene_.mirrored != (twin.intrinsics.fx < 0)) continue;
     keep(settle(scene_, twin, wanted()));
+    // From the rough gate the twin may settle on fewer or other balls than `h` itself did.
+    Hypothesis same;
+    same.candidate_of_ball = match(scene_, twin, rough_gate_px(scene_) / 4);
+    const auto correspondences = correspondences_of(scene_, same.candidate_of_ball, twin);
+    if (static_cast<int>(correspondences.size()) < wanted()) continue;
+    same.fit = fit_pose(twin, correspondences, scene_.camera, fit_steps);
+    weigh(scene_, same);
+    keep(std::move(same));
   }
 }
 

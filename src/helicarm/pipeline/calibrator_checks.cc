@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double diameter_sigma = 0.015;  // of all diameters together: edge model, tolerance of the balls
-constexpr double patient_sigma_mm = 60;   // the calibrator is beside the middle of the field
+constexpr double diameter_sigma = 0.01;  // of all diameters together: edge model, tolerance of the balls
+constexpr double patient_sigma_mm = 60;  // the calibrator is beside the middle of the field
 constexpr double warn_sigmas = 3, refuse_sigmas = 10;
 constexpr double displaced_reach_mm = 6;  // around a ball's place where it is looked for
 constexpr double displaced_gap_mm = 0.4;  // between the rays of a displaced ball
@@ -164,11 +164,16 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
   return calibration;
 }
 
-std::vector<Warning> scale_notes(const Case& given, const CalibrationResult& calibration,
+std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points) {
   if (given.calibrator.scale_sigma > 0) return {};
   const Vector3d middle = middle_of(given.calibrator);
   Warning note{Reason::scale_unverified, {}, {}, {}};
+  const ScaleEvidence evidence = scale_evidence(calibration, calibration.images, given.calibrator);
+  if (evidence.sigma > 0) {
+    note.figures["file_over_true"] = 1 + evidence.excess;
+    note.figures["sigma"] = evidence.sigma;
+  }
   double most = 0;
   for (const PointResult& point : points) {
     if (!point.place) continue;
@@ -182,12 +187,17 @@ std::vector<Warning> scale_notes(const Case& given, const CalibrationResult& cal
     note.figures["source_distance_mm " + view.name] = distance;
     distances += fmt::format("{}{} {:.0f} mm", distances.empty() ? "" : ", ", view.name, distance);
   }
+  std::string strain;
+  if (calibration.strain_sigma > 0) {
+    note.figures["strain_limit_per_cent"] = 100 * warn_sigmas * calibration.strain_sigma;
+    strain = fmt::format(", nor strains of it below {:.2g} %", 100 * warn_sigmas * calibration.strain_sigma);
+  }
   note.message = fmt::format(
-      "images do not show the calibrator's absolute size: each per cent by which its file is too large moves "
-      "points "
-      "by up to {:.2g} mm. Measure it (scale_sigma), or compare the distances of the balls' middle from the "
-      "source with a tape: {}",
-      most, distances);
+      "images do not show the calibrator's absolute size{}: each per cent by which its file is too large "
+      "moves points by up to {:.2g} mm. Measure it and state scale_sigma, or compare the distances of the "
+      "balls' "
+      "middle from the source with a tape: {}",
+      strain, most, distances);
   return {note};
 }
 

@@ -28,7 +28,7 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
 /// What an error of the calibrator's scale does, which no image shows: the millimetres per per cent at each
 /// point, and the distances from the source for a tape measure. Empty where the file states its scale's
 /// sigma.
-std::vector<Warning> scale_notes(const Case& given, const CalibrationResult& calibration,
+std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points);
 
 }  // namespace helicarm
