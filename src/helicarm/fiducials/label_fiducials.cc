@@ -133,6 +133,20 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
   fiducial.radius_px = dot.radius_px / std::sqrt(std::abs(map.jacobian(*uv).determinant()));
 }
 
+/// Whether balls off their places may be the reason that no labels were found.
+bool may_be_printed(const Expected<Labelling>& labelling, const Calibrator& calibrator) {
+  return !labelling && calibrator.tolerance_mm < printed_tolerance_mm &&
+         (labelling.error().reason == Reason::calibrator_mismatch ||
+          labelling.error().reason == Reason::ambiguous_labels);
+}
+
+/// Where the labels were ambiguous, a tolerance must explain more balls; else it only hides the ambiguity.
+bool explains_more(const Labelling& loose, const Failure& without) {
+  const auto matched = without.figures.find("matched");
+  return without.reason != Reason::ambiguous_labels ||
+         (matched != without.figures.end() && loose.matched > matched->second);
+}
+
 /// In the paper's mode a ball lies where the Hough transform sees its circle.
 std::vector<Dot> hough_circles(const XrayImage& xray_image, const std::vector<Dot>& named) {
   double least = 1e9;
@@ -186,10 +200,10 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
     prior.radius_bias_sigma = shared_bias_sigma;
   }
   auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
-  if (!labelling && labelling.error().reason == Reason::calibrator_mismatch &&
-      calibrator.tolerance_mm < printed_tolerance_mm) {
+  if (may_be_printed(labelling, calibrator)) {
     labelling_options.tolerance_mm = printed_tolerance_mm;
-    if (auto loose = label_balls(calibrator, rectified, prior, labelling_options))
+    auto loose = label_balls(calibrator, rectified, prior, labelling_options);
+    if (loose && explains_more(*loose, labelling.error()))
       labelling = std::move(loose);
     else
       labelling_options.tolerance_mm = 0;

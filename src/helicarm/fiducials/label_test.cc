@@ -198,14 +198,16 @@ TEST(LabelBalls, PlaneOfBallsLeavesTheMirroringOpen) {
 }
 
 /// A flat, nearly symmetric phantom like many that are sold: pairs of balls that mirror each other.
-Calibrator flat_and_symmetric(int balls, std::uint64_t seed) {
+Calibrator flat_and_symmetric(int balls, std::uint64_t seed, double half_height_mm = 4,
+                              double jitter_mm = 0.4) {
   RandomStream random(seed, 8);
   Calibrator calibrator{"flat", {}, {}};
   for (int k = 0; k < balls; ++k) {
-    Eigen::Vector3d centre(random.uniform(5, 53), random.uniform(-34, 34), random.uniform(-4, 4));
+    Eigen::Vector3d centre(random.uniform(5, 53), random.uniform(-34, 34),
+                           random.uniform(-half_height_mm, half_height_mm));
     if (k % 2 == 1)
       centre = calibrator.balls.back().centre_in_calibrator.cwiseProduct(Eigen::Vector3d(-1, 1, 1));
-    centre += 0.4 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    centre += jitter_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     calibrator.balls.push_back({fmt::format("B{}", k), centre, 3.2});
   }
   return calibrator;
@@ -237,7 +239,7 @@ TEST(LabelBalls, CandidatesOwnErrorsTellMirrorTwinsApart) {
   int before = 0, after = 0;
   for (int trial = 0; trial < 40; ++trial) {
     RandomStream random(32, 1, trial);
-    const Calibrator file = flat_and_symmetric(10, std::uint64_t(trial));
+    const Calibrator file = flat_and_symmetric(10, std::uint64_t(trial), 1, 0.1);
     auto seen = image_of(file, {.noise_px = 0.03}, random);
     before += label_balls(file, seen.candidates, prior).has_value();
     for (BallCandidate& candidate : seen.candidates) candidate.own_sigma_px = 0.04;

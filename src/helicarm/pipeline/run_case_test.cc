@@ -56,6 +56,57 @@ TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirErrorBars) {
   EXPECT_TRUE(result->timing_ms.total);
 }
 
+const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) {
+  const auto found = std::ranges::find(warnings, reason, &Warning::reason);
+  return found == warnings.end() ? nullptr : &*found;
+}
+
+TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
+  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness);
+  EXPECT_NE(result->failure->message.find("\"mirrored\": true"), std::string::npos);
+}
+
+TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOfAndScaleIsNoted) {
+  const auto untouched = run_case(given_, {});
+  ASSERT_TRUE(untouched.has_value());
+  EXPECT_FALSE(find_reason(untouched->warnings, Reason::scale_disagrees));
+  const Warning* note = find_reason(untouched->notes, Reason::scale_unverified);
+  ASSERT_TRUE(note);
+  EXPECT_NEAR(note->figures.at("file_over_true"), 1, 0.025);
+  EXPECT_GT(note->figures.at("source_distance_mm AP"), 300);
+
+  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator *= 1.07;
+  const auto scaled = run_case(given_, {});
+  ASSERT_TRUE(scaled.has_value());
+  const Warning* warning = find_reason(scaled->warnings, Reason::scale_disagrees);
+  ASSERT_TRUE(warning);
+  EXPECT_NEAR(warning->figures.at("file_over_true") / note->figures.at("file_over_true"), 1.07, 0.01);
+
+  given_.calibrator.scale_sigma = 0.001;
+  const auto measured = run_case(given_, {});
+  ASSERT_TRUE(measured.has_value());
+  EXPECT_FALSE(find_reason(measured->notes, Reason::scale_unverified));
+}
+
+TEST_F(SimulatedNavigation, BallOffItsPlaceIsNamed) {
+  CalibratorBall& ball = given_.calibrator.balls[4];
+  const Eigen::Vector3d seen = ball.centre_in_calibrator;
+  ball.centre_in_calibrator += Eigen::Vector3d(1.5, -1, 1.2);
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  ASSERT_FALSE(result->failure) << result->failure->message;
+  const Warning* warning = find_reason(result->warnings, Reason::ball_displaced);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find(ball.label), std::string::npos);
+  EXPECT_NEAR(warning->figures.at("x_mm"), seen.x(), 0.2);
+  EXPECT_NEAR(warning->figures.at("y_mm"), seen.y(), 0.2);
+  EXPECT_NEAR(warning->figures.at("z_mm"), seen.z(), 0.2);
+}
+
 TEST_F(SimulatedNavigation, HeldCalibrationGivesWhatTheWholeRunGives) {
   CalibrationCache cache;
   Case picked_later = given_;
