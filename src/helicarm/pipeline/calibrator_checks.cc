@@ -37,6 +37,46 @@ std::optional<Failure> doubt_of_hand(const std::vector<LabelledView>& images, co
       {{"views", double(images.size())}}};
 }
 
+/// False candidates among the used balls: no farther from their middle than the outermost of them.
+int false_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
+  std::vector<Eigen::Vector2d> used;
+  for (const Fiducial& ball : balls)
+    if (ball.status == FiducialStatus::used) used.push_back(ball.uv_raw);
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& uv : used) middle += uv / double(used.size());
+  double reach = 0;
+  for (const Eigen::Vector2d& uv : used) reach = std::max(reach, (uv - middle).norm());
+  return int(std::ranges::count_if(image.fiducials.false_blobs,
+                                   [&](const Dot& dot) { return (dot.centre_px - middle).norm() <= reach; }));
+}
+
+/// Labels that leave a third of the balls in the field without an image, though as many candidates of their
+/// size are left over among the others, explain the image too badly.
+std::optional<Failure> doubt_of_labels(const CaseCalibration& calibration,
+                                       const std::vector<LabelledView>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const auto count = [&](FiducialStatus status) {
+      return int(std::ranges::count(calibration.fiducials[i], status, &Fiducial::status));
+    };
+    const int used = count(FiducialStatus::used);
+    const int rejected = count(FiducialStatus::rejected), missing = count(FiducialStatus::not_found);
+    const int left_over = false_among(calibration.fiducials[i], images[i]);
+    const int unexplained = rejected + missing;
+    if (2 * unexplained < used || left_over < unexplained) continue;
+    return Failure{
+        Reason::ambiguous_labels,
+        fmt::format("the labels explain {} fiducials, but {} are rejected and {} not found, while {} "
+                    "candidates of their size among them are left over",
+                    used, rejected, missing, left_over),
+        images[i].name,
+        {{"matched", double(used)},
+         {"rejected", double(rejected)},
+         {"not_found", double(missing)},
+         {"left_over", double(left_over)}}};
+  }
+  return std::nullopt;
+}
+
 /// Over all used balls, of ln(radius seen / radius expected at the ball's distance).
 std::optional<double> mean_log_radius(const CalibrationResult& calibration, const Calibrator& calibrator) {
   double sum = 0, count = 0;
@@ -137,6 +177,7 @@ ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::ve
 
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given) {
+  if (auto doubt = doubt_of_labels(calibration, images)) return tl::unexpected<Failure>(*std::move(doubt));
   if (auto doubt = doubt_of_hand(images, given)) return tl::unexpected<Failure>(*std::move(doubt));
   const bool assumed = std::ranges::any_of(
       images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });

@@ -18,8 +18,9 @@ struct ScaleEvidence {
 ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
                              const Calibrator& calibrator);
 
-/// Whether the calibrator's file can be the calibrator in the images. Refuses `ambiguous_handedness` where
-/// every image looks mirrored and nothing says so, `scale_disagrees` where the scale is off by ten sigma,
+/// Whether the calibrator's file can be the calibrator in the images. Refuses `ambiguous_labels` where the
+/// labels leave a third of the balls and as many candidates unexplained, `ambiguous_handedness` where every
+/// image looks mirrored and nothing says so, `scale_disagrees` where the scale is off by ten sigma,
 /// `calibrator_mismatch` where labels were found only with an assumed tolerance and the views disagree about
 /// the balls' offsets. Adds warnings: the scale off by three sigma, balls seen off their places.
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
