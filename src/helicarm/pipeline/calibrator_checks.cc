@@ -162,6 +162,7 @@ std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
 
 ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
                              const Calibrator& calibrator) {
+  if (calibration.joint_covariance.size() == 0) return {};  // `--method paper`: its circles' radii are rough
   double weight = 0, sum = 0;
   const auto add = [&](double excess, double sigma) {
     weight += 1 / (sigma * sigma);
