@@ -20,7 +20,7 @@ const Eigen::Vector2d size_px(1024, 1024);
 const Eigen::Vector2d centre = (size_px - Eigen::Vector2d::Ones()) / 2;
 
 /// Two views of a flat panel that see the paper's helix of twelve balls.
-std::vector<ViewFiducials> two_views(std::uint64_t seed) {
+std::vector<ViewFiducials> helix_views(std::uint64_t seed) {
   std::vector<ViewFiducials> views;
   RandomStream random(seed, 0);
   for (const double alpha : {0.0, std::numbers::pi / 2}) {
@@ -56,12 +56,12 @@ void distort(ViewFiducials& view, double share) {  // inverse of the radial chan
 }
 
 TEST(ImageChange, UntouchedImagesHaveNone) {
-  for (std::uint64_t seed = 1; seed <= 50; ++seed) EXPECT_FALSE(change_of(two_views(seed))) << seed;
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) EXPECT_FALSE(change_of(helix_views(seed))) << seed;
 }
 
 TEST(ImageChange, RadialDistortionIsFound) {
   for (const double share : {0.01, -0.01, 0.02}) {
-    auto views = two_views(3);
+    auto views = helix_views(3);
     for (ViewFiducials& view : views) distort(view, share);
     const auto change = change_of(views);
     ASSERT_TRUE(change) << share;
@@ -72,7 +72,7 @@ TEST(ImageChange, RadialDistortionIsFound) {
 
 TEST(ImageChange, ScaleOfOneViewIsFound) {
   for (const double scale : {1.03, 0.97}) {
-    auto views = two_views(4);
+    auto views = helix_views(4);
     for (Fiducial& ball : views[1].fiducials) ball.uv = centre + scale * (ball.uv - centre);
     const auto change = change_of(views);
     ASSERT_TRUE(change) << scale;
@@ -82,7 +82,7 @@ TEST(ImageChange, ScaleOfOneViewIsFound) {
 }
 
 TEST(ImageChange, RowsFartherApartAreFound) {
-  auto views = two_views(5);
+  auto views = helix_views(5);
   for (ViewFiducials& view : views)
     for (Fiducial& ball : view.fiducials) ball.uv.y() = centre.y() + 1.02 * (ball.uv.y() - centre.y());
   const auto change = change_of(views);
@@ -93,7 +93,7 @@ TEST(ImageChange, RowsFartherApartAreFound) {
 
 TEST(ImageChange, OneFalseFiducialIsNotAChange) {
   for (const double off : {2.0, 10.0}) {
-    auto views = two_views(6);
+    auto views = helix_views(6);
     views[0].fiducials[4].uv.x() += off;
     EXPECT_FALSE(change_of(views)) << off;
   }
