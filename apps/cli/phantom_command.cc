@@ -2,7 +2,10 @@
 #include "phantom_command.h"
 
 #include <algorithm>
+#include <cmath>
+#include <ctime>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -12,6 +15,9 @@
 #include "helicarm/phantom/plate.h"
 #include "helicarm/phantom/rules.h"
 #include "helicarm/phantom/uniformity.h"
+#include "helicarm/phantom_calibration/measure_phantom.h"
+#include "helicarm/phantom_calibration/phantom_report.h"
+#include "helicarm/phantom_calibration/verify_phantom.h"
 
 namespace helicarm::cli {
 namespace {
@@ -119,6 +125,97 @@ void write(const Files& files, Console& console) {
   console.out << to_text(Json{{"written", written}}) << "\n";
 }
 
+std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
+
+void notify(const std::vector<Warning>& warnings, Console& console) {
+  if (console.quiet) return;
+  for (const Warning& warning : warnings)
+    console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
+                                    warning.view.empty() ? "" : ": ", warning.message);
+}
+
+PhantomOptions options_of(const PhantomArguments& arguments, const Console& console) {
+  PhantomOptions options;
+  options.from_scratch = arguments.from_scratch;
+  if (arguments.distance_sigma_mm) options.distance_sigma_mm = *arguments.distance_sigma_mm;
+  if (arguments.distance_is != "centres" && arguments.distance_is != "outer")
+    throw BadInput(Reason::usage,
+                   fmt::format("--distance-is: \"{}\" is none of: centres, outer", arguments.distance_is));
+  options.outer = arguments.distance_is == "outer";
+  for (const std::string& distance : arguments.distances)
+    options.distances.push_back(value_or_throw(hand_distance_from(distance, arguments.from_scratch)));
+  options.threads = console.threads;
+  options.date = today();
+  return options;
+}
+
+/// A case whose calibrator allows no answer is refused like any other.
+PhantomResult measured(const PhantomArguments& arguments, const Console& console) {
+  const PhantomOptions options = options_of(arguments, console);
+  const auto given = read_phantom_case(arguments.name_or_file);
+  if (!given && exit_code(given.error().reason) == 3) {
+    PhantomResult refused;
+    refused.failure = given.error();
+    return refused;
+  }
+  if (!given) throw BadInput(given.error());
+  return value_or_throw(measure_phantom(*given, options));
+}
+
+void print(const PhantomResult& result, const std::filesystem::path& out, Console& console) {
+  console.out << fmt::format("  {} balls, {} views, {:.3f} px rms per axis, scale by {} to {:.2g} %\n\n",
+                             result.balls.size(), result.views.size(), result.rms_px, result.scale.source,
+                             100 * result.scale.relative_sigma);
+  console.out << fmt::format("  {:<10}{:>10}{:>10}{:>10}{:>14}{:>16}\n", "ball", "x mm", "y mm", "z mm",
+                             "sigma mm", "from nominal mm");
+  for (const MeasuredBall& ball : result.balls)
+    console.out << fmt::format("  {:<10}{:>10.3f}{:>10.3f}{:>10.3f}{:>14.4f}{:>16}\n", ball.label,
+                               ball.centre.x(), ball.centre.y(), ball.centre.z(),
+                               std::sqrt(ball.covariance_mm2.trace() / 3),
+                               ball.from_nominal ? fmt::format("{:.3f}", ball.from_nominal->norm()) : "");
+  console.out << fmt::format("\n  worth measuring by hand: {} to {}, {:.1f} mm\n  written to {}\n",
+                             result.balls[result.pair.a].label, result.balls[result.pair.b].label,
+                             result.pair.distance_mm, out.string());
+}
+
+void measure(const PhantomArguments& arguments, Console& console) {
+  if (!arguments.out) throw BadInput(Reason::usage, "phantom measure: --out DIR is required");
+  const std::filesystem::path& out = *arguments.out;
+  std::error_code ignored;
+  for (const char* file : {"calibrator.json", "result.json", "report.html"})
+    std::filesystem::remove(out / file, ignored);
+  const PhantomResult result = measured(arguments, console);
+  notify(result.warnings, console);
+  if (!result.failure)
+    value_or_throw(write_file(out / "calibrator.json", to_text(to_json(result.calibrator)) + "\n"));
+  value_or_throw(write_file(out / "report.html", phantom_report_html(result)));
+  value_or_throw(write_file(out / "result.json", to_text(to_json(result)) + "\n"));
+  if (result.failure) throw BadInput(*result.failure);
+  if (console.json)
+    console.out << to_text(to_json(result)) << "\n";
+  else if (!console.quiet)
+    print(result, out, console);
+}
+
+void verify(const PhantomArguments& arguments, Console& console) {
+  const Case given = value_or_throw(read_case(arguments.name_or_file));
+  PhantomVerification result = value_or_throw(verify_phantom(given, console.threads));
+  result.date = today();
+  if (arguments.history && !result.balls.empty()) value_or_throw(add_to_history(*arguments.history, result));
+  if (arguments.out)
+    value_or_throw(write_file(*arguments.out / "result.json", to_text(to_json(result)) + "\n"));
+  notify(result.warnings, console);
+  if (console.json) console.out << to_text(to_json(result)) << "\n";
+  if (!console.json && !console.quiet) {
+    for (const VerifiedBall& ball : result.balls)
+      console.out << fmt::format("  {:<10}{:>9.3f} mm from the file, {:.3f} mm possible (95 %)   {}\n",
+                                 ball.label, ball.distance_mm.value_or(0), ball.bound_mm, word(ball.state));
+    if (!result.failure && !result.balls.empty())
+      console.out << fmt::format("\n  still as in the file, to within {:.3f} mm\n", result.within_mm);
+  }
+  if (result.failure) throw BadInput(*result.failure);
+}
+
 }  // namespace
 
 CommandResult phantom_command(const PhantomArguments& arguments, Console& console) {
@@ -135,6 +232,10 @@ CommandResult phantom_command(const PhantomArguments& arguments, Console& consol
         return write(arguments.plate ? exported(plate_of(arguments), arguments)
                                      : exported(calibrator_of(arguments), arguments),
                      console);
+      case PhantomAction::measure:
+        return measure(arguments, console);
+      case PhantomAction::verify:
+        return verify(arguments, console);
     }
   });
 }

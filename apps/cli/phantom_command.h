@@ -4,22 +4,30 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "command.h"
 
 namespace helicarm::cli {
 
-enum class PhantomAction { show, check, export_files };
+enum class PhantomAction { show, check, export_files, measure, verify };
 
 /// `helicarm phantom show|check|export [NAME_OR_FILE] [--plate] [--stl FILE] [--svg FILE]`. With --json,
-/// `show` prints a valid calibrator.json or plate.json.
+/// `show` prints a valid calibrator.json or plate.json. `helicarm phantom measure CASE --out DIR` and
+/// `helicarm phantom verify CASE` read a case instead.
 struct PhantomArguments {
   PhantomAction action = PhantomAction::show;
-  std::string name_or_file;                   ///< name of a built-in or a file; empty: udcsc or plate48
-  bool plate = false;                         ///< the rectification plate instead of the calibrator
-  std::optional<std::filesystem::path> stl;   ///< export: the printable body
-  std::optional<std::filesystem::path> svg;   ///< export: the drawing
-  std::optional<std::filesystem::path> file;  ///< export: calibrator.json or plate.json
+  std::string name_or_file;                      ///< name of a built-in or a file; empty: udcsc or plate48
+  bool plate = false;                            ///< the rectification plate instead of the calibrator
+  std::optional<std::filesystem::path> stl;      ///< export: the printable body
+  std::optional<std::filesystem::path> svg;      ///< export: the drawing
+  std::optional<std::filesystem::path> file;     ///< export: calibrator.json or plate.json
+  std::optional<std::filesystem::path> out;      ///< measure, verify: folder of the result
+  bool from_scratch = false;                     ///< measure: without a nominal file
+  std::vector<std::string> distances;            ///< measure: A,B=MM or u1,v1;u2,v2=MM
+  std::optional<double> distance_sigma_mm;       ///< measure
+  std::string distance_is = "centres";           ///< measure: centres or outer
+  std::optional<std::filesystem::path> history;  ///< verify: JSON, to which this verification is added
 };
 
 CommandResult phantom_command(const PhantomArguments& arguments, Console& console);

@@ -161,22 +161,56 @@ void add_study(CLI::App& app, Action& action) {
 }
 
 void add_phantom(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "phantom", "Show, check or export the calibrator and the plate",
-                              "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
-                              "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg");
+  auto* command = add_command(
+      app, "phantom", "Show, check, export, measure or verify the calibrator",
+      "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
+      "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg\n"
+      "  helicarm phantom measure eight-views --distance P1,P7=118.42 --distance-is outer --out my-phantom\n"
+      "  helicarm phantom measure eight-views --from-scratch --distance \"212,480;803,466=83.4\" --out "
+      "my-phantom\n"
+      "  helicarm phantom verify two-views --history my-phantom/history.json");
   auto& a = arguments_of(command, action, phantom_command);
-  command->add_option("ACTION", a.action, "show, check or export")
+  command
+      ->add_option(
+          "ACTION", a.action,
+          "show, check, export: a file\n"
+          "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
+          "30 degrees apart)\n"
+          "verify: whether the balls still lie as in the file, from a case of two views or more")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
                                                {"check", PhantomAction::check},
-                                               {"export", PhantomAction::export_files}}))
+                                               {"export", PhantomAction::export_files},
+                                               {"measure", PhantomAction::measure},
+                                               {"verify", PhantomAction::verify}}))
       ->required();
-  command->add_option("NAME_OR_FILE", a.name_or_file,
-                      "Name of a built-in or a file (default: udcsc or plate48)");
+  command->add_option(
+      "NAME_OR_FILE", a.name_or_file,
+      "Name of a built-in or a file (default: udcsc or plate48). measure, verify: the case's folder");
   command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
   command->add_option("--stl", a.stl, "export: the printable body");
   command->add_option("--svg", a.svg, "export: the drawing");
   command->add_option("--file", a.file, "export: calibrator.json or plate.json");
+  command->add_option("--out", a.out,
+                      "measure: folder for calibrator.json, result.json and report.html; verify: for "
+                      "result.json");
+  command->add_flag(
+      "--from-scratch", a.from_scratch,
+      "measure: without a nominal file; the case gives \"diameters_mm\" and each view \"mirrored\"");
+  command
+      ->add_option(
+          "--distance", a.distances,
+          "measure: distance of two balls by caliper, A,B=MM with labels; from scratch u1,v1;u2,v2=MM with "
+          "raw pixels in the first view; repeatable. Without it the scale is good to 3 % only")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--distance-sigma", a.distance_sigma_mm, "measure: of each distance, mm (default: 0.05)")
+      ->check(within(1e-4, 10));
+  command
+      ->add_option("--distance-is", a.distance_is,
+                   "measure: between the balls' centres, or outer, over both balls")
+      ->capture_default_str();
+  command->add_option("--history", a.history, "verify: JSON file to which this verification is added");
 }
 
 }  // namespace

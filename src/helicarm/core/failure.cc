@@ -107,6 +107,12 @@ std::string_view code(Reason reason) {
       return "replay_differs";
     case Reason::interrupted:
       return "interrupted";
+    case Reason::too_few_views:
+      return "too_few_views";
+    case Reason::distances_disagree:
+      return "distances_disagree";
+    case Reason::phantom_changed:
+      return "phantom_changed";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:
@@ -139,6 +145,8 @@ std::string_view code(Reason reason) {
       return "intrinsics_inconsistent";
     case Reason::residual_distortion:
       return "residual_distortion";
+    case Reason::scale_weak:
+      return "scale_weak";
   }
   return "internal";
 }

@@ -68,6 +68,9 @@ enum class Reason {
   not_connected,
   replay_differs,
   interrupted,
+  too_few_views,
+  distances_disagree,
+  phantom_changed,
   // Warnings only.
   name_differs,
   bone_taken_as_fixed,
@@ -85,6 +88,7 @@ enum class Reason {
   calibrator_deviates,
   ball_displaced,
   scale_unverified,
+  scale_weak,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

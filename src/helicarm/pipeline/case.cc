@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t least_views = 2;
+constexpr std::size_t least_views_of_run = 2;
 constexpr std::size_t most_views = 50;
 constexpr std::size_t most_picks = 1000;
 constexpr std::size_t most_note_characters = 100000;
@@ -187,7 +187,29 @@ TrackerNoise tracker_from(JsonReader reader) {
   return noise;
 }
 
-std::vector<CaseView> views_from(JsonReader& reader, const Case& known) {
+/// What a case is read for.
+enum class Purpose { run, phantom };
+
+std::vector<double> diameters_from(JsonReader& reader) {
+  constexpr std::size_t most_kinds = 10;
+  const Json& list = reader.raw("diameters_mm");
+  if (list.is_null()) return {};
+  if (!list.is_array() || list.empty() || list.size() > most_kinds)
+    reader.refuse(Reason::bad_value, "diameters_mm",
+                  fmt::format("is not a list of 1 to {} numbers", most_kinds));
+  return reader.numbers("diameters_mm", list.size(), {0.5, 30});
+}
+
+void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
+  read.diameters_mm = diameters_from(reader);
+  if (purpose == Purpose::phantom && !reader.has("calibrator") && !read.diameters_mm.empty()) {
+    reader.raw("calibrator");
+    return;
+  }
+  read.calibrator = value_or_throw(calibrator_named(reader.text("calibrator", 1000), read.folder));
+}
+
+std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::size_t least_views) {
   std::vector<CaseView> views;
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("views", true, most_views)) {
@@ -213,7 +235,7 @@ void warn_of_borrowed_name(Case& read) {
          {}});
 }
 
-Case case_from(const fs::path& path) {
+Case case_from(const fs::path& path, Purpose purpose) {
   const bool is_file = fs::is_regular_file(path);
   const fs::path folder = is_file ? fs::absolute(path).parent_path() : path;
   const fs::path file = is_file ? path : folder / "case.json";
@@ -223,10 +245,10 @@ Case case_from(const fs::path& path) {
   reader.optional_text("notes", most_note_characters);
   Case read;
   read.folder = folder;
-  read.calibrator = value_or_throw(calibrator_named(reader.text("calibrator", 1000), folder));
+  read_calibrator_of(read, reader, purpose);
   if (const auto plate = reader.optional_text("plate", 1000))
     read.plate = value_or_throw(plate_named(*plate, folder));
-  read.views = views_from(reader, read);
+  read.views = views_from(reader, read, purpose == Purpose::run ? least_views_of_run : 1);
   if (!reader.raw("poses_now").is_null()) read.poses_now = poses_from(reader.object("poses_now"), true);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
   read.picks = picks_of(reader, read.views, read.calibrator.targets);
@@ -258,7 +280,11 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
 }
 
 Expected<Case> read_case(const fs::path& path) {
-  return guarded([&] { return case_from(path); });
+  return guarded([&] { return case_from(path, Purpose::run); });
+}
+
+Expected<Case> read_phantom_case(const fs::path& path) {
+  return guarded([&] { return case_from(path, Purpose::phantom); });
 }
 
 }  // namespace helicarm

@@ -65,6 +65,7 @@ struct Case {
   std::vector<Pick> picks;
   std::vector<TunnelPlan> tunnels;
   std::vector<ToolLine> tool_lines;
+  std::vector<double> diameters_mm;  ///< kinds of ball of a phantom that is measured from scratch
   std::vector<Warning> warnings;
 };
 
@@ -72,5 +73,9 @@ struct Case {
 /// Images are not opened. Fails with missing_file, bad_json, not_finite, unknown_key, path_outside,
 /// name_clash or bad_value.
 Expected<Case> read_case(const std::filesystem::path& path);
+
+/// As `read_case`, for a case whose phantom is measured: one view or more, and the calibrator may be null
+/// where "diameters_mm" is given (`calibrator` then has no balls).
+Expected<Case> read_phantom_case(const std::filesystem::path& path);
 
 }  // namespace helicarm

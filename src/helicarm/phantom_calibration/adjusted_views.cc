@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/adjusted_views.h"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/phantom_calibration/correspondence.h"
+#include "helicarm/phantom_calibration/from_scratch.h"
+#include "helicarm/pipeline/prior.h"
+
+namespace helicarm {
+namespace {
+
+constexpr double reversal_ratio = 1.5;  // of the rms of a depth-reversed phantom to that of the best
+
+std::optional<bool> mirrored(const DetectedView& detected, const CaseView& view, bool from_scratch) {
+  if (view.mirrored) return view.mirrored;
+  if (from_scratch && detected.xray_image->acquisition.flip_hint) return true;
+  return std::nullopt;
+}
+
+Expected<void> check_handedness(const Reconstruction& r) {
+  if (!r.reversed_rms_px || *r.reversed_rms_px > reversal_ratio * r.rms_px) return {};
+  return fail(
+      Reason::ambiguous_handedness,
+      fmt::format(
+          "the phantom and its depth-reversed image fit almost alike ({:.3f} and {:.3f} px rms): take "
+          "views farther apart, or use a less flat phantom",
+          r.rms_px, *r.reversed_rms_px),
+      {{"rms_px", r.rms_px}, {"reversed_rms_px", *r.reversed_rms_px}});
+}
+
+using Observations = std::vector<std::vector<std::optional<Observed>>>;
+
+Observations observe_all(const std::vector<DetectedView>& detected, const std::vector<PreparedView>& views,
+                         const Reconstruction& r, unsigned threads) {
+  Observations observed(views.size());
+  parallel_for(views.size(), threads, [&](std::size_t v) {
+    if (r.views[v])
+      observed[v] = observe(detected[v], views[v], *r.views[v], r.centres, r.diameters_mm, r.candidate_of[v]);
+  });
+  return observed;
+}
+
+/// The problem of the fiducials that two views or more show; `balls` and `used` index the reconstruction.
+BundleProblem problem_of(const std::vector<DetectedView>& detected, const std::vector<PreparedView>& views,
+                         const Reconstruction& r, const Observations& observed,
+                         std::vector<std::size_t>& balls, std::vector<std::size_t>& used) {
+  BundleProblem problem;
+  problem.c_arm = unknown_c_arm();
+  std::vector<std::size_t> index(r.centres.size());
+  for (std::size_t ball = 0; ball < r.centres.size(); ++ball) {
+    int seen = 0;
+    for (const auto& of_view : observed) seen += !of_view.empty() && of_view[ball].has_value();
+    if (seen < 2) continue;
+    index[ball] = balls.size();
+    balls.push_back(ball);
+    problem.centres.push_back(r.centres[ball]);
+  }
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (!r.views[v]) continue;
+    BundleView view{views[v].view.name, *r.views[v], views[v].view.prior, {}};
+    std::vector<Eigen::Vector2d> places;
+    for (const std::size_t ball : balls)
+      if (const auto& seen = observed[v][ball]) {
+        view.images.push_back({index[ball], seen->uv, seen->sigma_px});
+        places.push_back(seen->uv);
+      }
+    view.map_covariance_px2 = detected[v].rectification.map.covariance_px2(places);
+    problem.views.push_back(std::move(view));
+    used.push_back(v);
+  }
+  return problem;
+}
+
+/// Poses and centres by the observed images, which then are observed again: the offset of a ball's blob from
+/// its centre depends on them, and balls that were missed are looked for.
+Expected<Observations> observe_twice(const std::vector<DetectedView>& detected,
+                                     const std::vector<PreparedView>& views, Reconstruction& r,
+                                     unsigned threads) {
+  Observations observed = observe_all(detected, views, r, threads);
+  std::vector<std::size_t> balls, used;
+  const BundleProblem problem = problem_of(detected, views, r, observed, balls, used);
+  BundleOptions robust;
+  robust.robust = true;
+  const auto fit = adjust(problem, robust);
+  if (!fit) return tl::unexpected<Failure>(fit.error());
+  for (std::size_t i = 0; i < balls.size(); ++i) r.centres[balls[i]] = fit->centres[i];
+  for (std::size_t i = 0; i < used.size(); ++i) r.views[used[i]] = fit->views[i];
+  return observe_all(detected, views, r, threads);
+}
+
+/// B1, B2, ... by descending diameter, then by u in the first view.
+void name_by_size(AdjustedViews& found) {
+  const auto& first = found.observed.front();
+  const View& view = found.consistent.fit.views.front();
+  std::vector<std::size_t> order(found.diameters_mm.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  const auto u_of = [&](std::size_t i) {
+    return first[i] ? first[i]->uv_raw.x() : view.project(found.consistent.fit.centres[i]).x();
+  };
+  std::ranges::sort(order, {}, [&](std::size_t i) { return std::tuple(-found.diameters_mm[i], u_of(i)); });
+  found.labels.resize(order.size());
+  for (std::size_t place = 0; place < order.size(); ++place)
+    found.labels[order[place]] = fmt::format("B{}", place + 1);
+  found.order = std::move(order);
+}
+
+void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& balls,
+                     const std::vector<PreparedView>& views, const Calibrator* nominal,
+                     std::vector<Warning>& warnings) {
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (!r.views[v])
+      warnings.push_back({Reason::too_few_fiducials,
+                          "the fiducials of this view agree with no other view: it is not used",
+                          views[v].view.name,
+                          {}});
+  for (std::size_t ball = 0; nominal && ball < r.centres.size(); ++ball)
+    if (std::ranges::find(balls, ball) == balls.end())
+      warnings.push_back({Reason::not_seen,
+                          fmt::format("{} is seen in fewer than two views: it is not in the measured file",
+                                      nominal->balls[ball].label),
+                          {},
+                          {}});
+}
+
+}  // namespace
+
+Expected<std::vector<DetectedView>> detected_views(const Case& given, unsigned threads) {
+  RunOptions options;
+  options.threads = threads;
+  const auto stage = [&](auto work) {
+    return [&, work](auto views) { return work(std::move(views), given, options); };
+  };
+  auto views = read_views(given, options).and_then(stage(rectify_views)).and_then(stage(detect_in_views));
+  if (!views) return tl::unexpected<Failure>(views.error().failure);
+  return *std::move(views);
+}
+
+Expected<AdjustedViews> adjusted_views(const std::vector<DetectedView>& detected, const Case& given,
+                                       bool from_scratch, std::size_t least_views, unsigned threads,
+                                       std::vector<Warning>& warnings) {
+  std::vector<double> kinds = given.diameters_mm;
+  if (!from_scratch)
+    for (const CalibratorBall& ball : given.calibrator.balls) kinds.push_back(ball.diameter_mm);
+  std::ranges::sort(kinds, std::greater{});
+  kinds.erase(std::unique(kinds.begin(), kinds.end()), kinds.end());
+  std::vector<PreparedView> views(detected.size());
+  for (std::size_t v = 0; v < detected.size(); ++v)
+    views[v] = prepared(detected[v], kinds, mirrored(detected[v], given.views[v], from_scratch));
+  std::vector<PhantomView> plain;
+  for (const PreparedView& view : views) plain.push_back(view.view);
+
+  auto r =
+      from_scratch ? reconstruct_from_scratch(plain, kinds) : reconstruct_nominal(plain, given.calibrator);
+  if (!r) return tl::unexpected<Failure>(r.error());
+  auto observed = observe_twice(detected, views, *r, threads);
+  if (!observed) return tl::unexpected<Failure>(observed.error());
+
+  std::vector<std::size_t> balls, used;
+  BundleProblem problem = problem_of(detected, views, *r, *observed, balls, used);
+  if (used.size() < least_views)
+    return fail(Reason::too_few_views,
+                fmt::format("the fiducials can be recognised in {} views only, at least {} are required",
+                            used.size(), least_views),
+                {{"views", double(used.size())}, {"needed", double(least_views)}});
+  auto consistent = adjust_without_outliers(std::move(problem));
+  if (!consistent) return tl::unexpected<Failure>(consistent.error());
+  if (auto handed = check_handedness(*r); !handed) return tl::unexpected<Failure>(handed.error());
+
+  AdjustedViews found{*std::move(consistent), {}, {}, {}, {}, used, {}, {}};
+  for (const std::size_t ball : balls) found.diameters_mm.push_back(r->diameters_mm[ball]);
+  for (const std::size_t v : used) {
+    auto& of_view = found.observed.emplace_back();
+    for (const std::size_t ball : balls) of_view.push_back((*observed)[v][ball]);
+    found.digests.push_back(detected[v].xray_image->acquisition.instance_key);
+  }
+  if (from_scratch) {
+    name_by_size(found);
+  } else {
+    found.ball_of_nominal = balls;
+    found.order.resize(balls.size());
+    std::iota(found.order.begin(), found.order.end(), std::size_t(0));
+    for (const std::size_t ball : balls) found.labels.push_back(given.calibrator.balls[ball].label);
+  }
+  warn_of_missing(*r, balls, views, from_scratch ? nullptr : &given.calibrator, warnings);
+  return found;
+}
+
+}  // namespace helicarm

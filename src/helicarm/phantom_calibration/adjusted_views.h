@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/phantom_calibration/consistent_fit.h"
+#include "helicarm/phantom_calibration/observe.h"
+
+namespace helicarm {
+
+/// Views with their fiducials observed, and the adjustment of all.
+struct AdjustedViews {
+  ConsistentFit consistent;  ///< its fiducials are those of `labels`
+  std::vector<std::string> labels;
+  std::vector<std::size_t> order;  ///< in which they are listed
+  std::vector<double> diameters_mm;
+  std::vector<std::size_t> ball_of_nominal;                    ///< empty from scratch
+  std::vector<std::size_t> view_of_case;                       ///< of each adjusted view
+  std::vector<std::vector<std::optional<Observed>>> observed;  ///< per adjusted view and fiducial
+  std::vector<std::string> digests;                            ///< of the images
+};
+
+/// The case's images, rectified and searched.
+Expected<std::vector<DetectedView>> detected_views(const Case& given, unsigned threads);
+
+/// Labels (by the nominal file) or finds (from scratch) the fiducials, observes them in the pixels and
+/// adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
+/// `least_views` are.
+Expected<AdjustedViews> adjusted_views(const std::vector<DetectedView>& detected, const Case& given,
+                                       bool from_scratch, std::size_t least_views, unsigned threads,
+                                       std::vector<Warning>& warnings);
+
+}  // namespace helicarm

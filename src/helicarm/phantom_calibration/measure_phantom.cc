@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/measure_phantom.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/geometry/ray.h"
+#include "helicarm/phantom_calibration/adjusted_views.h"
+#include "helicarm/phantom_calibration/gauge.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double diameter_scale_sigma = 0.03;  // of radii in an image, relative; as LabellingPrior's
+constexpr double least_angle_deg = 15;
+constexpr double least_move_mm = 0.4;
+constexpr double contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
+
+double median(std::vector<double> values) {
+  std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+/// Standard deviations by which chi2 exceeds its degrees of freedom (Wilson and Hilferty 1931).
+double excess_of(double chi2, int dof) {
+  const double width = 2.0 / (9 * dof);
+  return (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width);
+}
+
+Expected<void> check_apart(const AdjustedViews& found) {
+  Vector3d middle = Vector3d::Zero();
+  const auto& centres = found.consistent.fit.centres;
+  for (const Vector3d& centre : centres) middle += centre / double(centres.size());
+  double widest = 0;
+  const auto& views = found.consistent.fit.views;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      widest = std::max(widest, angle_between(ray_through(views[i], views[i].project(middle)),
+                                              ray_through(views[j], views[j].project(middle))));
+  widest *= 180 / std::numbers::pi;
+  if (widest >= least_angle_deg) return {};
+  return fail(
+      Reason::views_too_close,
+      fmt::format("the views are at most {:.3g} degrees apart, at least {:g} are needed: take further views",
+                  widest, least_angle_deg),
+      {{"angle_deg", widest}, {"limit_deg", least_angle_deg}});
+}
+
+Expected<void> check_unmoved(const AdjustedViews& found) {
+  const auto moved = moved_fiducial(found.consistent, least_move_mm);
+  if (!moved) return {};
+  std::string views;
+  for (const std::size_t v : moved->views)
+    views += (views.empty() ? "" : ", ") + found.consistent.problem.views[v].name;
+  return fail(
+      Reason::phantom_changed,
+      fmt::format("{} lies {:.2g} mm elsewhere in {}: it moved between the views; fix it and take all "
+                  "images again",
+                  found.labels[moved->fiducial], moved->moved_mm, views),
+      {{"moved_mm", moved->moved_mm}, {"views", double(moved->views.size())}});
+}
+
+/// Covariance inflation, as the calibration of views does it.
+double variance_scale_of(const BundleFit& fit, PhantomResult& result) {
+  if (fit.dof < 1 || excess_of(fit.chi2, fit.dof) < contradiction) return 1;
+  const double scale = fit.chi2 / fit.dof;
+  result.warnings.push_back(
+      {Reason::residual_too_large,
+       fmt::format("the residuals are {:.2g} times what the noise model allows: all covariances are inflated",
+                   std::sqrt(scale)),
+       {},
+       {{"chi2", fit.chi2}, {"dof", double(fit.dof)}}});
+  return scale;
+}
+
+/// Factor to mm by the balls' diameters as seen.
+double factor_of_diameters(const AdjustedViews& found) {
+  std::vector<double> factors;
+  for (const auto& view : found.observed)
+    for (std::size_t i = 0; i < view.size(); ++i)
+      if (view[i]) factors.push_back(found.diameters_mm[i] / view[i]->diameter_mm);
+  return median(std::move(factors));
+}
+
+Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedViews& found) {
+  if (const auto* label = std::get_if<std::string>(&name)) {
+    const auto at = std::ranges::find(found.labels, *label);
+    if (at != found.labels.end()) return std::size_t(at - found.labels.begin());
+    return fail(Reason::bad_value, fmt::format("--distance: \"{}\" is no measured ball", *label));
+  }
+  constexpr double reach_px = 20;
+  const auto& place = std::get<Eigen::Vector2d>(name);
+  double nearest = reach_px;
+  std::optional<std::size_t> which;
+  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
+    if (found.view_of_case[v] != 0) continue;
+    for (std::size_t i = 0; i < found.observed[v].size(); ++i)
+      if (const auto& seen = found.observed[v][i]; seen && (seen->uv_raw - place).norm() < nearest) {
+        nearest = (seen->uv_raw - place).norm();
+        which = i;
+      }
+  }
+  if (which) return *which;
+  return fail(Reason::bad_value,
+              fmt::format("--distance: no ball within {:g} px of {:g},{:g} in the first view", reach_px,
+                          place.x(), place.y()));
+}
+
+Expected<std::vector<CentreDistance>> distances_of(const AdjustedViews& found,
+                                                   const PhantomOptions& options) {
+  std::vector<CentreDistance> distances;
+  for (const HandDistance& given : options.distances) {
+    const auto a = fiducial_named(given.a, found);
+    const auto b = fiducial_named(given.b, found);
+    if (!a) return tl::unexpected<Failure>(a.error());
+    if (!b) return tl::unexpected<Failure>(b.error());
+    const double over = options.outer ? (found.diameters_mm[*a] + found.diameters_mm[*b]) / 2 : 0;
+    if (*a == *b || !(given.mm - over > 0))
+      return fail(Reason::bad_value,
+                  fmt::format("--distance: {:g} mm is no distance of two balls", given.mm));
+    distances.push_back({*a, *b, given.mm - over, options.distance_sigma_mm});
+  }
+  return distances;
+}
+
+/// To mm, with the scale's error.
+Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd& covariance,
+                              const PhantomOptions& options, PhantomResult& result) {
+  const auto& centres = found.consistent.fit.centres;
+  const auto distances = distances_of(found, options);
+  if (!distances) return tl::unexpected<Failure>(distances.error());
+  const double factor = factor_of_diameters(found);
+  auto points = scaled_by(centres, covariance, factor, diameter_scale_sigma);
+  result.pair = best_pair(points.centres, factor * factor * covariance, options.distance_sigma_mm);
+  if (!distances->empty()) {
+    auto by_distances = scaled_by(centres, covariance, *distances, found.labels);
+    if (!by_distances) return by_distances;
+    result.scale = {"distances", by_distances->scale_sigma};
+    return by_distances;
+  }
+  result.scale = {"diameters", diameter_scale_sigma};
+  result.warnings.push_back(
+      {Reason::scale_weak,
+       fmt::format(
+           "the scale comes from the balls' diameters as seen, to {:.2g} % (one sigma): measure {} to {} "
+           "(about {:.1f} mm) and give it by --distance",
+           100 * diameter_scale_sigma, found.labels[result.pair.a], found.labels[result.pair.b],
+           result.pair.distance_mm),
+       {},
+       {{"relative_sigma", diameter_scale_sigma}}});
+  return points;
+}
+
+/// Carried by a rotation and a translation; the covariance into the frame that weighted points fix.
+void carry(ScaledPoints& points, const RigidTransform& by, const Eigen::VectorXd& weights) {
+  const auto n = Eigen::Index(points.centres.size());
+  Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(3 * n, 3 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    turn.block<3, 3>(3 * i, 3 * i) = by.rotation;
+    points.centres[std::size_t(i)] = by * points.centres[std::size_t(i)];
+  }
+  points.covariance_mm2 = turn * points.covariance_mm2 * turn.transpose();
+  points.covariance_mm2 =
+      in_frame_of(points.covariance_mm2, similarity_motions(points.centres).leftCols<6>(), weights);
+}
+
+/// The frame of an unknown phantom: origin at the mean, axes along the principal directions, the longest
+/// first, x and y with their largest component positive in the first view's directions, right-handed.
+RigidTransform principal_frame(const std::vector<Vector3d>& centres, const Eigen::Matrix3d& view_rotation) {
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& centre : centres) mean += centre / double(centres.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vector3d& centre : centres) spread += (centre - mean) * (centre - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
+  Eigen::Matrix3d rotation;
+  for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    Vector3d direction = eigen.eigenvectors().col(2 - axis);
+    const Vector3d in_view = view_rotation * direction;
+    Eigen::Index largest = 0;
+    in_view.cwiseAbs().maxCoeff(&largest);
+    if (in_view[largest] < 0) direction = -direction;
+    rotation.row(axis) = direction.transpose();
+  }
+  rotation.row(2) = Vector3d(rotation.row(0)).cross(Vector3d(rotation.row(1))).transpose();
+  return {rotation, -(rotation * mean)};
+}
+
+void set_frame(ScaledPoints& points, const AdjustedViews& found, const std::optional<Calibrator>& nominal) {
+  const auto n = Eigen::Index(points.centres.size());
+  if (!nominal) {
+    carry(points, principal_frame(points.centres, found.consistent.fit.views[0].camera_from_world.rotation),
+          Eigen::VectorXd::Ones(n));
+    return;
+  }
+  std::vector<Vector3d> places;
+  for (const std::size_t ball : found.ball_of_nominal)
+    places.push_back(nominal->balls[ball].centre_in_calibrator);
+  // Weights are found with the scale free, as it may be wrong in the file; the frame is rigid.
+  const RobustFit fit = robust_similarity(points.centres, places, true);
+  carry(points, similarity_between(points.centres, places, fit.weights, false).a_from_b, fit.weights);
+}
+
+void describe_views(const AdjustedViews& found, const PhantomOptions& options, PhantomResult& result) {
+  const auto left_out = left_out_rms(found.consistent, options.threads);
+  const BundleFit& fit = found.consistent.fit;
+  for (std::size_t v = 0; v < fit.views.size(); ++v) {
+    MeasuredView view;
+    view.name = found.consistent.problem.views[v].name;
+    view.digest = found.digests[v];
+    view.view = fit.views[v];
+    view.left_out_rms_px = left_out[v];
+    double sum = 0;
+    for (std::size_t i = 0; i < fit.residuals_px[v].size(); ++i) {
+      view.residuals_px.emplace_back(found.consistent.problem.views[v].images[i].fiducial,
+                                     fit.residuals_px[v][i]);
+      view.images_px.push_back(found.consistent.problem.views[v].images[i].uv);
+      sum += fit.residuals_px[v][i].squaredNorm();
+    }
+    view.rms_px = std::sqrt(sum / double(2 * view.residuals_px.size()));
+    result.views.push_back(std::move(view));
+  }
+}
+
+void describe_balls(const ScaledPoints& points, const AdjustedViews& found, PhantomResult& result) {
+  result.calibrator.balls.clear();
+  std::vector<std::size_t> place(found.order.size());
+  for (std::size_t k = 0; k < place.size(); ++k) place[found.order[k]] = k;
+  result.pair.a = place[result.pair.a];
+  result.pair.b = place[result.pair.b];
+  for (MeasuredView& view : result.views)
+    for (auto& residual : view.residuals_px) residual.first = place[residual.first];
+  for (const std::size_t i : found.order) {
+    const auto at = 3 * Eigen::Index(i);
+    MeasuredBall ball{found.labels[i], points.centres[i], points.covariance_mm2.block<3, 3>(at, at), {}, 0};
+    if (result.nominal)
+      ball.from_nominal =
+          points.centres[i] - result.nominal->balls[found.ball_of_nominal[i]].centre_in_calibrator;
+    for (const BundleView& view : found.consistent.problem.views)
+      ball.views += int(std::ranges::count(view.images, i, &FiducialImage::fiducial));
+    result.calibrator.balls.push_back({ball.label, ball.centre, found.diameters_mm[i], ball.covariance_mm2});
+    result.balls.push_back(std::move(ball));
+  }
+}
+
+void describe_source(const PhantomOptions& options, PhantomResult& result) {
+  Json& measured = result.calibrator.measured;
+  measured = {{"date", options.date},
+              {"by", "helicarm phantom measure " HELICARM_VERSION},
+              {"views", Json::array()},
+              {"scale", {{"source", result.scale.source}, {"relative_sigma", result.scale.relative_sigma}}},
+              {"reprojection_rms_px", result.rms_px}};
+  for (const MeasuredView& view : result.views) measured["views"].push_back(view.digest);
+  if (options.distances.empty()) return;
+  measured["scale"]["distances"] = options.distances.size();
+  measured["scale"]["sigma_mm"] = options.distance_sigma_mm;
+}
+
+/// Everything after the adjustment; stops at the first refusal.
+Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& options, PhantomResult& result) {
+  const BundleFit& fit = found.consistent.fit;
+  result.rms_px = fit.rms_px;
+  result.chi2 = fit.chi2;
+  result.dof = fit.dof;
+  describe_views(found, options, result);
+  if (auto apart = check_apart(found); !apart) return apart;
+  if (auto unmoved = check_unmoved(found); !unmoved) return unmoved;
+  for (const RejectedImage& rejected : found.consistent.rejected)
+    result.warnings.push_back(
+        {Reason::residual_too_large,
+         fmt::format("the image of {} is {:.2g} px from where the other views put it: left out",
+                     found.labels[rejected.image.fiducial], rejected.off_px.norm()),
+         found.consistent.problem.views[rejected.view].name,
+         {{"off_px", rejected.off_px.norm()}}});
+  const double variance_scale = variance_scale_of(fit, result);
+  auto points = scaled(found, variance_scale * fit.covariance_mm2, options, result);
+  if (!points) return tl::unexpected<Failure>(points.error());
+  set_frame(*points, found, result.nominal);
+  result.calibrator.scale_sigma = result.scale.relative_sigma;
+  describe_balls(*points, found, result);
+  describe_source(options, result);
+  return {};
+}
+
+}  // namespace
+
+Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixels) {
+  const auto wrong = [&] {
+    return fail(Reason::usage,
+                fmt::format("--distance: \"{}\" is not {}", text, by_pixels ? "u1,v1;u2,v2=MM" : "A,B=MM"));
+  };
+  const std::size_t equals = text.rfind('=');
+  if (equals == std::string::npos) return wrong();
+  const auto number = [](const std::string& word, double& value) {
+    std::istringstream in(word);
+    in.imbue(std::locale::classic());
+    return bool(in >> value) && in.peek() == std::istringstream::traits_type::eof() && std::isfinite(value);
+  };
+  HandDistance distance{};
+  if (!number(text.substr(equals + 1), distance.mm) || !(distance.mm > 0) || distance.mm > 2000)
+    return wrong();
+  const std::string pair = text.substr(0, equals);
+  if (!by_pixels) {
+    const std::size_t comma = pair.find(',');
+    if (comma == std::string::npos || pair.find(',', comma + 1) != std::string::npos) return wrong();
+    distance.a = pair.substr(0, comma);
+    distance.b = pair.substr(comma + 1);
+    return distance;
+  }
+  const std::size_t semicolon = pair.find(';');
+  if (semicolon == std::string::npos) return wrong();
+  const auto place = [&](const std::string& words, FiducialName& name) {
+    const std::size_t comma = words.find(',');
+    Eigen::Vector2d uv;
+    if (comma == std::string::npos || !number(words.substr(0, comma), uv[0]) ||
+        !number(words.substr(comma + 1), uv[1]))
+      return false;
+    name = uv;
+    return true;
+  };
+  if (!place(pair.substr(0, semicolon), distance.a) || !place(pair.substr(semicolon + 1), distance.b))
+    return wrong();
+  return distance;
+}
+
+Expected<PhantomResult> measure_phantom(const Case& given, const PhantomOptions& options) {
+  PhantomResult result;
+  result.warnings = given.warnings;
+  if (!options.from_scratch) result.nominal = given.calibrator;
+  result.calibrator = result.nominal.value_or(Calibrator{});
+  result.calibrator.tolerance_mm = 0;
+  if (options.from_scratch) result.calibrator.name = "measured";
+  const auto refuse = [&](const Failure& failure) -> Expected<PhantomResult> {
+    if (exit_code(failure.reason) == 2) return tl::unexpected<Failure>(failure);
+    result.failure = failure;
+    return result;
+  };
+  constexpr std::size_t least_views = 3;
+  if (given.views.size() < least_views)
+    return refuse({Reason::too_few_views,
+                   fmt::format("{} views: at least {} are required to measure a phantom, 6 to 10 are advised",
+                               given.views.size(), least_views),
+                   {},
+                   {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
+  auto detected = detected_views(given, options.threads);
+  if (!detected) return refuse(detected.error());
+  const auto begin = std::chrono::steady_clock::now();
+  const auto found =
+      adjusted_views(*detected, given, options.from_scratch, least_views, options.threads, result.warnings);
+  if (!found) return refuse(found.error());
+  const auto concluded = conclude(*found, options, result);
+  result.solve_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  if (!concluded) return refuse(concluded.error());
+  return result;
+}
+
+}  // namespace helicarm

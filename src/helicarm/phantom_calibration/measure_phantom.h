@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
+#include "helicarm/geometry/view.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom_calibration/scale.h"
+#include "helicarm/pipeline/case.h"
+
+namespace helicarm {
+
+/// A fiducial by its label, or by a raw pixel in the first view.
+using FiducialName = std::variant<std::string, Eigen::Vector2d>;
+
+struct HandDistance {
+  FiducialName a, b;
+  double mm;
+};
+
+/// A,B=MM with labels, or u1,v1;u2,v2=MM. `usage` where it is neither.
+Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixels);
+
+struct PhantomOptions {
+  bool from_scratch = false;
+  std::vector<HandDistance> distances;
+  double distance_sigma_mm = 0.05;
+  bool outer = false;  ///< the distances are over both balls, not between the centres
+  unsigned threads = 0;
+  std::string date;  ///< as the calibrator's file will state it
+};
+
+struct MeasuredBall {
+  std::string label;
+  Eigen::Vector3d centre;          ///< mm, in the nominal frame, or in that of the balls' principal axes
+  Eigen::Matrix3d covariance_mm2;  ///< with the scale's
+  std::optional<Eigen::Vector3d> from_nominal;  ///< mm
+  int views = 0;
+};
+
+struct MeasuredView {
+  std::string name;
+  std::string digest;  ///< of the pixels
+  View view;
+  double rms_px = 0;  ///< per axis
+  std::optional<double> left_out_rms_px;
+  std::vector<std::pair<std::size_t, Eigen::Vector2d>> residuals_px;  ///< ball, projection less image
+  std::vector<Eigen::Vector2d> images_px;                             ///< rectified, in the same order
+};
+
+struct PhantomScale {
+  std::string source;  ///< distances or diameters
+  double relative_sigma = 0;
+};
+
+/// What `helicarm phantom measure` finds. With a failure it holds what was known until then.
+struct PhantomResult {
+  std::optional<Failure> failure;
+  std::vector<Warning> warnings;
+  Calibrator calibrator;  ///< as measured
+  std::optional<Calibrator> nominal;
+  std::vector<MeasuredBall> balls;
+  std::vector<MeasuredView> views;
+  PhantomScale scale;
+  PairToMeasure pair;  ///< worth measuring by hand, indices of balls
+  double rms_px = 0;   ///< per axis, all views
+  double chi2 = 0;
+  int dof = 0;
+  double solve_ms = 0;  ///< after detection
+};
+
+/// Measures the phantom of a case by bundle adjustment of its views (docs/method.md). Refusals are results;
+/// only unusable input fails.
+Expected<PhantomResult> measure_phantom(const Case& given, const PhantomOptions& options);
+
+/// result.json, `helicarm-phantom/1` (docs/formats.md).
+Json to_json(const PhantomResult& result);
+
+}  // namespace helicarm

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/phantom_calibration/phantom_view.h"
+#include "helicarm/pipeline/stages.h"
+
+namespace helicarm {
+
+/// A view's candidates for balls of these diameters (all sizes where the pixel's is not known), the clearest
+/// first, and what is known of its camera. `dots` has the dot of each candidate.
+struct PreparedView {
+  PhantomView view;
+  std::vector<Dot> dots;
+};
+PreparedView prepared(const DetectedView& detected, const std::vector<double>& diameters_mm,
+                      std::optional<bool> mirrored);
+
+/// The image of a fiducial's centre, measured in the pixels.
+struct Observed {
+  Eigen::Vector2d uv_raw;
+  Eigen::Vector2d uv;  ///< rectified
+  double sigma_px;     ///< per axis, without the map's error
+  double diameter_mm;  ///< as seen, at the fiducial's depth
+};
+
+/// Fits every fiducial's image with the look of this image's balls: at its candidate, or where the pose puts
+/// it. Nothing for one that is not seen.
+std::vector<std::optional<Observed>> observe(const DetectedView& detected, const PreparedView& prepared,
+                                             const View& pose, const std::vector<Eigen::Vector3d>& centres,
+                                             const std::vector<double>& diameters_mm,
+                                             const std::vector<int>& candidate_of);
+
+}  // namespace helicarm

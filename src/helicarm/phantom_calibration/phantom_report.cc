@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/phantom_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "helicarm/report/markup.h"
+#include "helicarm/report/style.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double usual_tolerance_mm = 0.3;  // of a printed and glued phantom, per axis
+constexpr double off_by = 3;                // tolerances
+
+std::vector<Vector3d> centres_of(const PhantomResult& result) {
+  std::vector<Vector3d> centres;
+  for (const MeasuredBall& ball : result.balls) centres.push_back(ball.centre);
+  return centres;
+}
+
+Vector3d mean_of(const std::vector<Vector3d>& points) {
+  Vector3d sum = Vector3d::Zero();
+  for (const Vector3d& point : points) sum += point;
+  return sum / double(std::max<std::size_t>(1, points.size()));
+}
+
+double tolerance_of(const PhantomResult& result) {
+  return result.nominal && result.nominal->tolerance_mm > 0 ? result.nominal->tolerance_mm
+                                                            : usual_tolerance_mm;
+}
+
+double nominal_rms(const PhantomResult& result) {
+  double sum = 0;
+  for (const MeasuredBall& ball : result.balls) sum += ball.from_nominal->squaredNorm();
+  return std::sqrt(sum / double(result.balls.size()));
+}
+
+double measured_rms(const PhantomResult& result) {
+  double sum = 0;
+  for (const MeasuredBall& ball : result.balls) sum += ball.covariance_mm2.trace();
+  return std::sqrt(sum / double(result.balls.size()));
+}
+
+std::string summary(const PhantomResult& result) {
+  if (result.failure)
+    return fmt::format("<p><span class=\"state refused\">refused: {}</span></p>\n<p>{}</p>\n",
+                       code(result.failure->reason), escaped(result.failure->message));
+  std::string html = "<p><span class=\"state ok\">measured</span></p>\n<div class=\"cards\">\n";
+  const auto card = [&](const std::string& value, const std::string& what) {
+    html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
+  };
+  card(fmt::format("{:.3f} px", result.rms_px), "reprojection error, rms per axis");
+  card(fmt::format("{:.3f} mm", measured_rms(result)), "sigma of a ball's centre, all axes together");
+  card(fmt::format("{:.2g} %", 100 * result.scale.relative_sigma),
+       fmt::format("sigma of the scale, by {}", escaped(result.scale.source)));
+  card(fmt::format("{:.0f} / {}", result.chi2, result.dof), "chi-square / degrees of freedom");
+  html += "</div>\n";
+  return html +
+         fmt::format(
+             "<p>Worth measuring by hand: {} to {}, about {:.1f} mm; it gives the scale to {:.2g} %.</p>\n",
+             escaped(result.balls[result.pair.a].label), escaped(result.balls[result.pair.b].label),
+             result.pair.distance_mm, 100 * result.pair.relative_sigma);
+}
+
+std::string warnings(const PhantomResult& result) {
+  if (result.warnings.empty()) return "";
+  std::string html = "<h2>Warnings</h2>\n<ul>\n";
+  for (const Warning& w : result.warnings)
+    html += fmt::format("<li>{}: {}{}{}</li>\n", code(w.reason), escaped(w.view), w.view.empty() ? "" : ": ",
+                        escaped(w.message));
+  return html + "</ul>\n";
+}
+
+/// Residuals of a view as arrows, 300 times enlarged.
+std::string residual_figure(const MeasuredView& view) {
+  constexpr double enlarged = 300;
+  std::vector<std::pair<Vector2d, Vector2d>> arrows;
+  Vector2d low = Vector2d::Constant(1e300), high = -low;
+  for (std::size_t i = 0; i < view.residuals_px.size(); ++i) {
+    arrows.emplace_back(view.images_px[i], view.residuals_px[i].second);
+    low = low.cwiseMin(arrows.back().first);
+    high = high.cwiseMax(arrows.back().first);
+  }
+  if (arrows.empty()) return "";
+  const Vector2d margin = 0.12 * (high - low) + Vector2d(30, 30);
+  low -= margin;
+  high += margin;
+  std::string svg = fmt::format("<figure class=\"plain\"><svg viewBox=\"{:.0f} {:.0f} {:.0f} {:.0f}\">",
+                                low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
+  for (const auto& [at, residual] : arrows) {
+    const Vector2d tip = at + enlarged * residual;
+    svg += fmt::format(
+        "<circle class=\"field\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"6\"/><path class=\"residual\" "
+        "d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>",
+        at.x(), at.y(), at.x(), at.y(), tip.x(), tip.y());
+  }
+  return svg + fmt::format(
+                   "</svg><figcaption>{}: residuals, {:g} times enlarged; {:.3f} px rms per axis{}"
+                   "</figcaption></figure>\n",
+                   escaped(view.name), enlarged, view.rms_px,
+                   view.left_out_rms_px
+                       ? fmt::format(", {:.3f} px when the other views predict it", *view.left_out_rms_px)
+                       : "");
+}
+
+std::string views_section(const PhantomResult& result) {
+  if (result.views.empty()) return "";
+  HtmlTable table({"view", "# balls", "# rms px per axis", "# left out px"});
+  std::string figures;
+  for (const MeasuredView& view : result.views) {
+    table.row({escaped(view.name), std::to_string(view.residuals_px.size()), fixed(view.rms_px, 3),
+               fixed(view.left_out_rms_px, 3)});
+    figures += residual_figure(view);
+  }
+  return "<h2>Views</h2>\n" + table.html() +
+         "<p class=\"soft\">left out: the phantom is measured by the other views, which then predict this "
+         "one's "
+         "images.</p>\n<div class=\"views\">" +
+         figures + "</div>\n";
+}
+
+std::string balls_section(const PhantomResult& result) {
+  if (result.balls.empty()) return "";
+  std::vector<std::string> headings = {"ball", "# x mm", "# y mm", "# z mm", "# sigma mm", "# views"};
+  if (result.nominal)
+    headings.insert(headings.end(), {"# dx mm", "# dy mm", "# dz mm", "# from nominal mm", ""});
+  HtmlTable table(headings);
+  for (const MeasuredBall& ball : result.balls) {
+    std::vector<std::string> cells = {escaped(ball.label),
+                                      fixed(ball.centre.x(), 3),
+                                      fixed(ball.centre.y(), 3),
+                                      fixed(ball.centre.z(), 3),
+                                      fixed(std::sqrt(ball.covariance_mm2.trace() / 3), 4),
+                                      std::to_string(ball.views)};
+    if (ball.from_nominal) {
+      const Vector3d& d = *ball.from_nominal;
+      const bool off = d.cwiseAbs().maxCoeff() > off_by * tolerance_of(result);
+      for (const double number : {d.x(), d.y(), d.z(), d.norm()}) cells.push_back(fixed(number, 3));
+      cells.push_back(off ? fmt::format("<span class=\"bad\">off by more than {:g} x {:g} mm</span>", off_by,
+                                        tolerance_of(result))
+                          : "");
+    }
+    table.row(std::move(cells));
+  }
+  return "<h2>Balls</h2>\n" + table.html();
+}
+
+/// The phantom seen along an axis, with the differences from nominal as arrows.
+std::string arrows_figure(const PhantomResult& result, Eigen::Index across, Eigen::Index up,
+                          const char* caption) {
+  const double enlarged = std::clamp(8 / std::max(0.02, nominal_rms(result)), 1.0, 100.0);
+  Vector2d low = Vector2d::Constant(1e300), high = -low;
+  const auto at = [&](const Vector3d& p) { return Vector2d(p[across], -p[up]); };
+  for (const MeasuredBall& ball : result.balls) {
+    low = low.cwiseMin(at(ball.centre));
+    high = high.cwiseMax(at(ball.centre));
+  }
+  low.array() -= 18;
+  high.array() += 18;
+  std::string svg = fmt::format("<figure class=\"plain\"><svg viewBox=\"{:.2f} {:.2f} {:.2f} {:.2f}\">",
+                                low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
+  for (const MeasuredBall& ball : result.balls) {
+    const Vector2d from = at(ball.centre - *ball.from_nominal);
+    const Vector2d to = from + enlarged * at(*ball.from_nominal);
+    svg += fmt::format(
+        "<circle class=\"field\" stroke-width=\"0.4\" cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"2\"/><path "
+        "class=\"residual\" style=\"stroke-width:0.8\" d=\"M{:.2f} {:.2f}L{:.2f} {:.2f}\"/>"
+        "<text font-size=\"4\" x=\"{:.2f}\" y=\"{:.2f}\">{}</text>",
+        from.x(), from.y(), from.x(), from.y(), to.x(), to.y(), from.x() + 3, from.y() - 2,
+        escaped(ball.label));
+  }
+  return svg +
+         fmt::format(
+             "</svg><figcaption>{}; from the nominal place, {:.0f} times enlarged</figcaption></figure>\n",
+             caption, enlarged);
+}
+
+std::string nominal_section(const PhantomResult& result) {
+  if (result.balls.empty() || !result.nominal) return "";
+  const std::vector<Vector3d> centres = centres_of(result);
+  const Vector3d mean = mean_of(centres);
+  HtmlTable table({"point", "# nominal file mm", "# measured file mm"});
+  double extent = 0;
+  for (const Vector3d& centre : centres) extent = std::max(extent, (centre - mean).norm());
+  for (const auto& [name, point] :
+       {std::pair{"middle of the balls", mean},
+        {"farthest ball's distance along x", Vector3d(mean + Vector3d(extent, 0, 0))},
+        {"the same along z", Vector3d(mean + Vector3d(0, 0, extent))}})
+    table.row({name, fixed(predicted_tre_mm(centres, nominal_rms(result), point), 3),
+               fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), point),
+                                result.scale.relative_sigma * (point - mean).norm()),
+                     3)});
+  return "<h2>From nominal</h2>\n<div class=\"views\">" +
+         arrows_figure(result, 0, 2, "along y: x to the right, z up") +
+         arrows_figure(result, 0, 1, "along z: x to the right, y up") +
+         "</div>\n<h2>What the balls' errors do to a located point</h2>\n" + table.html() +
+         "<p class=\"soft\">rms error that the coordinates' errors alone cause, as if they were independent "
+         "(Fitzpatrick, "
+         "West and Maurer 1998); noise of the images comes on top.</p>\n";
+}
+
+}  // namespace
+
+double predicted_tre_mm(const std::vector<Vector3d>& balls, double ball_rms_mm, const Vector3d& point) {
+  const Vector3d mean = mean_of(balls);
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vector3d& ball : balls) spread += (ball - mean) * (ball - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread / double(balls.size()));
+  double sum = 0;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Vector3d axis = axes.eigenvectors().col(k);
+    const double about = (point - mean).squaredNorm() - std::pow(axis.dot(point - mean), 2);
+    const double balls_about = axes.eigenvalues().sum() - axes.eigenvalues()[k];
+    sum += about / balls_about / 3;
+  }
+  return ball_rms_mm * std::sqrt((1 + sum) / double(balls.size()));
+}
+
+std::string phantom_report_html(const PhantomResult& result) {
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\"/>\n<title>helicarm "
+      "phantom</title>\n<style>{}</style>\n"
+      "</head>\n<body>\n<header>\n<h1>Phantom {}</h1>\n<p class=\"notice\">Research instrument, not a "
+      "medical "
+      "device.</p>\n</header>\n<main>\n",
+      report_style, escaped(result.calibrator.name));
+  html += summary(result) + warnings(result) + nominal_section(result) + balls_section(result) +
+          views_section(result);
+  return html +
+         fmt::format(
+             "</main>\n<footer><p class=\"soft\">helicarm {}. Millimetres and pixels.</p></footer>\n</body>\n"
+             "</html>\n",
+             HELICARM_VERSION);
+}
+
+}  // namespace helicarm

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/scale.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "helicarm/phantom_calibration/gauge.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+/// 99.9th percentile of chi-square (Wilson and Hilferty 1931).
+double chi2_limit(int dof) {
+  constexpr double deviate = 3.09;
+  const double spread = 2.0 / (9 * dof);
+  return dof * std::pow(1 - spread + deviate * std::sqrt(spread), 3);
+}
+
+/// d distance / d points.
+Eigen::MatrixXd by_points(const std::vector<Vector3d>& centres,
+                          const std::vector<CentreDistance>& distances) {
+  Eigen::MatrixXd rows =
+      Eigen::MatrixXd::Zero(Eigen::Index(distances.size()), 3 * Eigen::Index(centres.size()));
+  for (std::size_t k = 0; k < distances.size(); ++k) {
+    const Vector3d along = (centres[distances[k].a] - centres[distances[k].b]).normalized();
+    rows.block<1, 3>(Eigen::Index(k), 3 * Eigen::Index(distances[k].a)) = along.transpose();
+    rows.block<1, 3>(Eigen::Index(k), 3 * Eigen::Index(distances[k].b)) = -along.transpose();
+  }
+  return rows;
+}
+
+Eigen::VectorXd offsets_of(const std::vector<Vector3d>& centres) {
+  return similarity_motions(centres).col(6);
+}
+
+double scale_sigma_of(const std::vector<Vector3d>& centres, const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd offsets = offsets_of(centres);
+  return std::sqrt(std::max(0.0, offsets.dot(covariance * offsets))) / offsets.squaredNorm();
+}
+
+}  // namespace
+
+ScaledPoints scaled_by(const std::vector<Vector3d>& centres, const Eigen::MatrixXd& covariance_mm2,
+                       double factor, double sigma) {
+  ScaledPoints scaled;
+  for (const Vector3d& centre : centres) scaled.centres.push_back(factor * centre);
+  const Eigen::VectorXd offsets = offsets_of(scaled.centres);
+  scaled.covariance_mm2 = factor * factor * covariance_mm2 + sigma * sigma * offsets * offsets.transpose();
+  scaled.scale_sigma = sigma;
+  return scaled;
+}
+
+Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eigen::MatrixXd& covariance_mm2,
+                                 const std::vector<CentreDistance>& distances,
+                                 const std::vector<std::string>& labels) {
+  const auto count = Eigen::Index(distances.size());
+  const Eigen::MatrixXd rows = by_points(centres, distances);
+  Eigen::VectorXd measured(count), reckoned(count);
+  double factor = 0;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const CentreDistance& d = distances[std::size_t(k)];
+    measured[k] = d.mm;
+    reckoned[k] = (centres[d.a] - centres[d.b]).norm();
+    factor += d.mm / reckoned[k] / double(count);
+  }
+  Eigen::MatrixXd covariance = factor * factor * rows * covariance_mm2 * rows.transpose();
+  for (Eigen::Index k = 0; k < count; ++k)
+    covariance(k, k) += distances[std::size_t(k)].sigma_mm * distances[std::size_t(k)].sigma_mm;
+  const Eigen::LDLT<Eigen::MatrixXd> weight(covariance);
+  factor = reckoned.dot(weight.solve(measured)) / reckoned.dot(weight.solve(reckoned));
+  const Eigen::VectorXd residual = measured - factor * reckoned;
+  const double chi2 = residual.dot(weight.solve(residual));
+  if (count > 1 && chi2 > chi2_limit(int(count) - 1)) {
+    Eigen::Index worst = 0;
+    (residual.array() / covariance.diagonal().array().sqrt()).abs().maxCoeff(&worst);
+    const CentreDistance& d = distances[std::size_t(worst)];
+    return fail(
+        Reason::distances_disagree,
+        fmt::format("the distances contradict each other: {} to {} is {:.3f} mm by hand and {:.3f} mm by the "
+                    "images and the other distances; measure them again",
+                    labels[d.a], labels[d.b], d.mm, factor * reckoned[worst]),
+        {{"chi2", chi2}, {"limit", chi2_limit(int(count) - 1)}, {"difference_mm", residual[worst]}});
+  }
+  // The scale is not known beforehand: 100 % of a prior error change nothing.
+  ScaledPoints scaled = scaled_by(centres, covariance_mm2, factor, 1);
+  const Eigen::MatrixXd gain_rows = scaled.covariance_mm2 * rows.transpose();
+  Eigen::MatrixXd innovation = rows * gain_rows;
+  for (Eigen::Index k = 0; k < count; ++k)
+    innovation(k, k) += distances[std::size_t(k)].sigma_mm * distances[std::size_t(k)].sigma_mm;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(innovation);
+  const Eigen::VectorXd change = gain_rows * solver.solve(residual);
+  for (std::size_t i = 0; i < centres.size(); ++i)
+    scaled.centres[i] += change.segment<3>(3 * Eigen::Index(i));
+  scaled.covariance_mm2 -= gain_rows * solver.solve(gain_rows.transpose());
+  scaled.covariance_mm2 = (scaled.covariance_mm2 + scaled.covariance_mm2.transpose()).eval() / 2;
+  scaled.scale_sigma = scale_sigma_of(scaled.centres, scaled.covariance_mm2);
+  return scaled;
+}
+
+PairToMeasure best_pair(const std::vector<Vector3d>& centres, const Eigen::MatrixXd& covariance_mm2,
+                        double sigma_mm) {
+  PairToMeasure best;
+  for (std::size_t a = 0; a < centres.size(); ++a)
+    for (std::size_t b = a + 1; b < centres.size(); ++b) {
+      const double distance = (centres[a] - centres[b]).norm();
+      const Eigen::RowVectorXd row = by_points(centres, {{a, b, distance, sigma_mm}}).row(0);
+      const double sigma =
+          std::sqrt(row.dot(covariance_mm2 * row.transpose()) + sigma_mm * sigma_mm) / distance;
+      if (best.distance_mm == 0 || sigma < best.relative_sigma) best = {a, b, distance, sigma};
+    }
+  return best;
+}
+
+}  // namespace helicarm

@@ -1,0 +1,280 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/verify_phantom.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/phantom_calibration/adjusted_views.h"
+#include "helicarm/phantom_calibration/gauge.h"
+#include "helicarm/pipeline/accuracy.h"
+#include "helicarm/pipeline/result.h"
+
+namespace helicarm {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t least_views = 2;
+constexpr std::size_t least_kept = 6;
+
+/// The percentile of chi-square with 3 degrees of freedom that one of `count` unmoved balls exceeds with a
+/// probability of 5 % (Wilson and Hilferty 1931; the normal quantile by Abramowitz and Stegun 26.2.23).
+double chi2_limit(std::size_t count) {
+  const double t = std::sqrt(-2 * std::log(0.05 / double(count)));
+  const double deviate =
+      t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+  constexpr double spread = 2.0 / 27;
+  return 3 * std::pow(1 - spread + deviate * std::sqrt(spread), 3);
+}
+
+/// The balls at their places in the file, whose own errors are added to their images'.
+BundleProblem with_file_centres(const AdjustedViews& found, const Calibrator& file,
+                                const std::vector<Eigen::Matrix3d>& covariances) {
+  BundleProblem problem = found.consistent.problem;
+  for (const RejectedImage& rejected : found.consistent.rejected)
+    problem.views[rejected.view].images.push_back(rejected.image);
+  for (std::size_t i = 0; i < problem.centres.size(); ++i)
+    problem.centres[i] = file.balls[found.ball_of_nominal[i]].centre_in_calibrator;
+  for (BundleView& view : problem.views) {
+    view.map_covariance_px2 = {};
+    for (FiducialImage& image : view.images) {
+      if (covariances.empty()) continue;
+      const Eigen::Matrix3d& covariance = covariances[found.ball_of_nominal[image.fiducial]];
+      const double px_per_mm =
+          view.start.intrinsics.fy / view.start.depth(found.consistent.fit.centres[image.fiducial]);
+      image.sigma_px = std::hypot(image.sigma_px, px_per_mm * std::sqrt(covariance.trace() / 3));
+    }
+  }
+  return problem;
+}
+
+/// Poses in the file's frame: those of the free adjustment, carried by the balls.
+void start_in_file_frame(BundleProblem& problem, const AdjustedViews& found) {
+  const RobustFit fit = robust_similarity(found.consistent.fit.centres, problem.centres, true);
+  for (std::size_t v = 0; v < problem.views.size(); ++v) {
+    View view = found.consistent.fit.views[v];
+    const RigidTransform& by = fit.a_from_b.a_from_b;
+    RigidTransform& pose = view.camera_from_world;
+    // camera = pose * b and a = scale * R b + t, so scale * camera = (pose.R R') (a - t) + scale * pose.t
+    pose.rotation = pose.rotation * by.rotation.transpose();
+    pose.translation = fit.a_from_b.scale * pose.translation - pose.rotation * by.translation;
+    problem.views[v].start = view;
+  }
+}
+
+BundleProblem without(const BundleProblem& problem, const std::vector<bool>& out) {
+  BundleProblem kept = problem;
+  for (BundleView& view : kept.views)
+    std::erase_if(view.images, [&](const FiducialImage& image) { return out[image.fiducial]; });
+  return kept;
+}
+
+struct Place {
+  Vector3d off;
+  Eigen::Matrix3d covariance;
+  double chi2;
+};
+
+/// A ball's place by views that the others (those not `out`) calibrate.
+std::optional<Place> place_of(const BundleProblem& problem, std::size_t ball, std::vector<bool> out,
+                              const Eigen::Matrix3d& file_covariance) {
+  out[ball] = false;
+  BundleOptions options;
+  options.fixed_centres = true;
+  options.free_centre = ball;
+  const auto fit = adjust(without(problem, out), options);
+  if (!fit) return std::nullopt;
+  const double inflation = fit->dof > 0 ? std::max(1.0, fit->chi2 / fit->dof) : 1;
+  Place place{fit->centres[ball] - problem.centres[ball], inflation * fit->covariance_mm2 + file_covariance,
+              0};
+  place.chi2 = place.off.dot(place.covariance.ldlt().solve(place.off));
+  return place;
+}
+
+/// Balls that are off are found one by one, the farthest first, so that they do not disturb the others.
+std::vector<std::optional<Place>> places_of(const BundleProblem& problem, const AdjustedViews& found,
+                                            const std::vector<Eigen::Matrix3d>& covariances,
+                                            std::vector<bool>& moved, unsigned threads) {
+  const std::size_t n = problem.centres.size();
+  std::vector<std::optional<Place>> places(n);
+  for (std::size_t round = 0; round < n; ++round) {
+    parallel_for(n, threads, [&](std::size_t ball) {
+      const Eigen::Matrix3d of_file =
+          covariances.empty() ? Eigen::Matrix3d::Zero() : covariances[found.ball_of_nominal[ball]];
+      places[ball] = place_of(problem, ball, moved, of_file);
+    });
+    std::optional<std::size_t> worst;
+    for (std::size_t ball = 0; ball < n; ++ball)
+      if (!moved[ball] && places[ball] && places[ball]->chi2 > chi2_limit(n) &&
+          (!worst || places[ball]->chi2 > places[*worst]->chi2))
+        worst = ball;
+    if (!worst || n - std::size_t(std::ranges::count(moved, true)) <= least_kept) break;
+    moved[*worst] = true;
+  }
+  return places;
+}
+
+std::string listed(const PhantomVerification& result, BallState state) {
+  std::string names;
+  for (const VerifiedBall& ball : result.balls)
+    if (ball.state == state)
+      names += fmt::format("{}{}{}", names.empty() ? "" : ", ", ball.label,
+                           ball.distance_mm && state == BallState::moved
+                               ? fmt::format(" (by {:.2f} mm)", *ball.distance_mm)
+                               : "");
+  return names;
+}
+
+void judge(PhantomVerification& result) {
+  std::string message;
+  double off = 0;
+  for (const auto& [state, verb] : {std::pair{BallState::moved, "moved"},
+                                    {BallState::swapped, "of another size"},
+                                    {BallState::lost, "lost"}})
+    if (const std::string names = listed(result, state); !names.empty())
+      message += fmt::format("{}{}: {}", message.empty() ? "" : "; ", verb, names);
+  for (const VerifiedBall& ball : result.balls) {
+    result.within_mm = std::max({result.within_mm, ball.distance_mm.value_or(0), ball.bound_mm});
+    off += ball.state != BallState::as_in_file;
+  }
+  if (!message.empty())
+    result.failure = Failure{Reason::calibrator_mismatch,
+                             "the phantom is not as in its file: " + message +
+                                 "; measure it again with `helicarm phantom measure`",
+                             {},
+                             {{"balls_off", off}}};
+}
+
+/// A ball in whose place one of another size is seen, in two views or more.
+bool is_swapped(const CalibratorBall& ball, const Calibrator& file, const std::vector<DetectedView>& detected,
+                const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
+  constexpr double reach_px = 6, alike = 0.1;
+  int seen = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const DistortionMap& map = detected[view_of_case[v]].rectification.map;
+    const Eigen::Vector2d uv = views[v].project(ball.centre_in_calibrator);
+    const double px_per_mm = views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
+    for (const Dot& dot : detected[view_of_case[v]].candidates.dots) {
+      const auto at = map.rectified_from_raw(dot.centre_px);
+      if (!at || (*at - uv).norm() > reach_px) continue;
+      seen += std::ranges::any_of(file.balls, [&](const CalibratorBall& other) {
+        return other.diameter_mm != ball.diameter_mm &&
+               std::abs(std::log(2 * dot.radius_px / px_per_mm / other.diameter_mm)) < alike;
+      });
+    }
+  }
+  return seen >= 2;
+}
+
+/// Whether it should be in the image in two views or more.
+bool should_be_seen(const CalibratorBall& ball, const std::vector<DetectedView>& detected,
+                    const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
+  int inside = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const DistortionMap& map = detected[view_of_case[v]].rectification.map;
+    inside += map.shows(map.raw_from_rectified(views[v].project(ball.centre_in_calibrator)));
+  }
+  return inside >= 2;
+}
+
+void describe(const AdjustedViews& found, const Case& given, const std::vector<DetectedView>& detected,
+              unsigned threads, PhantomVerification& result) {
+  const auto covariances = ball_covariances(given.calibrator);
+  BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
+  start_in_file_frame(problem, found);
+  std::vector<bool> moved(problem.centres.size(), false);
+  const auto places = places_of(problem, found, covariances, moved, threads);
+  BundleOptions fixed;
+  fixed.fixed_centres = true;
+  const auto fit = adjust(without(problem, moved), fixed);
+  if (!fit) {
+    result.failure = fit.error();
+    return;
+  }
+  result.rms_px = fit->rms_px;
+  for (std::size_t ball = 0; ball < given.calibrator.balls.size(); ++ball) {
+    const CalibratorBall& in_file = given.calibrator.balls[ball];
+    VerifiedBall verified{in_file.label, {}, 0, BallState::as_in_file, 0};
+    const auto at = std::ranges::find(found.ball_of_nominal, ball);
+    if (at == found.ball_of_nominal.end()) {
+      if (is_swapped(in_file, given.calibrator, detected, fit->views, found.view_of_case))
+        verified.state = BallState::swapped;
+      else if (should_be_seen(in_file, detected, fit->views, found.view_of_case))
+        verified.state = BallState::lost;
+      else
+        result.warnings.push_back(
+            {Reason::not_seen, fmt::format("{} is not in two images: not verified", in_file.label), {}, {}});
+    } else {
+      const std::size_t i = std::size_t(at - found.ball_of_nominal.begin());
+      for (const BundleView& view : problem.views)
+        verified.views += int(std::ranges::count(view.images, i, &FiducialImage::fiducial));
+      if (moved[i]) verified.state = BallState::moved;
+      if (places[i]) {
+        verified.distance_mm = places[i]->off.norm();
+        verified.bound_mm = length_at_95(places[i]->covariance);
+      }
+    }
+    result.balls.push_back(std::move(verified));
+  }
+  judge(result);
+}
+
+}  // namespace
+
+std::string_view word(BallState state) {
+  switch (state) {
+    case BallState::as_in_file:
+      return "as in the file";
+    case BallState::moved:
+      return "moved";
+    case BallState::swapped:
+      return "another size";
+    case BallState::lost:
+      return "lost";
+  }
+  return "";
+}
+
+Expected<PhantomVerification> verify_phantom(const Case& given, unsigned threads) {
+  PhantomVerification result;
+  result.warnings = given.warnings;
+  result.calibrator = digest_of(given.calibrator);
+  const auto refuse = [&](const Failure& failure) -> Expected<PhantomVerification> {
+    if (exit_code(failure.reason) == 2) return tl::unexpected<Failure>(failure);
+    result.failure = failure;
+    return result;
+  };
+  const auto detected = detected_views(given, threads);
+  if (!detected) return refuse(detected.error());
+  const auto found = adjusted_views(*detected, given, false, least_views, threads, result.warnings);
+  if (!found) return refuse(found.error());
+  std::erase_if(result.warnings, [](const Warning& w) { return w.reason == Reason::not_seen; });
+  describe(*found, given, *detected, threads, result);
+  return result;
+}
+
+Json to_json(const PhantomVerification& v) {
+  Json json = {{"format", "helicarm-phantom-verification/1"},
+               {"status", v.failure ? "refused" : "ok"},
+               {"failure", v.failure ? to_json(*v.failure) : Json(nullptr)},
+               {"warnings", Json::array()},
+               {"date", v.date},
+               {"calibrator", v.calibrator},
+               {"within_mm", v.balls.empty() ? Json(nullptr) : Json(v.within_mm)},
+               {"reprojection_rms_px", v.balls.empty() ? Json(nullptr) : Json(v.rms_px)},
+               {"balls", Json::array()}};
+  for (const Warning& warning : v.warnings) json["warnings"].push_back(to_json(warning));
+  for (const VerifiedBall& ball : v.balls)
+    json["balls"].push_back({{"label", ball.label},
+                             {"distance_mm", ball.distance_mm ? Json(*ball.distance_mm) : Json(nullptr)},
+                             {"bound_mm", ball.distance_mm ? Json(ball.bound_mm) : Json(nullptr)},
+                             {"state", word(ball.state)},
+                             {"views", ball.views}});
+  return json;
+}
+
+}  // namespace helicarm
