@@ -40,6 +40,11 @@ BundleProblem with_file_centres(const AdjustedViews& found, const Calibrator& fi
   for (std::size_t i = 0; i < problem.centres.size(); ++i)
     problem.centres[i] = file.balls[found.ball_of_nominal[i]].centre_in_calibrator;
   for (BundleView& view : problem.views) {
+    // One ball is free at a time, so the map's errors are taken as independent.
+    for (Eigen::Index i = 0; i < view.map_covariance_px2.rows(); ++i) {
+      double& sigma = view.images[std::size_t(i)].sigma_px;
+      sigma = std::hypot(sigma, std::sqrt(view.map_covariance_px2(i, i)));
+    }
     view.map_covariance_px2 = {};
     for (FiducialImage& image : view.images) {
       if (covariances.empty()) continue;
@@ -170,15 +175,26 @@ bool is_swapped(const CalibratorBall& ball, const Calibrator& file, const std::v
   return seen >= 2;
 }
 
-/// Whether it should be in the image in two views or more.
-bool should_be_seen(const CalibratorBall& ball, const std::vector<DetectedView>& detected,
-                    const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
-  int inside = 0;
+/// Whether it is missing: in two views or more its place is in the image and free of any other dot that could
+/// hide it or be it.
+bool is_missing(const CalibratorBall& ball, const std::vector<DetectedView>& detected,
+                const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
+  constexpr double reach = 2;  // radii
+  int empty = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const DistortionMap& map = detected[view_of_case[v]].rectification.map;
-    inside += map.shows(map.raw_from_rectified(views[v].project(ball.centre_in_calibrator)));
+    const DetectedView& image = detected[view_of_case[v]];
+    const Eigen::Vector2d raw =
+        image.rectification.map.raw_from_rectified(views[v].project(ball.centre_in_calibrator));
+    const double radius_px =
+        ball.diameter_mm / 2 * views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
+    const auto is_near = [&](const Dot& dot) {
+      return (dot.centre_px - raw).norm() < reach * std::max(radius_px, dot.radius_px);
+    };
+    if (!image.rectification.map.shows(raw)) continue;
+    empty += std::ranges::none_of(image.candidates.dots, is_near) &&
+             std::ranges::none_of(image.rectification.plate_dots, is_near);
   }
-  return inside >= 2;
+  return empty >= 2;
 }
 
 void describe(const AdjustedViews& found, const Case& given, const std::vector<DetectedView>& detected,
@@ -203,11 +219,13 @@ void describe(const AdjustedViews& found, const Case& given, const std::vector<D
     if (at == found.ball_of_nominal.end()) {
       if (is_swapped(in_file, given.calibrator, detected, fit->views, found.view_of_case))
         verified.state = BallState::swapped;
-      else if (should_be_seen(in_file, detected, fit->views, found.view_of_case))
+      else if (is_missing(in_file, detected, fit->views, found.view_of_case))
         verified.state = BallState::lost;
       else
-        result.warnings.push_back(
-            {Reason::not_seen, fmt::format("{} is not in two images: not verified", in_file.label), {}, {}});
+        result.warnings.push_back({Reason::not_seen,
+                                   fmt::format("{} is not seen in two images: not verified", in_file.label),
+                                   {},
+                                   {}});
     } else {
       const std::size_t i = std::size_t(at - found.ball_of_nominal.begin());
       for (const BundleView& view : problem.views)
