@@ -27,7 +27,7 @@ struct Reconstruction {
   std::vector<std::optional<View>> views;      ///< nothing: not part of it
   std::vector<std::vector<int>> candidate_of;  ///< per view and fiducial; -1: not seen
   double rms_px = 0;                           ///< per axis
-  /// Reconstructed from scratch: rms of the depth-reversed phantom, which affine views cannot tell apart.
+  /// Reconstructed from scratch: rms of the depth-reversed phantom, which affine views show alike.
   std::optional<double> reversed_rms_px = {};
 };
 
