@@ -1,9 +1,17 @@
-# Flags shared by every unit of the project. The instruction set is uniform because Eigen's alignment is ABI.
+include(GNUInstallDirs)
+# Flags of the project's own units; a user's units get none of them.
 add_library(helicarm_flags INTERFACE)
+# Eigen's alignment is part of the binary interface and follows the instruction set unless it is fixed. This one
+# definition goes with the libraries to their users, so that a library with AVX2 serves a program without.
+set(helicarm_abi EIGEN_MAX_STATIC_ALIGN_BYTES=32 EIGEN_MAX_ALIGN_BYTES=32)
+target_compile_definitions(helicarm_flags INTERFACE ${helicarm_abi})
 target_compile_options(helicarm_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wno-aggressive-loop-optimizations)
 # Nobody reads errno or floating-point flags: without them loops with a root or a comparison become vectors.
 target_compile_options(helicarm_flags INTERFACE -fno-math-errno -fno-trapping-math)
-target_include_directories(helicarm_flags INTERFACE ${CMAKE_SOURCE_DIR}/src)
+# For all units, as programs and the Python module share libraries and precompiled headers. Functions may still be
+# inlined: nothing replaces them at run time.
+target_compile_options(helicarm_flags INTERFACE -fPIC -fno-semantic-interposition)
+target_include_directories(helicarm_flags INTERFACE ${PROJECT_SOURCE_DIR}/src)
 target_compile_definitions(helicarm_flags INTERFACE HELICARM_VERSION="${PROJECT_VERSION}")
 if(HELICARM_WERROR)
   target_compile_options(helicarm_flags INTERFACE -Werror)
@@ -26,38 +34,69 @@ if(HELICARM_FUZZ)
   target_link_options(helicarm_flags INTERFACE -fsanitize=address,undefined)
 endif()
 
+# A faster linker where there is one; GCC takes mold's name from version 12.1 on.
+find_program(HELICARM_MOLD mold)
+mark_as_advanced(HELICARM_MOLD)
+if(PROJECT_IS_TOP_LEVEL AND HELICARM_MOLD AND NOT HELICARM_SANITIZE AND NOT HELICARM_FUZZ)
+  target_link_options(helicarm_flags INTERFACE -fuse-ld=mold)
+endif()
+
 # Eigen, JSON and fmt are most of what the compiler reads: it reads them once.
-add_library(helicarm_precompiled OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)
+add_library(helicarm_precompiled OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cc)
 target_link_libraries(helicarm_precompiled PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json fmt::fmt
                       tl::expected)
 set(helicarm_often_included <algorithm> <cmath> <filesystem> <functional> <map> <optional> <string> <vector>
     <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <tl/expected.hpp>)
 target_precompile_headers(helicarm_precompiled PRIVATE ${helicarm_often_included})
-add_library(helicarm_precompiled_tests OBJECT ${CMAKE_SOURCE_DIR}/cmake/precompiled.cc)
-target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json
-                      fmt::fmt tl::expected GTest::gmock)
-target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
-                          <gmock/gmock.h> <gtest/gtest.h>)
+if(HELICARM_TESTS)
+  add_library(helicarm_precompiled_tests OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cc)
+  target_link_libraries(helicarm_precompiled_tests PRIVATE helicarm_flags Eigen3::Eigen nlohmann_json::nlohmann_json
+                        fmt::fmt tl::expected GTest::gmock)
+  target_precompile_headers(helicarm_precompiled_tests PRIVATE ${helicarm_often_included}
+                            <gmock/gmock.h> <gtest/gtest.h>)
+endif()
 
-# helicarm_module(NAME [APART] [TESTS_APART] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
+# Within this project whatever links a module is compiled with the project's flags; users of the library are not.
+if(PROJECT_IS_TOP_LEVEL)
+  set(helicarm_flags_scope PUBLIC)
+else()
+  set(helicarm_flags_scope PRIVATE)
+endif()
+
+# What a user of a module's headers compiles with.
+function(helicarm_public target scope)
+  target_include_directories(${target} ${scope} $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
+                                                $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_definitions(${target} ${scope} ${helicarm_abi})
+  target_compile_features(${target} ${scope} cxx_std_20)
+endfunction()
+
+# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
 # A room's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
-# name for several things.
+# name for several things. PRIVATE: no part of the installed library.
 function(helicarm_module name)
-  cmake_parse_arguments(ARG "APART;TESTS_APART" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(ARG "APART;TESTS_APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})
   list(TRANSFORM ARG_USES PREPEND helicarm_)
   list(TRANSFORM ARG_TEST_USES PREPEND helicarm_)
   if(ARG_SOURCES)
     add_library(helicarm_${name} STATIC ${ARG_SOURCES})
-    target_link_libraries(helicarm_${name} PUBLIC helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})
+    target_link_libraries(helicarm_${name} ${helicarm_flags_scope} $<BUILD_INTERFACE:helicarm_flags>)
+    target_link_libraries(helicarm_${name} PUBLIC ${ARG_USES} ${ARG_LIBRARIES})
+    helicarm_public(helicarm_${name} PUBLIC)
     target_precompile_headers(helicarm_${name} REUSE_FROM helicarm_precompiled)
     if(HELICARM_UNITY AND NOT ARG_APART)
       set_target_properties(helicarm_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
     endif()
   else()
     add_library(helicarm_${name} INTERFACE)
-    target_link_libraries(helicarm_${name} INTERFACE helicarm_flags ${ARG_USES} ${ARG_LIBRARIES})
+    target_link_libraries(helicarm_${name} INTERFACE ${ARG_USES} ${ARG_LIBRARIES})
+    helicarm_public(helicarm_${name} INTERFACE)
   endif()
-  if(ARG_TESTS)
+  add_library(helicarm::${name} ALIAS helicarm_${name})
+  if(HELICARM_INSTALL AND NOT ARG_PRIVATE)
+    helicarm_install_module(${name})
+  endif()
+  if(ARG_TESTS AND HELICARM_TESTS)
     add_executable(${name}_test ${ARG_TESTS})
     target_link_libraries(${name}_test PRIVATE helicarm_${name} ${ARG_TEST_USES} GTest::gmock GTest::gtest_main)
     target_precompile_headers(${name}_test REUSE_FROM helicarm_precompiled_tests)

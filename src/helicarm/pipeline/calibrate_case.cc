@@ -110,17 +110,22 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
 
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options) {
   Timing time;
-  const auto stage = [&](std::optional<double>& ms, auto work) {
-    return [&, work](auto views) {
+  const auto announce = [&](std::string_view name) {
+    if (options.on_stage) options.on_stage(name);
+  };
+  const auto stage = [&](std::string_view name, std::optional<double>& ms, auto work) {
+    return [&, name, work](auto views) {
+      announce(name);
       const Stopwatch watch(ms);
       return work(std::move(views), given, options);
     };
   };
+  announce("read");
   return timed(time.read, [&] { return read_views(given, options); })
-      .and_then(stage(time.rectify, rectify_views))      // 2.1, Eq. 1-3
-      .and_then(stage(time.detect, detect_in_views))     // 2.1
-      .and_then(stage(time.label, label_views))          // 2.3.4
-      .and_then(stage(time.calibrate, calibrate_views))  // 2.2, Eq. 4-7
+      .and_then(stage("rectify", time.rectify, rectify_views))        // 2.1, Eq. 1-3
+      .and_then(stage("detect", time.detect, detect_in_views))        // 2.1
+      .and_then(stage("label", time.label, label_views))              // 2.3.4
+      .and_then(stage("calibrate", time.calibrate, calibrate_views))  // 2.2, Eq. 4-7
       .map([&](CaseCalibration calibration) {
         calibration.timing_ms = time;
         return calibration;

@@ -62,6 +62,7 @@ Result begun(const Case& given, const CaseCalibration& calibration, const RunOpt
 
 Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
                              const RunOptions& options) {
+  if (options.on_stage) options.on_stage("locate");
   Result result = begun(given, calibration, options);
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {

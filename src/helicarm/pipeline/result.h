@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -32,6 +34,9 @@ struct RunOptions {
   std::optional<CArmHistory> history = {};  ///< the C-arm's history, which then serves as a prior
   /// Motion of an untracked bone between the acquisitions, per axis; enters the covariance of its points.
   double motion_sigma_mm = 0;
+  /// Called before each stage, in the calling thread, with its name as in Timing. What it throws ends the
+  /// run.
+  std::function<void(std::string_view stage)> on_stage = {};
 };
 
 /// All that the stages made of one exposure; what was not reached is absent.

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/numpy.h>
+
+#include "failures.h"
+#include "helicarm/image/image.h"
+
+namespace helicarm::python {
+
+namespace py = pybind11;
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+inline std::string shape_of(const py::array& array) {
+  std::string text = "(";
+  for (py::ssize_t i = 0; i < array.ndim(); ++i)
+    text += (i ? ", " : "") + std::to_string(array.shape(i)) + (array.ndim() == 1 ? "," : "");
+  return text + ")";
+}
+
+inline void check_finite(const Doubles& array, const char* name) {
+  for (py::ssize_t i = 0; i < array.size(); ++i)
+    if (!std::isfinite(array.data()[i]))
+      raise({Reason::not_finite, fmt::format("{}: element {} is not a finite number", name, i), {}, {}});
+}
+
+/// Rows of an N x K array; a plain vector of K numbers is one row.
+template <int K>
+std::vector<Eigen::Vector<double, K>> rows_of(const Doubles& array, const char* name) {
+  const bool one = array.ndim() == 1 && array.shape(0) == K;
+  if (!one && !(array.ndim() == 2 && array.shape(1) == K))
+    raise({Reason::bad_value, fmt::format("{}: shape {} is not (N, {})", name, shape_of(array), K), {}, {}});
+  check_finite(array, name);
+  std::vector<Eigen::Vector<double, K>> rows(std::size_t(array.size() / K));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    rows[i] = Eigen::Map<const Eigen::Vector<double, K>>(array.data() + K * py::ssize_t(i));
+  return rows;
+}
+
+/// N x K, or (K,) where `one` row was asked for.
+template <int K>
+py::array rows_array(const std::vector<Eigen::Vector<double, K>>& rows, bool one = false) {
+  auto array = one ? py::array_t<double>(py::ssize_t{K})
+                   : py::array_t<double>({py::ssize_t(rows.size()), py::ssize_t{K}});
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    std::memcpy(array.mutable_data() + K * py::ssize_t(i), rows[i].data(), K * sizeof(double));
+  return array;
+}
+
+/// Row major, as NumPy's own.
+inline py::array matrix_array(const Eigen::MatrixXd& matrix) {
+  py::array_t<double> array({matrix.rows(), matrix.cols()});
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      array.mutable_data(), matrix.rows(), matrix.cols()) = matrix;
+  return array;
+}
+
+template <int K>
+py::object vector_array(const std::optional<Eigen::Vector<double, K>>& vector) {
+  if (!vector) return py::none();
+  return rows_array<K>({*vector}, true);
+}
+
+inline Eigen::MatrixXd matrix_of(const Doubles& array, py::ssize_t rows, py::ssize_t columns,
+                                 const char* name) {
+  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != columns)
+    raise({Reason::bad_value,
+           fmt::format("{}: shape {} is not ({}, {})", name, shape_of(array), rows, columns),
+           {},
+           {}});
+  check_finite(array, name);
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+      array.data(), rows, columns);
+}
+
+/// (height, width), rows from top to bottom. Without a copy: `owner` keeps the pixels alive, which are read
+/// only.
+template <class T>
+py::array view_of(const Image<T>& image, const py::handle& owner) {
+  py::array_t<T> array({py::ssize_t(image.height()), py::ssize_t(image.width())}, image.pixels().data(),
+                       owner);
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return std::move(array);
+}
+
+/// The same for an image that nothing else holds.
+template <class T>
+py::array moved_to_array(Image<T> image) {
+  auto* held = new Image<T>(std::move(image));
+  const py::capsule owner(held, [](void* memory) { delete static_cast<Image<T>*>(memory); });
+  return py::array_t<T>({py::ssize_t(held->height()), py::ssize_t(held->width())}, held->pixels().data(),
+                        owner);
+}
+
+}  // namespace helicarm::python

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <memory>
+
+#include "arrays.h"
+#include "held_calibration.h"
+#include "helicarm/core/files.h"
+#include "helicarm/pipeline/run_case.h"
+#include "helicarm/pipeline/run_fields.h"
+#include "helicarm/report/overlay.h"
+#include "helicarm/report/picture.h"
+#include "helicarm/report/report.h"
+#include "helicarm/simulation/truth_json.h"
+#include "helicarm/simulation/write_case.h"
+#include "helicarm/volume/read_volume.h"
+#include "module.h"
+#include "options.h"
+
+namespace helicarm::python {
+namespace {
+
+using ViewKey = std::variant<std::size_t, std::string>;
+
+std::size_t index_of(const Result& result, const ViewKey& key) {
+  for (std::size_t i = 0; i < result.views.size(); ++i)
+    if (key == ViewKey(i) || key == ViewKey(result.views[i].name)) return i;
+  raise({Reason::bad_value, "view: the result has no such view", {}, {}});
+}
+
+Result run(const std::filesystem::path& folder, const std::string& method, std::optional<double> max_error_mm,
+           unsigned threads, const std::optional<std::filesystem::path>& history,
+           const py::object& progress) {
+  RunOptions options;
+  options.method = method_of(method);
+  options.max_error_mm = max_error_mm;
+  options.threads = threads;
+  value_or_raise(check_fields<RunOptions>(run_fields, options, "run_case"));
+  if (history) options.machine = value_or_raise(read_machine(*history));
+  if (!progress.is_none())
+    options.on_stage = [&](std::string_view stage) {
+      const py::gil_scoped_acquire acquire;
+      progress(std::string(stage));
+    };
+  else
+    options.on_stage = [](std::string_view) {
+      const py::gil_scoped_acquire acquire;
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C ends the run between stages
+    };
+  Result result = value_or_raise(without_gil([&] {
+    return read_case(folder).and_then([&](const Case& given) { return run_case(given, options); });
+  }));
+  result.options.on_stage = nullptr;
+  if (result.failure) raise(*result.failure, py::cast(result));
+  return result;
+}
+
+HeldCalibration calibration_of(const Result& result) {
+  HeldCalibration held{{{}, result.joint_covariance}, {}, {}, {}, {}, {}, {}};
+  for (const ViewResult& view : result.views) {
+    if (!view.calibrated || !view.rectification || !view.found)
+      raise({result.failure ? result.failure->reason : Reason::too_few_fiducials,
+             "the views were not calibrated",
+             {},
+             {}});
+    held.views.push_back(*view.calibrated);
+    held.maps.emplace_back(view.rectification->map);
+    held.fiducials.push_back(view.found->fiducials);
+  }
+  return held;
+}
+
+void write(const Result& result, const std::filesystem::path& folder) {
+  const auto written = without_gil([&] {
+    return write_report(result, folder).and_then([&] {
+      return write_file(folder / "result.json", to_text(to_json(result)) + "\n");
+    });
+  });
+  value_or_raise(written);
+}
+
+py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, const std::string& kind,
+                    const std::optional<std::string>& preset, int size, int bits, bool knee,
+                    const std::vector<std::string>& faults, const std::vector<std::string>& views,
+                    const std::optional<std::filesystem::path>& ct, unsigned threads) {
+  using namespace simulation;
+  SimulationOptions options;
+  options.seed = seed;
+  options.kind = value_or_raise(case_kind(kind));
+  if (preset) options.preset = value_or_raise(simulation::preset(*preset));
+  options.size = size;
+  options.bits = bits;
+  options.knee = knee;
+  options.threads = threads;
+  for (const std::string& word : faults) options.faults.push_back(value_or_raise(fault(word)));
+  for (const std::string& word : views) options.views.push_back(value_or_raise(view_angles(word)));
+  if (ct) {
+    CtOptions body;
+    body.volume = value_or_raise(read_volume(*ct));
+    body.name = ct->filename().string();
+    options.ct = std::make_shared<const CtOptions>(std::move(body));
+  }
+  value_or_raise(check_case_folder(folder));
+  const auto simulated = without_gil([&] {
+    return simulate_case(options).and_then([&](const SimulatedCase& made) {
+      return write_case(folder, made).map([&] { return truth_json(made); });
+    });
+  });
+  return python_from(value_or_raise(simulated));
+}
+
+void add_points(py::module_& module) {
+  using Point = PointResult;
+  const auto of_place = [](auto get) {
+    return [get](const Point& p) -> py::object { return p.place ? get(*p.place) : py::none(); };
+  };
+  py::class_<Point>(module, "ResultPoint", "A pick or check target of a case: its place, or why it has none.")
+      .def_readonly("name", &Point::name)
+      .def_property_readonly("source",
+                             [](const Point& p) { return p.source == PointSource::pick ? "pick" : "target"; })
+      .def_property_readonly(
+          "xyz_mm",
+          of_place([](const GuidedPoint& g) -> py::object { return rows_array<3>({g.in_calibrator}, true); }),
+          "(3,) calibrator frame at the first view's moment, mm; None where it was not located.")
+      .def_property_readonly("covariance_mm2", of_place([](const GuidedPoint& g) -> py::object {
+                               return matrix_array(g.covariance_in_calibrator);
+                             }),
+                             "(3, 3) mm^2, or None.")
+      .def_property_readonly("error_95_mm", of_place([](const GuidedPoint& g) -> py::object {
+                               return py::float_(length_at_95(g.covariance_in_calibrator));
+                             }),
+                             "95 % of the errors with this covariance are no longer, mm; or None.")
+      .def_property_readonly("in_femur_mm",
+                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_femur); }),
+                             "(3,) or None.")
+      .def_property_readonly("in_tibia_mm",
+                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_tibia); }),
+                             "(3,) or None.")
+      .def_property_readonly("in_tool_mm",
+                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_tool); }),
+                             "(3,) or None.")
+      .def_readonly("ray_gap_mm", &Point::ray_gap_mm)
+      .def_property_readonly(
+          "reason",
+          [](const Point& p) {
+            return p.reason ? py::object(warning_dict(*p.reason)) : py::object(py::none());
+          },
+          "Why it was not located: {code, message, view, figures}; else None.")
+      .def("__repr__", [](const Point& p) {
+        if (!p.place) return fmt::format("<ResultPoint {}: not located>", p.name);
+        const Eigen::Vector3d& at = p.place->in_calibrator;
+        return fmt::format("<ResultPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %)>", p.name,
+                           at.x(), at.y(), at.z(), length_at_95(p.place->covariance_in_calibrator));
+      });
+}
+
+}  // namespace
+
+void add_cases(py::module_& module) {
+  add_points(module);
+  py::class_<Result>(module, "Result", "The answer of run_case; to_dict() is result.json.")
+      .def_property_readonly("status", [](const Result& r) { return r.failure ? "refused" : "ok"; })
+      .def_property_readonly("warnings", [](const Result& r) { return warning_list(r.warnings); })
+      .def_property_readonly(
+          "names",
+          [](const Result& r) {
+            std::vector<std::string> names;
+            for (const ViewResult& view : r.views) names.push_back(view.name);
+            return names;
+          },
+          "Of the views.")
+      .def_readonly("points", &Result::points, "List of ResultPoint: picks, then check targets.")
+      .def(
+          "point",
+          [](const Result& r, const std::string& name) {
+            for (const PointResult& point : r.points)
+              if (point.name == name) return point;
+            raise({Reason::bad_value, fmt::format("no point \"{}\"", name), {}, {}});
+          },
+          py::arg("name"))
+      .def_property_readonly("calibration", &calibration_of,
+                             "Calibration; RefusedError where it was not reached.")
+      .def(
+          "image",
+          [](const Result& r, const ViewKey& key) {
+            return std::const_pointer_cast<Exposure>(r.views[index_of(r, key)].exposure);
+          },
+          py::arg("view"), "The view's XrayImage, not copied; None where it was not read.")
+      .def(
+          "rectified_image",
+          [](const Result& r, const ViewKey& key) {
+            const ViewResult& view = r.views[index_of(r, key)];
+            if (!view.exposure) raise({Reason::missing_file, "the image was not read", view.name, {}});
+            return moved_to_array(without_gil([&] { return rectified_picture(view); }));
+          },
+          py::arg("view"), "(height, width) uint8: rectified and windowed for the eye.")
+      .def(
+          "overlay_png",
+          [](const Result& r, const ViewKey& key) {
+            const std::size_t view = index_of(r, key);
+            return py::bytes(without_gil([&] { return overlay_png(r, view); }));
+          },
+          py::arg("view"), "PNG file content: fiducials, points, planned tunnels on the rectified image.")
+      .def(
+          "to_dict", [](const Result& r) { return python_from(to_json(r)); }, "The content of result.json.")
+      .def("write", &write, py::arg("folder"),
+           "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.");
+  const RunOptions usual;
+  module.def(
+      "run_case", &run, py::arg("folder"), py::kw_only(),
+      py::arg("method") = std::string(method_words[std::size_t(usual.method)]),
+      py::arg("max_error_mm") = usual.max_error_mm, py::arg("threads") = usual.threads,
+      py::arg("history") = py::none(), py::arg("progress") = py::none(),
+      R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics.
+
+folder: holds case.json. max_error_mm: refuse (uncertain) where a point may be off by more (95 %). history: a C-arm's
+history file, which serves as prior. progress: called with the name of each stage (read, rectify, detect, label,
+calibrate, locate) before it begins; an exception from it ends the run. Releases the GIL. Returns a Result.
+Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
+  const simulation::SimulationOptions made;
+  module.def(
+      "simulate_case", &simulate, py::arg("folder"), py::kw_only(), py::arg("seed") = made.seed,
+      py::arg("kind") = std::string(simulation::word(made.kind)), py::arg("preset") = py::none(),
+      py::arg("size") = made.size, py::arg("bits") = made.bits, py::arg("knee") = made.knee,
+      py::arg("faults") = std::vector<std::string>(), py::arg("views") = std::vector<std::string>(),
+      py::arg("ct") = py::none(), py::arg("threads") = made.threads,
+      R"(Writes a simulated case (images, case.json, calibrator.json, plate.json, truth.json) into a folder.
+
+The same seed gives the same bytes. kind: accuracy, tunnels, flat or grid; preset: paper-sim, ii-9in or flat-panel;
+faults, views (NAME:PRIMARY,SECONDARY in degrees) and ct as `helicarm simulate`. Releases the GIL.
+Returns the content of truth.json. Raises InputError: usage, bad_value, cannot_write.)");
+}
+
+}  // namespace helicarm::python

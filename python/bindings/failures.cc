@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "failures.h"
+
+namespace helicarm::python {
+
+py::dict warning_dict(const Warning& warning) {
+  py::dict dict;
+  dict["code"] = std::string(code(warning.reason));
+  dict["message"] = warning.message;
+  dict["view"] = warning.view.empty() ? py::object(py::none()) : py::object(py::str(warning.view));
+  dict["figures"] = py::cast(warning.figures);
+  return dict;
+}
+
+py::list warning_list(const std::vector<Warning>& warnings) {
+  py::list list;
+  for (const Warning& warning : warnings) list.append(warning_dict(warning));
+  return list;
+}
+
+void raise(const Failure& failure, const py::object& result) {
+  const py::object type = py::module_::import("helicarm.errors")
+                              .attr(exit_code(failure.reason) == 2 ? "InputError" : "RefusedError");
+  const py::dict given = warning_dict(failure);
+  const py::object error = type(given["code"], given["message"], given["view"], given["figures"], result);
+  PyErr_SetObject(type.ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
+py::object python_from(const Json& json) { return py::module_::import("json").attr("loads")(to_text(json)); }
+
+Json json_from(const py::object& value) {
+  py::dict how;
+  how["allow_nan"] = false;
+  std::string text;
+  try {
+    text = py::module_::import("json").attr("dumps")(value, **how).cast<std::string>();
+  } catch (py::error_already_set& error) {
+    raise({Reason::bad_json, std::string("not JSON: ") + error.what(), {}, {}});
+  }
+  return value_or_raise(parse_json(text, "dict"));
+}
+
+void add_failures(py::module_&) {
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const py::builtin_exception&) {
+      throw;
+    } catch (const BadInput& bad) {
+      try {
+        raise(bad.failure());
+      } catch (py::error_already_set& error) {
+        error.restore();
+      }
+    } catch (const std::bad_alloc&) {
+      throw;
+    } catch (const std::logic_error&) {
+      throw;  // misuse: ValueError, IndexError
+    } catch (const std::exception& error) {
+      const py::object type = py::module_::import("helicarm.errors").attr("HelicarmError");
+      PyErr_SetObject(type.ptr(), type("internal", error.what()).ptr());
+    }
+  });
+}
+
+}  // namespace helicarm::python

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <memory>
+
+#include "arrays.h"
+#include "helicarm/detection/find_marks.h"
+#include "helicarm/image/grey_picture.h"
+#include "helicarm/xray/read_exposure.h"
+#include "module.h"
+
+namespace helicarm::python {
+namespace {
+
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+/// What the array's type can hold; of floating-point pixels the caller must say it.
+std::pair<float, float> range_of(const py::array& pixels,
+                                 const std::optional<std::pair<float, float>>& given) {
+  if (given && given->first < given->second) return *given;
+  if (given)
+    raise({Reason::bad_value,
+           fmt::format("range: {:g} is not below {:g}", given->first, given->second),
+           {},
+           {}});
+  const char kind = pixels.dtype().kind();
+  if (kind == 'u' && pixels.itemsize() <= 2) return {0.f, pixels.itemsize() == 1 ? 255.f : 65535.f};
+  raise(
+      {Reason::bad_value,
+       "range: is needed for pixels that are neither uint8 nor uint16: the least and the greatest grey value",
+       {},
+       {}});
+}
+
+std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
+  if (pixel_mm.is_none()) return {};
+  const Doubles given = Doubles::ensure(pixel_mm);
+  if (!given || (given.size() != 1 && given.size() != 2))
+    raise({Reason::bad_value, "pixel_mm: is neither a number nor (column spacing, row spacing)", {}, {}});
+  const Eigen::Vector2d spacing(given.data()[0], given.data()[given.size() - 1]);
+  if (!(spacing.minCoeff() > 0)) raise({Reason::bad_value, "pixel_mm: is not positive", {}, {}});
+  return spacing;
+}
+
+Exposure image_from(const py::array& pixels, const py::object& pixel_mm,
+                    std::optional<double> source_detector_mm,
+                    const std::optional<std::pair<float, float>>& range, const std::string& name) {
+  if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > max_picture_side ||
+      pixels.shape(1) > max_picture_side)
+    raise({Reason::bad_size,
+           fmt::format("pixels: shape {} is not (height, width) with sides from 1 to {}", shape_of(pixels),
+                       max_picture_side),
+           {},
+           {}});
+  Exposure image;
+  std::tie(image.lowest, image.highest) = range_of(pixels, range);
+  const Floats values = Floats::ensure(pixels);
+  if (!values) raise({Reason::bad_value, "pixels: are not numbers", {}, {}});
+  image.name = name;
+  image.pixels = Image<float>(int(values.shape(1)), int(values.shape(0)));
+  for (std::size_t i = 0; i < image.pixels.pixels().size(); ++i) {
+    if (!std::isfinite(values.data()[i])) raise({Reason::not_finite, "pixels: hold NaN or infinity", {}, {}});
+    image.pixels.pixels()[i] = values.data()[i];
+  }
+  image.acquisition.pixel_mm = spacing_of(pixel_mm);
+  image.acquisition.source_detector_mm = source_detector_mm;
+  return image;
+}
+
+py::dict marks(const Exposure& image, const std::string& kind) {
+  const MarkKind which = value_or_raise(mark_kind(kind));
+  const std::vector<Dot> dots = without_gil([&] { return find_marks(image, which); });
+  std::vector<Eigen::Vector2d> uv;
+  py::array_t<double> sigma(py::ssize_t(dots.size())), radius(py::ssize_t(dots.size()));
+  for (std::size_t i = 0; i < dots.size(); ++i) {
+    uv.push_back(dots[i].centre_px);
+    sigma.mutable_at(i) = dots[i].sigma_px;
+    radius.mutable_at(i) = dots[i].radius_px;
+  }
+  py::dict found;
+  found["uv"] = rows_array<2>(uv);
+  found["sigma_px"] = sigma;
+  found["radius_px"] = radius;
+  return found;
+}
+
+std::shared_ptr<Exposure> image_at(const std::filesystem::path& path, std::optional<int> frame,
+                                   const std::optional<std::string>& name) {
+  auto image = without_gil([&] { return read_exposure(path, name.value_or(path.stem().string()), frame); });
+  return std::make_shared<Exposure>(value_or_raise(std::move(image)));
+}
+
+}  // namespace
+
+void add_images(py::module_& module) {
+  py::class_<Exposure, std::shared_ptr<Exposure>>(module, "XrayImage", R"(An X-ray image as stored.
+
+Pixels are neither flipped nor turned. Pixel (0, 0) is the centre of the top-left pixel; u (column) runs right,
+v (row) down. Points are always (u, v); arrays are indexed [v, u].
+
+XrayImage(pixels, *, pixel_mm, source_detector_mm, range=None, name="")
+  pixels: (height, width), any numeric type; converted to float32 by one copy
+  pixel_mm: detector pixel spacing, mm: a number, (column, row), or None where unknown
+  source_detector_mm: mm, or None where unknown
+  range: least and greatest possible grey value; of uint8 and uint16 pixels that of the type
+Raises InputError: bad_size, bad_value, not_finite.)")
+      .def(py::init(&image_from), py::arg("pixels"), py::kw_only(), py::arg("pixel_mm"),
+           py::arg("source_detector_mm"), py::arg("range") = py::none(), py::arg("name") = "")
+      .def_property_readonly(
+          "pixels", [](const py::object& self) { return view_of(self.cast<const Exposure&>().pixels, self); },
+          "(height, width) float32, read only, not copied: it shares the image's memory.")
+      .def_readonly("name", &Exposure::name)
+      .def_property_readonly(
+          "shape", [](const Exposure& i) { return std::pair(i.pixels.height(), i.pixels.width()); },
+          "(height, width)")
+      .def_property_readonly(
+          "range", [](const Exposure& i) { return std::pair(i.lowest, i.highest); },
+          "Least and greatest grey value that the file could have stored.")
+      .def_property_readonly(
+          "pixel_mm", [](const Exposure& i) { return vector_array<2>(i.acquisition.pixel_mm); },
+          "(column, row) spacing on the detector, mm; None where the file does not say.")
+      .def_property_readonly(
+          "source_detector_mm", [](const Exposure& i) { return i.acquisition.source_detector_mm; },
+          "mm, or None.")
+      .def_property_readonly("warnings", [](const Exposure& i) { return warning_list(i.warnings); })
+      .def("__repr__", [](const Exposure& i) {
+        return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
+      });
+  module.def("read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),
+             py::arg("name") = py::none(), R"(Reads a DICOM, PNG or TIFF X-ray image, told apart by content.
+
+PNG and TIFF need a sidecar NAME.json with pixel_mm and source_detector_mm. frame: 1-based, needed only where the
+file holds several. name: of the view; the file's stem where not given. Releases the GIL.
+Raises InputError: missing_file, not_an_image, truncated, bad_size, bad_value, unsupported, bad_json.)");
+  module.def("detect", &marks, py::arg("image"), py::kw_only(), py::arg("kind"),
+             R"(Balls, holes or crosses (kind) anywhere in an image, without plate or calibrator.
+
+Returns {"uv": (N, 2) raw pixels, "sigma_px": (N,) standard deviation per axis, "radius_px": (N,)}; of crosses the
+radius is half the wires' width. Releases the GIL. Raises InputError: usage for another kind.)");
+}
+
+}  // namespace helicarm::python

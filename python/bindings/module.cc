@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "module.h"
+
+namespace helicarm::python {
+
+PYBIND11_MODULE(_helicarm, module) {
+  module.doc() = "Compiled part of helicarm; import helicarm instead.";
+  module.attr("__version__") = HELICARM_VERSION;
+  add_failures(module);
+  add_images(module);
+  add_phantom(module);
+  add_rectification(module);
+  add_calibration(module);
+  add_cases(module);
+}
+
+}  // namespace helicarm::python

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "failures.h"
+
+namespace helicarm::python {
+
+/// XrayImage, read_image, detect.
+void add_images(py::module_& module);
+/// Calibrator, Plate.
+void add_phantom(py::module_& module);
+/// DistortionMap, Rectification, rectify.
+void add_rectification(py::module_& module);
+/// calibrate, Calibration, LocatedPoint.
+void add_calibration(py::module_& module);
+/// run_case, Result, simulate_case.
+void add_cases(py::module_& module);
+
+}  // namespace helicarm::python

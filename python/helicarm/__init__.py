@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A C-arm as a measuring instrument: X-ray images to points in space with confidence regions.
+
+Points are (u, v) in pixels, (0, 0) the centre of the top-left pixel; images are indexed [v, u]. Lengths are mm, angles
+degrees. A matrix named a_from_b maps points of b into a. Failures are InputError and RefusedError.
+"""
+from ._helicarm import (  # noqa: F401
+    CArmPrior, Calibration, Calibrator, DistortionMap, IntrinsicsPrior, LocatedPoint, Plate, Rectification, Result,
+    ResultPoint, ViewPoints, XrayImage, __version__, calibrate, detect, read_image, rectify, run_case, simulate_case)
+from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
+
+__all__ = [
+    "CArmPrior", "Calibration", "Calibrator", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
+    "LocatedPoint", "Plate", "Rectification", "RefusedError", "Result", "ResultPoint", "ViewPoints", "XrayImage",
+    "calibrate", "detect", "figures", "read_image", "rectify", "run_case", "simulate_case"]
+
+
+def __getattr__(name):
+    if name == "figures":  # matplotlib is loaded only where figures are drawn
+        import importlib
+        return importlib.import_module(".figures", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Matplotlib figures. Each function draws into `ax` (a new figure where None) and returns it."""
+import numpy as np
+
+
+def _axes(ax):
+    if ax is not None:
+        return ax
+    import matplotlib.pyplot as plt
+    return plt.subplots(figsize=(6, 6))[1]
+
+
+def overlay(result, view=0, ax=None):
+    """Rectified image of a view with its fiducials, their labels and the located points.
+
+    result: Result; view: name or index. Axes in rectified pixels, u right, v down.
+    """
+    ax = _axes(ax)
+    ax.imshow(result.rectified_image(view), cmap="gray", interpolation="nearest")
+    calibration = result.calibration
+    for fiducial in calibration.fiducials(view):
+        if fiducial["uv"] is None:
+            continue
+        used = fiducial["status"] == "used"
+        ax.plot(*fiducial["uv"], "+" if used else "x", color="lime" if used else "red", markersize=9)
+        ax.annotate(fiducial["label"], fiducial["uv"], xytext=(5, -5), textcoords="offset points", color="lime",
+                    fontsize=7)
+    for point in result.points:
+        if point.xyz_mm is not None:
+            uv = calibration.project(point.xyz_mm, view)
+            ax.plot(*uv, "o", mfc="none", color="orange")
+            ax.annotate(point.name, uv, xytext=(5, 5), textcoords="offset points", color="orange", fontsize=8)
+    ax.set(xlabel="u (px)", ylabel="v (px)", title=result.names[view] if isinstance(view, int) else view)
+    return ax
+
+
+def residuals(calibration, view=0, ax=None, scale=None):
+    """Arrows from each used fiducial towards its projection, enlarged.
+
+    calibration: Calibration with fiducials (of calibrate or run_case). scale: enlargement; chosen from the largest
+    residual where None. Axes in rectified pixels.
+    """
+    ax = _axes(ax)
+    used = [f for f in calibration.fiducials(view) if f["status"] == "used"]
+    if not used:
+        raise ValueError("the calibration holds no fiducials of this view")
+    uv = np.array([f["uv"] for f in used])
+    off = calibration.project(np.array([f["xyz_mm"] for f in used]), view) - uv
+    largest = np.linalg.norm(off, axis=1).max()
+    if scale is None:
+        scale = 0.1 * np.ptp(uv, axis=0).max() / max(largest, 1e-12)
+    ax.quiver(uv[:, 0], uv[:, 1], scale * off[:, 0], scale * off[:, 1], angles="xy", scale_units="xy", scale=1,
+              color="tab:red", width=0.004)
+    ax.plot(uv[:, 0], uv[:, 1], "k.")
+    for fiducial in used:
+        ax.annotate(fiducial["label"], fiducial["uv"], xytext=(4, 4), textcoords="offset points", fontsize=7)
+    rms = np.sqrt(np.mean(np.sum(off ** 2, axis=1)))
+    ax.set(xlabel="u (px)", ylabel="v (px)", title=f"residuals {rms:.3f} px rms, arrows x {scale:.0f}", aspect="equal")
+    ax.invert_yaxis()
+    return ax
+
+
+def tre_map(calibration, centre_mm, *, half_mm, step_mm, sigma_px, z_mm=None, ax=None):
+    """Predicted TRE (rms, mm) over x and y of the calibrator frame, in the lattice plane nearest to z_mm.
+
+    centre_mm: (3,); half_mm, step_mm: extent and step of the lattice; sigma_px: noise of a pick per axis; z_mm: the
+    centre's where None.
+    """
+    ax = _axes(ax)
+    volume = calibration.tre_map(centre_mm, half_mm=half_mm, step_mm=step_mm, sigma_px=sigma_px)
+    first, step, rms = volume["first_mm"], volume["step_mm"], volume["rms_mm"]
+    k = int(np.clip(round(((centre_mm[2] if z_mm is None else z_mm) - first[2]) / step), 0, rms.shape[2] - 1))
+    x, y = (first[i] + step * np.arange(rms.shape[i]) for i in (0, 1))
+    filled = ax.contourf(x, y, rms[:, :, k].T, levels=12, cmap="viridis")  # contourf takes rows along y
+    ax.figure.colorbar(filled, ax=ax, label="predicted TRE (mm rms)")
+    ax.set(xlabel="x (mm)", ylabel="y (mm)", title=f"z = {first[2] + step * k:.1f} mm, calibrator frame",
+           aspect="equal")
+    return ax

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+import cv2
+import numpy as np
+import pytest
+
+import helicarm
+
+POINT = np.array([12.0, -7.0, 45.0])
+
+
+def test_projection_is_that_of_numpy_and_opencv(pair):
+    calibration = pair.calibration()
+    points = POINT + np.random.default_rng(2).uniform(-30, 30, (20, 3))
+    for name in calibration.names:
+        uv = calibration.project(points, name)
+        homogeneous = np.c_[points, np.ones(20)] @ calibration.projection(name).T
+        assert uv == pytest.approx(homogeneous[:, :2] / homogeneous[:, 2:], abs=1e-9)
+        pose = calibration.camera_from_calibrator(name)
+        expected, _ = cv2.projectPoints(points, cv2.Rodrigues(pose[:3, :3])[0], pose[:3, 3],
+                                        calibration.intrinsics(name), None)
+        assert uv == pytest.approx(expected.reshape(-1, 2), abs=1e-6)
+        assert calibration.project(points[0], name) == pytest.approx(uv[0])
+
+
+def test_exact_points_give_the_views_back(pair):
+    calibration = pair.calibration()
+    for name, (rotation, t) in pair.pose.items():
+        assert calibration.intrinsics(name) == pytest.approx(pair.k, abs=1e-4)
+        assert calibration.camera_from_calibrator(name)[:3] == pytest.approx(np.c_[rotation, t], abs=1e-5)
+
+
+def test_pose_agrees_with_opencv(pair):
+    """Intrinsics known to 0.001 px leave the pose of solvePnP's iterated least squares."""
+    random = np.random.default_rng(4)
+    uv = pair.pixels("AP", pair.xyz) + 0.2 * random.standard_normal((12, 2))
+    k = np.diag([2500.0, 2500, 1])
+    k[:2, 2] = 330, 215
+    prior = helicarm.IntrinsicsPrior(focal_px=2500, principal_px=(330, 215), aspect=(1, 1e-9))
+    arm = helicarm.CArmPrior(focal=(1e-3, 1e-6), principal=(1e-3, 1e-6))
+    views = [helicarm.ViewPoints("AP", pair.xyz, uv, sigma_px=0.2, prior=prior)]
+    calibration = helicarm.calibrate(views, c_arm=arm, rejection_probability=0, largest_rms_px=100)
+    good, r, t = cv2.solvePnP(pair.xyz, uv, k, None, flags=cv2.SOLVEPNP_ITERATIVE)
+    r, t = cv2.solvePnPRefineLM(pair.xyz, uv, k, None, r, t)
+    pose = calibration.camera_from_calibrator("AP")
+    assert good and pose[:3, 3] == pytest.approx(t.ravel(), abs=0.01)
+    assert pose[:3, :3] == pytest.approx(cv2.Rodrigues(r)[0], abs=1e-5)
+
+
+def test_located_point_is_opencvs_for_exact_pixels(pair):
+    calibration = pair.calibration()
+    seen = {name: calibration.project(POINT, name) for name in calibration.names}
+    located = calibration.locate(seen, sigma_px=0.3)
+    p = cv2.triangulatePoints(calibration.projection(0), calibration.projection(1), seen["AP"], seen["LAT"]).ravel()
+    assert located.xyz_mm == pytest.approx(p[:3] / p[3], abs=1e-6)
+    assert located.xyz_mm == pytest.approx(POINT, abs=1e-6)
+    assert located.ray_gap_mm < 1e-6 and located.views == ["AP", "LAT"]
+
+
+def test_covariance_is_that_of_monte_carlo(pair):
+    """Noise of fiducials and of the picks together: 400 calibrations, each with its own noise."""
+    expected = pair.calibration(sigma=0.1).predict(POINT, sigma_px=0.3)
+    random = np.random.default_rng(5)
+    errors = []
+    for seed in range(400):
+        calibration = pair.calibration(noise=0.1, sigma=0.1, seed=seed)
+        seen = {name: pair.pixels(name, POINT)[0] + 0.3 * random.standard_normal(2) for name in pair.pose}
+        errors.append(calibration.locate(seen, sigma_px=0.3).xyz_mm - POINT)
+    scatter = np.cov(np.array(errors).T)
+    assert np.trace(scatter) == pytest.approx(np.trace(expected), rel=0.2)
+    assert np.diag(scatter) == pytest.approx(np.diag(expected), rel=0.3)
+
+
+def test_predictions_of_many_points_are_those_of_each(pair):
+    calibration = pair.calibration()
+    points = POINT + np.array([[0, 0, 0], [5, -3, 2], [0, 10, 0.0]])
+    all_at_once = calibration.predict(points, sigma_px=0.5)
+    assert all_at_once.shape == (3, 3, 3)
+    for point, covariance in zip(points, all_at_once):
+        assert calibration.predict(point, sigma_px=0.5) == pytest.approx(covariance)
+    behind = calibration.predict(np.array([POINT, [0, -5000, 0]]), sigma_px=0.5)
+    assert np.isfinite(behind[0]).all() and np.isnan(behind[1]).all()
+
+
+def test_tre_map_is_indexed_x_y_z(pair):
+    calibration = pair.calibration()
+    volume = calibration.tre_map(POINT, half_mm=20, step_mm=10, sigma_px=0.5)
+    rms, first = volume["rms_mm"], volume["first_mm"]
+    for index in ((0, 1, 4), (4, 0, 2)):
+        covariance = calibration.predict(first + volume["step_mm"] * np.array(index), sigma_px=0.5)
+        assert rms[index] == pytest.approx(np.sqrt(np.trace(covariance)))
+
+
+def test_outlier_is_rejected(pair):
+    views = []
+    for name in pair.pose:
+        uv = pair.pixels(name, pair.xyz)
+        if name == "AP":
+            uv[4] += 8
+        views.append(helicarm.ViewPoints(name, pair.xyz, uv, sigma_px=0.1))
+    calibration = helicarm.calibrate(views)
+    status = {f["label"]: f["status"] for f in calibration.fiducials("AP")}
+    assert status["P5"] == "rejected" and list(status.values()).count("used") == 11
+
+
+def test_one_view_places_nothing(pair):
+    with pytest.raises(helicarm.RefusedError) as error:
+        pair.calibration().locate({"AP": (300, 200)})
+    assert error.value.code == "not_seen"
+
+
+def test_flat_phantom_is_refused_with_figures(pair):
+    flat = pair.xyz * [1, 1, 0]
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.calibrate([helicarm.ViewPoints("AP", flat, pair.pixels("AP", flat), sigma_px=0.1)])
+    assert error.value.code == "coplanar_fiducials" and error.value.view == "AP"
+    assert all(isinstance(v, float) for v in error.value.figures.values()) and error.value.figures
+
+
+@pytest.mark.parametrize("xyz, uv, code", [(np.zeros((5, 2)), np.zeros((5, 2)), "bad_value"),
+                                           (np.zeros((5, 3)), np.zeros((4, 2)), "bad_value"),
+                                           (np.full((5, 3), np.nan), np.zeros((5, 2)), "not_finite")])
+def test_wrong_arrays_are_input_errors(xyz, uv, code):
+    with pytest.raises(helicarm.InputError) as error:
+        helicarm.ViewPoints("AP", xyz, uv, sigma_px=0.1)
+    assert error.value.code == code
+
+
+def test_unknown_view_is_an_input_error(pair):
+    with pytest.raises(helicarm.InputError, match="no view"):
+        pair.calibration().projection("PA")
