@@ -86,7 +86,7 @@ py::array view_of(const Image<T>& image, const py::handle& owner) {
   py::array_t<T> array({py::ssize_t(image.height()), py::ssize_t(image.width())}, image.pixels().data(),
                        owner);
   py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-  return std::move(array);
+  return array;
 }
 
 /// The same for an image that nothing else holds.

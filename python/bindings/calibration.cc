@@ -59,7 +59,7 @@ ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const 
   return view;
 }
 
-HeldCalibration calibrated(const std::vector<ViewFiducials>& views, const MachinePrior& c_arm,
+HeldCalibration calibrated(const std::vector<ViewFiducials>& views, const CArmPrior& c_arm,
                            const std::optional<std::vector<Doubles>>& ball_covariance_mm2, double scale_sigma,
                            double rejection_probability, double largest_rms_px) {
   CalibrationOptions options{{c_arm, {}, scale_sigma}, rejection_probability, largest_rms_px};
@@ -94,30 +94,30 @@ py::array projected(const HeldCalibration& calibration, const Doubles& xyz_mm, c
   for (const Eigen::Vector3d& point : rows_of<3>(xyz_mm, "xyz_mm")) {
     std::optional<Eigen::Vector2d> uv;
     if (view.depth(point) > 0) uv = view.project(point);
-    if (uv && raw && map) uv = raw_in_picture(*map, *uv);
+    if (uv && raw && map) uv = raw_in_image(*map, *uv);
     pixels.push_back(uv.value_or(Eigen::Vector2d::Constant(nan)));
   }
   return rows_array<2>(pixels, xyz_mm.ndim() == 1);
 }
 
-PointPicture picture_from(const HeldCalibration& calibration, const ViewKey& key, const Doubles& uv,
-                          std::optional<double> sigma_px, bool raw) {
+PointObservation observation_from(const HeldCalibration& calibration, const ViewKey& key, const Doubles& uv,
+                                  std::optional<double> sigma_px, bool raw) {
   const auto pixels = rows_of<2>(uv, "observations");
   if (pixels.size() != 1) raise({Reason::bad_value, "observations: is not one (u, v) for each view", {}, {}});
   if (sigma_px && !(*sigma_px >= 0)) raise({Reason::bad_value, "sigma_px: is negative", {}, {}});
   const std::size_t view = index_of(calibration, key);
   const auto& map = calibration.maps[view];
-  const SeenPoint seen = raw && map ? value_or_raise(see_click(*map, pixels[0], sigma_px))
-                                    : SeenPoint{pixels[0], pixels[0], sigma_px.value_or(click_sigma_px)};
+  const ImagePoint seen = raw && map ? value_or_raise(see_click(*map, pixels[0], sigma_px))
+                                     : ImagePoint{pixels[0], pixels[0], sigma_px.value_or(click_sigma_px)};
   return {view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
 }
 
 LocatedPoint located(const HeldCalibration& calibration, const std::map<ViewKey, Doubles>& observations,
                      std::optional<double> sigma_px, bool raw, const std::string& name) {
-  std::vector<PointPicture> pictures;
+  std::vector<PointObservation> observed;
   for (const auto& [key, uv] : observations)
-    pictures.push_back(picture_from(calibration, key, uv, sigma_px, raw));
-  return value_or_raise(locate(name, PointSource::pick, pictures, calibration));
+    observed.push_back(observation_from(calibration, key, uv, sigma_px, raw));
+  return value_or_raise(locate(name, PointSource::pick, observed, calibration));
 }
 
 py::array predicted(const HeldCalibration& calibration, const Doubles& xyz_mm, double sigma_px) {
@@ -175,7 +175,7 @@ py::list fiducials(const HeldCalibration& calibration, const ViewKey& key) {
 
 void add_priors(py::module_& module) {
   const IntrinsicsPrior usual;
-  const auto pair_of = [](const std::optional<Belief>& b) -> std::optional<std::pair<double, double>> {
+  const auto pair_of = [](const std::optional<NormalPrior>& b) -> std::optional<std::pair<double, double>> {
     if (!b) return std::nullopt;
     return std::pair(b->value, b->sigma);
   };
@@ -193,22 +193,22 @@ the receiver, or 1; aspect: (value, sigma) of |fx| / fy; skew: (value, sigma) ov
              prior.unit_px = unit_px;
              prior.aspect.reset();
              prior.skew.reset();
-             if (aspect) prior.aspect = Belief{aspect->first, aspect->second};
-             if (skew) prior.skew = Belief{skew->first, skew->second};
+             if (aspect) prior.aspect = NormalPrior{aspect->first, aspect->second};
+             if (skew) prior.skew = NormalPrior{skew->first, skew->second};
              return prior;
            }),
            py::kw_only(), py::arg("focal_px") = usual.focal_px, py::arg("principal_px") = py::none(),
            py::arg("unit_px") = usual.unit_px, py::arg("aspect") = pair_of(usual.aspect),
            py::arg("skew") = pair_of(usual.skew));
-  py::class_<MachinePrior>(module, "CArmPrior",
-                           R"(How far a C-arm's intrinsics may be from nominal: standard deviations.
+  py::class_<CArmPrior>(module, "CArmPrior",
+                        R"(How far a C-arm's intrinsics may be from nominal: standard deviations.
 
 focal, principal: (common to all views, of each view: sag), in units of IntrinsicsPrior.unit_px; None: not known.)")
       .def(py::init([](const std::optional<std::pair<double, double>>& focal,
                        const std::optional<std::pair<double, double>>& principal) {
-             MachinePrior prior;
-             if (focal) prior.focal = Departure{focal->first, focal->second};
-             if (principal) prior.principal = Departure{principal->first, principal->second};
+             CArmPrior prior;
+             if (focal) prior.focal = IntrinsicsVariation{focal->first, focal->second};
+             if (principal) prior.principal = IntrinsicsVariation{principal->first, principal->second};
              return prior;
            }),
            py::kw_only(), py::arg("focal") = py::none(), py::arg("principal") = py::none());
@@ -329,9 +329,8 @@ a click. Returns a LocatedPoint. Raises RefusedError: not_seen, parallel_rays, p
 Returns {"first_mm": (3,), "step_mm", "rms_mm": (n, n, n) indexed [x, y, z], not copied, NaN where no point can be
 located}. Releases the GIL. Raises InputError: bad_value.)");
   const CalibrationOptions usual;
-  module.def("calibrate", &calibrated, py::arg("views"), py::kw_only(),
-             py::arg("c_arm") = usual.common.machine, py::arg("ball_covariance_mm2") = py::none(),
-             py::arg("scale_sigma") = usual.common.scale_sigma,
+  module.def("calibrate", &calibrated, py::arg("views"), py::kw_only(), py::arg("c_arm") = usual.common.c_arm,
+             py::arg("ball_covariance_mm2") = py::none(), py::arg("scale_sigma") = usual.common.scale_sigma,
              py::arg("rejection_probability") = usual.rejection_probability,
              py::arg("largest_rms_px") = usual.largest_rms_px,
              R"(Pinhole views by maximum likelihood, all ViewPoints at once, under their priors.

@@ -7,7 +7,7 @@
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/report/overlay.h"
-#include "helicarm/report/picture.h"
+#include "helicarm/report/rectified_image.h"
 #include "helicarm/report/report.h"
 #include "helicarm/simulation/truth_json.h"
 #include "helicarm/simulation/write_case.h"
@@ -34,7 +34,7 @@ Result run(const std::filesystem::path& folder, const std::string& method, std::
   options.max_error_mm = max_error_mm;
   options.threads = threads;
   value_or_raise(check_fields<RunOptions>(run_fields, options, "run_case"));
-  if (history) options.machine = value_or_raise(read_machine(*history));
+  if (history) options.history = value_or_raise(read_history(*history));
   if (!progress.is_none())
     options.on_stage = [&](std::string_view stage) {
       const py::gil_scoped_acquire acquire;
@@ -117,25 +117,26 @@ void add_points(py::module_& module) {
       .def_property_readonly("source",
                              [](const Point& p) { return p.source == PointSource::pick ? "pick" : "target"; })
       .def_property_readonly(
-          "xyz_mm",
-          of_place([](const GuidedPoint& g) -> py::object { return rows_array<3>({g.in_calibrator}, true); }),
+          "xyz_mm", of_place([](const PointInFrames& g) -> py::object {
+            return rows_array<3>({g.in_calibrator}, true);
+          }),
           "(3,) calibrator frame at the first view's moment, mm; None where it was not located.")
-      .def_property_readonly("covariance_mm2", of_place([](const GuidedPoint& g) -> py::object {
+      .def_property_readonly("covariance_mm2", of_place([](const PointInFrames& g) -> py::object {
                                return matrix_array(g.covariance_in_calibrator);
                              }),
                              "(3, 3) mm^2, or None.")
-      .def_property_readonly("error_95_mm", of_place([](const GuidedPoint& g) -> py::object {
+      .def_property_readonly("error_95_mm", of_place([](const PointInFrames& g) -> py::object {
                                return py::float_(length_at_95(g.covariance_in_calibrator));
                              }),
                              "95 % of the errors with this covariance are no longer, mm; or None.")
       .def_property_readonly("in_femur_mm",
-                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_femur); }),
+                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_femur); }),
                              "(3,) or None.")
       .def_property_readonly("in_tibia_mm",
-                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_tibia); }),
+                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_tibia); }),
                              "(3,) or None.")
       .def_property_readonly("in_tool_mm",
-                             of_place([](const GuidedPoint& g) { return vector_array<3>(g.in_tool); }),
+                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_tool); }),
                              "(3,) or None.")
       .def_readonly("ray_gap_mm", &Point::ray_gap_mm)
       .def_property_readonly(
@@ -181,15 +182,15 @@ void add_cases(py::module_& module) {
       .def(
           "image",
           [](const Result& r, const ViewKey& key) {
-            return std::const_pointer_cast<Exposure>(r.views[index_of(r, key)].exposure);
+            return std::const_pointer_cast<XrayImage>(r.views[index_of(r, key)].xray_image);
           },
           py::arg("view"), "The view's XrayImage, not copied; None where it was not read.")
       .def(
           "rectified_image",
           [](const Result& r, const ViewKey& key) {
             const ViewResult& view = r.views[index_of(r, key)];
-            if (!view.exposure) raise({Reason::missing_file, "the image was not read", view.name, {}});
-            return moved_to_array(without_gil([&] { return rectified_picture(view); }));
+            if (!view.xray_image) raise({Reason::missing_file, "the image was not read", view.name, {}});
+            return moved_to_array(without_gil([&] { return rectified_image(view); }));
           },
           py::arg("view"), "(height, width) uint8: rectified and windowed for the eye.")
       .def(

@@ -4,8 +4,8 @@
 
 #include "arrays.h"
 #include "helicarm/detection/find_marks.h"
-#include "helicarm/image/grey_picture.h"
-#include "helicarm/xray/read_exposure.h"
+#include "helicarm/image/grey_image.h"
+#include "helicarm/xray/read_xray_image.h"
 #include "module.h"
 
 namespace helicarm::python {
@@ -41,17 +41,17 @@ std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
   return spacing;
 }
 
-Exposure image_from(const py::array& pixels, const py::object& pixel_mm,
-                    std::optional<double> source_detector_mm,
-                    const std::optional<std::pair<float, float>>& range, const std::string& name) {
-  if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > max_picture_side ||
-      pixels.shape(1) > max_picture_side)
+XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
+                     std::optional<double> source_detector_mm,
+                     const std::optional<std::pair<float, float>>& range, const std::string& name) {
+  if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > max_image_side ||
+      pixels.shape(1) > max_image_side)
     raise({Reason::bad_size,
            fmt::format("pixels: shape {} is not (height, width) with sides from 1 to {}", shape_of(pixels),
-                       max_picture_side),
+                       max_image_side),
            {},
            {}});
-  Exposure image;
+  XrayImage image;
   std::tie(image.lowest, image.highest) = range_of(pixels, range);
   const Floats values = Floats::ensure(pixels);
   if (!values) raise({Reason::bad_value, "pixels: are not numbers", {}, {}});
@@ -66,7 +66,7 @@ Exposure image_from(const py::array& pixels, const py::object& pixel_mm,
   return image;
 }
 
-py::dict marks(const Exposure& image, const std::string& kind) {
+py::dict marks(const XrayImage& image, const std::string& kind) {
   const MarkKind which = value_or_raise(mark_kind(kind));
   const std::vector<Dot> dots = without_gil([&] { return find_marks(image, which); });
   std::vector<Eigen::Vector2d> uv;
@@ -83,16 +83,16 @@ py::dict marks(const Exposure& image, const std::string& kind) {
   return found;
 }
 
-std::shared_ptr<Exposure> image_at(const std::filesystem::path& path, std::optional<int> frame,
-                                   const std::optional<std::string>& name) {
-  auto image = without_gil([&] { return read_exposure(path, name.value_or(path.stem().string()), frame); });
-  return std::make_shared<Exposure>(value_or_raise(std::move(image)));
+std::shared_ptr<XrayImage> image_at(const std::filesystem::path& path, std::optional<int> frame,
+                                    const std::optional<std::string>& name) {
+  auto image = without_gil([&] { return read_xray_image(path, name.value_or(path.stem().string()), frame); });
+  return std::make_shared<XrayImage>(value_or_raise(std::move(image)));
 }
 
 }  // namespace
 
 void add_images(py::module_& module) {
-  py::class_<Exposure, std::shared_ptr<Exposure>>(module, "XrayImage", R"(An X-ray image as stored.
+  py::class_<XrayImage, std::shared_ptr<XrayImage>>(module, "XrayImage", R"(An X-ray image as stored.
 
 Pixels are neither flipped nor turned. Pixel (0, 0) is the centre of the top-left pixel; u (column) runs right,
 v (row) down. Points are always (u, v); arrays are indexed [v, u].
@@ -106,23 +106,24 @@ Raises InputError: bad_size, bad_value, not_finite.)")
       .def(py::init(&image_from), py::arg("pixels"), py::kw_only(), py::arg("pixel_mm"),
            py::arg("source_detector_mm"), py::arg("range") = py::none(), py::arg("name") = "")
       .def_property_readonly(
-          "pixels", [](const py::object& self) { return view_of(self.cast<const Exposure&>().pixels, self); },
+          "pixels",
+          [](const py::object& self) { return view_of(self.cast<const XrayImage&>().pixels, self); },
           "(height, width) float32, read only, not copied: it shares the image's memory.")
-      .def_readonly("name", &Exposure::name)
+      .def_readonly("name", &XrayImage::name)
       .def_property_readonly(
-          "shape", [](const Exposure& i) { return std::pair(i.pixels.height(), i.pixels.width()); },
+          "shape", [](const XrayImage& i) { return std::pair(i.pixels.height(), i.pixels.width()); },
           "(height, width)")
       .def_property_readonly(
-          "range", [](const Exposure& i) { return std::pair(i.lowest, i.highest); },
+          "range", [](const XrayImage& i) { return std::pair(i.lowest, i.highest); },
           "Least and greatest grey value that the file could have stored.")
       .def_property_readonly(
-          "pixel_mm", [](const Exposure& i) { return vector_array<2>(i.acquisition.pixel_mm); },
+          "pixel_mm", [](const XrayImage& i) { return vector_array<2>(i.acquisition.pixel_mm); },
           "(column, row) spacing on the detector, mm; None where the file does not say.")
       .def_property_readonly(
-          "source_detector_mm", [](const Exposure& i) { return i.acquisition.source_detector_mm; },
+          "source_detector_mm", [](const XrayImage& i) { return i.acquisition.source_detector_mm; },
           "mm, or None.")
-      .def_property_readonly("warnings", [](const Exposure& i) { return warning_list(i.warnings); })
-      .def("__repr__", [](const Exposure& i) {
+      .def_property_readonly("warnings", [](const XrayImage& i) { return warning_list(i.warnings); })
+      .def("__repr__", [](const XrayImage& i) {
         return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
       });
   module.def("read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),

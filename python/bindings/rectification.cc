@@ -31,7 +31,7 @@ py::array sigmas(const DistortionMap& map, const Doubles& points) {
   return sigma;
 }
 
-py::array rectified_pixels(const DistortionMap& map, const Exposure& image) {
+py::array rectified_pixels(const DistortionMap& map, const XrayImage& image) {
   if (image.pixels.width() != map.width || image.pixels.height() != map.height)
     raise({Reason::bad_size,
            fmt::format("the image has {} x {} pixels, the map is for {} x {}", image.pixels.width(),
@@ -45,7 +45,7 @@ DistortionMap loaded(const std::filesystem::path& path) {
   return value_or_raise(distortion_map_from_json(value_or_raise(read_json(path)), path.filename().string()));
 }
 
-Rectification rectified(const Exposure& image, const std::variant<Plate, std::string>& plate,
+Rectification rectified(const XrayImage& image, const std::variant<Plate, std::string>& plate,
                         const std::string& method) {
   const RectificationOptions options{method_of(method), {}};
   const Plate given = std::holds_alternative<Plate>(plate)
@@ -104,14 +104,14 @@ the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-l
           "The content of map.json.")
       .def(
           "rectified_from_raw",
-          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, rectified_in_picture); },
+          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, rectified_in_image); },
           py::arg("uv"), R"((N, 2) or (2,) raw pixels to rectified ones, same shape.
 
 NaN for points off the image and where the map folds: it is not extrapolated. Releases the GIL.
 Raises InputError: bad_value for another shape, not_finite.)")
       .def(
           "raw_from_rectified",
-          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, raw_in_picture); },
+          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, raw_in_image); },
           py::arg("uv"), "The inverse: (N, 2) or (2,) rectified pixels to raw ones. As rectified_from_raw.")
       .def("rectify_image", &rectified_pixels, py::arg("image"),
            R"(An XrayImage resampled to rectified pixels (Eq. 3): (height, width) float32, same size.
