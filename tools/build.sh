@@ -14,4 +14,6 @@ if grep -qw avx2 /proc/cpuinfo && grep -qw fma /proc/cpuinfo; then preset=releas
 echo "Building ($preset) ..." >&2
 cmake --preset "$preset" "${options[@]}" >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
 mv build-configure.log build/configure.log
+# Share done, steps done of all.
+export NINJA_STATUS=${NINJA_STATUS:-"[%p %f/%t] "}
 cmake --build build --target "${targets[@]:-all}" >&2

@@ -12,12 +12,12 @@ case "${1:-}" in
   *) files=("$@") ;;
 esac
 # Compiled in other builds only, or as the body of a precompiled header.
-skipped='^(benchmarks/|src/helicarm/study/small_studies.cc|cmake/precompiled.cc|fuzz/)'
+skipped='^(benchmarks/|examples/|src/helicarm/study/small_studies.cc|cmake/precompiled.cc|fuzz/)'
 mapfile -t files < <(printf '%s\n' "${files[@]}" | grep '\.cc$' | grep -Ev "$skipped" || true)
 [ ${#files[@]} -eq 0 ] && exit 0
 
 # A build without GCC's precompiled headers, which clang cannot read. It is configured, never built.
-cmake --preset release -B build/tidy -DHELICARM_UNITY=OFF -DHELICARM_GUI=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
+cmake --preset release -B build/tidy -DHELICARM_UNITY=OFF -DHELICARM_GUI=ON -DHELICARM_PYTHON=ON -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
   >build-tidy.log 2>&1 || { cat build-tidy.log >&2; exit 1; }
 mv build-tidy.log build/tidy/configure.log
 

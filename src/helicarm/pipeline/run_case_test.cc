@@ -107,6 +107,18 @@ TEST_F(SimulatedNavigation, BallOffItsPlaceIsNamed) {
   EXPECT_NEAR(warning->figures.at("z_mm"), seen.z(), 0.2);
 }
 
+TEST_F(SimulatedNavigation, StagesAreAnnouncedInOrderAndMayBeStopped) {
+  std::vector<std::string> stages;
+  RunOptions options;
+  options.on_stage = [&](std::string_view stage) { stages.emplace_back(stage); };
+  ASSERT_TRUE(run_case(given_, options).has_value());
+  EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify", "detect", "label", "calibrate", "locate"}));
+  options.on_stage = [&](std::string_view stage) {
+    if (stage == "rectify") throw std::runtime_error("stopped");
+  };
+  EXPECT_THROW((void)run_case(given_, options), std::runtime_error);
+}
+
 TEST_F(SimulatedNavigation, HeldCalibrationGivesWhatTheWholeRunGives) {
   CalibrationCache cache;
   Case picked_later = given_;
