@@ -24,7 +24,7 @@ def main():
                "tre": helicarm.figures.tre_map(result.calibration, centre, half_mm=60, step_mm=5, sigma_px=0.5)}
     for name, ax in figures.items():
         ax.figure.tight_layout()
-        ax.figure.savefig(out / f"python-{name}.png", dpi=80, metadata={"Software": None})
+        ax.figure.savefig(out / f"python-{name}.png", dpi=100, metadata={"Software": None})
         plt.close(ax.figure)
 
 

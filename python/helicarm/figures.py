@@ -24,12 +24,12 @@ def overlay(result, view=0, ax=None):
         used = fiducial["status"] == "used"
         ax.plot(*fiducial["uv"], "+" if used else "x", color="lime" if used else "red", markersize=9)
         ax.annotate(fiducial["label"], fiducial["uv"], xytext=(5, -5), textcoords="offset points", color="lime",
-                    fontsize=7)
+                    fontsize=9)
     for point in result.points:
         if point.xyz_mm is not None:
             uv = calibration.project(point.xyz_mm, view)
             ax.plot(*uv, "o", mfc="none", color="orange")
-            ax.annotate(point.name, uv, xytext=(5, 5), textcoords="offset points", color="orange", fontsize=8)
+            ax.annotate(point.name, uv, xytext=(5, 5), textcoords="offset points", color="orange", fontsize=10)
     ax.set(xlabel="u (px)", ylabel="v (px)", title=result.names[view] if isinstance(view, int) else view)
     return ax
 
@@ -53,7 +53,7 @@ def residuals(calibration, view=0, ax=None, scale=None):
               color="tab:red", width=0.004)
     ax.plot(uv[:, 0], uv[:, 1], "k.")
     for fiducial in used:
-        ax.annotate(fiducial["label"], fiducial["uv"], xytext=(4, 4), textcoords="offset points", fontsize=7)
+        ax.annotate(fiducial["label"], fiducial["uv"], xytext=(4, 4), textcoords="offset points", fontsize=9)
     rms = np.sqrt(np.mean(np.sum(off ** 2, axis=1)))
     ax.set(xlabel="u (px)", ylabel="v (px)", title=f"residuals {rms:.3f} px rms, arrows x {scale:.0f}", aspect="equal")
     ax.invert_yaxis()
