@@ -35,6 +35,7 @@ endforeach()
 string(JOIN " " helicarm_libraries ${libraries})
 list(TRANSFORM helicarm_abi PREPEND -D OUTPUT_VARIABLE definitions)
 string(JOIN " " helicarm_definitions ${definitions} -DASIO_STANDALONE)
+file(RELATIVE_PATH helicarm_prefix_from_pc /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/helicarm.pc.in ${PROJECT_BINARY_DIR}/helicarm.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/helicarm.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 

@@ -18,7 +18,7 @@ if grep -rlF -e "$PWD" "$folder/usr" --include='*.cmake' --include='*.pc' --incl
   exit 1
 fi
 pc=$(dirname "$(find "$folder/usr" -name helicarm.pc)")
-flags=$(PKG_CONFIG_PATH=$pc pkg-config --define-variable=prefix="$folder/usr" --cflags --libs --static helicarm)
+flags=$(PKG_CONFIG_PATH=$pc pkg-config --cflags --libs --static helicarm)
 # shellcheck disable=SC2086
 g++ examples/cpp/locate_point.cc -o "$folder/by_pkg_config" $flags
 "$folder/by_pkg_config" >/dev/null
