@@ -17,7 +17,7 @@ cp /etc/resolv.conf "$root/etc/resolv.conf"
 cp -r examples/cpp "$root/example"
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 HOME=/root DEBIAN_FRONTEND=noninteractive "$@"; }
 
-inside sh -c 'apt-get update -qq && apt-get install -y -qq --no-install-recommends /debs/*.deb >/dev/null'
+inside sh -c 'apt-get update -qq && apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends /debs/*.deb >/dev/null'
 inside helicarm --version
 inside sh -c 'cd /tmp && helicarm demo --quiet && test -s helicarm-demo/result/report.html && echo "demo: report written"'
 inside sh -c 'gzip -cd /usr/share/man/man1/helicarm.1.gz 2>/dev/null || cat /usr/share/man/man1/helicarm.1' | grep -q 'SH COMMANDS'
@@ -29,6 +29,6 @@ if [ -e "$root/usr/bin/helicarm-gui" ]; then
   [ "$code" = 124 ] || { echo "helicarm-gui ended by itself with $code" >&2; exit 1; }
   echo "helicarm-gui: runs"
 fi
-inside apt-get install -y -qq --no-install-recommends cmake g++ make >/dev/null
+inside apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends cmake g++ make >/dev/null
 inside sh -c 'cmake -S /example -B /tmp/example >/dev/null && cmake --build /tmp/example >/dev/null && /tmp/example/locate_point'
 echo "Packages work in a bare system." >&2
