@@ -127,9 +127,10 @@ Raises InputError: bad_size, bad_value, not_finite.)")
         return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
       });
   module.def("read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),
-             py::arg("name") = py::none(), R"(Reads a DICOM, PNG or TIFF X-ray image, told apart by content.
+             py::arg("name") = py::none(),
+             R"(Reads a DICOM, PNG or TIFF X-ray image; the content decides which.
 
-PNG and TIFF need a sidecar NAME.json with pixel_mm and source_detector_mm. frame: 1-based, needed only where the
+PNG and TIFF take pixel_mm and source_detector_mm from a sidecar NAME.json. frame: 1-based, needed only where the
 file holds several. name: of the view; the file's stem where not given. Releases the GIL.
 Raises InputError: missing_file, not_an_image, truncated, bad_size, bad_value, unsupported, bad_json.)");
   module.def("detect", &marks, py::arg("image"), py::kw_only(), py::arg("kind"),
