@@ -25,7 +25,7 @@ constexpr double least_angle_deg = 15;
 constexpr double least_move_mm = 0.4;
 constexpr double contradiction = 3;  // standard deviations of chi2 beyond which the sigmas are enlarged
 
-double median(std::vector<double> values) {
+double median_of(std::vector<double> values) {
   std::ranges::nth_element(values, values.begin() + std::ptrdiff_t(values.size() / 2));
   return values[values.size() / 2];
 }
@@ -88,7 +88,7 @@ double factor_of_diameters(const AdjustedViews& found) {
   for (const auto& view : found.observed)
     for (std::size_t i = 0; i < view.size(); ++i)
       if (view[i]) factors.push_back(found.diameters_mm[i] / view[i]->diameter_mm);
-  return median(std::move(factors));
+  return median_of(std::move(factors));
 }
 
 Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedViews& found) {

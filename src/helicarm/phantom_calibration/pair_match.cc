@@ -15,9 +15,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double degree = std::numbers::pi / 180;
-constexpr double angle_step = 1.5 * degree;
-constexpr double largest_roll = 39 * degree;
+constexpr double one_degree = std::numbers::pi / 180;
+constexpr double angle_step = 1.5 * one_degree;
+constexpr double largest_roll = 39 * one_degree;
 constexpr double scale_step = 0.015;
 constexpr double largest_log_scale = 0.15;
 constexpr double bin_px = 5;
