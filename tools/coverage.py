@@ -107,7 +107,7 @@ def main():
     print(*lines, sep="\n")
     print(f"\n{len(refused)} refused", *refused, sep="\n", file=sys.stderr)
     if options.doc:
-        text, begin, end = options.doc.read_text(), "<!-- coverage -->", "<!-- /coverage -->"
+        text, begin, end = options.doc.read_text(), "<!-- coverage-by-point -->", "<!-- /coverage-by-point -->"
         options.doc.write_text(text.split(begin)[0] + begin + "\n" + "\n".join(lines) + "\n" + end + text.split(end)[1])
 
 

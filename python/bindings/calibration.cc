@@ -9,9 +9,9 @@
 #include "helicarm/calibration/saved_calibration.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/localization/error_bound.h"
 #include "helicarm/localization/locate.h"
 #include "helicarm/localization/tre_volume.h"
-#include "helicarm/pipeline/accuracy.h"
 #include "module.h"
 
 namespace helicarm::python {
@@ -245,7 +245,7 @@ void add_points(py::module_& module) {
       .def_property_readonly(
           "warning",
           [](const LocatedPoint& p) {
-            return p.doubt ? py::object(warning_dict(*p.doubt)) : py::object(py::none());
+            return p.missing_rays ? py::object(warning_dict(*p.missing_rays)) : py::object(py::none());
           },
           "residual_too_large where the rays miss each other and the covariance was enlarged; else None.")
       .def("__repr__", [](const LocatedPoint& p) {

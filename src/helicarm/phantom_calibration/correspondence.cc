@@ -24,7 +24,7 @@ constexpr double candidate_sigma_px = 0.3;  // of a blob's middle as the image o
 constexpr double largest_radius_error = 0.15;
 constexpr double gates_px[] = {12, 6, 4, 3};
 constexpr double largest_shift_mm = 12;  // of a fiducial from its nominal place
-constexpr std::size_t least_views = 3;
+constexpr std::size_t least_track_views = 3;
 
 Calibrator calibrator_of(const Reconstruction& r) {
   Calibrator calibrator;
@@ -114,7 +114,7 @@ std::optional<Support> best_support(const Reconstruction& r, const std::vector<P
           if (!place || place->chi2 > 16) continue;
           if (about && (place->point - *about).norm() > reach_mm) continue;
           Support support = support_of(r, views, taken, place->point, diameter_mm);
-          if (support.views < int(least_views)) continue;
+          if (support.views < int(least_track_views)) continue;
           if (!best ||
               std::tuple(-support.views, support.error_px) < std::tuple(-best->views, best->error_px))
             best = std::move(support);
@@ -270,7 +270,7 @@ void add_fiducials(Reconstruction& r, const std::vector<PhantomView>& views,
       diameter = d;
     }
     // A chance meeting of rays in three views of many is none.
-    if (!best || best->views < std::max(int(least_views), int(labelled_views(r) + 1) / 2)) return;
+    if (!best || best->views < std::max(int(least_track_views), int(labelled_views(r) + 1) / 2)) return;
     r.centres.push_back(best->centre);
     r.diameters_mm.push_back(diameter);
     for (std::size_t v = 0; v < views.size(); ++v) r.candidate_of[v].push_back(best->candidate_of[v]);

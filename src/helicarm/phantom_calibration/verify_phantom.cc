@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"
-#include "helicarm/pipeline/accuracy.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm {
