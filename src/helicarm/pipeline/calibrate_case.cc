@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "helicarm/pipeline/causes.h"
 #include "helicarm/pipeline/calibrator_checks.h"
+#include "helicarm/pipeline/causes.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/residuals.h"
 #include "helicarm/pipeline/stopwatch.h"
@@ -87,20 +87,33 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
       });
 }
 
+/// With the changes of the images that explain the residuals as warnings. Refuses where one magnification
+/// fits all fiducials, without it only displacements of each: the wrong tag is the simpler cause.
+Expected<CaseCalibration> explained(CaseCalibration calibration, const LabelledViews& views,
+                                    const Case& given, const RunOptions& options) {
+  if (options.method == Method::paper) return calibration;
+  for (Warning& warning : explain_residuals(views, calibration, common_prior(given.calibrator))) {
+    if (warning.reason == Reason::intrinsics_inconsistent && calibration.found_tolerance_mm > 0) {
+      warning.reason = Reason::calibrator_mismatch;
+      return tl::unexpected<Failure>(std::move(warning));
+    }
+    calibration.warnings.push_back(std::move(warning));
+  }
+  return calibration;
+}
+
 /// 2.2, Eq. 4-7: all views together, or each alone by the published recipe.
 OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
                                            const RunOptions& options) {
-  auto calibration = calibrated(views, given, options).and_then([&](CaseCalibration done) {
-    return check_calibrator(std::move(done), views, given);
-  });
+  auto calibration =
+      calibrated(views, given, options)
+          .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, given); })
+          .and_then([&](CaseCalibration done) { return explained(std::move(done), views, given, options); });
   if (!calibration) {
     Refusal refusal{calibration.error(), {}};
     for (const LabelledView& view : views) refusal.views.push_back(reported(view));
     return tl::unexpected(std::move(refusal));
   }
-  if (options.method == Method::best)
-    for (Warning& warning : explain_residuals(views, *calibration, common_prior(given.calibrator)))
-      calibration->warnings.push_back(std::move(warning));
   calibration->images = std::move(views);
   if (options.history) calibration->entries = new_entries(*calibration, common_prior(given.calibrator));
   return *std::move(calibration);

@@ -180,14 +180,14 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given) {
   if (auto doubt = doubt_of_labels(calibration, images)) return tl::unexpected<Failure>(*std::move(doubt));
   if (auto doubt = doubt_of_hand(images, given)) return tl::unexpected<Failure>(*std::move(doubt));
-  const bool assumed = std::ranges::any_of(
+  const auto assumed = std::ranges::find_if(
       images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });
-  if (assumed && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
-    return fail(
-        Reason::calibrator_mismatch,
-        "the balls lie near the calibrator's places but not at them, and not by the same amount in all "
-        "views",
-        {{"variance_scale", calibration.variance_scale}});
+  if (assumed != images.end() && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
+    return tl::unexpected<Failure>({Reason::calibrator_mismatch,
+                                    "the fiducials are displaced from the calibrator's coordinates, and not "
+                                    "by the same amount in all views",
+                                    assumed->name,
+                                    {{"variance_scale", calibration.variance_scale}}});
   const ScaleEvidence scale = scale_evidence(calibration, images, given.calibrator);
   const double sigma = std::hypot(scale.sigma, given.calibrator.scale_sigma);
   if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
