@@ -34,7 +34,8 @@ MODULES = {
                   " verification volume simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification volume simulation pipeline",
-    "phantom_calibration": "core geometry image phantom xray detection rectification fiducials calibration pipeline report",
+    "phantom_calibration": "core geometry image phantom xray detection rectification fiducials calibration localization"
+                           " pipeline report",
     "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
                  " verification devices session pipeline report",
     "rehearsal": "core geometry image phantom xray volume simulation devices virtual_devices session pipeline operation"
