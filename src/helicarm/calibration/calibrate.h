@@ -27,7 +27,7 @@ struct ViewFiducials {
 
 struct CalibrationOptions {
   CommonPrior common = {};
-  double rejection_probability = 1e-4;  ///< of losing a good ball, 0 to 0.1; 0: every ball is believed
+  double rejection_probability = 1e-4;  ///< of losing a good ball, 0 to 0.1; 0: none is rejected
   double largest_rms_px = 5;            ///< beyond it (and 3 sigma) labels or calibrator must be wrong
 };
 
@@ -35,13 +35,13 @@ struct CalibrationResult : Calibration {
   std::vector<std::vector<Fiducial>> fiducials;  ///< per view, with residuals; false balls marked `rejected`
   double chi2 = 0;
   int dof = 0;
-  double variance_scale = 1;  ///< by which the covariance was enlarged as chi2 belies the balls' sigmas
+  double variance_scale = 1;  ///< inflation of the covariance where chi2 contradicts the fiducials' sigmas
   /// Per axis, of the balls' places, where the residuals ask for more than the calibrator's file states.
   double found_tolerance_mm = 0;
   double strain_sigma = 0;  ///< relative, of the calibrator's strain that the views show least; 0: not known
   double ball_rms_mm = 0;   ///< of the balls' estimated distances from the file; 0: they are taken as exact
-  std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (belied sigmas), calibrator_strained,
-                                  ///< calibrator_deviates
+  std::vector<Warning> warnings;  ///< few_fiducials, residual_too_large (inconsistent sigmas),
+                                  ///< calibrator_strained, calibrator_deviates
   std::vector<Warning> notes;     ///< calibrator_deviates, within the stated tolerance
 };
 
@@ -54,7 +54,7 @@ struct CalibrationResult : Calibration {
 Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
                                       const CalibrationOptions& options);
 
-/// The published recipe: Eq. 7 for each view alone, all balls believed. No covariance; dof = 2n - 11.
+/// The published recipe: Eq. 7 for each view alone, no fiducial rejected. No covariance; dof = 2n - 11.
 Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& views,
                                             const CalibrationOptions& options);
 

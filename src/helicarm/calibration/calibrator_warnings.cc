@@ -38,13 +38,13 @@ void tell_offsets(CalibrationResult& result, const CleanFit& clean) {
   result.ball_rms_mm = rms_offset_mm(clean.problems, clean.fit);
   constexpr double least_worth_telling_mm = 0.02;
   if (result.ball_rms_mm < least_worth_telling_mm) return;
-  Warning told{Reason::calibrator_deviates,
-               fmt::format("the balls are {:.2g} mm rms from the calibrator's file: measure the phantom",
-                           result.ball_rms_mm),
-               {},
-               {{"rms_mm", result.ball_rms_mm}}};
-  if (result.found_tolerance_mm > 0) told.figures["tolerance_found_mm"] = result.found_tolerance_mm;
-  (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(told));
+  Warning deviation{Reason::calibrator_deviates,
+                    fmt::format("the balls are {:.2g} mm rms from the calibrator's file: measure the phantom",
+                                result.ball_rms_mm),
+                    {},
+                    {{"rms_mm", result.ball_rms_mm}}};
+  if (result.found_tolerance_mm > 0) deviation.figures["tolerance_found_mm"] = result.found_tolerance_mm;
+  (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(deviation));
 }
 
 }  // namespace helicarm

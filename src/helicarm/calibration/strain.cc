@@ -10,7 +10,7 @@
 namespace helicarm {
 namespace {
 
-constexpr double prior_sigma = 0.05;  // no calibrator is believed to be stretched by more
+constexpr double prior_sigma = 0.05;  // of the strain of a manufactured calibrator
 
 /// Orthonormal symmetric matrices without trace.
 std::array<Eigen::Matrix3d, 5> strain_modes() {

@@ -24,7 +24,7 @@ bool looks_mirrored_unasked(const LabelledView& image, const CaseView& view) {
   return image.fiducials.mirrored && !view.mirrored && !image.xray_image->acquisition.flip_hint;
 }
 
-std::optional<Failure> doubt_of_hand(const std::vector<LabelledView>& images, const Case& given) {
+std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
   for (std::size_t i = 0; i < images.size(); ++i)
     if (!looks_mirrored_unasked(images[i], given.views[i])) return std::nullopt;
   return Failure{
@@ -52,8 +52,8 @@ int false_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
 
 /// Labels that leave a third of the balls in the field without an image, though as many candidates of their
 /// size are left over among the others, explain the image too badly.
-std::optional<Failure> doubt_of_labels(const CaseCalibration& calibration,
-                                       const std::vector<LabelledView>& images) {
+std::optional<Failure> check_labels(const CaseCalibration& calibration,
+                                    const std::vector<LabelledView>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     const auto count = [&](FiducialStatus status) {
       return int(std::ranges::count(calibration.fiducials[i], status, &Fiducial::status));
@@ -178,8 +178,8 @@ ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::ve
 
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given) {
-  if (auto doubt = doubt_of_labels(calibration, images)) return tl::unexpected<Failure>(*std::move(doubt));
-  if (auto doubt = doubt_of_hand(images, given)) return tl::unexpected<Failure>(*std::move(doubt));
+  if (auto refused = check_labels(calibration, images)) return tl::unexpected<Failure>(*std::move(refused));
+  if (auto refused = check_handedness(images, given)) return tl::unexpected<Failure>(*std::move(refused));
   const auto assumed = std::ranges::find_if(
       images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });
   if (assumed != images.end() && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
@@ -191,15 +191,16 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
   const ScaleEvidence scale = scale_evidence(calibration, images, given.calibrator);
   const double sigma = std::hypot(scale.sigma, given.calibrator.scale_sigma);
   if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
-    Failure told{
+    Failure disagreement{
         Reason::scale_disagrees,
         fmt::format("the balls' diameters as seen imply that the calibrator is {:.1f} % {} than in its file "
                     "(+-{:.1f} %): check coordinates, diameters and pixel size",
                     100 * std::abs(scale.excess), scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
         {},
         {{"file_over_true", 1 + scale.excess}, {"sigma", sigma}}};
-    if (std::abs(scale.excess) > refuse_sigmas * sigma) return tl::unexpected<Failure>(std::move(told));
-    calibration.warnings.push_back(std::move(told));
+    if (std::abs(scale.excess) > refuse_sigmas * sigma)
+      return tl::unexpected<Failure>(std::move(disagreement));
+    calibration.warnings.push_back(std::move(disagreement));
   }
   for (Warning& warning : warn_of_displaced(calibration, images, given.calibrator))
     calibration.warnings.push_back(std::move(warning));
