@@ -41,7 +41,7 @@ Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
   if (raw && map && !map->shows(uv))
     throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the image of {} x {} pixels",
                                                   where, uv.x(), uv.y(), map->width, map->height));
-  return (raw && map ? see_click(*map, uv, given_sigma)
+  return (raw && map ? point_of_click(*map, uv, given_sigma)
                      : ImagePoint{uv, uv, given_sigma.value_or(click_sigma_px)})
       .map([&](const ImagePoint& seen) {
         return PointObservation{view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};

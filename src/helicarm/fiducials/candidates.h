@@ -13,7 +13,7 @@ struct Candidates {
   std::vector<Dot> dots;  ///< raw pixels, with their standard deviations and radii
 };
 
-/// Stage 2 (2.1): what the rectification found on its way is not searched for again.
+/// Stage 2 (2.1). Uses the dots that the rectification has found already.
 Candidates detect_candidates(const XrayImage& xray_image, const Rectification& rectification);
 
 }  // namespace helicarm

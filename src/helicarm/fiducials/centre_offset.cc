@@ -14,7 +14,7 @@ Vector2d blob_offset(const DistortionMap& map, const View& view, const Vector2d&
   const double push = 0.8 * radius_mm * radius_mm / (depth_mm * depth_mm - radius_mm * radius_mm);
   const Vector2d perspective = map.jacobian(centre) * (push * (centre - principal));
   if (map.is_identity()) return perspective;
-  // Mean of a smooth function over a disc: its Laplacian times R^2 / 8.
+  // The mean of a smooth function over a disc exceeds its central value by its Laplacian times R^2 / 8.
   const double radius_px = std::abs(view.intrinsics.fy) * radius_mm / depth_mm;
   const Vector2d here = map.raw_from_rectified(centre);
   Vector2d around = Vector2d::Zero();

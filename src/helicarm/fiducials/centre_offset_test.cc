@@ -15,8 +15,7 @@ using Eigen::Vector3d;
 
 View straight_view() { return {{1500, 1500, 250, 240}, {Eigen::Matrix3d::Identity(), {0, 0, 0}}}; }
 
-/// Centroid of a ball's shadow in raw pixels, less the image of its centre: every fine pixel's own ray is
-/// traced.
+/// Centroid of a ball's image less the image of its centre, raw px, by tracing one ray per subpixel.
 Vector2d traced_offset(const DistortionMap& map, const View& view, const Vector3d& centre, double diameter) {
   const Vector2d image = map.raw_from_rectified(view.project(centre));
   const Eigen::Matrix3d inverse = view.intrinsics.matrix().inverse();
@@ -36,7 +35,7 @@ Vector2d traced_offset(const DistortionMap& map, const View& view, const Vector3
   return sum / mass;
 }
 
-/// 13 px at the edge of an image of 1024, as intensifiers have it, on half the size.
+/// Pincushion distortion of an image intensifier: 6.5 px at the edge of a 512 px image.
 DistortionMap pincushion() {
   DistortionMap map = identity_map(512, 512, {});
   map.order = 3;
@@ -48,11 +47,11 @@ DistortionMap pincushion() {
   return map;
 }
 
-TEST(BlobOffset, NoneOnTheCentralRay) {
+TEST(BlobOffset, IsZeroOnTheCentralRay) {
   EXPECT_LT(blob_offset(identity_map(512, 512, {}), straight_view(), {250, 240}, 640, 4).norm(), 1e-12);
 }
 
-TEST(BlobOffset, PerspectivePushEqualsTheTracedCentroid) {
+TEST(BlobOffset, PerspectiveOffsetEqualsTheTracedCentroid) {
   const DistortionMap map = identity_map(512, 512, {});
   for (const double diameter : {4.0, 30.0}) {
     const Vector3d centre(90, -70, 600);
@@ -62,13 +61,13 @@ TEST(BlobOffset, PerspectivePushEqualsTheTracedCentroid) {
   }
 }
 
-TEST(BlobOffset, PushPointsAwayFromThePrincipalPoint) {
+TEST(BlobOffset, PointsAwayFromThePrincipalPoint) {
   const Vector2d offset = blob_offset(identity_map(512, 512, {}), straight_view(), {400, 240}, 640, 20);
   EXPECT_GT(offset.x(), 0);
   EXPECT_EQ(offset.y(), 0);
 }
 
-TEST(BlobOffset, BentBlobIsWithinAFiftiethOfAPixelOfTheTracedCentroid) {
+TEST(BlobOffset, WithDistortionIsWithinAFiftiethOfAPixelOfTheTracedCentroid) {
   for (const Vector3d& centre : {Vector3d(70, 60, 640), Vector3d(-80, 10, 640), Vector3d(5, -8, 640)}) {
     const Vector2d traced = traced_offset(pincushion(), straight_view(), centre, 4);
     const Vector2d offset =

@@ -10,8 +10,8 @@ namespace helicarm {
 
 enum class FiducialStatus { used, occluded, outside, rejected, not_found };
 
-/// One ball of the calibrator in one view. The pixels are those of the image of the ball's centre and are
-/// meaningful only when it is `used` or `rejected`.
+/// One fiducial in one view. Pixels refer to the image of its centre and are valid if it is `used` or
+/// `rejected`.
 struct Fiducial {
   std::string label;
   Eigen::Vector3d centre_in_calibrator;  ///< mm
@@ -20,7 +20,7 @@ struct Fiducial {
   Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< rectified
   double sigma_px = 0;                           ///< per axis, rectified
   double residual_px = 0;                        ///< distance to the calibrated view's projection
-  double radius_px = 0;                          ///< as seen, rectified
+  double radius_px = 0;                          ///< measured, rectified
 };
 
 }  // namespace helicarm

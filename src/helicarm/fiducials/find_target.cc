@@ -24,15 +24,15 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double max_shift_px = 8;
-constexpr double sigma_floor_px = 0.06;  // what a drawn solid on a smooth background does not know of
+constexpr double sigma_floor_px = 0.06;  // model error of a template on a smooth background
 
-/// A cubic background, contrast, shift.
+/// Parameters: cubic background, contrast, shift.
 constexpr int n_background = 10;
 constexpr int n_parameters = n_background + 3;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
-/// raw -> rectified by a biquadratic through 3 x 3 exact points: the map is smooth and a patch is small.
+/// raw -> rectified in a small patch: biquadratic interpolation of 3 x 3 exact points.
 class LocalInverse {
  public:
   static std::optional<LocalInverse> make(const DistortionMap& map, const Vector2d& raw, double half) {
@@ -71,13 +71,13 @@ struct Fit {
   double misfit = 0;
 };
 
-/// The pixels about a target as columns.
+/// The pixels around a target, one column each.
 struct Patch {
   std::vector<Vector2d> offsets;  ///< rectified, from the predicted image of the target's point
   std::vector<float> grey;        ///< over `scale`
   std::vector<float> weights;
-  std::vector<int> cells;  ///< place in the patch's grid of raw pixels
-  PixelRows rows;          ///< the model's derivatives, and below them the residuals
+  std::vector<int> cells;  ///< index in the patch's grid of raw pixels
+  PixelRows rows;          ///< the model's derivatives, then the residuals
   double scale;
   double window;
   int side;
@@ -92,7 +92,7 @@ struct Sums {
 };
 
 /// Derivatives and residuals at the given parameters.
-void evaluate(Patch& patch, const SolidTemplate& shade, const Vector& p) {
+void evaluate(Patch& patch, const SolidTemplate& absorbed, const Vector& p) {
   const Vector2d shift = p.tail<2>();
   const auto contrast = static_cast<float>(p[n_background]);
   const auto row = [&](int k) { return patch.rows.row(k).data(); };
@@ -101,7 +101,7 @@ void evaluate(Patch& patch, const SolidTemplate& shade, const Vector& p) {
   float* by_v = row(n_background + 2);
   float* residual = row(n_parameters);
   for (std::size_t i = 0; i < patch.offsets.size(); ++i) {
-    const auto [value, slope] = shade.at(patch.offsets[i] - shift);
+    const auto [value, slope] = absorbed.at(patch.offsets[i] - shift);
     by_contrast[i] = -static_cast<float>(value);
     by_u[i] = contrast * static_cast<float>(slope.x());
     by_v[i] = contrast * static_cast<float>(slope.y());
@@ -118,9 +118,8 @@ Sums accumulate(const Patch& patch, std::span<const float> weights) {
           products(0, 0)};
 }
 
-/// The spread of the shift when each sector of the patch in turn is left out (delete-a-group jackknife, one
-/// Gauss-Newton step each): what is wrong with the model on one side only, such as an edge of the body
-/// nearby, shows here and not in the noise.
+/// Delete-a-group jackknife of the shift over the patch's sectors, one Gauss-Newton step each. It includes
+/// model errors on one side of the target, such as an edge of the body, which the noise does not.
 double jackknife_variance(const Patch& patch, const Vector& p) {
   constexpr int sectors = 8;
   std::vector<int> sector(patch.offsets.size());
@@ -143,9 +142,9 @@ double jackknife_variance(const Patch& patch, const Vector& p) {
   return 0.5 * (sectors - 1.0) / sectors * (squares - sum.squaredNorm() / sectors);
 }
 
-std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
+std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
   Vector p = Vector::Zero();
-  evaluate(patch, shade, p);
+  evaluate(patch, absorbed, p);
   Sums sums = accumulate(patch, patch.weights);
   constexpr int linear = n_background + 1;
   const Eigen::Matrix<double, linear, 1> start =
@@ -157,14 +156,14 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   double damping = 1;
   Vector2d before = Vector2d::Zero();
   for (int i = 0; i < 20; ++i) {
-    evaluate(patch, shade, p);
+    evaluate(patch, absorbed, p);
     const float cut = tukey_cut<float>(
         residuals, float(std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background])));
     for (std::size_t k = 0; k < residuals.size(); ++k) patch.weights[k] = tukey_weight(residuals[k], cut);
     sums = accumulate(patch, patch.weights);
     Vector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
-    // The drawn template has kinks: a step that turns back overshot.
+    // The template is not smooth: a step that reverses the one before it is damped.
     if (step.tail<2>().dot(before) < 0) damping *= 0.5;
     before = step.tail<2>();
     step.tail<2>() *= damping * std::min(1.0, 2 / std::max(1e-9, before.norm()));
@@ -174,7 +173,7 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
     if (i >= 5 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
-  evaluate(patch, shade, p);
+  evaluate(patch, absorbed, p);
   sums = accumulate(patch, patch.weights);
   const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
   const Normal inverse = sums.normal.ldlt().solve(Normal::Identity());
@@ -195,13 +194,13 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& shade) {
   return fit;
 }
 
-/// The pixels within a few pixels of the metal: further off the background is another one.
+/// The pixels within a few pixels of the metal; the background model holds no farther.
 Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, const Vector2d& centre,
                        double half_width, const PathImage& view_image, std::span<const Disc> others,
                        const NoiseCorrelation& noise, const std::string& name) {
-  const SolidTemplate candidate_grid(view_image, 1, 2.5);
+  const SolidTemplate near_metal(view_image, 1, 2.5);
   const auto not_seen = [&] {
-    return fail(Reason::not_seen, fmt::format("{}: lies outside the picture", name));
+    return fail(Reason::not_seen, fmt::format("check target \"{}\" lies outside the image", name));
   };
   const Vector2d raw = map.raw_from_rectified(centre);
   if (!raw.allFinite() || !xray_image.pixels.contains(static_cast<int>(raw.x()), static_cast<int>(raw.y())))
@@ -218,7 +217,7 @@ Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, co
   for (int v = v0 - half; v <= v0 + half; ++v)
     for (int u = u0 - half; u <= u0 + half; ++u) {
       const Vector2d offset = (*inverse)(Vector2d(u, v)) - centre;
-      if (offset.norm() > half_width || candidate_grid.at(offset).value < 0.01) continue;
+      if (offset.norm() > half_width || near_metal.at(offset).value < 0.01) continue;
       ++inside;
       if (!xray_image.pixels.contains(u, v)) continue;
       const float grey = xray_image.pixels(u, v);
@@ -255,11 +254,12 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
                                  const NoiseCorrelation& noise) {
   const double depth = view.depth(target.point_in_calibrator);
   if (!(depth > 0))
-    return fail(Reason::behind_source, fmt::format("{}: lies behind the source", target.name));
+    return fail(Reason::behind_source,
+                fmt::format("check target \"{}\" lies behind the source", target.name));
   const double px_per_mm = std::abs(view.intrinsics.fy) / depth;
   const Vector2d centre = view.project(target.point_in_calibrator);
-  // Enough of a wire to tell its direction, but short of its far end (a wire of unknown length has 10 mm at
-  // least).
+  // Long enough for the wire's direction, short of its far end (a wire of unknown length has at least
+  // 10 mm).
   const double reach_mm = target.kind == TargetKind::ball ? 0.55 * target.diameter_mm
                           : target.kind == TargetKind::cross
                               ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
@@ -269,21 +269,21 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
   const auto patch = gather(xray_image, map, centre, half_width, view_image, others, noise, target.name);
   if (!patch) return tl::unexpected<Failure>(patch.error());
   std::optional<Fit> best;
-  const auto consider = [&](double attenuation, double blur) {
+  const auto try_template = [&](double attenuation, double blur) {
     const auto fit = fit_template(*patch, SolidTemplate(view_image, attenuation, blur));
     const bool better = fit && (!best || fit->noise < best->noise);
     if (better) best = fit;
     return better;
   };
-  consider(0.25, 1.0);
-  const double attenuation = consider(0.7, 1.0) ? 0.7 : 0.25;
-  if (consider(attenuation, 0.7))
-    consider(attenuation, 0.5);
+  try_template(0.25, 1.0);
+  const double attenuation = try_template(0.7, 1.0) ? 0.7 : 0.25;
+  if (try_template(attenuation, 0.7))
+    try_template(attenuation, 0.5);
   else
-    consider(attenuation, 1.4);
+    try_template(attenuation, 1.4);
   if (!best || std::abs(best->contrast) < 4 * best->noise || best->misfit > 0.4 || best->sigma_px > 1)
     return fail(Reason::target_not_found,
-                fmt::format("{}: is not to be seen where the view puts it", target.name));
+                fmt::format("check target \"{}\" is not visible at its predicted position", target.name));
   const Vector2d uv = centre + best->shift;
   const double map_sigma = map.sigma_px(uv);
   return ImagePoint{
@@ -291,12 +291,13 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
       std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
-Expected<ImagePoint> see_click(const DistortionMap& map, const Vector2d& click_raw,
-                               std::optional<double> sigma_px) {
+Expected<ImagePoint> point_of_click(const DistortionMap& map, const Vector2d& click_raw,
+                                    std::optional<double> sigma_px) {
   const auto uv = map.rectified_from_raw(click_raw);
   if (!uv)
-    return fail(Reason::not_seen, fmt::format("({:.1f}, {:.1f}) lies where the map cannot be inverted",
-                                              click_raw.x(), click_raw.y()));
+    return fail(Reason::not_seen,
+                fmt::format("pick ({:.1f}, {:.1f}) px: the distortion map cannot be inverted there",
+                            click_raw.x(), click_raw.y()));
   return ImagePoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
 }
 
@@ -326,10 +327,11 @@ Expected<ImagePoint> snap_to_ball(const XrayImage& xray_image, const DistortionM
       if (!best || dot.misfit < best->misfit) best = dot;
     }
   if (!best)
-    return fail(Reason::target_not_found, fmt::format("no ball of {} mm within {:.0f} px of ({:.1f}, {:.1f})",
-                                                      diameter_mm, reach, click_raw.x(), click_raw.y()));
+    return fail(Reason::target_not_found,
+                fmt::format("no ball of {} mm diameter within {:.0f} px of the pick ({:.1f}, {:.1f})",
+                            diameter_mm, reach, click_raw.x(), click_raw.y()));
   const auto rough_uv = map.rectified_from_raw(best->centre_px);
-  if (!rough_uv) return fail(Reason::not_seen, "the click lies outside the rectified field");
+  if (!rough_uv) return fail(Reason::not_seen, "the pick lies outside the rectified field");
   const Vector2d raw = best->centre_px - blob_offset(map, view, *rough_uv, depth_mm, diameter_mm);
   const Vector2d uv = map.rectified_from_raw(raw).value_or(*rough_uv);
   const double map_sigma = map.sigma_px(uv);

@@ -14,17 +14,16 @@
 
 namespace helicarm {
 
-/// Where a point was seen in one image.
+/// A point measured in one image.
 struct ImagePoint {
   Eigen::Vector2d uv_raw;
   Eigen::Vector2d uv;  ///< rectified
   double sigma_px;     ///< per axis, rectified
 };
 
-/// Finds a check target (ball, cross of wires, end of a wire) near the place where the calibrated view puts
-/// it: the absorption of the solid itself, drawn for this view, is shifted until it fits the pixels. `others`
-/// are discs to leave out, `noise` is that of the exposure. target_not_found; not_seen when it falls outside
-/// the image.
+/// Measures a check target (ball, wire cross, wire end) near its projection by fitting a template of its
+/// absorption, rendered for this view. Pixels in the discs `others` are left out; `noise` is the image's.
+/// Fails with target_not_found, with not_seen if the projection lies outside the image, or behind_source.
 Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMap& map, const View& view,
                                  const CalibratorTarget& target, std::span<const Disc> others,
                                  const NoiseCorrelation& noise);
@@ -32,13 +31,13 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
 /// Standard deviation of a click per axis, where none is given.
 inline constexpr double click_sigma_px = 0.5;
 
-/// A click as it is (picks with "snap": "none"), its noise joined with the map's. not_seen where the map
+/// A pick with "snap": "none": its standard deviation includes the map's. Fails with not_seen where the map
 /// cannot be inverted.
-Expected<ImagePoint> see_click(const DistortionMap& map, const Eigen::Vector2d& click_raw,
-                               std::optional<double> sigma_px);
+Expected<ImagePoint> point_of_click(const DistortionMap& map, const Eigen::Vector2d& click_raw,
+                                    std::optional<double> sigma_px);
 
-/// The image of the centre of the ball nearest to a click (picks with "snap": "ball"). The ball is taken to
-/// be at `depth_mm` from the source. target_not_found where no such ball is within its own radius of the
+/// A pick with "snap": "ball": the image of the centre of the ball at the click, assumed at `depth_mm` from
+/// the source. Fails with target_not_found if no such ball lies within its radius (at least 5 px) of the
 /// click.
 Expected<ImagePoint> snap_to_ball(const XrayImage& xray_image, const DistortionMap& map, const View& view,
                                   double depth_mm, const Eigen::Vector2d& click_raw, double diameter_mm,

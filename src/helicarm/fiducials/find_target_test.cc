@@ -19,17 +19,17 @@ using simulation::SimulatedCase;
 using simulation::SimulatedView;
 using simulation::Visibility;
 
-/// A flat panel, so that rectified, ideal and raw pixels are the same; the lateral view is mirrored.
+/// A flat panel (rectified, ideal and raw pixels are equal); the lateral view is mirrored.
 const SimulatedCase& simulated_case() {
   static const SimulatedCase simulated =
       small_case(9, simulation::CaseKind::flat, {simulation::Fault::mirrored});
   return simulated;
 }
 
-DistortionMap straight() { return identity_map(512, 512, {}); }
+DistortionMap no_distortion() { return identity_map(512, 512, {}); }
 
-/// One target of each kind in soft tissue that grows thicker sideways, in an image of 256 pixels.
-struct Bench {
+/// One target of each kind in soft tissue of varying thickness, in an image of 256 x 256 pixels.
+struct TargetImage {
   View view{{3300, 3300, 127, 126}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
   std::vector<CalibratorTarget> targets = {
       {"ball", {-12.3, -10.1, 3}, TargetKind::ball, 3, {}, 0},
@@ -37,7 +37,7 @@ struct Bench {
       {"end", {-9.2, 11.4, 5}, TargetKind::line_end, 2, {Vector3d(0.96, 0.28, 0)}, 20}};
   XrayImage xray_image;
 
-  explicit Bench(bool mirrored) {
+  explicit TargetImage(bool mirrored) {
     const simulation::Body tissue{
         "tissue", {simulation::ellipsoid({25, 10, 0}, {90, 70, 40})}, simulation::material::muscle};
     const auto wire = [&](std::size_t k, const Vector3d& axis, double from, double to) {
@@ -62,17 +62,19 @@ struct Bench {
   }
 };
 
-/// The view as a calibration would have it: a pixel or two off.
+/// With a view that is 1.5 px off, as after a calibration.
 void expect_found(std::size_t k) {
   for (const bool mirrored : {false, true}) {
-    const Bench bench(mirrored);
-    View off = bench.view;
+    const TargetImage target_image(mirrored);
+    View off = target_image.view;
     off.intrinsics.u0 += 1.3;
     off.intrinsics.v0 -= 0.8;
-    const auto found = find_target(bench.xray_image, identity_map(256, 256, {}), off, bench.targets[k], {},
-                                   noise_correlation(bench.xray_image));
+    const auto found = find_target(target_image.xray_image, identity_map(256, 256, {}), off,
+                                   target_image.targets[k], {}, noise_correlation(target_image.xray_image));
     ASSERT_TRUE(found) << found.error().message;
-    EXPECT_LT((found->uv - bench.view.project(bench.targets[k].point_in_calibrator)).norm(), 0.1) << mirrored;
+    EXPECT_LT((found->uv - target_image.view.project(target_image.targets[k].point_in_calibrator)).norm(),
+              0.1)
+        << mirrored;
     EXPECT_EQ(found->uv, found->uv_raw);
     EXPECT_LT(found->sigma_px, 0.1);
   }
@@ -87,7 +89,7 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
     for (const std::size_t k : {1u, 2u}) {
       if (view.targets[k].visibility != Visibility::clear) continue;
       const auto found =
-          find_target(exposure_of(view), straight(), view.true_view.stored_view(),
+          find_target(exposure_of(view), no_distortion(), view.true_view.stored_view(),
                       simulated_case().calibrator.targets[k], {}, noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << found.error().message;
       EXPECT_LT((found->uv - view.targets[k].ideal).norm(), 0.1)
@@ -95,29 +97,30 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
     }
 }
 
-TEST(FindTarget, NothingThereIsNotFound) {
+TEST(FindTarget, AbsentTargetIsNotFound) {
   CalibratorTarget absent = simulated_case().calibrator.targets[0];
   absent.point_in_calibrator += Vector3d(14, 5, -20);
-  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(),
+  const auto found = find_target(exposure_of(simulated_case().views[0]), no_distortion(),
                                  simulated_case().views[0].true_view.stored_view(), absent, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
 
-TEST(FindTarget, OutsideTheImageIsNotSeen) {
+TEST(FindTarget, TargetOutsideTheImageIsNotSeen) {
   CalibratorTarget outside = simulated_case().calibrator.targets[0];
   outside.point_in_calibrator += Vector3d(0, 400, 0);
-  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(),
+  const auto found = find_target(exposure_of(simulated_case().views[0]), no_distortion(),
                                  simulated_case().views[0].true_view.stored_view(), outside, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::not_seen);
 }
 
-TEST(FindTarget, BehindTheSourceIsRefused) {
+TEST(FindTarget, TargetBehindTheSourceIsRefused) {
   const View view = simulated_case().views[0].true_view.stored_view();
   CalibratorTarget behind = simulated_case().calibrator.targets[0];
   behind.point_in_calibrator = view.camera_from_world.inverse() * Vector3d(0, 0, -50);
-  const auto found = find_target(exposure_of(simulated_case().views[0]), straight(), view, behind, {}, {});
+  const auto found =
+      find_target(exposure_of(simulated_case().views[0]), no_distortion(), view, behind, {}, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::behind_source);
 }
@@ -128,7 +131,7 @@ TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
     for (const auto& ball : view.balls) {
       if (ball.visibility != Visibility::clear) continue;
       const auto found =
-          snap_to_ball(exposure_of(view), straight(), stored, stored.depth(ball.in_calibrator),
+          snap_to_ball(exposure_of(view), no_distortion(), stored, stored.depth(ball.in_calibrator),
                        ball.raw + Vector2d(2.1, -1.6), 4, noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << view.true_view.name << " " << ball.name;
       EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.true_view.name << " " << ball.name;
@@ -139,7 +142,7 @@ TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
 TEST(SnapToBall, NoBallNearTheClickIsNotFound) {
   const SimulatedView& view = simulated_case().views[0];
   const auto found =
-      snap_to_ball(exposure_of(view), straight(), view.true_view.stored_view(), 640, {20, 20}, 4, {});
+      snap_to_ball(exposure_of(view), no_distortion(), view.true_view.stored_view(), 640, {20, 20}, 4, {});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
@@ -170,21 +173,21 @@ TEST(PathInTarget, LineEndsFlatAtItsPoint) {
   EXPECT_EQ(path_in_target(end, {17.01, 2, -90}, Vector3d::UnitZ()), 0);
 }
 
-TEST(SolidTemplate, SlopeMatchesNumbers) {
+TEST(SolidTemplate, SlopeMatchesFiniteDifferences) {
   const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  const SolidTemplate shade(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
+  const SolidTemplate absorbed(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
   const double h = 0.01;
   for (double x = -9.13; x < 9; x += 1.7)
     for (double y = -9.13; y < 9; y += 1.7)
       for (int axis = 0; axis < 2; ++axis) {
         const Vector2d step = h * Vector2d::Unit(axis);
         const double numeric =
-            (shade.at(Vector2d(x, y) + step).value - shade.at(Vector2d(x, y) - step).value) / (2 * h);
-        EXPECT_NEAR(shade.at({x, y}).slope[axis], numeric, 1e-4);
+            (absorbed.at(Vector2d(x, y) + step).value - absorbed.at(Vector2d(x, y) - step).value) / (2 * h);
+        EXPECT_NEAR(absorbed.at({x, y}).slope[axis], numeric, 1e-4);
       }
 }
 
-TEST(SolidTemplate, IsNoughtOutsideItsImage) {
+TEST(SolidTemplate, IsZeroOutsideItsImage) {
   const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
   EXPECT_EQ(SolidTemplate(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1).at({90, 0}).value,
             0);

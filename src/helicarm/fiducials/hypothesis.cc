@@ -14,26 +14,27 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double radius_sigmas = 4;
-constexpr double match_sigmas = 4.5;         // where a ball ceases to pay for itself; loses one in 25,000
-constexpr double least_radius_sigma = 0.02;  // relative; a disc over bone or metal is no better known
-constexpr double radius_range = 0.2;         // of ln radius: how evenly false blobs are thought to spread
-constexpr double depth_span = 1.4;  // ln of the ratio of the farthest to the nearest distance thinkable
+constexpr double match_sigmas = 4.5;         // beyond it a match lowers the odds; loses one in 25,000
+constexpr double least_radius_sigma = 0.02;  // relative; limit over bone or metal
+constexpr double radius_range = 0.2;         // of ln radius: assumed spread of outliers
+constexpr double depth_span = 1.4;           // ln of the ratio of the greatest to the least distance
 
-/// Cauchy's weights: one false match among the true ones must not bend the fit to itself. Nor must the three
-/// that made the pose and fit it best: what lies within a third of the gate counts alike.
-void test_the_far(std::vector<WeightedCorrespondence>& correspondences, const View& view, double gate_px) {
+/// Cauchy weights limit the influence of false matches. Within a third of the gate all count alike, so that
+/// the three that gave the pose do not dominate.
+void downweight_outliers(std::vector<WeightedCorrespondence>& correspondences, const View& view,
+                         double gate_px) {
   for (auto& s : correspondences)
     s.sigma_px = std::hypot(s.sigma_px, gate_px / 3, (view.project(s.point) - s.uv).norm());
 }
 
-struct RadiusVerdict {
+struct RadiusEvidence {
   double excess = 0;
   double log_odds = 0;
 };
 
-/// How well the radii fit the distances, the common bias being known only to its sigma. Vague radii say
-/// nothing.
-RadiusVerdict radius_verdict(const Scene& scene, const Hypothesis& h) {
+/// Agreement of the radii with the distances, marginalised over the common bias. Imprecise radii do not
+/// contribute.
+RadiusEvidence radius_evidence(const Scene& scene, const Hypothesis& h) {
   double weight = 0;
   double first = 0;
   double second = 0;
@@ -55,14 +56,14 @@ RadiusVerdict radius_verdict(const Scene& scene, const Hypothesis& h) {
   return {first / weight, std::max(0.0, peak - 0.5 * std::log1p(weight / bias_weight)) - 0.5 * chi2};
 }
 
-/// ln n!. std::lgamma writes the global `signgam`, which views that are labelled in parallel share.
+/// ln n!. std::lgamma writes the global `signgam`, a data race between views.
 double log_factorial(double n) {
   int sign = 0;
   return ::lgamma_r(n + 1, &sign);
 }
 
-/// Laplace approximation of the evidence. Prior: any rotation, the calibrator's centroid anywhere in the
-/// field, ln depth even over its span, any number of balls visible and then any of them, mirrored or not.
+/// Laplace approximation of the evidence. Prior, uniform each: rotation, centroid's image in the field, ln
+/// depth over its span, number of visible balls and which of them, mirrored or not.
 double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& correspondences,
                 const PoseFit& fit) {
   const double n = static_cast<double>(scene.candidates.size());
@@ -82,10 +83,10 @@ double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& c
   return odds + fit.log_volume + 3 * log_2pi;
 }
 
-/// Pairs balls and candidates one to one, the cheapest first; infinite cost means never, as does a distance
-/// beyond the gate.
+/// Pairs balls and candidates one to one by increasing cost; pairs of infinite cost or outside the gate are
+/// excluded.
 template <class Cost>
-std::vector<int> pair_up(const Scene& scene, const View& view, double gate_px, const Cost& cost_of) {
+std::vector<int> assign(const Scene& scene, const View& view, double gate_px, const Cost& cost_of) {
   struct Pair {
     double cost;
     int ball;
@@ -118,38 +119,39 @@ std::vector<int> pair_up(const Scene& scene, const View& view, double gate_px, c
   return candidate_of_ball;
 }
 
-/// Within the noise of the candidate and, for a ball that had no say in the fit, that of the fit.
+/// Matches within the candidate's noise and, for balls that were not fitted, the fit's prediction.
 std::vector<int> match_within_noise(const Scene& scene, const Hypothesis& h) {
-  std::vector<Eigen::Matrix2d> doubt(scene.balls.size(), Eigen::Matrix2d::Zero());
+  std::vector<Eigen::Matrix2d> prediction(scene.balls.size(), Eigen::Matrix2d::Zero());
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
-    if (h.candidate_of_ball[k] < 0) doubt[k] = prediction_covariance(h.fit, scene.balls[k].centre);
-  return pair_up(
-      scene, h.fit.view, rough_gate_px(scene), [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
-        const double sigma = match_sigma_px(scene, h.fit.view, k, i);
-        const double cost = off.dot((sigma * sigma * Eigen::Matrix2d::Identity() + doubt[k]).inverse() * off);
-        return cost < match_sigmas * match_sigmas ? cost : infinity;
-      });
+    if (h.candidate_of_ball[k] < 0) prediction[k] = prediction_covariance(h.fit, scene.balls[k].centre);
+  return assign(scene, h.fit.view, rough_gate_px(scene),
+                [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
+                  const double sigma = match_sigma_px(scene, h.fit.view, k, i);
+                  const double cost =
+                      off.dot((sigma * sigma * Eigen::Matrix2d::Identity() + prediction[k]).inverse() * off);
+                  return cost < match_sigmas * match_sigmas ? cost : infinity;
+                });
 }
 
-/// Squared distance of a ball from where the others put it, in sigmas: its residual, studentised.
-double variation2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
+/// Squared studentised residual of a ball: its distance from the others' prediction, in sigmas.
+double studentised2(const Scene& scene, const Hypothesis& h, std::size_t ball) {
   const auto& seen = scene.candidates[h.candidate_of_ball[ball]];
   const Eigen::Vector3d& centre = scene.balls[ball].centre;
   const Eigen::Vector2d off = seen.uv - h.fit.view.project(centre);
   const double sigma = match_sigma_px(scene, h.fit.view, ball, std::size_t(h.candidate_of_ball[ball]));
   const double noise = sigma * sigma;
-  constexpr double unchecked = 1e-3;  // a ball that alone holds the fit by one end is never off
+  constexpr double unchecked = 1e-3;  // finite for a ball that alone determines a parameter
   const Eigen::Matrix2d spread =
       (1 + unchecked) * noise * Eigen::Matrix2d::Identity() - prediction_covariance(h.fit, centre);
   const double off2 = off.dot(spread.inverse() * off);
   return std::isfinite(off2) ? off2 : infinity;
 }
 
-/// The balls farther than this from where the others put them, the farthest first.
+/// The balls farther than `sigmas` from the others' prediction, the farthest first.
 std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) {
   std::vector<std::pair<double, int>> off2;
   for (std::size_t k = 0; k < scene.balls.size(); ++k)
-    if (h.candidate_of_ball[k] >= 0) off2.push_back({variation2(scene, h, k), static_cast<int>(k)});
+    if (h.candidate_of_ball[k] >= 0) off2.push_back({studentised2(scene, h, k), static_cast<int>(k)});
   std::sort(off2.rbegin(), off2.rend());
   std::vector<int> balls;
   for (const auto& [distance2, ball] : off2)
@@ -188,51 +190,51 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
 }
 
 std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
-  return pair_up(scene, view, gate_px, [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
+  return assign(scene, view, gate_px, [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
     const double sigma = match_sigma_px(scene, view, k, i);
     return off.squaredNorm() / (sigma * sigma);
   });
 }
 
-Hypothesis settle(const Scene& scene, const View& rough, int least) {
+Hypothesis match_and_fit(const Scene& scene, const View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
   constexpr int narrowing = 4;
-  constexpr int most_turns = 10;
-  for (int turn = 0; turn < most_turns; ++turn) {
-    const bool narrow = turn >= narrowing;
-    const double gate_px = rough_gate_px(scene) / (1 + turn);
+  constexpr int most_iterations = 10;
+  for (int iteration = 0; iteration < most_iterations; ++iteration) {
+    const bool narrow = iteration >= narrowing;
+    const double gate_px = rough_gate_px(scene) / (1 + iteration);
     auto matches = narrow ? match_within_noise(scene, h) : match(scene, h.fit.view, gate_px);
-    if (turn > narrowing && matches == h.candidate_of_ball) break;
+    if (iteration > narrowing && matches == h.candidate_of_ball) break;
     h.candidate_of_ball = std::move(matches);
     auto correspondences = correspondences_of(scene, h.candidate_of_ball, h.fit.view);
     h.matched = static_cast<int>(correspondences.size());
     if (h.matched < least) return h;
-    if (!narrow) test_the_far(correspondences, h.fit.view, gate_px);
+    if (!narrow) downweight_outliers(correspondences, h.fit.view, gate_px);
     h.fit = fit_pose(h.fit.view, correspondences, scene.camera, narrow ? fit_steps : 5);
   }
-  while (h.fit.chi2 > match_sigmas * match_sigmas) {  // no ball's removal can take away more
+  while (h.fit.chi2 > match_sigmas * match_sigmas) {  // an upper limit of what one ball's removal gains
     const auto off = beyond(scene, h, match_sigmas);
     if (off.empty()) break;
     h = without(scene, std::move(h), off.front());
   }
-  weigh(scene, h);
+  evaluate_odds(scene, h);
   if (h.matched < least) h.log_odds = -infinity;
   return h;
 }
 
-void weigh(const Scene& scene, Hypothesis& h) {
+void evaluate_odds(const Scene& scene, Hypothesis& h) {
   const auto correspondences = correspondences_of(scene, h.candidate_of_ball, h.fit.view);
   h.matched = static_cast<int>(correspondences.size());
   h.residual2_px2 = 0;
   for (const auto& s : correspondences) h.residual2_px2 += (h.fit.view.project(s.point) - s.uv).squaredNorm();
-  const auto radii = radius_verdict(scene, h);
+  const auto radii = radius_evidence(scene, h);
   h.radius_excess = radii.excess;
   h.log_odds = log_odds(scene, correspondences, h.fit) + radii.log_odds;
 }
 
-std::vector<int> inflated(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
+std::vector<int> outlying(const Scene& scene, const Hypothesis& h) { return beyond(scene, h, 3.3); }
 
 Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
   h.candidate_of_ball[ball] = -1;
@@ -243,23 +245,23 @@ Hypothesis without(const Scene& scene, Hypothesis h, int ball) {
 
 std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate) {
   Hypothesis all = h;
-  for (int& named : all.candidate_of_ball)
-    if (named == candidate) named = -1;
+  for (int& assigned : all.candidate_of_ball)
+    if (assigned == candidate) assigned = -1;
   all.candidate_of_ball[ball] = candidate;
   all.fit = fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball, h.fit.view), scene.camera,
                      fit_steps);
   std::vector<Hypothesis> rivals{all};
-  for (const int other : inflated(scene, all)) {
+  for (const int other : outlying(scene, all)) {
     if (other == ball) continue;
     Hypothesis rival = without(scene, all, other);
     rivals.push_back(rival);
-    for (auto off = inflated(scene, rival); !off.empty() && off.front() != ball;
-         off = inflated(scene, rival)) {
+    for (auto off = outlying(scene, rival); !off.empty() && off.front() != ball;
+         off = outlying(scene, rival)) {
       rival = without(scene, std::move(rival), off.front());
       rivals.push_back(rival);
     }
   }
-  for (auto& rival : rivals) weigh(scene, rival);
+  for (auto& rival : rivals) evaluate_odds(scene, rival);
   return rivals;
 }
 

@@ -10,14 +10,13 @@
 
 namespace helicarm {
 
-/// A dark disc that may be a calibrator ball.
+/// A dot that may be a fiducial.
 struct BallCandidate {
   Eigen::Vector2d uv;  ///< rectified pixels
   double sigma_px;     ///< per axis
   double radius_px;
-  double radius_sigma_px;  ///< without the bias common to all
-  /// Per axis, with what the distortion map is known to leave at this place; 0: only the general figure is
-  /// known.
+  double radius_sigma_px;  ///< without the common bias
+  /// Per axis, with the distortion map's standard deviation at this position; 0: not known.
   double own_sigma_px = 0;
 };
 
@@ -27,18 +26,18 @@ struct ModelBall {
   double sigma_mm = 0;  ///< of the centre, per axis
 };
 
-/// One X-ray as the labelling sees it.
+/// One image's input to the labelling.
 struct Scene {
   std::vector<ModelBall> balls;
-  std::vector<BallCandidate> candidates;  ///< sigma_px floored
+  std::vector<BallCandidate> candidates;  ///< sigma_px with its lower limit
   CameraPrior camera;
-  double field_radius_px;  ///< of the disc where false blobs may lie
-  double radius_bias;      ///< of all radii found, relative
+  double field_radius_px;  ///< of the disc where outliers may lie
+  double radius_bias;      ///< of all measured radii, relative
   double radius_bias_sigma;
-  std::optional<bool> mirrored = {};  ///< the only handedness that is tried, where it is known
+  std::optional<bool> mirrored = {};  ///< if known, only this handedness is tried
 };
 
-/// Millimetres that a pixel may span at a candidate, if it is this ball, judged by its radius.
+/// Possible mm per px at a candidate if it is a given ball, by its radius.
 struct Scale {
   double finest;
   double coarsest;
@@ -48,56 +47,54 @@ struct Scale {
 Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const ModelBall& ball,
                       double sigmas);
 
-/// A pose and the candidate each ball has under it (-1: none).
+/// A pose and the candidate assigned to each ball (-1: none).
 struct Hypothesis {
   std::vector<int> candidate_of_ball;
   int matched = 0;
   PoseFit fit;
   double residual2_px2 = 0;  ///< sum of squared distances
-  double radius_excess = 0;  ///< weighted mean of ln(radius found / radius expected at the ball's distance)
-  /// Logarithm of the odds that these matches are the calibrator and not chance. With all candidates strewn
-  /// evenly over the field, the odds summed over every hypothesis have expectation 1, so by Markov's
-  /// inequality a sum above e^x comes by accident with a probability below e^-x.
+  double radius_excess = 0;  ///< weighted mean of ln(measured / expected radius at the ball's distance)
+  /// Logarithm of the odds of these matches against chance. For candidates uniform over the field, the odds
+  /// summed over all hypotheses have expectation 1; by Markov's inequality the sum exceeds e^x with a
+  /// probability below e^-x.
   double log_odds = 0;
 
   bool mirrored() const { return fit.view.intrinsics.fx < 0; }
 };
 
-/// Pairs balls and candidates one to one, nearest first, when within `gate_px` of each other and at a
-/// distance from the source that fits the candidate's radius.
+/// Pairs balls and candidates one to one, nearest first, within `gate_px` and at a distance from the source
+/// that agrees with the candidate's radius.
 std::vector<int> match(const Scene& scene, const View& view, double gate_px);
 
 constexpr int fit_steps = 10;  ///< at most
 
-/// Per axis, px: the candidate's own error and that of the ball's place in the file, seen at the calibrator's
-/// distance.
+/// Per axis, px: the candidate's error and that of the ball's coordinates, projected.
 double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, std::size_t candidate);
 
-/// The matched balls, as a fit near `view` wants them.
+/// The matched balls as input of `fit_pose` near `view`.
 std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
                                                        const std::vector<int>& candidate_of_ball,
                                                        const View& view);
 
-/// How far a pose from three points may err at the others.
+/// Largest error of a pose from three points at the other balls.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 
-/// Matches and fits in turn with narrowing gates until the matches stand still, from a rough pose. Once it
-/// has fewer than `least` matches it is worth nothing: log_odds = -infinity.
-Hypothesis settle(const Scene& scene, const View& rough, int least = 4);
+/// Alternates matching, with narrowing gates, and fitting from a rough pose until the matches are stable.
+/// With fewer than `least` matches, log_odds = -infinity.
+Hypothesis match_and_fit(const Scene& scene, const View& rough, int least = 4);
 
-/// Sets what follows from the matches and the fit: their number, residuals and log odds.
-void weigh(const Scene& scene, Hypothesis& h);
+/// Sets the number of matches, residuals and log odds from the matches and the fit.
+void evaluate_odds(const Scene& scene, Hypothesis& h);
 
-/// The balls that lie off where the others put them, by 3.3 sigma of their candidates and of the prediction:
-/// one true ball of 230, and each false disc that anyone could tell from a ball (4 sigma, less what the
-/// systematic error adds). The farthest comes first.
-std::vector<int> inflated(const Scene& scene, const Hypothesis& h);
+/// The balls over 3.3 sigma (candidate and prediction) from their positions predicted by the others, the
+/// farthest first: one true ball of 230.
+std::vector<int> outlying(const Scene& scene, const Hypothesis& h);
 
-/// `h` without a ball, fitted anew but not weighed.
+/// `h` without a ball, fitted again; the odds are not updated.
 Hypothesis without(const Scene& scene, Hypothesis h, int ball);
 
-/// What becomes of `h` when this candidate is that ball after all: with all the others, and without each that
-/// this puts in doubt and those that are then still in doubt.
+/// Variants of `h` with this pair: with all others, and without each that is then outlying, and those that
+/// still are after its removal.
 std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate);
 
 }  // namespace helicarm

@@ -10,7 +10,7 @@
 namespace helicarm {
 namespace {
 
-constexpr double radius_sigmas = 3;  // a true triple lost here is made good by the next
+constexpr double radius_sigmas = 3;  // a true triple lost here is replaced by another
 constexpr int reach = 3;             // of a candidate, in cells
 
 template <class T>
@@ -93,7 +93,7 @@ HypothesisFilter::HypothesisFilter(const Scene& scene) : scene_(scene), near_(sc
   }
 }
 
-/// Scaled orthography, both leans.
+/// Scaled orthography, both depth signs.
 void HypothesisFilter::gather_starts(const std::array<int, 3>& candidates, const Image& image) {
   mm_per_px_ = inverse_distance2(a_, b_, c_, image.a, image.b, image.c).rsqrt() / image.focal_px;
   std::array<const std::array<float, 2>*, 3> scales{};
@@ -120,15 +120,15 @@ void HypothesisFilter::gather_starts(const std::array<int, 3>& candidates, const
     const float h2 = std::copysign(std::sqrt(std::max(0.0f, w * b_[t] - image.b)), w * c_[t] - image.c);
     const auto& s1 = scales[1][static_cast<std::size_t>(triangles_[t].balls[1])];
     const auto& s2 = scales[2][static_cast<std::size_t>(triangles_[t].balls[2])];
-    for (const float lean : {1.0f, -1.0f}) {
-      starts_[filled] = {t, lean, lean * h1, lean * h2};
-      filled += holds(s1, per_px * (1 + lean * h1)) & holds(s2, per_px * (1 + lean * h2)) ? 1 : 0;
+    for (const float depth_sign : {1.0f, -1.0f}) {
+      starts_[filled] = {t, depth_sign, depth_sign * h1, depth_sign * h2};
+      filled += holds(s1, per_px * (1 + depth_sign * h1)) & holds(s2, per_px * (1 + depth_sign * h2)) ? 1 : 0;
     }
   }
   starts_.resize(filled);
 }
 
-void HypothesisFilter::test(const Start* starts, int used, const Image& image, int wanted) {
+void HypothesisFilter::test(const Start* starts, int used, const Image& image, int required) {
   Simd model_a, model_b, model_c, h1, h2;
   std::array<Vector<Simd>, 3> model;
   for (int lane = 0; lane < width; ++lane) {
@@ -151,7 +151,7 @@ void HypothesisFilter::test(const Start* starts, int used, const Image& image, i
   };
   Simd w = Simd::Zero();
   Simd open = Simd::Ones();
-  for (int turn = 0; turn < most_depth_turns && (open > 0).any(); ++turn) {
+  for (int iteration = 0; iteration < most_depth_iterations && (open > 0).any(); ++iteration) {
     const Vector<Simd> e1 = lift(image.at1, h1);
     const Vector<Simd> e2 = lift(image.at2, h2);
     const Simd a = e1.x * e1.x + e1.y * e1.y;
@@ -179,7 +179,7 @@ void HypothesisFilter::test(const Start* starts, int used, const Image& image, i
   const Eigen::Array2f centre =
       ((scene_.camera.principal_px.array() - near_.low_px()) / near_.cell_px()).cast<float>();
   const float focal = image.focal_px * scale;
-  // Rows of the pose without the part along the triangle's normal, which a mirrored image has negated.
+  // Rows of the pose without the component along the triangle's normal, which changes sign if mirrored.
   const auto in_plane = [&](const Simd& along, const Simd& across, const Simd& origin) {
     const Vector<Simd> row = own[0] * along + own[1] * across;
     return std::pair<Vector<Simd>, Simd>(row, origin - row.dot(model[0]));
@@ -201,25 +201,26 @@ void HypothesisFilter::test(const Start* starts, int used, const Image& image, i
     const Simd ox = out * lifted[2].x;
     const Simd oy = out * lifted[2].y;
     const Simd oz = out * lifted[2].z;
-    const auto look = [&](const Simd& qx, const Simd& qy, const Simd& qz, std::array<int, width>& count) {
+    const auto count_marked = [&](const Simd& qx, const Simd& qy, const Simd& qz,
+                                  std::array<int, width>& count) {
       const Simd per_depth = focal / qz;
       near_.add_marks<width>(qx * per_depth + centre.x(), qy * per_depth + centre.y(), count);
     };
-    look(px + ox, py + oy, pz + oz, upright);
-    look(px - ox, py - oy, pz - oz, mirrored);
+    count_marked(px + ox, py + oy, pz + oz, upright);
+    count_marked(px - ox, py - oy, pz - oz, mirrored);
   }
   for (int lane = 0; lane < used; ++lane) {
     if (open[lane] > 0 || std::max(std::abs(h1[lane]), std::abs(h2[lane])) >= deepest_corner) continue;
     const auto& balls = triangles_[starts[lane].triangle].balls;
     for (const bool flip : {false, true}) {
-      if ((flip ? mirrored : upright)[lane] >= wanted)
-        passed_.push_back({{balls[0], balls[1], balls[2]}, starts[lane].lean, flip});
+      if ((flip ? mirrored : upright)[lane] >= required)
+        passed_.push_back({{balls[0], balls[1], balls[2]}, starts[lane].depth_sign, flip});
     }
   }
 }
 
 const std::vector<PoseHypothesis>& HypothesisFilter::filter(const std::array<int, 3>& candidates,
-                                                            double focal_px, int wanted) {
+                                                            double focal_px, int required) {
   const auto at = [&](int i) -> Eigen::Vector2f {
     return ((scene_.candidates[candidates[i]].uv - scene_.camera.principal_px) / focal_px).cast<float>();
   };
@@ -233,7 +234,7 @@ const std::vector<PoseHypothesis>& HypothesisFilter::filter(const std::array<int
   passed_.clear();
   for (std::size_t i = 0; i < starts_.size(); i += width)
     test(starts_.data() + i, static_cast<int>(std::min<std::size_t>(width, starts_.size() - i)), image,
-         wanted);
+         required);
   return passed_;
 }
 

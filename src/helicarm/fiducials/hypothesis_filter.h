@@ -11,17 +11,18 @@
 
 namespace helicarm {
 
-/// Where balls have a candidate within the rough gate (to a third of it), at the cost of one look each.
+/// Grid that marks the rough gate around each candidate, with cells of a third of the gate: one lookup per
+/// projected ball.
 class CandidateGrid {
  public:
   explicit CandidateGrid(const Scene& scene);
 
-  /// Adds one where image coordinates, in cells, lie near a candidate.
+  /// Increments `count` where image coordinates, in cells, lie near a candidate.
   template <int width>
   void add_marks(const Eigen::Array<float, width, 1>& column, const Eigen::Array<float, width, 1>& line,
                  std::array<int, width>& count) const {
     using Simd = Eigen::Array<float, width, 1>;
-    const auto within = [](const Simd& at, float last) -> Simd {  // NaN goes to the rim, too
+    const auto within = [](const Simd& at, float last) -> Simd {  // NaN becomes 0
       const Simd high = (at > 0).select(at, Simd::Zero());
       return (high < last).select(high, Simd::Constant(last)).floor();
     };
@@ -41,24 +42,24 @@ class CandidateGrid {
   std::vector<std::uint8_t> marked_;
 };
 
-/// A pose from three balls, by what tells it from the others of three candidates.
+/// A pose from three candidates: the balls assigned to them and which of the four solutions.
 struct PoseHypothesis {
   std::array<int, 3> balls;
-  double lean;  ///< 1 or -1: times the depths of the scaled orthography from which it starts
+  double depth_sign;  ///< 1 or -1: of the relative depths in the starting scaled orthography
   bool mirrored;
 };
 
-/// Passes the poses of three candidates that other candidates support. Eight poses go at a time, in single
-/// precision, through the same steps as `three_point.h`, which is their reference.
+/// Passes the poses of three candidates that other candidates support. SIMD form, eight poses at a time in
+/// single precision, of `three_point.h`, the reference.
 class HypothesisFilter {
  public:
-  /// The scene must outlive the sieve.
+  /// The scene must outlive the filter.
   explicit HypothesisFilter(const Scene& scene);
 
-  /// Those of every three balls in every order, with each radius within three sigma of what the distance
-  /// asks for, and candidates near at least `wanted` balls.
+  /// Poses of all ordered triples of balls whose radii agree with the distance within three sigma and that
+  /// have candidates near at least `required` balls.
   const std::vector<PoseHypothesis>& filter(const std::array<int, 3>& candidates, double focal_px,
-                                            int wanted);
+                                            int required);
 
  private:
   static constexpr int width = 8;
@@ -68,7 +69,7 @@ class HypothesisFilter {
   };
   struct Start {
     int triangle;
-    float lean, behind1, behind2;
+    float depth_sign, behind1, behind2;
   };
   struct Image {
     Eigen::Vector2f at0, at1, at2;  ///< normalised
@@ -77,13 +78,13 @@ class HypothesisFilter {
   };
 
   void gather_starts(const std::array<int, 3>& candidates, const Image& image);
-  void test(const Start* starts, int used, const Image& image, int wanted);
+  void test(const Start* starts, int used, const Image& image, int required);
 
   const Scene& scene_;
   CandidateGrid near_;
   std::vector<Eigen::Vector3f> balls_;
-  std::vector<Triangle> triangles_;  ///< that are not nearly flat, by their first ball
-  std::vector<int> first_of_ball_;   ///< index of the triangles, one more than balls
+  std::vector<Triangle> triangles_;  ///< not nearly collinear, ordered by first ball
+  std::vector<int> first_of_ball_;   ///< start index among the triangles, and the end
   Eigen::ArrayXf a_, b_, c_;         ///< of the triangles
   Eigen::ArrayXf mm_per_px_;
   std::vector<std::array<float, 2>> scales_;  ///< finest and coarsest; candidate by ball

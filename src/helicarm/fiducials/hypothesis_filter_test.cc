@@ -25,8 +25,8 @@ Scene scene_of(const Calibrator& calibrator, const SyntheticImage& view_image) {
   return scene;
 }
 
-/// Of one pose after the other, in double precision: the balls that have a candidate within `reach` rough
-/// gates. -1: there is no such pose, or a radius forbids it.
+/// Scalar reference in double precision: number of balls with a candidate within `reach` rough gates; -1 if
+/// the pose does not exist or a radius contradicts it.
 int support(const Scene& scene, const std::array<int, 3>& candidates, const PoseHypothesis& pose,
             double reach, double radius_sigmas) {
   std::array<Eigen::Vector2d, 3> image;
@@ -41,8 +41,8 @@ int support(const Scene& scene, const std::array<int, 3>& candidates, const Pose
   const Eigen::Vector2d e1 = image[1] - image[0];
   const Eigen::Vector2d e2 = image[2] - image[0];
   Orthography start = orthography(*triangle, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
-  start.behind1 *= pose.lean;
-  start.behind2 *= pose.lean;
+  start.behind1 *= pose.depth_sign;
+  start.behind2 *= pose.depth_sign;
   const std::array<double, 3> behind{0, start.behind1, start.behind2};
   const double mm_per_px = 1 / std::sqrt(start.inverse_distance2) / scene.camera.focal_px;
   for (int i = 0; i < 3; ++i) {
@@ -65,8 +65,8 @@ int support(const Scene& scene, const std::array<int, 3>& candidates, const Pose
   return near;
 }
 
-TEST(HypothesisFilter, PassesWhatOneAfterTheOtherDoes) {
-  constexpr int wanted = 6;
+TEST(HypothesisFilter, PassesTheSamePosesAsTheScalarReference) {
+  constexpr int required = 6;
   int passed = 0;
   for (int trial = 0; trial < 6; ++trial) {
     RandomStream random(6, 1, trial);
@@ -75,9 +75,9 @@ TEST(HypothesisFilter, PassesWhatOneAfterTheOtherDoes) {
     const Scene scene = scene_of(calibrator, view_image);
     const std::array<int, 3> candidates{0, 3, 5};
     HypothesisFilter hypothesis_filter(scene);
-    const auto filtered = hypothesis_filter.filter(candidates, scene.camera.focal_px, wanted);
+    const auto filtered = hypothesis_filter.filter(candidates, scene.camera.focal_px, required);
     passed += static_cast<int>(filtered.size());
-    for (const auto& pose : filtered) EXPECT_GE(support(scene, candidates, pose, 1.6, 3.1), wanted);
+    for (const auto& pose : filtered) EXPECT_GE(support(scene, candidates, pose, 1.6, 3.1), required);
     const int balls = static_cast<int>(scene.balls.size());
     for (int code = 0; code < balls * balls * balls * 4; ++code) {
       const PoseHypothesis pose{{code / 4 % balls, code / 4 / balls % balls, code / 4 / balls / balls},
@@ -85,16 +85,16 @@ TEST(HypothesisFilter, PassesWhatOneAfterTheOtherDoes) {
                                 code / 2 % 2 == 1};
       const auto& b = pose.balls;
       if (b[0] == b[1] || b[1] == b[2] || b[0] == b[2]) continue;
-      if (support(scene, candidates, pose, 0.5, 2.9) < wanted) continue;
+      if (support(scene, candidates, pose, 0.5, 2.9) < required) continue;
       EXPECT_TRUE(std::any_of(filtered.begin(), filtered.end(), [&](const PoseHypothesis& other) {
-        return other.balls == b && other.lean == pose.lean && other.mirrored == pose.mirrored;
+        return other.balls == b && other.depth_sign == pose.depth_sign && other.mirrored == pose.mirrored;
       }));
     }
   }
   EXPECT_GT(passed, 12);
 }
 
-TEST(HypothesisFilter, NoSupportNoPose) {
+TEST(HypothesisFilter, NoPosePassesWithoutSupport) {
   RandomStream random(6, 2);
   const auto view_image = image_of(helix(), {.noise_px = 0.3}, random);
   const Scene scene = scene_of(helix(), view_image);

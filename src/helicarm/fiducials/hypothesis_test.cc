@@ -14,14 +14,14 @@ namespace {
 
 using namespace label_scene;
 
-/// A clean image from the side in which candidate k is ball k.
-struct Drawn {
+/// A noise-free lateral image in which candidate k is ball k.
+struct SyntheticScene {
   Scene scene;
   View view;
 };
 
-Drawn drawn() {
-  Drawn all;
+SyntheticScene synthetic_scene() {
+  SyntheticScene all;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const auto& ball : helix().balls) middle += ball.centre_in_calibrator / 12;
   all.view = {{4345, 4345, 511.5, 511.5}, {}};
@@ -41,17 +41,17 @@ Drawn drawn() {
   return all;
 }
 
-TEST(Hypothesis, DoubtIsTheDistanceFromAFitToTheOthers) {
-  auto [scene, view] = drawn();
+TEST(Hypothesis, OutlierTestEqualsTheDistanceFromAFitToTheOthers) {
+  auto [scene, view] = synthetic_scene();
   for (const double off_px : {1.6, 3.0}) {
     scene.candidates[4].uv = view.project(scene.balls[4].centre) + Eigen::Vector2d(off_px, 0);
-    const Hypothesis h = settle(scene, view);
+    const Hypothesis h = match_and_fit(scene, view);
     ASSERT_EQ(h.matched, off_px > 2.5 ? 11 : 12);
     Hypothesis all = h;
     all.candidate_of_ball[4] = 4;
     all.fit =
         fit_pose(h.fit.view, correspondences_of(scene, all.candidate_of_ball, view), scene.camera, fit_steps);
-    const auto balls = inflated(scene, all);
+    const auto balls = outlying(scene, all);
     const PoseFit others = without(scene, all, 4).fit;
     const Eigen::Vector2d off = scene.candidates[4].uv - others.view.project(scene.balls[4].centre);
     const Eigen::Matrix2d noise = 0.25 * Eigen::Matrix2d::Identity();
@@ -63,18 +63,18 @@ TEST(Hypothesis, DoubtIsTheDistanceFromAFitToTheOthers) {
 }
 
 TEST(Hypothesis, OddsWriteNoGlobalVariable) {
-  const auto [scene, view] = drawn();
-  Hypothesis h = settle(scene, view);
+  const auto [scene, view] = synthetic_scene();
+  Hypothesis h = match_and_fit(scene, view);
   constexpr int untouched = 42;
   signgam = untouched;
-  weigh(scene, h);
+  evaluate_odds(scene, h);
   EXPECT_EQ(signgam, untouched);
 }
 
-TEST(Hypothesis, AnOutlierInAHiddenBallsSteadIsARivalsLoss) {
-  auto [scene, view] = drawn();
+TEST(Hypothesis, OutlierNearAHiddenBallIsReplacedInARival) {
+  auto [scene, view] = synthetic_scene();
   scene.candidates[7].uv += Eigen::Vector2d(0, 3.5);
-  Hypothesis h = settle(scene, view);
+  Hypothesis h = match_and_fit(scene, view);
   h.candidate_of_ball.assign(12, -1);
   for (const int k : {0, 2, 5, 7, 9, 11}) h.candidate_of_ball[k] = k;
   h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, view), scene.camera, fit_steps);

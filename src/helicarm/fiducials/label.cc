@@ -14,8 +14,8 @@
 namespace helicarm {
 namespace {
 
-constexpr double most_deviation = 3.3;  // of chi2, in sigmas: one honest view in 2000
-constexpr std::size_t most_loose = 24;  // poses; a calibrator much like the file's supports the first of them
+constexpr double chi2_sigmas = 3.3;     // of chi2, in sigmas: exceeded by one correct view in 2000
+constexpr std::size_t most_loose = 24;  // poses; for a similar calibrator one of the first is right
 
 Eigen::Vector3d centroid(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -58,52 +58,52 @@ std::vector<double> focals_to_try(const LabellingPrior& prior) {
   return focals;
 }
 
-bool surely(const Hypothesis& h, const LabellingOptions& options) {
+bool is_certain(const Hypothesis& h, const LabellingOptions& options) {
   return h.matched >= least_balls && h.log_odds >= options.least_log_odds;
 }
 
-int count_named(const Hypothesis& h) {
+int count_labelled(const Hypothesis& h) {
   return static_cast<int>(
       std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; }));
 }
 
-/// A ball is better left unnamed when the disc of another, unnamed ball covers it, or when two candidates are
-/// in its reach.
+/// Removes the label of a fiducial that an unlabelled one may cover, or with two candidates in reach.
 void drop_covered(const Scene& scene, Hypothesis& h) {
-  const std::vector<int> named = h.candidate_of_ball;
-  for (std::size_t k = 0; k < named.size(); ++k) {
-    if (named[k] < 0) continue;
-    const auto& own = scene.candidates[named[k]];
+  const std::vector<int> labelled = h.candidate_of_ball;
+  for (std::size_t k = 0; k < labelled.size(); ++k) {
+    if (labelled[k] < 0) continue;
+    const auto& own = scene.candidates[labelled[k]];
     bool uncertain = false;
-    for (std::size_t other = 0; other < named.size(); ++other) {
-      if (named[other] >= 0) continue;
+    for (std::size_t other = 0; other < labelled.size(); ++other) {
+      if (labelled[other] >= 0) continue;
       const Eigen::Vector2d uv = h.fit.view.project(scene.balls[other].centre);
       uncertain |= (uv - own.uv).norm() < 0.5 * own.radius_px;
     }
     const Eigen::Vector2d uv = h.fit.view.project(scene.balls[k].centre);
     for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
       const auto& other = scene.candidates[i];
-      uncertain |= static_cast<int>(i) != named[k] &&
+      uncertain |= static_cast<int>(i) != labelled[k] &&
                    (other.uv - uv).norm() < 5 * match_sigma_px(scene, h.fit.view, k, i);
     }
     if (uncertain) h.candidate_of_ball[k] = -1;
   }
 }
 
-/// Takes out of `h` each pair that `rival` does not share, if `rival` names any ball otherwise than `h`.
+/// Removes from `h` each pair that `rival` lacks, if `rival` assigns another candidate to any fiducial.
 void keep_agreed(Hypothesis& h, const Hypothesis& rival) {
-  const auto& mine = h.candidate_of_ball;
-  const auto& theirs = rival.candidate_of_ball;
+  const auto& own_labels = h.candidate_of_ball;
+  const auto& of_rival = rival.candidate_of_ball;
   bool other = false;
-  for (std::size_t k = 0; k < mine.size(); ++k) other |= theirs[k] >= 0 && theirs[k] != mine[k];
-  for (std::size_t k = 0; other && k < mine.size(); ++k)
-    if (theirs[k] != mine[k]) h.candidate_of_ball[k] = -1;
+  for (std::size_t k = 0; k < own_labels.size(); ++k)
+    other |= of_rival[k] >= 0 && of_rival[k] != own_labels[k];
+  for (std::size_t k = 0; other && k < own_labels.size(); ++k)
+    if (of_rival[k] != own_labels[k]) h.candidate_of_ball[k] = -1;
 }
 
 bool contradicts(const Hypothesis& rival, const Hypothesis& h) {
   Hypothesis agreed = h;
   keep_agreed(agreed, rival);
-  return rival.mirrored() != h.mirrored() || count_named(agreed) < count_named(h);
+  return rival.mirrored() != h.mirrored() || count_labelled(agreed) < count_labelled(h);
 }
 
 /// Chi-square over its degrees of freedom as a standard normal deviate (Wilson and Hilferty 1931).
@@ -112,65 +112,66 @@ double deviate(double chi2, int dof) {
   return (std::cbrt(chi2 / dof) - (1 - spread)) / std::sqrt(spread);
 }
 
-/// The best that the calibrator can do with its balls well off their places: better than `best` when the file
-/// is of a similar but different calibrator, of which a few balls happen to fit.
+/// The best hypothesis with enlarged errors. It exceeds the best one if the file describes a similar but
+/// different calibrator, of which a few fiducials fit by chance.
 Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options) {
   const Hypothesis& best = search.ranking().front();
   Scene loose = search.scene();
   for (auto& candidate : loose.candidates) {
     candidate.sigma_px = std::hypot(candidate.sigma_px, 0.006 * loose.field_radius_px);
   }
-  for (auto& ball : loose.balls) ball.sigma_mm *= 3;  // well off, for a ball of stated tolerance
-  Hypothesis found = settle(loose, best.fit.view);
+  for (auto& ball : loose.balls) ball.sigma_mm *= 3;  // three times the stated tolerance
+  Hypothesis found = match_and_fit(loose, best.fit.view);
   const auto could_match = static_cast<double>(std::min(loose.candidates.size(), loose.balls.size()));
   if (best.matched >= 0.75 * could_match) return found;
   for (const View& rough : search.supported(best.matched, most_loose)) {
-    if (found.log_odds > best.log_odds && surely(found, options)) break;
-    Hypothesis other = settle(loose, rough, best.matched);
+    if (found.log_odds > best.log_odds && is_certain(found, options)) break;
+    Hypothesis other = match_and_fit(loose, rough, best.matched);
     if (other.log_odds > found.log_odds) found = std::move(other);
   }
   return found;
 }
 
 tl::unexpected<Failure> too_few(int balls, int candidates) {
-  return fail(
-      Reason::too_few_fiducials,
-      fmt::format("only {} balls of the calibrator could be recognised; {} are needed", balls, least_balls),
-      {{"n", balls}, {"candidates", candidates}, {"needed", least_balls}});
+  return fail(Reason::too_few_fiducials,
+              fmt::format("{} fiducials were labelled, at least {} are required", balls, least_balls),
+              {{"n", balls}, {"candidates", candidates}, {"needed", least_balls}});
 }
 
-/// A stated tolerance is itself known to about 40 %; without one, 1.
+/// Factor on the variance: a stated tolerance is uncertain by about 40 %.
 double variance_allowance(const Scene& scene) { return scene.balls.front().sigma_mm > 0 ? 2 : 1; }
 
-/// Chi-square beyond chance, and not for one false disc's sake that posed as a ball.
-bool misfits(const Scene& scene, const Hypothesis& h) {
+/// Whether chi-square exceeds its limit, also without the worst fiducial, which may be an outlier.
+bool is_inconsistent(const Scene& scene, const Hypothesis& h) {
   const double allowance = variance_allowance(scene);
-  if (deviate(h.fit.chi2 / allowance, 2 * h.matched - 6) < most_deviation) return false;
+  if (deviate(h.fit.chi2 / allowance, 2 * h.matched - 6) < chi2_sigmas) return false;
   Hypothesis kept = h;
-  if (const auto off = inflated(scene, h); !off.empty()) kept = without(scene, h, off.front());
-  const int named = count_named(kept);
-  return named < std::max(least_balls, h.matched - 1) ||
-         deviate(kept.fit.chi2 / allowance, 2 * named - 6) > most_deviation;
+  if (const auto off = outlying(scene, h); !off.empty()) kept = without(scene, h, off.front());
+  const int labelled = count_labelled(kept);
+  return labelled < std::max(least_balls, h.matched - 1) ||
+         deviate(kept.fit.chi2 / allowance, 2 * labelled - 6) > chi2_sigmas;
 }
 
-/// Why not even the best hypothesis is to be believed, if so.
-std::optional<Failure> objection(const LabelSearch& search, const LabellingOptions& options) {
+/// The reason to refuse the best hypothesis, if any.
+std::optional<Failure> refusal_of(const LabelSearch& search, const LabellingOptions& options) {
   const Scene& scene = search.scene();
   const Ranking& ranking = search.ranking();
   const int n = static_cast<int>(scene.candidates.size());
   if (ranking.empty() || ranking.front().log_odds <= 0) {
     if (n < least_balls + 2) return too_few(ranking.empty() ? 0 : ranking.front().matched, n).value();
     return fail(Reason::calibrator_mismatch,
-                fmt::format("no pose of the calibrator explains the {} discs found in the image", n),
+                fmt::format("no pose of the calibrator explains the {} candidates in the image", n),
                 {{"candidates", n}, {"matched", ranking.empty() ? 0 : ranking.front().matched}})
         .value();
   }
   const Hypothesis& best = ranking.front();
   const int dof = 2 * best.matched - 6;
   const Hypothesis loose = loose_best(search, options);
-  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || misfits(scene, best)) {
+  if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || is_inconsistent(scene, best)) {
     return fail(Reason::calibrator_mismatch,
-                fmt::format("the balls lie near the calibrator's places but not at them ({:.2f} px)",
+                fmt::format("the fiducials deviate from the calibrator's coordinates by {:.2f} px rms: wrong "
+                            "calibrator file, "
+                            "pixel size or source distance",
                             std::sqrt(loose.residual2_px2 / loose.matched)),
                 {{"matched", best.matched},
                  {"chi2", best.fit.chi2},
@@ -183,8 +184,9 @@ std::optional<Failure> objection(const LabelSearch& search, const LabellingOptio
   if (best.matched < least_balls) return too_few(best.matched, n).value();
   if (best.log_odds < options.least_log_odds) {
     return fail(Reason::ambiguous_labels,
-                fmt::format("{} of the {} discs fit the calibrator, but chance could do as well",
-                            best.matched, n),
+                fmt::format("{} of {} candidates fit the calibrator, with log odds of {:.1f} against chance, "
+                            "limit {:g}",
+                            best.matched, n, best.log_odds, options.least_log_odds),
                 {{"matched", best.matched},
                  {"log_odds", best.log_odds},
                  {"log_odds_needed", options.least_log_odds}})
@@ -193,63 +195,68 @@ std::optional<Failure> objection(const LabelSearch& search, const LabellingOptio
   return std::nullopt;
 }
 
-/// Rivals whose log odds are less by up to so many times what is asked for are compared by the candidates'
-/// own errors, too: one more ball that fits badly may outweigh a rival that fits well.
-constexpr double contest_width = 3;
+/// Rivals within this multiple of the required log odds are also compared by the candidates' own errors: one
+/// more fiducial that fits badly may outweigh a rival that fits well.
+constexpr double comparison_width = 3;
 
-/// The best hypothesis, or one almost as good that contradicts it and is surely better by the candidates' own
+/// The best hypothesis, or a rival almost as good that contradicts it and is better by the candidates' own
 /// errors.
-Hypothesis finest(const LabelSearch& search, const LabellingOptions& options) {
+Hypothesis best_by_own_errors(const LabelSearch& search, const LabellingOptions& options) {
   const Hypothesis* best = &search.ranking().front();
   for (const Hypothesis& rival : search.ranking()) {
-    if (search.ranking().front().log_odds - rival.log_odds >= contest_width * options.least_log_odds) break;
+    if (search.ranking().front().log_odds - rival.log_odds >= comparison_width * options.least_log_odds)
+      break;
     if (rival.matched < least_balls || !contradicts(rival, *best)) continue;
     if (fine_margin(search.scene(), rival, *best).value_or(0) >= options.least_log_odds) best = &rival;
   }
   return *best;
 }
 
-/// Whether `rival` cannot be told from `h` for sure.
-bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double asked) {
+/// Whether `h` does not exceed `rival` by the required log odds.
+bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
   const double margin = h.log_odds - rival.log_odds;
-  if (margin >= contest_width * asked) return false;
+  if (margin >= comparison_width * required) return false;
   const auto fine = fine_margin(scene, h, rival);
-  if (!fine) return margin < asked;
-  return *fine < (margin < asked ? asked : 0);
+  if (!fine) return margin < required;
+  return *fine < (margin < required ? required : 0);
 }
 
-/// The best hypothesis less the balls in doubt and whatever an almost as good one contradicts; refused when
-/// too little remains.
-Expected<Hypothesis> undisputed(LabelSearch& search, const LabellingOptions& options) {
+/// The best hypothesis without outlying fiducials and without labels that a rival almost as good contradicts.
+/// Refused if fewer than six labels remain.
+Expected<Hypothesis> unambiguous(LabelSearch& search, const LabellingOptions& options) {
   const Scene& scene = search.scene();
-  Hypothesis best = finest(search, options);
+  Hypothesis best = best_by_own_errors(search, options);
   const int dof = 2 * best.matched - 6;
-  // Where chi2 is larger than chance makes it (by 1.5 sigma), the odds are less sure in the same measure.
-  const double asked =
+  // If chi2 exceeds its expectation by over 1.5 sigma, the required odds grow in proportion.
+  const double required =
       options.least_log_odds * std::max(1.0, best.fit.chi2 / (dof + 1.5 * std::sqrt(2.0 * dof)));
   const int matched = best.matched;
   const int n = static_cast<int>(scene.candidates.size());
-  // All in doubt go, since it need not be the farthest that is false; what they would be instead is weighed.
-  for (auto off = inflated(scene, best); !off.empty(); off = inflated(scene, best)) {
+  // All outlying fiducials are removed, since the farthest is not always the outlier; then other candidates
+  // near them are tried.
+  for (auto off = outlying(scene, best); !off.empty(); off = outlying(scene, best)) {
     for (const int ball : off) best = without(scene, std::move(best), ball);
-    if (count_named(best) < least_balls) return too_few(count_named(best), n);
-    weigh(scene, best);
+    if (count_labelled(best) < least_balls) return too_few(count_labelled(best), n);
+    evaluate_odds(scene, best);
     search.try_near_misses(best);
   }
   const Hypothesis full = best;
   drop_covered(scene, best);
-  if (count_named(best) < least_balls) return too_few(count_named(best), n);
+  if (count_labelled(best) < least_balls) return too_few(count_labelled(best), n);
   for (const auto& rival : search.ranking()) {
-    if (full.log_odds - rival.log_odds >= contest_width * asked) break;
-    if (!contradicts(rival, best) || !is_close(scene, full, rival, asked)) continue;
+    if (full.log_odds - rival.log_odds >= comparison_width * required) break;
+    if (!contradicts(rival, best) || !is_close(scene, full, rival, required)) continue;
     if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
-    if (rival.mirrored() != best.mirrored() || count_named(best) < least_balls) {
-      return fail(Reason::ambiguous_labels, "another labelling explains the image almost as well",
+    if (rival.mirrored() != best.mirrored() || count_labelled(best) < least_balls) {
+      return fail(Reason::ambiguous_labels,
+                  fmt::format("another labelling explains the image almost as well: log odds {:.1f} apart, "
+                              "at least {:.1f} are required",
+                              full.log_odds - rival.log_odds, required),
                   {{"matched", matched},
                    {"runner_up_matched", rival.matched},
                    {"mirror_differs", rival.mirrored() != best.mirrored()},
                    {"margin", full.log_odds - rival.log_odds},
-                   {"margin_needed", asked}});
+                   {"margin_needed", required}});
     }
   }
   best.fit = fit_pose(best.fit.view, correspondences_of(scene, best.candidate_of_ball, best.fit.view),
@@ -265,16 +272,16 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
-  // A labelling of as many balls, less one, would have been met.
-  explore(search, triples_to_meet(least_balls, candidates.size()),
-          [&](const Hypothesis& h, std::size_t tried) {
-            return surely(h, options) &&
-                   tried >= triples_to_meet(std::max(least_balls, h.matched - 1), candidates.size());
-          });
-  if (!search.ranking().empty()) challenge(search);
-  auto failure = objection(search, options);
+  // By then, a labelling with one fiducial less would have been found, too.
+  try_random_triples(
+      search, triples_required(least_balls, candidates.size()), [&](const Hypothesis& h, std::size_t tried) {
+        return is_certain(h, options) &&
+               tried >= triples_required(std::max(least_balls, h.matched - 1), candidates.size());
+      });
+  if (!search.ranking().empty()) search_rivals(search);
+  auto failure = refusal_of(search, options);
   if (failure) return tl::unexpected(*std::move(failure));
-  const auto best = undisputed(search, options);
+  const auto best = unambiguous(search, options);
   if (!best) return tl::unexpected(best.error());
 
   Labelling labelling;
@@ -283,7 +290,7 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   labelling.view.camera_from_world.translation -=
       best->fit.view.camera_from_world.rotation * centroid(calibrator);
   labelling.mirrored = best->mirrored();
-  labelling.matched = count_named(*best);
+  labelling.matched = count_labelled(*best);
   labelling.false_blobs = n - best->matched;
   labelling.rms_px = std::sqrt(best->residual2_px2 / best->matched);
   labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best->radius_excess) - 1;

@@ -18,14 +18,14 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr std::size_t max_candidates = 30;
-constexpr double paper_systematic = 2e-3;  // of the field radius: what a quadratic leaves of the distortion
+constexpr double paper_systematic = 2e-3;  // of the field radius: residual distortion of a quadratic map
 constexpr double shared_bias_sigma = 0.008;
 constexpr double sigma_floor_px = 0.02;
-constexpr double rescue_reach_px = 4;
-constexpr double tolerance_sigmas = 3.3;      // as far as a labelled ball may lie off
-constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that was never measured
+constexpr double prediction_reach_px = 4;
+constexpr double tolerance_sigmas = 3.3;      // as for a labelled fiducial
+constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that has not been measured
 
-/// Dots that may be balls of the calibrator, the clearest first.
+/// Dots that may be fiducials, by decreasing ratio of contrast to misfit.
 std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionMap& map,
                                  const Calibrator& calibrator) {
   const auto& pixel_mm = map.rectified_pixel_mm;
@@ -35,9 +35,9 @@ std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionM
     if (radii.low <= dot.radius_px && dot.radius_px <= radii.high && dot.sigma_px < 0.5 &&
         map.rectified_from_raw(dot.centre_px))
       balls.push_back(dot);
-  const auto clarity = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
+  const auto contrast_to_misfit = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
   std::stable_sort(balls.begin(), balls.end(),
-                   [&](const Dot& a, const Dot& b) { return clarity(a) > clarity(b); });
+                   [&](const Dot& a, const Dot& b) { return contrast_to_misfit(a) > contrast_to_misfit(b); });
   if (balls.size() > max_candidates) balls.resize(max_candidates);
   return balls;
 }
@@ -53,7 +53,7 @@ LabellingPrior prior_of(const XrayImage& xray_image, const DistortionMap& map) {
   return prior;
 }
 
-/// Of a ball's image, rectified, per axis.
+/// Standard deviation of a fiducial's image point, rectified, per axis.
 double sigma_of(const Dot& dot, const DistortionMap& map, const Vector2d& uv) {
   const double map_sigma = map.sigma_px(uv);
   return std::sqrt(dot.error_px() * dot.error_px() + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
@@ -63,28 +63,28 @@ double predicted_radius(const View& view, const CalibratorBall& ball) {
   return 0.5 * ball.diameter_mm * std::abs(view.intrinsics.fy) / view.depth(ball.centre_in_calibrator);
 }
 
-/// The named balls fitted with a profile of their own, and the others looked for where the pose puts them.
+/// Fits fiducials with the profile common to the labelled ones.
 class BallFitter {
  public:
   BallFitter(const XrayImage& xray_image, const Rectification& rectification, const Candidates& candidates,
-             const std::vector<Dot>& named)
-      : exposure_(xray_image),
-        look_(estimate_look(xray_image, rectification.noise, named)),
+             const std::vector<Dot>& labelled_dots)
+      : image_(xray_image),
+        look_(estimate_look(xray_image, rectification.noise, labelled_dots)),
         neighbours_(candidates.dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
-    for (const Dot& dot : named) contrasts.push_back(dot.contrast);
+    for (const Dot& dot : labelled_dots) contrasts.push_back(dot.contrast);
     std::sort(contrasts.begin(), contrasts.end());
     typical_contrast_ = contrasts[contrasts.size() / 2];
   }
 
   std::optional<Dot> fit(const Dot& start) const {
-    const auto fitted = refit_dots(exposure_, {start}, look_, neighbours_);
+    const auto fitted = refit_dots(image_, {start}, look_, neighbours_);
     return fitted.empty() ? std::nullopt : std::optional(fitted.front());
   }
 
-  /// A ball at its predicted place, or nothing where the pixels do not show one.
-  std::optional<Dot> rescue(const Vector2d& raw, double radius, double reach_px) const {
+  /// A fiducial at its predicted position; nothing if none is visible there.
+  std::optional<Dot> fit_at_prediction(const Vector2d& raw, double radius, double reach_px) const {
     Dot start;
     start.centre_px = raw;
     start.radius_px = radius;
@@ -93,12 +93,12 @@ class BallFitter {
   }
 
   bool is_black(const Vector2d& raw) const {
-    return exposure_.pixels(static_cast<int>(std::lround(raw.x())), static_cast<int>(std::lround(raw.y()))) <=
+    return image_.pixels(static_cast<int>(std::lround(raw.x())), static_cast<int>(std::lround(raw.y()))) <=
            look_.options.floor;
   }
 
  private:
-  const XrayImage& exposure_;
+  const XrayImage& image_;
   DotLook look_;
   std::vector<Dot> neighbours_;
   double typical_contrast_ = 0;
@@ -109,11 +109,11 @@ bool inside(const XrayImage& xray_image, const Vector2d& raw, double margin) {
          raw.y() <= xray_image.pixels.height() - 1 - margin;
 }
 
-/// Why a ball that the pose puts here was not seen.
-FiducialStatus absence(const XrayImage& xray_image, const BallFitter& fitter, const Vector2d& raw,
-                       double radius, const std::vector<Dot>& named) {
+/// Why a fiducial predicted at `raw` was not measured.
+FiducialStatus status_if_absent(const XrayImage& xray_image, const BallFitter& fitter, const Vector2d& raw,
+                                double radius, const std::vector<Dot>& labelled_dots) {
   if (!inside(xray_image, raw, 0.5 * radius) || fitter.is_black(raw)) return FiducialStatus::outside;
-  const bool behind = std::any_of(named.begin(), named.end(), [&](const Dot& other) {
+  const bool behind = std::any_of(labelled_dots.begin(), labelled_dots.end(), [&](const Dot& other) {
     return (other.centre_px - raw).norm() < 1.2 * other.radius_px;
   });
   return behind ? FiducialStatus::occluded : FiducialStatus::not_found;
@@ -133,25 +133,25 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
   fiducial.radius_px = dot.radius_px / std::sqrt(std::abs(map.jacobian(*uv).determinant()));
 }
 
-/// Whether balls off their places may be the reason that no labels were found.
-bool may_be_printed(const Expected<Labelling>& labelling, const Calibrator& calibrator) {
+/// Whether displaced fiducials may be the reason that labelling failed.
+bool may_be_displaced(const Expected<Labelling>& labelling, const Calibrator& calibrator) {
   return !labelling && calibrator.tolerance_mm < printed_tolerance_mm &&
          (labelling.error().reason == Reason::calibrator_mismatch ||
           labelling.error().reason == Reason::ambiguous_labels);
 }
 
-/// Where the labels were ambiguous, a tolerance must explain more balls; else it only hides the ambiguity.
+/// A tolerance resolves ambiguous labels only if it explains more fiducials.
 bool explains_more(const Labelling& loose, const Failure& without) {
   const auto matched = without.figures.find("matched");
   return without.reason != Reason::ambiguous_labels ||
          (matched != without.figures.end() && loose.matched > matched->second);
 }
 
-/// In the paper's mode a ball lies where the Hough transform sees its circle.
-std::vector<Dot> hough_circles(const XrayImage& xray_image, const std::vector<Dot>& named) {
+/// `--method paper` takes the Hough transform's circle centres.
+std::vector<Dot> hough_circles(const XrayImage& xray_image, const std::vector<Dot>& labelled_dots) {
   double least = 1e9;
   double most = 0;
-  for (const Dot& dot : named) {
+  for (const Dot& dot : labelled_dots) {
     least = std::min(least, dot.radius_px);
     most = std::max(most, dot.radius_px);
   }
@@ -200,7 +200,7 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
     prior.radius_bias_sigma = shared_bias_sigma;
   }
   auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
-  if (may_be_printed(labelling, calibrator)) {
+  if (may_be_displaced(labelling, calibrator)) {
     labelling_options.tolerance_mm = printed_tolerance_mm;
     auto loose = label_balls(calibrator, rectified, prior, labelling_options);
     if (loose && explains_more(*loose, labelling.error()))
@@ -218,13 +218,13 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
   found.runner_up_rms_px = labelling->runner_up_rms_px;
   found.radius_bias = labelling->radius_bias;
   found.assumed_tolerance_mm = labelling_options.tolerance_mm;
-  std::vector<Dot> named;
+  std::vector<Dot> labelled_dots;
   for (const int candidate : labelling->candidate_of_ball)
-    if (candidate >= 0) named.push_back(balls[static_cast<std::size_t>(candidate)]);
-  const BallFitter fitter(xray_image, rectification, candidates, named);
+    if (candidate >= 0) labelled_dots.push_back(balls[static_cast<std::size_t>(candidate)]);
+  const BallFitter fitter(xray_image, rectification, candidates, labelled_dots);
   const double tolerance_mm = std::hypot(calibrator.tolerance_mm, labelling_options.tolerance_mm);
   const std::vector<Dot> circles =
-      method == Method::paper ? hough_circles(xray_image, named) : std::vector<Dot>{};
+      method == Method::paper ? hough_circles(xray_image, labelled_dots) : std::vector<Dot>{};
 
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const CalibratorBall& ball = calibrator.balls[k];
@@ -238,12 +238,12 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
     if (candidate >= 0)
       dot = fitter.fit(balls[static_cast<std::size_t>(candidate)]);
     else if (inside(xray_image, raw, 2))
-      dot = fitter.rescue(raw, radius,
-                          rescue_reach_px + tolerance_sigmas * tolerance_mm * 2 * radius / ball.diameter_mm);
+      dot = fitter.fit_at_prediction(
+          raw, radius, prediction_reach_px + tolerance_sigmas * tolerance_mm * 2 * radius / ball.diameter_mm);
     if (dot && method == Method::paper) dot = circle_near(circles, *dot);
     if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
     if (fiducial.status != FiducialStatus::used)
-      fiducial.status = absence(xray_image, fitter, raw, radius, named);
+      fiducial.status = status_if_absent(xray_image, fitter, raw, radius, labelled_dots);
     found.fiducials.push_back(fiducial);
   }
   for (std::size_t i = 0; i < balls.size(); ++i) {

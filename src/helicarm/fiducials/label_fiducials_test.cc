@@ -22,7 +22,7 @@ const SimulatedCase& sound_case() {
   return simulated_case;
 }
 
-/// The lateral view mirrored, two stray balls, two of the calibrator's lost.
+/// Lateral view mirrored, two decoy balls, two fiducials missing.
 const SimulatedCase& faulty_case() {
   static const SimulatedCase simulated_case =
       small_case(8, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
@@ -44,7 +44,7 @@ LabelledFiducials found_in(const SimulatedCase& simulated_case, const SimulatedV
   return label(xray_image, rectification, simulated_case.calibrator, {method}).value();
 }
 
-/// Every used ball is where it truly is, and every clear one is used.
+/// Every used fiducial is within the tolerance of its true position, and every clear one is used.
 void expect_right(const LabelledFiducials& found, const SimulatedView& view, double tolerance_px) {
   ASSERT_EQ(found.fiducials.size(), view.balls.size());
   for (std::size_t k = 0; k < view.balls.size(); ++k) {
@@ -59,7 +59,7 @@ void expect_right(const LabelledFiducials& found, const SimulatedView& view, dou
   }
 }
 
-TEST(LabelFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
+TEST(LabelFiducials, ApAndLateralViewLabelEveryFiducial) {
   for (const SimulatedView& view : sound_case().views) {
     const LabelledFiducials found = found_in(sound_case(), view);
     expect_right(found, view, 0.1);
@@ -69,7 +69,7 @@ TEST(LabelFiducials, ApAndLateralViewNameEveryBallAtItsPlace) {
   }
 }
 
-TEST(LabelFiducials, RectifiedPlaceIsTheRawOnesOwn) {
+TEST(LabelFiducials, RectifiedPixelsMapToTheRawOnes) {
   const XrayImage xray_image = exposure_of(sound_case().views[0]);
   const Rectification rectification = rectify(xray_image, plate48(), {}).value();
   const auto found = label(xray_image, rectification, sound_case().calibrator);
@@ -80,7 +80,7 @@ TEST(LabelFiducials, RectifiedPlaceIsTheRawOnesOwn) {
     }
 }
 
-TEST(LabelFiducials, MirroredLateralViewIsSeenToBeMirrored) {
+TEST(LabelFiducials, MirroredLateralViewIsDetected) {
   const LabelledFiducials found = found_in(faulty_case(), faulty_case().views[1]);
   EXPECT_TRUE(found.mirrored);
   EXPECT_LT(found.view.intrinsics.fx, 0);
@@ -88,7 +88,7 @@ TEST(LabelFiducials, MirroredLateralViewIsSeenToBeMirrored) {
   EXPECT_FALSE(found_in(faulty_case(), faulty_case().views[0]).mirrored);
 }
 
-TEST(LabelFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
+TEST(LabelFiducials, MissingBallsAreNotFoundAndDecoysAreUnlabelled) {
   for (const SimulatedView& view : faulty_case().views) {
     const LabelledFiducials found = found_in(faulty_case(), view);
     for (const Fiducial& fiducial : found.fiducials)
@@ -104,7 +104,7 @@ TEST(LabelFiducials, LostBallsAreNotFoundAndDecoysAreFalse) {
   }
 }
 
-TEST(LabelFiducials, BallOutOfTheFieldIsOutside) {
+TEST(LabelFiducials, BallOutsideTheFieldIsOutside) {
   XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& lost = sound_case().views[0].balls[5];
   Rectification rectification = rectify(xray_image, plate48(), {}).value();
@@ -119,7 +119,7 @@ TEST(LabelFiducials, BallOutOfTheFieldIsOutside) {
     EXPECT_EQ(fiducial.status == FiducialStatus::outside, fiducial.label == lost.name) << fiducial.label;
 }
 
-TEST(LabelFiducials, BallTheSearchMissedIsRescued) {
+TEST(LabelFiducials, BallWithoutACandidateIsFittedAtItsPrediction) {
   const XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& ball = sound_case().views[0].balls[6];
   ASSERT_EQ(ball.visibility, Visibility::clear);
@@ -132,7 +132,7 @@ TEST(LabelFiducials, BallTheSearchMissedIsRescued) {
   EXPECT_LT((found->fiducials[6].uv_raw - ball.raw).norm(), 0.1);
 }
 
-TEST(LabelFiducials, WithoutCandidatesIsRefused) {
+TEST(LabelFiducials, NoCandidatesAreRefused) {
   const XrayImage xray_image = exposure_of(sound_case().views[0]);
   Rectification rectification = rectify(xray_image, plate48(), {}).value();
   rectification.other_dots->clear();
@@ -141,7 +141,7 @@ TEST(LabelFiducials, WithoutCandidatesIsRefused) {
   EXPECT_EQ(found.error().reason, Reason::too_few_fiducials);
 }
 
-TEST(LabelFiducials, PaperMethodNamesTheBallsWithinAPixelAndAHalf) {
+TEST(LabelFiducials, PaperMethodMeasuresWithinAPixelAndAHalf) {
   const LabelledFiducials found = found_in(sound_case(), sound_case().views[0], Method::paper);
   int used = 0;
   for (std::size_t k = 0; k < found.fiducials.size(); ++k) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random images of a calibrator for the labelling's tests.
+// Random synthetic images of a calibrator for the tests of labelling.
 #pragma once
 
 #include <cmath>
@@ -51,12 +51,13 @@ struct SyntheticImage : simulation::SyntheticView {
 inline SyntheticImage image_of(const Calibrator& calibrator,
                                const simulation::SyntheticDetectionOptions& options, RandomStream& random) {
   SyntheticImage view_image{simulation::synthetic_detections(calibrator, options, random), {}};
-  for (const auto& disc : view_image.detections)
-    view_image.candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
+  for (const auto& detection : view_image.detections)
+    view_image.candidates.push_back(
+        {detection.uv, detection.sigma_px, detection.radius_px, detection.radius_sigma_px});
   return view_image;
 }
 
-/// Whether the mirroring is right and each named ball's candidate is that ball's disc or lies where it is.
+/// Whether the mirroring is right and each labelled ball's candidate is its detection, or lies at its image.
 inline bool right(const Labelling& labelling, const SyntheticImage& view_image,
                   const Calibrator& calibrator) {
   bool all = labelling.mirrored == view_image.mirrored();

@@ -22,7 +22,7 @@ struct Tally {
   int wrong = 0;
 };
 
-/// Random views with 0 to 6 balls hidden and 0 to 10 false discs.
+/// Random views with 0 to 6 hidden balls and 0 to 10 outliers.
 SyntheticImage any_image(const Calibrator& calibrator, std::uint64_t trial, double noise_px) {
   RandomStream random(1, 1, trial);
   const int hidden = static_cast<int>(random.index(7));
@@ -52,20 +52,20 @@ Expected<Labelling> label_one(const Calibrator& seen, const Calibrator& file,
   return label_balls(file, view_image.candidates, nominal);
 }
 
-TEST(LabelBalls, FineCentresFromAnySideAreNeverNamedWrong) {
+TEST(LabelBalls, PreciseCentresAreNeverLabelledWrong) {
   const auto tally = monte_carlo(helix(), 120, 0.1);
   EXPECT_EQ(tally.wrong, 0);
   EXPECT_GE(tally.good_solved, tally.good_views - 2);
 }
 
-TEST(LabelBalls, NoisyCentresFromAnySideAreNeverNamedWrong) {
+TEST(LabelBalls, NoisyCentresAreNeverLabelledWrong) {
   const auto tally = monte_carlo(helix(), 120, 0.5);
   EXPECT_EQ(tally.wrong, 0);
   EXPECT_GE(tally.good_solved, 0.93 * tally.good_views);
 }
 
-TEST(LabelBalls, PartsOfTheTruthGiveWayToAllOfIt) {
-  // In these the first fit misses true balls that lie within its own error, or names a few of them as others.
+TEST(LabelBalls, PartialLabellingsAreCompleted) {
+  // Regression: in these the first fit missed true balls within its own error, or mislabelled a few.
   for (const int trial : {241, 1639, 3544, 3976, 4259, 4680}) {
     const auto view_image = any_image(udcsc(), trial, 0.5);
     const auto labelling = label_balls(udcsc(), view_image.candidates, nominal);
@@ -73,14 +73,14 @@ TEST(LabelBalls, PartsOfTheTruthGiveWayToAllOfIt) {
   }
 }
 
-TEST(LabelBalls, ImitatedBallsDoNotBendTheNames) {
-  // In these a false disc near a hidden ball's place once cost a true ball its name, and kept its own.
+TEST(LabelBalls, ImitatingOutliersNeverGiveWrongLabels) {
+  // Regression: in these an outlier near a hidden ball was labelled, and a true ball was not.
   struct Hard {
     std::uint64_t seed, number;
   };
   for (const Hard hard : {Hard{1, 1040}, Hard{1, 2874}, Hard{1, 4800}, Hard{1, 6021}, Hard{1, 7785},
                           Hard{2, 6155}, Hard{2, 6880}, Hard{5, 47}, Hard{5, 7049}}) {
-    RandomStream random(hard.seed, 2000, hard.number);  // as the study draws it
+    RandomStream random(hard.seed, 2000, hard.number);  // as in the study
     const int hidden = static_cast<int>(random.index(7));
     const int outliers = static_cast<int>(random.index(11));
     const auto view_image = image_of(
@@ -125,8 +125,7 @@ TEST(LabelBalls, WithoutSpacingOrSourceDistance) {
 }
 
 TEST(LabelBalls, HelixFromAnotherStartingAngleIsRefusedFromTheSide) {
-  // Its balls are those of a turned copy of this one, 0.8 % wider: along the axis nobody could tell them
-  // apart.
+  // Its balls equal those of a turned copy of this one, 0.8 % wider: both agree in a view along the axis.
   int mismatches = 0;
   int views = 0;
   for (int trial = 0; trial < 60; ++trial) {
@@ -167,7 +166,7 @@ TEST(LabelBalls, FiveBallsAreTooFew) {
   }
 }
 
-TEST(LabelBalls, ClutterAloneIsNoCalibrator) {
+TEST(LabelBalls, OutliersAloneAreRefused) {
   for (int trial = 0; trial < 10; ++trial) {
     const auto labelling =
         label_one(helix(), helix(), {.hidden = 12, .outliers = 14, .noise_px = 0.3}, trial);
@@ -176,7 +175,7 @@ TEST(LabelBalls, ClutterAloneIsNoCalibrator) {
   }
 }
 
-TEST(LabelBalls, PlaneOfBallsLeavesTheMirroringOpen) {
+TEST(LabelBalls, CoplanarBallsLeaveTheMirroringAmbiguous) {
   // The mirror image of a plane is another view of that plane.
   Calibrator calibrator = scattered(9, 5);
   for (std::size_t k = 0; k < 7; ++k) {
@@ -198,7 +197,7 @@ TEST(LabelBalls, PlaneOfBallsLeavesTheMirroringOpen) {
   }
 }
 
-/// A flat, nearly symmetric phantom like many that are sold: pairs of balls that mirror each other.
+/// A flat, nearly mirror-symmetric phantom, like many commercial ones.
 Calibrator flat_and_symmetric(int balls, std::uint64_t seed, double half_height_mm = 4,
                               double jitter_mm = 0.4) {
   RandomStream random(seed, 8);
@@ -214,8 +213,8 @@ Calibrator flat_and_symmetric(int balls, std::uint64_t seed, double half_height_
   return calibrator;
 }
 
-TEST(LabelBalls, MoreOfFlatSymmetricPhantomIsFoundThanAFirstHypothesisNames) {
-  // Some balls of a larger phantom are the calibrator; the others are discs of the same size among them.
+TEST(LabelBalls, FlatSymmetricPhantomAmongEqualBallsIsLabelled) {
+  // The calibrator is a part of the phantom's balls; the others are outliers of the same size.
   LabellingPrior prior = nominal;
   prior.focal_px.reset();
   int solved = 0;
@@ -233,8 +232,8 @@ TEST(LabelBalls, MoreOfFlatSymmetricPhantomIsFoundThanAFirstHypothesisNames) {
   EXPECT_GE(solved, 20);
 }
 
-TEST(LabelBalls, CandidatesOwnErrorsTellMirrorTwinsApart) {
-  // By the general figure of the rectification's error alone, a flat phantom's mirrored image fits as well.
+TEST(LabelBalls, CandidatesOwnErrorsResolveTheMirrorAmbiguity) {
+  // With the rectification's mean error alone, a flat phantom's mirror image fits as well.
   LabellingPrior prior = nominal;
   prior.focal_px.reset();
   int before = 0, after = 0;
@@ -273,7 +272,7 @@ TEST(LabelBalls, PrintedPhantomWithDeclaredToleranceIsLabelled) {
   }
 }
 
-/// Balls anywhere in a slab, in pairs that mirror each other exactly, or on the conical helix.
+/// Balls at random in a slab, in mirror-symmetric pairs, or on the conical helix.
 enum class Shape { flat, symmetric, helical };
 
 Calibrator shaped(Shape shape, int balls, std::uint64_t seed) {
@@ -295,7 +294,7 @@ Calibrator shaped(Shape shape, int balls, std::uint64_t seed) {
   return calibrator;
 }
 
-/// 6 to 18 balls of which at most three are hidden, and up to eight false discs.
+/// 6 to 18 balls, up to three hidden, and up to eight outliers.
 void label_shaped_views(Shape shape, int views, const char* name) {
   int solved = 0, wrong = 0, tried = 0;
   std::map<Reason, int> refused;
@@ -335,9 +334,9 @@ TEST(LabelBalls, DISABLED_TenThousandViewsOfFlatSymmetricAndHelicalPhantoms) {
   label_shaped_views(Shape::helical, 3400, "helical");
 }
 
-TEST(LabelBalls, RadiusBiasFoundInOneViewServesTheNext) {
-  // Along the axis with an end ball hidden, a shift by one ball fits nearly as well, five per cent farther
-  // away.
+TEST(LabelBalls, RadiusBiasOfAnotherViewResolvesMoreViews) {
+  // Along the axis with an end ball hidden, labels shifted by one fit nearly as well at a 5 % larger
+  // distance.
   int before = 0;
   int after = 0;
   for (int trial = 0; trial < 300; ++trial) {
@@ -345,10 +344,10 @@ TEST(LabelBalls, RadiusBiasFoundInOneViewServesTheNext) {
     const auto view_image = image_of(helix(), {.hidden = 2, .noise_px = 0.5}, random);
     if (view_image.axis_deg() > 12) continue;
     before += label_balls(helix(), view_image.candidates, nominal).has_value();
-    LabellingPrior told = nominal;
-    told.radius_bias = view_image.radius_bias;
-    told.radius_bias_sigma = 0.007;
-    const auto labelling = label_balls(helix(), view_image.candidates, told);
+    LabellingPrior informed = nominal;
+    informed.radius_bias = view_image.radius_bias;
+    informed.radius_bias_sigma = 0.007;
+    const auto labelling = label_balls(helix(), view_image.candidates, informed);
     after += labelling.has_value();
     EXPECT_TRUE(!labelling || right(*labelling, view_image, helix()));
   }

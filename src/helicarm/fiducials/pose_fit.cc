@@ -15,7 +15,7 @@ using Vector9 = Eigen::Matrix<double, 9, 1>;
 
 using Four = Eigen::Array4d;
 
-/// Four sightings side by side; of the last four some may have no weight.
+/// Four correspondences for SIMD; the last group is padded with zero weights.
 struct FourCorrespondences {
   Four x, y, z, u, v, weight;
 };
@@ -36,7 +36,7 @@ std::vector<FourCorrespondences> in_fours(const std::vector<WeightedCorresponden
   return fours;
 }
 
-/// Of a point's image. Unknowns: rotation (applied from the left), translation, ln f, u0, v0.
+/// d pixel / d (rotation applied from the left, translation, ln f, u0, v0).
 Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& point) {
   const Intrinsics& k = view.intrinsics;
   const Eigen::Vector3d turned = view.camera_from_world.rotation * point;
@@ -55,26 +55,26 @@ Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& po
   return j;
 }
 
-/// A row of the Jacobian without its zeros, with the residual at its end.
+/// A row of the Jacobian without its zero, followed by the residual.
 using Row = std::array<Four, 8>;
-using Products = std::array<Row, 8>;
+using RowSums = std::array<Row, 8>;
 
-void add(Products& sums, const Row& row) {
+void add(RowSums& sums, const Row& row) {
   for (std::size_t i = 0; i < row.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j) sums[i][j] += row[i] * row[j];
 }
 
-/// Lower triangle of the normal equations; row 9 is the gradient and (9, 9) chi2. The last two rows make up
-/// whole vectors.
+/// Lower triangle of the normal equations; row 9 is the gradient, (9, 9) is chi2. Two rows pad the columns to
+/// whole SIMD vectors.
 using Normal = Eigen::Matrix<double, 12, 10>;
 
 Normal normal_equations(const View& view, const std::vector<FourCorrespondences>& fours,
                         const CameraPrior& prior) {
   constexpr std::array<int, 8> of_u{0, 1, 2, 3, 5, 6, 7, 9};
   constexpr std::array<int, 8> of_v{0, 1, 2, 4, 5, 6, 8, 9};
-  Products u_sums;
+  RowSums u_sums;
   for (Row& row : u_sums) row.fill(Four::Zero());
-  Products v_sums = u_sums;
+  RowSums v_sums = u_sums;
   const Eigen::Matrix3d& r = view.camera_from_world.rotation;
   const Eigen::Vector3d& t = view.camera_from_world.translation;
   const Intrinsics& k = view.intrinsics;
@@ -114,8 +114,7 @@ Normal normal_equations(const View& view, const std::vector<FourCorrespondences>
   return normal;
 }
 
-/// Cholesky's factor takes the place of the normal equations; what becomes of the gradient on the way is half
-/// of the solution.
+/// Cholesky factorisation in place; including the gradient's row in it does the forward substitution.
 Vector9 descent(Normal a, double damping) {
   a.diagonal().head<9>() *= 1 + damping;
   for (int j = 0; j < 9; ++j) {

@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// What is known of the camera before the balls are looked at: Gaussian about the file's nominal values.
+/// Gaussian prior of the camera about the file's nominal values.
 struct CameraPrior {
   double focal_px;
   double focal_sigma;  ///< relative
@@ -18,7 +18,7 @@ struct CameraPrior {
   double principal_sigma_px;  ///< per axis
 };
 
-/// A point of the world seen in the image.
+/// A world point (mm) and its image point (px).
 struct WeightedCorrespondence {
   Eigen::Vector3d point;
   Eigen::Vector2d uv;
@@ -27,16 +27,16 @@ struct WeightedCorrespondence {
 
 struct PoseFit {
   View view;
-  double chi2 = 0;        ///< residuals and the camera's departure from its prior
+  double chi2 = 0;        ///< of the residuals and of the camera prior
   double log_volume = 0;  ///< 0.5 ln det of the covariance of (rotation rad, translation mm, ln f, u0, v0)
-  Eigen::LLT<Eigen::Matrix<double, 9, 9>> information = {};  ///< the inverse of that covariance
+  Eigen::LLT<Eigen::Matrix<double, 9, 9>> information = {};  ///< inverse of that covariance
 };
 
-/// What the fit's own error does to a point's image, px^2.
+/// Covariance of a point's projection due to the fit, px^2.
 Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d& point);
 
-/// The most probable pose, focal length and principal point (square pixels, the mirroring of `start` kept),
-/// by Levenberg-Marquardt from `start`. The covariance is finite only with three or more sightings.
+/// Maximum a posteriori pose, focal length and principal point by Levenberg-Marquardt from `start`. Pixels
+/// are square; the mirroring of `start` is kept. The covariance is finite from three correspondences on.
 PoseFit fit_pose(const View& start, const std::vector<WeightedCorrespondence>& correspondences,
                  const CameraPrior& prior, int most_steps);
 

@@ -58,25 +58,25 @@ TEST(FitPose, KeepsTheMirroring) {
 }
 
 TEST(FitPose, GradientVanishesAtTheFit) {
-  // chi2 rises whichever way the pose is moved: an oracle that shares no derivative with the fit.
+  // chi2 rises in every direction of the pose: a test without derivatives.
   const auto seen = correspondences(9, 0.5);
   const auto fit = fit_pose(nudged(truth()), seen, prior, 50);
   for (int axis = 0; axis < 3; ++axis) {
-    for (const double way : {-1.0, 1.0}) {
+    for (const double direction : {-1.0, 1.0}) {
       View turned = fit.view;
       turned.camera_from_world.rotation =
-          Eigen::AngleAxisd(way * 1e-3, Eigen::Vector3d::Unit(axis)).matrix() *
+          Eigen::AngleAxisd(direction * 1e-3, Eigen::Vector3d::Unit(axis)).matrix() *
           turned.camera_from_world.rotation;
       EXPECT_GT(fit_pose(turned, seen, prior, 0).chi2, fit.chi2);
       View shifted = fit.view;
-      shifted.camera_from_world.translation += way * 0.2 * Eigen::Vector3d::Unit(axis);
+      shifted.camera_from_world.translation += direction * 0.2 * Eigen::Vector3d::Unit(axis);
       EXPECT_GT(fit_pose(shifted, seen, prior, 0).chi2, fit.chi2);
     }
   }
 }
 
-TEST(PredictionCovariance, IsWhatNoiseMakesOfThePrediction) {
-  // Over many fits to the same points: the simple way to the same numbers.
+TEST(PredictionCovariance, EqualsTheScatterOfSimulatedFits) {
+  // Reference: the scatter over 2000 fits.
   const Eigen::Vector3d elsewhere(40, -60, 10);
   const auto seen = correspondences(8, 0.5);
   const PoseFit fit = fit_pose(truth(), seen, prior, 20);

@@ -10,7 +10,7 @@ namespace {
 Hypothesis fitted_in(const Scene& scene, Hypothesis h) {
   h.fit = fit_pose(h.fit.view, correspondences_of(scene, h.candidate_of_ball, h.fit.view), scene.camera,
                    fit_steps);
-  weigh(scene, h);
+  evaluate_odds(scene, h);
   return h;
 }
 

@@ -7,9 +7,8 @@
 
 namespace helicarm {
 
-/// Log odds of `h` against `rival` by each candidate's own error instead of the general figure; all errors
-/// are enlarged by what the better fit of the two leaves beyond chance. Nothing where the candidates have
-/// none.
+/// Log odds of `h` over `rival` with each candidate's `own_sigma_px`, inflated by the smaller reduced
+/// chi-square of the two fits if that exceeds 1. Empty if a candidate has no own sigma.
 std::optional<double> fine_margin(const Scene& scene, const Hypothesis& h, const Hypothesis& rival);
 
 }  // namespace helicarm

@@ -15,7 +15,7 @@ namespace helicarm {
 namespace {
 
 constexpr std::size_t most_kept = 24;        // hypotheses
-constexpr std::size_t most_candidates = 16;  // that the search is measured by
+constexpr std::size_t most_candidates = 16;  // more do not extend the search
 
 Eigen::Matrix3d principal_axes_of(const std::vector<ModelBall>& balls) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -23,12 +23,12 @@ Eigen::Matrix3d principal_axes_of(const std::vector<ModelBall>& balls) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
 }
 
-/// Every item in turn, in random company, so that none is left out for long.
-class TripleDealer {
+/// Random triples in which all items occur equally often.
+class TripleSampler {
  public:
-  explicit TripleDealer(std::vector<int> items) : items_(std::move(items)), next_(items_.size()) {}
+  explicit TripleSampler(std::vector<int> items) : items_(std::move(items)), next_(items_.size()) {}
 
-  std::array<int, 3> deal() {
+  std::array<int, 3> next_triple() {
     if (next_ + 3 > items_.size()) {
       for (std::size_t i = items_.size(); i > 1; --i) {
         std::swap(items_[i - 1], items_[random_.index(static_cast<std::uint32_t>(i))]);
@@ -67,7 +67,7 @@ bool LabelSearch::try_triple(std::array<int, 3> candidates) {
 
 void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_px) {
   const Eigen::Vector2d& centre = scene_.camera.principal_px;
-  for (const PoseHypothesis& pose : filter_.filter(candidates, focal_px, wanted())) {
+  for (const PoseHypothesis& pose : filter_.filter(candidates, focal_px, required())) {
     if (scene_.mirrored && pose.mirrored != *scene_.mirrored) continue;
     std::array<Eigen::Vector2d, 3> image;
     std::array<Eigen::Vector3d, 3> points;
@@ -81,35 +81,35 @@ void LabelSearch::try_scale(const std::array<int, 3>& candidates, double focal_p
     const Eigen::Vector2d e1 = image[1] - image[0];
     const Eigen::Vector2d e2 = image[2] - image[0];
     Orthography start = orthography(*triangle, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));
-    start.behind1 *= pose.lean;
-    start.behind2 *= pose.lean;
+    start.behind1 *= pose.depth_sign;
+    start.behind2 *= pose.depth_sign;
     const auto depths = three_point_depths(*triangle, image, start);
     if (!depths) continue;
     const double fx = pose.mirrored ? -focal_px : focal_px;
     try_pose({{fx, focal_px, centre.x(), centre.y()}, three_point_pose(*triangle, image, *depths)},
-             pose.lean);
+             pose.depth_sign);
   }
 }
 
-int LabelSearch::wanted() const {
+int LabelSearch::required() const {
   return std::max(least_balls - 1, (ranking_.empty() ? 0 : ranking_.front().matched) - 3);
 }
 
-void LabelSearch::try_pose(const View& rough, double lean) {
+void LabelSearch::try_pose(const View& rough, double depth_sign) {
   auto key = match(scene_, rough, rough_gate_px(scene_));
   const auto matched = static_cast<int>(std::count_if(key.begin(), key.end(), [](int i) { return i >= 0; }));
-  if (matched < wanted()) return;
+  if (matched < required()) return;
   key.push_back(rough.intrinsics.fx < 0 ? -1 : 1);
-  key.push_back(lean < 0 ? -1 : 1);
+  key.push_back(depth_sign < 0 ? -1 : 1);
   if (!tried_.insert(std::move(key)).second) return;
-  met_.push_back({matched, rough});
-  keep(settle(scene_, rough, wanted()));
+  supported_.push_back({matched, rough});
+  keep(match_and_fit(scene_, rough, required()));
 }
 
-std::vector<View> LabelSearch::supported(int wanted, std::size_t most) const {
+std::vector<View> LabelSearch::supported(int required, std::size_t most) const {
   std::vector<Rough> enough;
-  std::copy_if(met_.begin(), met_.end(), std::back_inserter(enough),
-               [&](const Rough& rough) { return rough.matched >= wanted; });
+  std::copy_if(supported_.begin(), supported_.end(), std::back_inserter(enough),
+               [&](const Rough& rough) { return rough.matched >= required; });
   std::stable_sort(enough.begin(), enough.end(),
                    [](const Rough& p, const Rough& q) { return p.matched > q.matched; });
   std::vector<View> views;
@@ -129,30 +129,30 @@ void LabelSearch::try_near_misses(const Hypothesis& h) {
   }
 }
 
-void LabelSearch::try_twins(const Hypothesis& h) {
+void LabelSearch::try_symmetric_poses(const Hypothesis& h) {
   const Eigen::Vector3d flip(-1, 1, 1);  // of a mirrored image
   for (int which = 1; which < 16; ++which) {
     const auto sign = [&](int bit) { return which >> bit & 1 ? -1.0 : 1.0; };
     const Eigen::Vector3d along_axes(sign(0), sign(1), sign(2)), in_depth(1, 1, sign(3));
-    View twin = h.fit.view;
-    RigidTransform& pose = twin.camera_from_world;
+    View symmetric = h.fit.view;
+    RigidTransform& pose = symmetric.camera_from_world;
     pose.rotation = in_depth.asDiagonal() * pose.rotation * principal_axes_ * along_axes.asDiagonal() *
                     principal_axes_.transpose();
     const bool flips = along_axes.prod() * in_depth.z() < 0;
     if (flips) {
-      twin.intrinsics.fx *= -1;
+      symmetric.intrinsics.fx *= -1;
       pose.rotation = flip.asDiagonal() * pose.rotation;
       pose.translation = flip.asDiagonal() * pose.translation;
     }
-    if (scene_.mirrored && *scene_.mirrored != (twin.intrinsics.fx < 0)) continue;
-    keep(settle(scene_, twin, wanted()));
-    // From the rough gate the twin may settle on fewer or other balls than `h` itself did.
+    if (scene_.mirrored && *scene_.mirrored != (symmetric.intrinsics.fx < 0)) continue;
+    keep(match_and_fit(scene_, symmetric, required()));
+    // From the rough gate the matches may differ from those of `h`: a narrower gate is tried, too.
     Hypothesis same;
-    same.candidate_of_ball = match(scene_, twin, rough_gate_px(scene_) / 4);
-    const auto correspondences = correspondences_of(scene_, same.candidate_of_ball, twin);
-    if (static_cast<int>(correspondences.size()) < wanted()) continue;
-    same.fit = fit_pose(twin, correspondences, scene_.camera, fit_steps);
-    weigh(scene_, same);
+    same.candidate_of_ball = match(scene_, symmetric, rough_gate_px(scene_) / 4);
+    const auto correspondences = correspondences_of(scene_, same.candidate_of_ball, symmetric);
+    if (static_cast<int>(correspondences.size()) < required()) continue;
+    same.fit = fit_pose(symmetric, correspondences, scene_.camera, fit_steps);
+    evaluate_odds(scene_, same);
     keep(std::move(same));
   }
 }
@@ -174,36 +174,36 @@ void LabelSearch::keep(Hypothesis hypothesis) {
   if (ranking_.size() > most_kept) ranking_.pop_back();
 }
 
-std::size_t triples_to_meet(int balls, std::size_t candidates) {
+std::size_t triples_required(int balls, std::size_t candidates) {
   const double n = static_cast<double>(std::min(candidates, most_candidates));
   const double b = std::min(static_cast<double>(balls), n);
   return static_cast<std::size_t>(std::ceil(std::log(1e3) * n * (n - 1) * (n - 2) / (b * (b - 1) * (b - 2))));
 }
 
-void explore(LabelSearch& search, std::size_t triples,
-             const std::function<bool(const Hypothesis&, std::size_t)>& will_do) {
+void try_random_triples(LabelSearch& search, std::size_t triples,
+                        const std::function<bool(const Hypothesis&, std::size_t)>& is_sufficient) {
   std::vector<int> all(search.scene().candidates.size());
   std::iota(all.begin(), all.end(), 0);
-  TripleDealer dealer(all);
+  TripleSampler sampler(all);
   for (std::size_t i = 0; i < triples; ++i) {
-    search.try_triple(dealer.deal());
-    if (!search.ranking().empty() && will_do(search.ranking().front(), i + 1)) return;
+    search.try_triple(sampler.next_triple());
+    if (!search.ranking().empty() && is_sufficient(search.ranking().front(), i + 1)) return;
   }
 }
 
-void challenge(LabelSearch& search) {
+void search_rivals(LabelSearch& search) {
   std::vector<int> best;
   do {
     best = search.ranking().front().candidate_of_ball;
     std::vector<int> seen;
     std::copy_if(best.begin(), best.end(), std::back_inserter(seen), [](int i) { return i >= 0; });
-    const int triples = seen.size() < 8 ? 24 : 8;  // of six candidates few are left when one is not shared
-    TripleDealer dealer(seen);
-    for (int done = 0, dealt = 0; done < triples && dealt < 5 * triples; ++dealt) {
-      done += search.try_triple(dealer.deal()) ? 1 : 0;
+    const int triples = seen.size() < 8 ? 24 : 8;  // six candidates have few triples without a given one
+    TripleSampler sampler(seen);
+    for (int done = 0, sampled = 0; done < triples && sampled < 5 * triples; ++sampled) {
+      done += search.try_triple(sampler.next_triple()) ? 1 : 0;
     }
     search.try_near_misses(Hypothesis(search.ranking().front()));
-    search.try_twins(Hypothesis(search.ranking().front()));
+    search.try_symmetric_poses(Hypothesis(search.ranking().front()));
   } while (search.ranking().front().candidate_of_ball != best);
 }
 

@@ -11,34 +11,33 @@
 
 namespace helicarm {
 
-constexpr int least_balls = 6;  ///< that a labelling must name
+constexpr int least_balls = 6;  ///< least of a labelling
 
-/// The hypotheses met so far, best first and all different.
+/// The hypotheses found so far, best first, all different.
 using Ranking = std::vector<Hypothesis>;
 
-/// Takes three candidates for every three balls in turn, mirrored and not, and settles each pose that others
-/// of the candidates support.
+/// Pose hypotheses from three candidates and every three balls, mirrored and not; those supported by further
+/// candidates are matched and fitted.
 class LabelSearch {
  public:
   /// `focals_px`: the focal lengths at which poses are tried. The scene must outlive the search.
   LabelSearch(const Scene& scene, std::vector<double> focals_px);
 
-  /// False, and nothing done, when the three lie too nearly in a line or have been tried before.
+  /// False if the three are nearly collinear or have been tried.
   bool try_triple(std::array<int, 3> candidates);
 
-  /// Weighs what becomes of `h` when a candidate near a ball, but not near enough for it, is that ball after
-  /// all. A false disc in a hidden ball's stead can bend the fit until a true one is missed.
+  /// Adds the variants of `h` in which a candidate near a ball, but outside its gate, is assigned to it: an
+  /// outlier assigned to a hidden ball can shift the fit until a true candidate is outside.
   void try_near_misses(const Hypothesis& h);
 
-  /// Settles the poses that show nearly the same as `h` from afar, whatever the calibrator: turned back to
-  /// front in a mirrored image, and mirrored or turned about its principal axes, which keep a flat or
-  /// symmetric calibrator's balls about where they are.
-  void try_twins(const Hypothesis& h);
+  /// Fits the poses whose images are nearly those of `h` at a large distance: reversed in depth and mirrored,
+  /// and reflected or turned about the principal axes (flat or symmetric calibrators).
+  void try_symmetric_poses(const Hypothesis& h);
 
   const Ranking& ranking() const { return ranking_; }
 
-  /// The poses met that have candidates near at least `wanted` balls, best supported first, up to `most`.
-  std::vector<View> supported(int wanted, std::size_t most) const;
+  /// Up to `most` poses with candidates near at least `required` balls, by decreasing number.
+  std::vector<View> supported(int required, std::size_t most) const;
   const Scene& scene() const { return scene_; }
 
  private:
@@ -48,8 +47,8 @@ class LabelSearch {
   };
 
   void try_scale(const std::array<int, 3>& candidates, double focal_px);
-  int wanted() const;  ///< balls near candidates
-  void try_pose(const View& rough, double lean);
+  int required() const;  ///< balls near candidates
+  void try_pose(const View& rough, double depth_sign);
   void keep(Hypothesis hypothesis);
 
   const Scene& scene_;
@@ -58,20 +57,21 @@ class LabelSearch {
   Eigen::Matrix3d principal_axes_;  ///< of the balls, columns
   HypothesisFilter filter_;
   std::set<std::array<int, 3>> triples_;  ///< tried
-  std::set<std::vector<int>> tried_;      ///< matches of the poses settled
-  std::vector<Rough> met_;
+  std::set<std::vector<int>> tried_;      ///< matches of the fitted poses
+  std::vector<Rough> supported_;
   Ranking ranking_;
 };
 
-/// So many random triples that `balls` balls among the candidates escape with a chance below 1e-3.
-std::size_t triples_to_meet(int balls, std::size_t candidates);
+/// Number of random triples after which none is of three true balls, of `balls` among the candidates, with a
+/// probability below 1e-3.
+std::size_t triples_required(int balls, std::size_t candidates);
 
-/// Tries up to `triples` random triples of the candidates, until the best hypothesis will do after so many.
-void explore(LabelSearch& search, std::size_t triples,
-             const std::function<bool(const Hypothesis&, std::size_t tried)>& will_do);
+/// Tries up to `triples` random triples of the candidates, until the best hypothesis is sufficient.
+void try_random_triples(LabelSearch& search, std::size_t triples,
+                        const std::function<bool(const Hypothesis&, std::size_t tried)>& is_sufficient);
 
-/// Seeks rivals of the best hypothesis on triples of its own candidates, and of whichever unseats it. A rival
-/// almost as good shares all but one or two of its candidates, so it holds several of these triples whole.
-void challenge(LabelSearch& search);
+/// Searches for rivals of the best hypothesis on triples of its candidates, and again whenever the best
+/// changes. A rival almost as good shares all but one or two candidates, hence several triples.
+void search_rivals(LabelSearch& search);
 
 }  // namespace helicarm

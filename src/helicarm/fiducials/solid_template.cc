@@ -62,8 +62,8 @@ Span in_cylinder(const Vector3d& start, const Vector3d& along, const Vector3d& a
 double path_in_target(const CalibratorTarget& target, const Vector3d& point, const Vector3d& along) {
   const Vector3d start = point - target.point_in_calibrator;
   const double radius = 0.5 * target.diameter_mm;
-  const double endless = 1e6;
-  const double length = target.length_mm > 0 ? target.length_mm : endless;
+  const double unlimited_mm = 1e6;
+  const double length = target.length_mm > 0 ? target.length_mm : unlimited_mm;
   switch (target.kind) {
     case TargetKind::ball:
       return in_sphere(start, along, radius).length();
@@ -99,10 +99,10 @@ PathImage image_of_target(const CalibratorTarget& target, const View& view, doub
 }
 
 SolidTemplate::SolidTemplate(const PathImage& view_image, double attenuation_per_mm, double blur_px)
-    : shade_(view_image.path_mm), middle_(view_image.middle) {
-  for (float& path : shade_.pixels())
+    : absorbed_(view_image.path_mm), middle_(view_image.middle) {
+  for (float& path : absorbed_.pixels())
     if (path > 0) path = -std::expm1(-static_cast<float>(attenuation_per_mm) * path);
-  cv::Mat mat = as_mat(shade_);
+  cv::Mat mat = as_mat(absorbed_);
   cv::GaussianBlur(mat, mat, {}, blur_px * PathImage::per_pixel, 0, cv::BORDER_REPLICATE);
 }
 
@@ -111,13 +111,14 @@ SolidTemplate::Sample SolidTemplate::at(const Vector2d& offset) const {
   const double y = offset.y() * PathImage::per_pixel + middle_;
   const int i = static_cast<int>(std::floor(x));
   const int j = static_cast<int>(std::floor(y));
-  if (i < 0 || j < 0 || i + 1 >= shade_.width() || j + 1 >= shade_.height()) return {0, Vector2d::Zero()};
+  if (i < 0 || j < 0 || i + 1 >= absorbed_.width() || j + 1 >= absorbed_.height())
+    return {0, Vector2d::Zero()};
   const double s = x - i;
   const double t = y - j;
-  const double a = double(shade_(i, j));
-  const double b = double(shade_(i + 1, j));
-  const double c = double(shade_(i, j + 1));
-  const double d = double(shade_(i + 1, j + 1));
+  const double a = double(absorbed_(i, j));
+  const double b = double(absorbed_(i + 1, j));
+  const double c = double(absorbed_(i, j + 1));
+  const double d = double(absorbed_(i + 1, j + 1));
   return {(1 - t) * ((1 - s) * a + s * b) + t * ((1 - s) * c + s * d),
           PathImage::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
 }

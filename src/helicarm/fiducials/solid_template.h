@@ -9,8 +9,8 @@
 
 namespace helicarm {
 
-/// Length of a straight line inside a target's metal, mm. `along` is a unit vector. Wires are as long as the
-/// file says, or without end; a line's end is flat.
+/// Length (mm) of the ray from `point` along the unit vector `along` inside a target's metal. Wires have the
+/// file's length, or are infinite without one; a line's end is flat.
 double path_in_target(const CalibratorTarget& target, const Eigen::Vector3d& point,
                       const Eigen::Vector3d& along);
 
@@ -23,7 +23,7 @@ struct PathImage {
 
 PathImage image_of_target(const CalibratorTarget& target, const View& view, double half_width_px);
 
-/// The share of the rays that a target absorbs, 1 - exp(-attenuation x path), blurred.
+/// Absorbed share of the radiation, 1 - exp(-attenuation x path), blurred.
 class SolidTemplate {
  public:
   SolidTemplate(const PathImage& view_image, double attenuation_per_mm, double blur_px);
@@ -32,11 +32,11 @@ class SolidTemplate {
     double value;
     Eigen::Vector2d slope;  ///< d value / d offset
   };
-  /// At an offset (rectified px) from the image of the target's point; nought outside.
+  /// At an offset (rectified px) from the image of the target's point; zero outside the template.
   Sample at(const Eigen::Vector2d& offset) const;
 
  private:
-  Image<float> shade_;
+  Image<float> absorbed_;
   int middle_;
 };
 

@@ -39,8 +39,9 @@ std::optional<Orthography> three_point_depths(const ModelTriangle& model,
                                               const Orthography& start) {
   double h1 = start.behind1;
   double h2 = start.behind2;
-  for (int turn = 0; turn < most_depth_turns && std::max(std::abs(h1), std::abs(h2)) < deepest_corner;
-       ++turn) {
+  for (int iteration = 0;
+       iteration < most_depth_iterations && std::max(std::abs(h1), std::abs(h2)) < deepest_corner;
+       ++iteration) {
     const Eigen::Vector2d e1 = (1 + h1) * image[1] - image[0];
     const Eigen::Vector2d e2 = (1 + h2) * image[2] - image[0];
     auto next = orthography(model, e1.squaredNorm(), e2.squaredNorm(), e1.dot(e2));

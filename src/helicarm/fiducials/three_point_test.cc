@@ -41,7 +41,7 @@ TEST(ThreePointPose, FindsTheTruePoseFromExactPoints) {
       const auto pose = three_point_pose(*model, image, *depths);
       error = std::min(error, (pose.matrix() - truth.matrix()).norm());
     }
-    solved += error < 3;  // mm: a poor triangle magnifies where the repetition stops
+    solved += error < 3;  // mm: a poor triangle magnifies the convergence limit
   }
   EXPECT_GT(posed, 900);
   EXPECT_GT(solved, 0.95 * posed);
@@ -56,7 +56,7 @@ TEST(ThreePointPose, GivesAProperRotation) {
   EXPECT_NEAR((pose.rotation * pose.rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 0, 1e-12);
 }
 
-TEST(ModelTriangle, BallsInALineAreNone) {
+TEST(ModelTriangle, CollinearBallsAreRefused) {
   EXPECT_FALSE(model_triangle({0, 1, 2}, {Eigen::Vector3d(0, 0, 0), {10, 0, 0}, {30, 0.5, 0}}));
 }
 

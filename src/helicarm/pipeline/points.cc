@@ -12,10 +12,10 @@
 namespace helicarm {
 namespace {
 
-constexpr double least_sigma_px = 0.01;  ///< of an exact click among other rays
+constexpr double least_sigma_px = 0.01;  ///< of an exact pick among other rays
 
-Expected<ImagePoint> see_pick(const Pick& pick, const LabelledView& image, const View& camera,
-                              const Eigen::Vector3d& centre) {
+Expected<ImagePoint> observe_pick(const Pick& pick, const LabelledView& image, const View& camera,
+                                  const Eigen::Vector3d& centre) {
   const DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
     auto seen = snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
@@ -23,7 +23,7 @@ Expected<ImagePoint> see_pick(const Pick& pick, const LabelledView& image, const
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
-  return see_click(map, pick.uv_raw, pick.sigma_px);
+  return point_of_click(map, pick.uv_raw, pick.sigma_px);
 }
 
 void check_inside(const Pick& pick, const DistortionMap& map) {
@@ -35,7 +35,7 @@ void check_inside(const Pick& pick, const DistortionMap& map) {
                     {}});
 }
 
-/// The dots of plate and calibrator, for a target's fit to leave out.
+/// The images of plate dots and fiducials, to be left out of a target's fit.
 std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
                                 const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
   constexpr double rim_share = 0.1;  // of the radius: the blur of the ball's edge
@@ -51,7 +51,7 @@ std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
   return discs;
 }
 
-/// Label of the calibrator's ball on whose image an image point lies.
+/// Label of the fiducial on whose image a point lies.
 std::optional<std::string> fiducial_at(const ImagePoint& seen, const View& camera,
                                        const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
   for (std::size_t k = 0; k < fiducials.size(); ++k) {
@@ -63,7 +63,7 @@ std::optional<std::string> fiducial_at(const ImagePoint& seen, const View& camer
   return std::nullopt;
 }
 
-/// One thing to be seen in one view.
+/// A pick or a target in one view.
 struct Task {
   std::size_t point;
   std::size_t view;
@@ -91,7 +91,7 @@ std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) 
   return tasks;
 }
 
-void warn_at(PointResult& point, std::vector<Warning>& warnings, const Warning& warning) {
+void add_warning(PointResult& point, std::vector<Warning>& warnings, const Warning& warning) {
   point.warnings.push_back(warning);
   warnings.push_back(warning);
 }
@@ -102,7 +102,7 @@ struct Located {
   std::vector<DatedView> views;
 };
 
-/// The bone in whose frame the rays are to meet; nothing where it moves with none or a pose is missing.
+/// The bone in whose frame the rays intersect; nothing if there is none or a pose is missing.
 std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
   if (!point.moves_with) return std::nullopt;
   for (std::size_t i = 0; i < point.seen.size(); ++i)
@@ -110,7 +110,7 @@ std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
   return point.moves_with;
 }
 
-/// Check targets are part of the calibrator, a tracked bone's motion is in its poses.
+/// Check targets are fixed to the calibrator; a tracked bone's motion is in its poses.
 bool may_move(const PointResult& point, std::optional<Bone> anchor) {
   return point.source == PointSource::pick && !anchor;
 }
@@ -130,7 +130,7 @@ Expected<Located> intersect_rays(const PointResult& point, const Case& given, co
     views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
   }
   auto located = locate(point.name, point.source, observations, calibration, motion);
-  // Readings of their own move each exposure's ray by itself; shared ones move all rays alike.
+  // Independent tracker samples displace each ray independently, shared ones all rays equally.
   if (located && anchor && given.tracker.samples == Samples::independent) {
     for (PointObservation& observation : observations)
       observation.anchor_covariance = noise_of_poses(located->point_in_anchor, *anchor,
@@ -159,7 +159,7 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
     const View& camera = calibration.views[task.view].view;
     const auto seen =
         task.pick
-            ? see_pick(*task.pick, image, camera, centre)
+            ? observe_pick(*task.pick, image, camera, centre)
             : find_target(*image.xray_image, image.rectification.map, camera, *task.target,
                           detections_of(image, camera, calibration.fiducials[task.view], given.calibrator),
                           image.rectification.noise);
@@ -186,20 +186,21 @@ std::vector<Warning> locate_points(const Case& given, const Calibration& calibra
       continue;
     }
     point.reason.reset();
-    if (located->point.missing_rays) warn_at(point, warnings, *located->point.missing_rays);
+    if (located->point.missing_rays) add_warning(point, warnings, *located->point.missing_rays);
     point.rays_miss = located->point.missing_rays.has_value();
     point.ray_gap_mm = located->point.ray_gap_mm;
     point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
                          located->views, located->point.by_calibration},
                         given.poses_now, given.tracker);
     if (point.moves_with && !located->anchor)
-      warn_at(point, warnings,
-              {Reason::bone_taken_as_fixed,
-               fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
-                           "is taken as fixed to the calibrator",
-                           point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
-               {},
-               {}});
+      add_warning(
+          point, warnings,
+          {Reason::bone_taken_as_fixed,
+           fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
+                       "is taken as fixed to the calibrator",
+                       point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
+           {},
+           {}});
   }
   return warnings;
 }
@@ -234,12 +235,12 @@ std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration
         hits.push_back(fmt::format("{} in {}", *label, view.name));
     }
     if (hits.empty() || (hits.size() < views && !point.rays_miss)) continue;
-    warn_at(point, warnings,
-            {Reason::pick_on_fiducial,
-             fmt::format("\"{}\" lies on the calibrator's ball {}: pick the bone's own point", point.name,
-                         fmt::join(hits, " and on ")),
-             {},
-             {{"views", double(hits.size())}}});
+    add_warning(point, warnings,
+                {Reason::pick_on_fiducial,
+                 fmt::format("\"{}\" lies on fiducial {}: pick the point of the bone", point.name,
+                             fmt::join(hits, " and on ")),
+                 {},
+                 {{"views", double(hits.size())}}});
   }
   return warnings;
 }
