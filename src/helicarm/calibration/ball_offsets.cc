@@ -9,10 +9,10 @@
 namespace helicarm {
 namespace {
 
-constexpr double most_tolerance_mm = 0.5;  // beyond it the file is of another calibrator
+constexpr double most_tolerance_mm = 0.5;  // above it the file describes another calibrator
 constexpr double least_tolerance_mm = 0.02;
 constexpr double tolerance_step = 1.3;
-constexpr double likely_excess = 0.5;  // standard deviations of chi2
+constexpr double consistent_excess = 0.5;  // standard deviations of chi2: consistent below it
 
 std::size_t count_of(const std::vector<ViewProblem>& problems) {
   std::size_t count = 0;
@@ -22,8 +22,8 @@ std::size_t count_of(const std::vector<ViewProblem>& problems) {
 
 std::vector<ViewProblem> with_tolerance(std::vector<ViewProblem> problems, double tolerance_mm) {
   for (ViewProblem& problem : problems)
-    for (Observation& seen : problem.observations)
-      seen.place_root = tolerance_mm * Eigen::Matrix3d::Identity();
+    for (Observation& observation : problem.observations)
+      observation.offset_root = tolerance_mm * Eigen::Matrix3d::Identity();
   return problems;
 }
 
@@ -31,19 +31,19 @@ double log_determinant(const Eigen::MatrixXd& covariance) {
   return 2 * covariance.llt().matrixLLT().diagonal().array().log().sum();
 }
 
-/// Laplace's approximation, without what both explanations share.
+/// Laplace approximation, up to a common constant.
 double log_likelihood(const Refinement& fit) {
   return -0.5 * fit.chi2 + 0.5 * log_determinant(fit.covariance);
 }
 
-/// Of every image point erring by itself, all by the same factor more than its sigma.
+/// For independent errors of the image points, all inflated by one factor.
 std::optional<double> log_likelihood_enlarged(std::vector<ViewProblem> problems, const CommonPrior& common) {
   problems = with_tolerance(std::move(problems), 0);
   const auto exact = refine(problems, common);
   if (!exact) return std::nullopt;
   const double factor = std::sqrt(std::max(1.0, exact->chi2 / exact->dof));
   for (ViewProblem& problem : problems)
-    for (Observation& seen : problem.observations) seen.sigma_px *= factor;
+    for (Observation& observation : problem.observations) observation.sigma_px *= factor;
   const auto enlarged = refine(problems, common);
   if (!enlarged) return std::nullopt;
   return log_likelihood(*enlarged) - 2.0 * double(count_of(problems)) * std::log(factor);
@@ -66,7 +66,7 @@ std::optional<OffsetFit> fit_ball_offsets(const std::vector<ViewProblem>& proble
     auto clean =
         refine_without_outliers(with_tolerance(problems, tolerance), common, probability, least_kept);
     if (!clean || rejects_many(*clean, problems)) continue;
-    if (clean->fit.dof < 1 || excess_of(clean->fit.chi2, clean->fit.dof) > likely_excess) continue;
+    if (clean->fit.dof < 1 || excess_of(clean->fit.chi2, clean->fit.dof) > consistent_excess) continue;
     const auto enlarged = log_likelihood_enlarged(clean->problems, common);
     if (!enlarged || log_likelihood(clean->fit) <= *enlarged) return std::nullopt;
     return OffsetFit{*std::move(clean), tolerance};
@@ -77,10 +77,11 @@ std::optional<OffsetFit> fit_ball_offsets(const std::vector<ViewProblem>& proble
 double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement& fit) {
   std::map<std::size_t, double> squared;
   for (const ViewProblem& problem : problems)
-    for (const Observation& seen : problem.observations)
-      if (!seen.place_root.isZero(0))
-        squared[seen.ball] =
-            (seen.place_root * fit.variations.segment<3>(3 * Eigen::Index(seen.ball))).squaredNorm();
+    for (const Observation& observation : problem.observations)
+      if (!observation.offset_root.isZero(0))
+        squared[observation.ball] =
+            (observation.offset_root * fit.variations.segment<3>(3 * Eigen::Index(observation.ball)))
+                .squaredNorm();
   double sum = 0;
   for (const auto& [ball, squared_length] : squared) sum += squared_length / double(squared.size());
   return std::sqrt(sum);

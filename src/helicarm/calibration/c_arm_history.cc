@@ -28,7 +28,7 @@ double variance(double first, double observed, double n) {
 
 Json row(const Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }
 
-HistoryEntry shot_from(JsonReader& reader) {
+HistoryEntry entry_from(JsonReader& reader) {
   const auto estimate = reader.numbers("estimate_mm", 3, {-1e4, 1e4});
   const auto information = reader.matrix("information_per_mm2", 3, 3, {-1e12, 1e12});
   HistoryEntry entry{reader.text("picture"), reader.text("view"), Vector3d(estimate.data()),
@@ -86,7 +86,7 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   if (!view.prior.focal_px || !view.prior.principal_px) return std::nullopt;
   CalibrationOptions options;
   options.common = unknown;
-  options.rejection_probability = 0;  // the false balls are out already
+  options.rejection_probability = 0;  // outliers have been removed already
   const auto alone = calibrate({view}, options);
   if (!alone) return std::nullopt;
   const CalibratedView& calibrated = alone->views[0];
@@ -104,10 +104,11 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   const Matrix3d assumed = squares(variance_of(*unknown.c_arm.focal), variance_of(*unknown.c_arm.principal))
                                .cwiseInverse()
                                .asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> told(information - assumed);
-  const Matrix3d own = told.eigenvectors() * told.eigenvalues().cwiseMax(least_information).asDiagonal() *
-                       told.eigenvectors().transpose();
-  // posterior = own^-1-weighted mean of the estimate and the nominal values.
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> difference(information - assumed);
+  const Matrix3d own = difference.eigenvectors() *
+                       difference.eigenvalues().cwiseMax(least_information).asDiagonal() *
+                       difference.eigenvectors().transpose();
+  // The posterior is the mean of estimate and nominal values, weighted by `own` and `assumed`.
   const Vector3d estimate = posterior + own.ldlt().solve(assumed * (posterior - nominal));
   return HistoryEntry{image, view.name, estimate, own};
 }
@@ -130,7 +131,7 @@ Expected<CArmHistory> history_from_json(const Json& json, const std::string& ori
     reader.choice("format", {"helicarm-machine/1"});
     CArmHistory history;
     for (JsonReader& entry : reader.objects("shots", true, most_entries))
-      history.entries.push_back(shot_from(entry));
+      history.entries.push_back(entry_from(entry));
     reader.finish();
     return history;
   });

@@ -14,8 +14,8 @@
 
 namespace helicarm {
 
-/// What the balls of one image told of its C-arm, apart from all that was believed before: focal length and
-/// principal point from the image's centre (u, v; as if not mirrored), mm on the receiver.
+/// Intrinsics estimated from one image's fiducials without the prior: focal length, and principal point from
+/// the image's centre (u, v; as if not mirrored), mm on the detector.
 struct HistoryEntry {
   std::string image;  ///< digest of the pixels
   std::string view;
@@ -28,24 +28,24 @@ struct CArmHistory {
   std::vector<HistoryEntry> entries;
 };
 
-/// What a history tells of the next views: they depart from `mean_mm` as `prior` says.
+/// Prior of the next views from a history: mean, and variation about it.
 struct LearnedIntrinsics {
   Eigen::Vector3d mean_mm;
   CArmPrior prior;
 };
 
-/// Shots scatter about a mean by sag: both are found together by expectation maximisation, starting from what
-/// is believed of an unknown machine about `nominal_mm`. The sag's variance is believed as if from
-/// four earlier acquisitions (Gelman et al., Bayesian Data Analysis, 2013, 5.4).
+/// Estimates the mean and the sag about it by expectation maximisation from the prior `unknown` about
+/// `nominal_mm`. The prior of the sag's variance has the weight of four acquisitions (Gelman et al., Bayesian
+/// Data Analysis, 2013, 5.4).
 LearnedIntrinsics learn_intrinsics(std::span<const HistoryEntry> entries, const Eigen::Vector3d& nominal_mm,
                                    const CArmPrior& unknown);
 
-/// The lesson of one view's balls: its calibration alone, less what was believed beforehand. Nothing where
-/// the view cannot be calibrated or its scale is not known.
+/// The entry of one view: calibrated alone, with the prior's information subtracted. Nothing if the view
+/// cannot be calibrated, or if pixel size or source distance are unknown.
 std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const std::string& image,
                                              const CommonPrior& unknown);
 
-/// `prior` with the mean of what is known of the machine in place of the nominal values.
+/// `prior` with the history's mean in place of the nominal values.
 IntrinsicsPrior learned_prior(IntrinsicsPrior prior, const LearnedIntrinsics& knowledge, bool mirrored);
 
 /// machine.json (docs/formats.md).

@@ -15,28 +15,28 @@ constexpr double px_per_mm = 1 / 0.15;
 const Vector3d nominal(900, 0, 0);
 const CArmPrior unknown{IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
 
-/// An acquisition of a machine whose focal length and principal point (mm from the middle) are these.
-ViewFiducials shot_with(const Vector3d& intrinsics_mm, bool mirrored, RandomStream& random) {
+/// An acquisition with the given focal length and principal point (mm from the image's centre).
+ViewFiducials acquisition_with(const Vector3d& intrinsics_mm, bool mirrored, RandomStream& random) {
   View view = paper_view(6 * random.uniform());
   const double hand = mirrored ? -1 : 1;
   view.intrinsics = {hand * px_per_mm * intrinsics_mm.x(), px_per_mm * intrinsics_mm.x(),
                      512 + hand * px_per_mm * intrinsics_mm.y(), 512 + px_per_mm * intrinsics_mm.z(), 0};
-  ViewFiducials seen = pictured("AP", view, 0.05, random);
+  ViewFiducials seen = observed_fiducials("AP", view, 0.05, random);
   seen.prior = {px_per_mm * nominal.x(), Eigen::Vector2d(512, 512), px_per_mm, NormalPrior{1, 1e-3}};
   return seen;
 }
 
-Vector3d wander(const Vector3d& mean, const Vector3d& sigma, RandomStream& random) {
+Vector3d scattered_about(const Vector3d& mean, const Vector3d& sigma, RandomStream& random) {
   return mean + sigma.cwiseProduct(Vector3d(random.normal(), random.normal(), random.normal()));
 }
 
-TEST(ShotOf, EstimateAndInformationHoldTheTruthWithoutThePrior) {
-  const Vector3d truth(912, -9, 8);  // far from nominal: a prior that stayed in would show
+TEST(HistoryEntryOf, EstimateIsConsistentWithTheTruthWithoutThePrior) {
+  const Vector3d truth(912, -9, 8);  // far from nominal, so that a remaining prior shows
   double distance2 = 0;
   const int trials = 200;
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream random(31, 0, std::uint64_t(trial));
-    const auto entry = history_entry_of(shot_with(truth, trial % 2, random), "a", {unknown});
+    const auto entry = history_entry_of(acquisition_with(truth, trial % 2, random), "a", {unknown});
     ASSERT_TRUE(entry.has_value());
     const Vector3d error = entry->estimate_mm - truth;
     distance2 += error.dot(entry->information * error) / trials;
@@ -44,30 +44,30 @@ TEST(ShotOf, EstimateAndInformationHoldTheTruthWithoutThePrior) {
   EXPECT_NEAR(distance2, 3, 0.6);
 }
 
-TEST(KnowledgeOf, NoHistoryReportsNothing) {
+TEST(LearnIntrinsics, EmptyHistoryGivesTheNominalPrior) {
   const LearnedIntrinsics known = learn_intrinsics({}, nominal, unknown);
   EXPECT_EQ(known.mean_mm, nominal);
   EXPECT_EQ(known.prior.focal->common, unknown.focal->common);
 }
 
-TEST(KnowledgeOf, InformationTooSmallToBeInvertedChangesNothing) {
+TEST(LearnIntrinsics, SingularInformationChangesNothing) {
   const std::vector<HistoryEntry> entries{{"a", "AP", {950, 5, 5}, 1e-200 * Eigen::Matrix3d::Identity()}};
   EXPECT_TRUE(learn_intrinsics(entries, nominal, unknown).mean_mm.isApprox(nominal, 1e-12));
 }
 
-TEST(KnowledgeOf, PredictsTheNextShotAsWidelyAsItMust) {
+TEST(LearnIntrinsics, CovarianceOfTheNextAcquisitionIsConsistent) {
   double distance2 = 0, focal_sigma = 0;
   const int trials = 100;
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream random(32, 0, std::uint64_t(trial));
-    const Vector3d mean = wander(nominal, {10, 7, 7}, random);
+    const Vector3d mean = scattered_about(nominal, {10, 7, 7}, random);
     const Vector3d sag(1.4, 4.2, 4.2);
     std::vector<HistoryEntry> entries;
     for (int k = 0; k < 12; ++k)
-      entries.push_back(
-          *history_entry_of(shot_with(wander(mean, sag, random), false, random), "a", {unknown}));
+      entries.push_back(*history_entry_of(acquisition_with(scattered_about(mean, sag, random), false, random),
+                                          "a", {unknown}));
     const LearnedIntrinsics known = learn_intrinsics(entries, nominal, unknown);
-    const Vector3d next = wander(mean, sag, random) - known.mean_mm;
+    const Vector3d next = scattered_about(mean, sag, random) - known.mean_mm;
     const double focal = std::hypot(known.prior.focal->common, known.prior.focal->of_view);
     const double principal = std::hypot(known.prior.principal->common, known.prior.principal->of_view);
     distance2 +=
@@ -78,7 +78,7 @@ TEST(KnowledgeOf, PredictsTheNextShotAsWidelyAsItMust) {
   EXPECT_LT(focal_sigma, 2.5);  // of 10 mm beforehand
 }
 
-TEST(KnownPrior, TakesTheMeanAndTurnsItWithAMirroredImage) {
+TEST(LearnedPrior, TakesTheMeanAndReflectsItForAMirroredImage) {
   const LearnedIntrinsics known{{905, 4, -2}, unknown};
   const IntrinsicsPrior prior{900 * px_per_mm, Eigen::Vector2d(512, 512), px_per_mm};
   EXPECT_NEAR(*learned_prior(prior, known, false).focal_px, 905 * px_per_mm, 1e-9);
@@ -86,9 +86,10 @@ TEST(KnownPrior, TakesTheMeanAndTurnsItWithAMirroredImage) {
   EXPECT_NEAR(learned_prior(prior, known, true).principal_px->x(), 512 - 4 * px_per_mm, 1e-9);
 }
 
-TEST(CArmHistoryJson, ComesBackAsItWasWritten) {
+TEST(CArmHistoryJson, RoundTrip) {
   RandomStream random(33, 0);
-  const CArmHistory history{{*history_entry_of(shot_with({905, 1, 2}, false, random), "digest", {unknown})}};
+  const CArmHistory history{
+      {*history_entry_of(acquisition_with({905, 1, 2}, false, random), "digest", {unknown})}};
   const auto again = history_from_json(to_json(history), "machine.json");
   ASSERT_TRUE(again.has_value()) << again.error().message;
   EXPECT_EQ(again->entries.at(0).image, "digest");
@@ -96,10 +97,10 @@ TEST(CArmHistoryJson, ComesBackAsItWasWritten) {
   EXPECT_TRUE(again->entries[0].information.isApprox(history.entries[0].information));
 }
 
-TEST(CArmHistoryJson, RefusesInformationThatIsNone) {
+TEST(CArmHistoryJson, IndefiniteInformationIsRefused) {
   RandomStream random(34, 0);
-  Json json =
-      to_json(CArmHistory{{*history_entry_of(shot_with({905, 1, 2}, false, random), "digest", {unknown})}});
+  Json json = to_json(
+      CArmHistory{{*history_entry_of(acquisition_with({905, 1, 2}, false, random), "digest", {unknown})}});
   json["shots"][0]["information_per_mm2"][0][0] = -1;
   EXPECT_EQ(history_from_json(json, "machine.json").error().reason, Reason::bad_value);
 }

@@ -17,10 +17,9 @@ namespace helicarm {
 namespace {
 
 constexpr std::size_t least_fiducials = 6;
-constexpr std::size_t comfortable_fiducials = 8;
-constexpr double least_rho = 1e-8;  // 1 / mm: a source 100 km away
-constexpr double inconsistent_sigmas =
-    3;  // standard deviations of chi2 beyond which the sigmas are not believed
+constexpr std::size_t recommended_fiducials = 8;
+constexpr double least_rho = 1e-8;         // 1 / mm: a source 100 km away
+constexpr double inconsistent_sigmas = 3;  // standard deviations of chi2
 
 tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
   failure.view = view;
@@ -42,9 +41,9 @@ Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<Poin
       [&](const DltResult& dlt) { return shrunk_to_prior(centred(dlt.view, centre), view.prior); });
 }
 
-/// Splits each sigma into the ball's own and the map's, which is shared: its covariance is made of
-/// independent errors along its eigenvectors.
-void give_map_errors(std::vector<Observation>& observations, const Eigen::MatrixXd& covariance_px2) {
+/// Splits each sigma into the fiducial's own and the map's, which is correlated: independent errors along the
+/// eigenvectors of its covariance.
+void split_map_errors(std::vector<Observation>& observations, const Eigen::MatrixXd& covariance_px2) {
   constexpr double least_own_share = 0.1;  // of the variance
   if (covariance_px2.size() == 0 || covariance_px2.isZero()) return;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_px2);
@@ -75,19 +74,19 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view,
     if (f.status != FiducialStatus::used) continue;
     if (!(f.sigma_px > 0) || !std::isfinite(f.sigma_px))
       return fail(Reason::bad_value,
-                  fmt::format("ball {}: sigma {} px must be positive", f.label, f.sigma_px));
+                  fmt::format("fiducial {}: sigma_px is {}, must be positive", f.label, f.sigma_px));
     observations.push_back({ball, f.centre_in_calibrator, f.uv, f.sigma_px});
-    if (!ball_covariance_mm2.empty()) observations.back().place_root = root_of(ball_covariance_mm2[ball]);
+    if (!ball_covariance_mm2.empty()) observations.back().offset_root = root_of(ball_covariance_mm2[ball]);
     centre += f.centre_in_calibrator;
   }
   centre /= std::max(1.0, double(observations.size()));
-  give_map_errors(observations, view.map_covariance_px2);
+  split_map_errors(observations, view.map_covariance_px2);
   const auto start = start_of(view, pairs_of(view.fiducials), centre);
   if (!start) return tl::unexpected<Failure>(start.error());
   return ViewProblem{*start, std::move(observations), view.prior};
 }
 
-/// What of a matrix of all views concerns one.
+/// One view's block of a matrix of all views.
 auto block_of(Eigen::MatrixXd& joint, std::size_t view) {
   const Eigen::Index at = view_parameters * Eigen::Index(view);
   return joint.block<view_parameters, view_parameters>(at, at);
@@ -101,8 +100,7 @@ void mark_rejected(std::vector<Fiducial>& fiducials, std::size_t used_index) {
     if (is_candidate(f) && used_index-- == 0) f.status = FiducialStatus::rejected;
 }
 
-/// What is found the same way however the view was calibrated; `residual_too_large` where labels must be
-/// wrong.
+/// Residuals and figures of a view, calibrated by either method. Refuses `residual_too_large`.
 Expected<CalibratedView> described(const std::string& name, const View& view,
                                    std::vector<Fiducial>& fiducials, const CalibrationOptions& options) {
   const auto pairs = pairs_of(fiducials);
@@ -123,23 +121,25 @@ Expected<CalibratedView> described(const std::string& name, const View& view,
   if (!(result.reprojection_rms_px <= limit))
     return in_view(
         {Reason::residual_too_large,
-         fmt::format("the balls miss their pictures by {:.3g} px rms, limit {:g}: labels, calibrator or "
-                     "rectification are wrong",
-                     result.reprojection_rms_px, limit),
+         fmt::format(
+             "reprojection error {:.3g} px rms exceeds {:.3g} px: labels, calibrator or rectification "
+             "are wrong",
+             result.reprojection_rms_px, limit),
          {},
          {{"reprojection_rms_px", result.reprojection_rms_px}, {"limit_px", limit}}},
         name);
   return result;
 }
 
-void warn_of_few(CalibrationResult& result) {
+void warn_of_few_fiducials(CalibrationResult& result) {
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     const double n = double(pairs_of(result.fiducials[i]).size());
-    if (n < comfortable_fiducials)
-      result.warnings.push_back({Reason::few_fiducials,
-                                 fmt::format("only {} balls are used", n),
-                                 result.views[i].name,
-                                 {{"n", n}}});
+    if (n < recommended_fiducials)
+      result.warnings.push_back(
+          {Reason::few_fiducials,
+           fmt::format("{} fiducials are used, at least {} are recommended", n, recommended_fiducials),
+           result.views[i].name,
+           {{"n", n}}});
   }
 }
 
@@ -150,22 +150,20 @@ void inflate_if_inconsistent(CalibrationResult& result) {
   for (CalibratedView& view : result.views) view.covariance *= result.variance_scale;
   result.warnings.push_back(
       {Reason::residual_too_large,
-       fmt::format(
-           "the balls' residuals are {:.2g} times what their sigmas allow: all predicted errors are enlarged",
-           std::sqrt(result.variance_scale)),
+       fmt::format("the fiducials' residuals are {:.2g} times the noise model: all covariances are inflated",
+                   std::sqrt(result.variance_scale)),
        {},
        {{"chi2", result.chi2}, {"dof", double(result.dof)}}});
 }
 
-/// A calibrator larger by a share about the balls' mean c gives the same images from sources that much
-/// farther away: d t = share * (t + R c) in every view. This error is one number, common to all views and
-/// points.
+/// A calibrator scaled by 1 + s about the fiducials' mean c gives the same images if all distances are
+/// scaled, too: d t = s (t + R c) in every view. s is one number, common to all views and points.
 void add_scale_error(CalibrationResult& result, double scale_sigma) {
   if (scale_sigma == 0) return;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   const std::vector<Fiducial>& balls = result.fiducials.front();
   for (const Fiducial& ball : balls) mean += ball.centre_in_calibrator / double(balls.size());
-  constexpr Eigen::Index translation = 7;  // of a view's numbers, see view_parameters
+  constexpr Eigen::Index translation = 7;  // index among view_parameters
   Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(result.joint_covariance.rows());
   for (std::size_t i = 0; i < result.views.size(); ++i)
     by_scale.segment<3>(view_parameters * Eigen::Index(i) + translation) =
@@ -175,7 +173,7 @@ void add_scale_error(CalibrationResult& result, double scale_sigma) {
     result.views[i].covariance = block_of(result.joint_covariance, i);
 }
 
-/// The fit without false balls; with the balls off their places where only that explains the residuals.
+/// The fit without outliers; with offsets of the fiducials where only these explain the residuals.
 Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const CalibrationOptions& options,
                              double& found_tolerance_mm) {
   auto clean =
@@ -192,10 +190,10 @@ Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const Cal
   return std::move(offsets->clean);
 }
 
-/// A joint fit that failed names no view: a start that misses its own balls tells which one is at fault.
-tl::unexpected<Failure> blame(const std::vector<ViewFiducials>& views,
-                              const std::vector<ViewProblem>& problems, const Failure& failure,
-                              const CalibrationOptions& options) {
+/// A failed joint fit has no view: reports the view whose start does not fit its own fiducials, if any.
+tl::unexpected<Failure> with_view(const std::vector<ViewFiducials>& views,
+                                  const std::vector<ViewProblem>& problems, const Failure& failure,
+                                  const CalibrationOptions& options) {
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto fiducials = views[i].fiducials;
     const auto start = described(views[i].name, uncentred(problems[i].start), fiducials, options);
@@ -217,14 +215,15 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     result.fiducials.push_back(view.fiducials);
   }
   const auto clean = clean_fit(problems, options, result.found_tolerance_mm);
-  if (!clean) return blame(views, problems, clean.error(), options);
+  if (!clean) return with_view(views, problems, clean.error(), options);
   const Refinement& fit = clean->fit;
   result.chi2 = fit.chi2;
   result.dof = fit.dof;
-  const Eigen::Index numbers = view_parameters * Eigen::Index(views.size());
-  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(numbers, numbers);
+  const Eigen::Index parameters = view_parameters * Eigen::Index(views.size());
+  Eigen::MatrixXd by_step = Eigen::MatrixXd::Zero(parameters, parameters);
   for (std::size_t i = 0; i < views.size(); ++i) block_of(by_step, i) = parameters_by_step(fit.views[i]);
-  result.joint_covariance = by_step * fit.covariance.topLeftCorner(numbers, numbers) * by_step.transpose();
+  result.joint_covariance =
+      by_step * fit.covariance.topLeftCorner(parameters, parameters) * by_step.transpose();
   for (const auto& [view, observation] : clean->removed) mark_rejected(result.fiducials[view], observation);
 
   Eigen::Index row = 0;
@@ -234,13 +233,21 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
     const double rho = fit.views[i].rho;
     if (!(rho > least_rho))
       return in_view(
-          {Reason::uncertain, "the balls do not tell how far the X-ray source is", {}, {{"per_mm", rho}}},
+          {Reason::uncertain,
+           fmt::format(
+               "the source distance is not observable from these fiducials: its inverse is {:.1g} per mm, "
+               "limit {:g}",
+               rho, least_rho),
+           {},
+           {{"per_mm", rho}}},
           views[i].name);
     double fitted = 0;
-    for (const Observation& seen : clean->problems[i].observations) {
-      const auto j = fit.jacobian.block(row, 0, 2, numbers);
-      const double own_share = 1 / (1 + seen.by_map.squaredNorm() / (seen.sigma_px * seen.sigma_px));
-      fitted += own_share * (j * fit.covariance.topLeftCorner(numbers, numbers) * j.transpose()).trace();
+    for (const Observation& observation : clean->problems[i].observations) {
+      const auto j = fit.jacobian.block(row, 0, 2, parameters);
+      const double own_share =
+          1 / (1 + observation.by_map.squaredNorm() / (observation.sigma_px * observation.sigma_px));
+      fitted +=
+          own_share * (j * fit.covariance.topLeftCorner(parameters, parameters) * j.transpose()).trace();
       row += 2;
     }
     view->dof = int(std::lround(2 * double(clean->problems[i].observations.size()) - fitted));
@@ -249,9 +256,9 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   }
   inflate_if_inconsistent(result);
   add_scale_error(result, options.common.scale_sigma);
-  warn_of_few(result);
+  warn_of_few_fiducials(result);
   warn_of_strain(result, *clean);
-  tell_offsets(result, *clean);
+  report_offsets(result, *clean);
   return result;
 }
 
@@ -271,7 +278,7 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
     result.dof += calibrated->dof;
     result.views.push_back(*std::move(calibrated));
   }
-  warn_of_few(result);
+  warn_of_few_fiducials(result);
   return result;
 }
 

@@ -17,11 +17,11 @@ namespace {
 
 std::vector<ViewFiducials> pair_of_views(double sigma, std::uint64_t trial) {
   RandomStream random(11, 0, trial);
-  return {pictured("AP", paper_view(0), sigma, random),
-          pictured("LAT", paper_view(std::numbers::pi / 2), sigma, random)};
+  return {observed_fiducials("AP", paper_view(0), sigma, random),
+          observed_fiducials("LAT", paper_view(std::numbers::pi / 2), sigma, random)};
 }
 
-TEST(Calibrate, NearlyExactImagesGiveTheViewsBack) {
+TEST(Calibrate, NearlyExactImagesRecoverTheViews) {
   auto views = pair_of_views(1e-6, 0);
   const auto result = calibrate(views, {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
@@ -31,11 +31,11 @@ TEST(Calibrate, NearlyExactImagesGiveTheViewsBack) {
   EXPECT_TRUE(result->warnings.empty());
 }
 
-TEST(Calibrate, MirroredViewKeepsItsHand) {
+TEST(Calibrate, MirroredViewKeepsItsHandedness) {
   RandomStream random(12, 0);
   View mirrored = paper_view(0.4);
   mirrored.intrinsics.fx *= -1;
-  const auto result = calibrate({pictured("AP", mirrored, 0.1, random)}, {});
+  const auto result = calibrate({observed_fiducials("AP", mirrored, 0.1, random)}, {});
   ASSERT_TRUE(result.has_value());
   EXPECT_LT(result->views[0].view.intrinsics.fx, -5000);
   EXPECT_GT(result->views[0].view.camera_from_world.rotation.determinant(), 0);
@@ -44,7 +44,7 @@ TEST(Calibrate, MirroredViewKeepsItsHand) {
 class ScatterWithTolerance : public testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Calibrate, ScatterWithTolerance, testing::Values(0, 0.02));
 
-TEST_P(ScatterWithTolerance, IsAsTheJointCovarianceSays) {
+TEST_P(ScatterWithTolerance, EqualsTheJointCovariance) {
   const double tolerance_mm = GetParam();
   CalibrationOptions options;
   options.rejection_probability = 0;
@@ -114,7 +114,7 @@ TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
   EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm());
 }
 
-TEST(Calibrate, ErrorsThatTheMapSharesAreInTheCovariance) {
+TEST(Calibrate, CorrelatedErrorsOfTheMapAreInTheCovariance) {
   CalibrationOptions options;
   options.rejection_probability = 0;
   const double own = 0.05, map = 0.2, reach_px = 150;
@@ -159,19 +159,19 @@ TEST(Calibrate, ErrorsThatTheMapSharesAreInTheCovariance) {
     alone += distance2() / trials;
   }
   EXPECT_NEAR(together, 2, 0.4);
-  EXPECT_GT(alone, 4);  // what it costs to take them for independent
+  EXPECT_GT(alone, 4);  // with independent errors assumed
 }
 
 TEST(Calibrate, ConvergesWithoutAnyPriorInTheNoiseOfThePaper) {
   int done = 0;
   for (int trial = 0; trial < 200; ++trial) {
     RandomStream random(14, 0, std::uint64_t(trial));
-    done += calibrate({pictured("AP", paper_view(0), 2.34, random)}, {}).has_value();
+    done += calibrate({observed_fiducials("AP", paper_view(0), 2.34, random)}, {}).has_value();
   }
   EXPECT_GE(done, 198);
 }
 
-TEST(Calibrate, FalseBallsAreRejectedAndOnlyThey) {
+TEST(Calibrate, OnlyOutliersAreRejected) {
   for (const auto& wrong : {std::vector<int>{3}, {3, 7}, {1, 2, 10}})
     for (double off : {2.0, 12.0}) {
       auto views = pair_of_views(0.1, 5);
@@ -190,7 +190,7 @@ TEST(Calibrate, FalseBallsAreRejectedAndOnlyThey) {
     }
 }
 
-TEST(Calibrate, OneBallFarOffIsRejected) {
+TEST(Calibrate, GrossOutlierIsRejected) {
   auto views = pair_of_views(0.1, 6);
   views[0].fiducials[4].uv += Eigen::Vector2d(90, -40);
   const auto result = calibrate(views, {});
@@ -199,13 +199,13 @@ TEST(Calibrate, OneBallFarOffIsRejected) {
   EXPECT_NEAR(result->fiducials[0][4].residual_px, 98, 3);
 }
 
-TEST(Calibrate, GoodBallsAreKept) {
+TEST(Calibrate, InliersAreKept) {
   int rejected = 0;
   for (int trial = 0; trial < 100; ++trial) {
     auto views = pair_of_views(0.3, std::uint64_t(trial));
     for (auto& view : views)
       for (auto& f : view.fiducials)
-        f.sigma_px = trial % 2 ? 0.15 : 0.3;  // even where sigma is half the truth
+        f.sigma_px = trial % 2 ? 0.15 : 0.3;  // also if sigma is half the true one
     const auto result = calibrate(views, {});
     ASSERT_TRUE(result.has_value());
     for (const auto& fiducials : result->fiducials)
@@ -225,9 +225,10 @@ TEST(Calibrate, InconsistentSigmasInflateTheCovarianceAndWarn) {
   EXPECT_EQ(result->warnings[0].reason, Reason::residual_too_large);
 }
 
-/// The calibrator that is in the images differs from the file's.
-std::vector<ViewFiducials> views_of_other(const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& place,
-                                          std::uint64_t trial, double sigma = 0.05) {
+/// Views of a calibrator that differs from the file by `place`.
+std::vector<ViewFiducials> views_of_deviating_calibrator(
+    const std::function<Eigen::Vector3d(const Eigen::Vector3d&)>& place, std::uint64_t trial,
+    double sigma = 0.05) {
   auto views = pair_of_views(sigma, trial);
   RandomStream random(21, 0, trial);
   std::vector<Eigen::Vector3d> places;
@@ -242,7 +243,7 @@ std::vector<ViewFiducials> views_of_other(const std::function<Eigen::Vector3d(co
   return views;
 }
 
-CalibrationOptions c_arm_known_roughly() {
+CalibrationOptions with_c_arm_prior() {
   CalibrationOptions options;
   options.common.c_arm = {IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2}};
   return options;
@@ -252,13 +253,13 @@ bool warns(const CalibrationResult& result, Reason reason) {
   return std::ranges::any_of(result.warnings, [&](const Warning& w) { return w.reason == reason; });
 }
 
-TEST(Calibrate, ScatteredBallsNeedNoDeclaredTolerance) {
+TEST(Calibrate, ToleranceOfScatteredBallsIsEstimated) {
   for (std::uint64_t trial = 0; trial < 10; ++trial) {
     RandomStream random(22, 0, trial);
     const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
       return place + 0.1 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
     };
-    const auto result = calibrate(views_of_other(off, trial), c_arm_known_roughly());
+    const auto result = calibrate(views_of_deviating_calibrator(off, trial), with_c_arm_prior());
     ASSERT_TRUE(result.has_value()) << result.error().message;
     EXPECT_GT(result->found_tolerance_mm, 0.04) << trial;
     EXPECT_LT(result->found_tolerance_mm, 0.25) << trial;
@@ -270,7 +271,7 @@ TEST(Calibrate, ScatteredBallsNeedNoDeclaredTolerance) {
 TEST(Calibrate, ExactCalibratorIsNeitherOffsetNorStrained) {
   for (std::uint64_t trial = 0; trial < 30; ++trial) {
     const auto same = [](const Eigen::Vector3d& place) { return place; };
-    const auto result = calibrate(views_of_other(same, trial), c_arm_known_roughly());
+    const auto result = calibrate(views_of_deviating_calibrator(same, trial), with_c_arm_prior());
     ASSERT_TRUE(result.has_value());
     EXPECT_EQ(result->found_tolerance_mm, 0) << trial;
     EXPECT_EQ(result->ball_rms_mm, 0) << trial;
@@ -279,26 +280,26 @@ TEST(Calibrate, ExactCalibratorIsNeitherOffsetNorStrained) {
   }
 }
 
-TEST(Calibrate, StrainOfTheCalibratorIsNamedWithItsAxis) {
+TEST(Calibrate, StrainOfTheCalibratorIsWarnedOfWithItsAxis) {
   const auto longer = [](const Eigen::Vector3d& place) -> Eigen::Vector3d {
     return place.cwiseProduct(Eigen::Vector3d(1, 1, 1.01));
   };
-  const auto result = calibrate(views_of_other(longer, 0), c_arm_known_roughly());
+  const auto result = calibrate(views_of_deviating_calibrator(longer, 0), with_c_arm_prior());
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(warns(*result, Reason::calibrator_strained));
   const auto warning = std::ranges::find(result->warnings, Reason::calibrator_strained, &Warning::reason);
   EXPECT_GT(std::abs(warning->figures.at("z")), 0.9);
-  EXPECT_NEAR(warning->figures.at("per_cent"), 0.67, 0.25);  // the change of volume is not seen
+  EXPECT_NEAR(warning->figures.at("per_cent"), 0.67, 0.25);  // the change of volume is not observable
 }
 
-TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsDistances) {
+TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsOffsets) {
   RandomStream random(23, 0);
   const auto off = [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
     return place + 0.3 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
   };
-  CalibrationOptions options = c_arm_known_roughly();
+  CalibrationOptions options = with_c_arm_prior();
   options.common.ball_covariance_mm2.assign(12, 0.09 * Eigen::Matrix3d::Identity());
-  const auto result = calibrate(views_of_other(off, 3), options);
+  const auto result = calibrate(views_of_deviating_calibrator(off, 3), options);
   ASSERT_TRUE(result.has_value());
   for (const auto& of_view : result->fiducials)
     for (const Fiducial& ball : of_view) EXPECT_EQ(ball.status, FiducialStatus::used) << ball.label;
@@ -307,9 +308,9 @@ TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsDistances) {
   EXPECT_NEAR(result->ball_rms_mm, 0.3 * std::sqrt(3), 0.2);
 }
 
-TEST(Calibrate, SixBallsAreEnoughFiveAreNot) {
+TEST(Calibrate, SixFiducialsAreRequired) {
   RandomStream random(15, 0);
-  auto view = pictured("AP", paper_view(0.3), 0.1, random, 7);
+  auto view = observed_fiducials("AP", paper_view(0.3), 0.1, random, 7);
   view.fiducials[2].status = FiducialStatus::occluded;
   const auto six = calibrate({view}, {});
   ASSERT_TRUE(six.has_value()) << six.error().message;
@@ -333,17 +334,16 @@ TEST(Calibrate, CoplanarBallsWrongLabelsAndZeroSigmaAreRefused) {
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().reason, Reason::residual_too_large) << refused.error().message;
   EXPECT_EQ(refused.error().view, "LAT");
-  auto blind = pair_of_views(0.1, 2);
-  blind[0].fiducials[0].sigma_px = 0;
-  EXPECT_EQ(calibrate(blind, {}).error().reason, Reason::bad_value);
+  auto without_sigma = pair_of_views(0.1, 2);
+  without_sigma[0].fiducials[0].sigma_px = 0;
+  EXPECT_EQ(calibrate(without_sigma, {}).error().reason, Reason::bad_value);
 }
 
 TEST(CalibratePaper, IsTheDltOfEachView) {
   const auto views = pair_of_views(0.5, 3);
   const auto result = calibrate_paper(views, {});
   ASSERT_TRUE(result.has_value());
-  // Eq. 7 by its normal equations, in units that keep them well conditioned: least squares do not depend on
-  // these.
+  // Eq. 7 by its normal equations, in scaled units for their condition.
   const auto& balls = views[1].fiducials;
   Eigen::MatrixXd design(2 * balls.size(), 11);
   Eigen::VectorXd pixels(design.rows());

@@ -12,16 +12,16 @@
 
 namespace helicarm {
 
-/// Numbers of a view: fx, fy, u0, v0, rotation vector in the camera frame (rad), translation (mm), skew.
+/// Parameters of a view: fx, fy, u0, v0, rotation vector in the camera frame (rad), translation (mm), skew.
 inline constexpr int view_parameters = 11;
 using ViewCovariance = Eigen::Matrix<double, view_parameters, view_parameters>;
 
-/// A view that has been calibrated by its fiducials.
+/// A calibrated view.
 struct CalibratedView {
   std::string name;
   View view;                      ///< world = calibrator, pixels = rectified
   std::optional<DltFactors> dlt;  ///< A1..A11 of Eq. 6; nothing where t_z = 0
-  /// Of the view's numbers: the true pose is (exp(w) R, t + dt). Zero where it was not computed.
+  /// Of the view's parameters; the true pose is (exp(w) R, t + dt). Zero: not computed.
   ViewCovariance covariance = ViewCovariance::Zero();
   double reprojection_rms_px = 0;
   double chi2 = 0;
@@ -32,8 +32,7 @@ struct CalibratedView {
 /// Views calibrated together.
 struct Calibration {
   std::vector<CalibratedView> views;
-  /// Of all views' parameters (CalibratedView::covariance), 11 n x 11 n. Empty: not computed, the views are
-  /// taken as exact.
+  /// Of all views' parameters (CalibratedView::covariance), 11 n x 11 n. Empty: not computed.
   Eigen::MatrixXd joint_covariance;
 };
 

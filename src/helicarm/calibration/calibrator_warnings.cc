@@ -23,7 +23,7 @@ void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
       {Reason::calibrator_strained,
        fmt::format(
            "the views fit a calibrator that is {:.2g} % {} along ({:.2f}, {:.2f}, {:.2f}) than in its file: "
-           "measure it, or check the image's pixel aspect",
+           "measure it with `helicarm phantom measure`, or check the image's pixel aspect",
            100 * std::abs(strain.extension), strain.extension > 0 ? "longer" : "shorter", strain.axis.x(),
            strain.axis.y(), strain.axis.z()),
        {},
@@ -34,12 +34,13 @@ void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
         {"chi2_gain", strain.chi2_gain / left}}});
 }
 
-void tell_offsets(CalibrationResult& result, const CleanFit& clean) {
+void report_offsets(CalibrationResult& result, const CleanFit& clean) {
   result.ball_rms_mm = rms_offset_mm(clean.problems, clean.fit);
-  constexpr double least_worth_telling_mm = 0.02;
-  if (result.ball_rms_mm < least_worth_telling_mm) return;
+  constexpr double least_reported_mm = 0.02;
+  if (result.ball_rms_mm < least_reported_mm) return;
   Warning deviation{Reason::calibrator_deviates,
-                    fmt::format("the balls are {:.2g} mm rms from the calibrator's file: measure the phantom",
+                    fmt::format("the fiducials deviate by {:.2g} mm rms from the calibrator's file: measure "
+                                "it with `helicarm phantom measure`",
                                 result.ball_rms_mm),
                     {},
                     {{"rms_mm", result.ball_rms_mm}}};

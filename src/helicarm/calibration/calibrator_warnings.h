@@ -6,12 +6,12 @@
 
 namespace helicarm {
 
-/// Warns `calibrator_strained` where the stretching of the calibrator that the views imply is more than
-/// chance: chi-square of five degrees of freedom at three sigma. Sets `strain_sigma`.
+/// Warns `calibrator_strained` if the calibrator's estimated strain is significant: chi-square of five
+/// degrees of freedom at three sigma. Sets `strain_sigma`.
 void warn_of_strain(CalibrationResult& result, const CleanFit& clean);
 
-/// How far the balls are from the file, as estimated: a note within the stated tolerance, else a warning
-/// (`calibrator_deviates`). Sets `ball_rms_mm`.
-void tell_offsets(CalibrationResult& result, const CleanFit& clean);
+/// Reports the fiducials' estimated offsets from the file (`calibrator_deviates`): a note for a stated
+/// tolerance, a warning for one found from the residuals. Sets `ball_rms_mm`.
+void report_offsets(CalibrationResult& result, const CleanFit& clean);
 
 }  // namespace helicarm

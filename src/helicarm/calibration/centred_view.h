@@ -8,11 +8,11 @@
 
 namespace helicarm {
 
-/// A view written about the centre of its fiducials: with d = R (x - centre),
+/// A view parametrised about the centre of its fiducials: with d = R (x - centre),
 ///   gx = (dx - qx dz) / (1 + dz rho),   gy = (dy - qy dz) / (1 + dz rho),
 ///   u = uc + ax gx + skew gy,   v = vc + ay gy.
-/// In fx, u0 and t the fiducials hardly tell a far source with a long focus from a near one; here that doubt
-/// is all in rho (one over the depth of the centre), and the fit is nearly linear.
+/// Focal length and distance are strongly correlated in (fx, u0, t). Here rho (inverse depth of the centre)
+/// carries that uncertainty alone, and the fit is nearly linear.
 struct CentredView {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< in the world, mm
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< camera_from_world
@@ -23,7 +23,7 @@ struct CentredView {
   double skew = 0;        ///< px / mm
 };
 
-/// Small changes of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy, skew).
+/// Step of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy, skew).
 using ViewStep = Eigen::Vector<double, view_parameters>;
 
 CentredView centred(const View& view, const Eigen::Vector3d& centre);
@@ -33,8 +33,8 @@ CentredView moved(const CentredView& view, const ViewStep& step);
 struct ImageCoordinates {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, view_parameters> by_step;
-  Eigen::Matrix<double, 2, 3> by_place;
-  double relative_depth;  ///< over that of the centre; positive before the source
+  Eigen::Matrix<double, 2, 3> by_point;
+  double relative_depth;  ///< over that of the centre; positive in front of the source
 };
 ImageCoordinates image_of(const CentredView& view, const Eigen::Vector3d& point_in_world);
 

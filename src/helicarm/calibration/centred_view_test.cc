@@ -32,7 +32,7 @@ View view_of(const Parameters& p) {
 const Parameters step_sizes =
     (Parameters() << 1e-4, 1e-4, 1e-2, 1e-2, 1e-5, 1e-5, 1e-5, 1e-7, 1e-5, 1e-5, 1e-4).finished();
 
-TEST(CentredView, IsTheSameCamera) {
+TEST(CentredView, ProjectsLikeThePlainView) {
   const CentredView view = centred(example, centre);
   EXPECT_LT((uncentred(view).projection() - example.projection()).norm(), 1e-8);
   const Eigen::Vector3d point(-20, 40, 70);
@@ -54,7 +54,7 @@ TEST(CentredView, ImageJacobianAgreesWithDifferences) {
     const Eigen::Vector3d step = 1e-4 * Eigen::Vector3d::Unit(axis);
     const Eigen::Vector2d slope =
         (image_of(view, point + step).pixel - image_of(view, point - step).pixel) / 2e-4;
-    EXPECT_LT((slope - image_of(view, point).by_place.col(axis)).norm(), 1e-6) << axis;
+    EXPECT_LT((slope - image_of(view, point).by_point.col(axis)).norm(), 1e-6) << axis;
   }
 }
 
@@ -87,14 +87,14 @@ TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
 TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
   const CentredView view = centred(example, centre);
   const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, NormalPrior{0.97, 0.01}};
-  const CentredView drawn = shrunk_to_prior(view, prior);
-  const Intrinsics k = uncentred(drawn).intrinsics;
+  const CentredView shrunk = shrunk_to_prior(view, prior);
+  const Intrinsics k = uncentred(shrunk).intrinsics;
   EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
   EXPECT_NEAR(-k.fx / k.fy, 0.97, 1e-12);
   EXPECT_NEAR(k.u0, 512, 1e-9);
   EXPECT_NEAR(k.v0, 515, 1e-9);
   for (const Eigen::Vector3d& point : {Eigen::Vector3d(-20, 40, 70), {30, 30, 10}})
-    EXPECT_LT((image_of(drawn, point).pixel - image_of(view, point).pixel).norm(), 2);
+    EXPECT_LT((image_of(shrunk, point).pixel - image_of(view, point).pixel).norm(), 2);
 }
 
 TEST(PriorRows, JacobianAgreesWithDifferences) {
@@ -119,18 +119,18 @@ TEST(PriorRows, JacobianAgreesWithDifferences) {
   }
 }
 
-TEST(PriorRows, VariationsOfTwoViewsGoTogether) {
+TEST(PriorRows, CommonVariationOfTwoViewsCountsOnce) {
   const std::vector<CentredView> views{centred(example, centre), centred(example, centre)};
   IntrinsicsPrior prior{6200, std::nullopt, 4};
   prior.skew.reset();
   const double first = (6100 - 6200) / 4.0;
   const PriorRows rows =
       prior_rows(views, std::vector{prior, prior}, {IntrinsicsVariation{10, 2}, std::nullopt});
-  // Both views depart alike: a common cause, not two.
+  // Both deviate by the same amount: one common cause.
   EXPECT_NEAR(rows.residuals.squaredNorm(), first * first / (100 + 4.0 / 2), 1e-9);
 }
 
-TEST(PriorRows, MirroredViewVariesTheOtherWay) {
+TEST(PriorRows, MirroredViewReversesTheVariation) {
   View plain = example, mirrored = example;
   plain.intrinsics.fx = 6000;
   plain.intrinsics.u0 = 512 + 30;

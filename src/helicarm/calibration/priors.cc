@@ -11,39 +11,39 @@
 namespace helicarm {
 namespace {
 
-/// Numbers of one view that priors speak of, by its step.
+/// Quantities of a view that have priors, and their derivatives by its step.
 enum : Eigen::Index { focal, aspect, principal_u, principal_v, skew };
-struct Known {
+struct Quantities {
   Eigen::Vector<double, 5> values;
   Eigen::Matrix<double, 5, view_parameters> by_step;
 };
 
-Known known_of(const CentredView& view) {
+Quantities quantities_of(const CentredView& view) {
   const Intrinsics k = uncentred(view).intrinsics;
   const ViewCovariance by_step = parameters_by_step(view);
   const double sign = k.fx < 0 ? -1 : 1;
-  Known known{{(sign * k.fx + k.fy) / 2, sign * k.fx / k.fy, k.u0, k.v0, k.skew / k.fy}, {}};
-  known.by_step.row(focal) = (sign * by_step.row(0) + by_step.row(1)) / 2;
-  known.by_step.row(aspect) = sign * (by_step.row(0) - k.fx / k.fy * by_step.row(1)) / k.fy;
-  known.by_step.middleRows<2>(principal_u) = by_step.middleRows<2>(2);
-  known.by_step.row(skew) = (by_step.row(10) - k.skew / k.fy * by_step.row(1)) / k.fy;
-  return known;
+  Quantities quantities{{(sign * k.fx + k.fy) / 2, sign * k.fx / k.fy, k.u0, k.v0, k.skew / k.fy}, {}};
+  quantities.by_step.row(focal) = (sign * by_step.row(0) + by_step.row(1)) / 2;
+  quantities.by_step.row(aspect) = sign * (by_step.row(0) - k.fx / k.fy * by_step.row(1)) / k.fy;
+  quantities.by_step.middleRows<2>(principal_u) = by_step.middleRows<2>(2);
+  quantities.by_step.row(skew) = (by_step.row(10) - k.skew / k.fy * by_step.row(1)) / k.fy;
+  return quantities;
 }
 
 class Rows {
  public:
   explicit Rows(std::span<const CentredView> views) : columns_(view_parameters * Eigen::Index(views.size())) {
-    for (const CentredView& view : views) known_.push_back(known_of(view));
+    for (const CentredView& view : views) quantities_.push_back(quantities_of(view));
   }
 
   void add_own(std::size_t view, Eigen::Index which, const NormalPrior& normal_prior) {
-    residuals_.push_back((known_[view].values(which) - normal_prior.value) / normal_prior.sigma);
+    residuals_.push_back((quantities_[view].values(which) - normal_prior.value) / normal_prior.sigma);
     rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_))
         .segment<view_parameters>(view_parameters * Eigen::Index(view)) =
-        known_[view].by_step.row(which) / normal_prior.sigma;
+        quantities_[view].by_step.row(which) / normal_prior.sigma;
   }
 
-  /// A quantity's departures from nominal in some views, which have covariance common^2 + of_view^2 [i = j].
+  /// Deviations of a quantity from nominal in several views, of covariance common^2 + of_view^2 [i = j].
   struct Nominal {
     std::size_t view;
     double value;
@@ -56,9 +56,9 @@ class Rows {
     Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(count, columns_);
     for (Eigen::Index i = 0; i < count; ++i) {
       const auto& [view, value, unit] = nominal[std::size_t(i)];
-      residuals(i) = (known_[view].values(which) - value) / unit;
+      residuals(i) = (quantities_[view].values(which) - value) / unit;
       rows.row(i).segment<view_parameters>(view_parameters * Eigen::Index(view)) =
-          known_[view].by_step.row(which) / unit;
+          quantities_[view].by_step.row(which) / unit;
     }
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, variation.common * variation.common);
     covariance.diagonal().array() += variation.of_view * variation.of_view;
@@ -80,7 +80,7 @@ class Rows {
 
  private:
   Eigen::Index columns_;
-  std::vector<Known> known_;
+  std::vector<Quantities> quantities_;
   std::vector<double> residuals_;
   std::vector<Eigen::RowVectorXd> rows_;
 };
@@ -114,7 +114,7 @@ PriorRows prior_rows(std::span<const CentredView> views, std::span<const Intrins
     if (prior.skew) rows.add_own(i, skew, *prior.skew);
     if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});
     if (!prior.principal_px) continue;
-    // In a mirrored image the machine's own departure points the other way.
+    // A mirrored image reverses the C-arm's deviation along u.
     const double hand = views[i].ax < 0 ? -1 : 1;
     principals_u.push_back({i, prior.principal_px->x(), hand * prior.unit_px});
     principals_v.push_back({i, prior.principal_px->y(), prior.unit_px});

@@ -11,49 +11,46 @@
 
 namespace helicarm {
 
-/// What is known of a number beforehand: a normal distribution.
+/// Normal prior of a scalar.
 struct NormalPrior {
   double value = 0;
   double sigma = 0;
 };
 
-/// What is known of one view's intrinsics before a ball is seen (rectified px), each where it is known.
+/// Prior of one view's intrinsics (rectified px); absent members are unknown.
 struct IntrinsicsPrior {
   std::optional<double> focal_px = {};  ///< nominal mean of |fx| and fy
   std::optional<Eigen::Vector2d> principal_px = {};
-  double unit_px = 1;  ///< the unit of CArmPrior in this view: px / mm on the receiver, or 1
+  double unit_px = 1;  ///< unit of CArmPrior in this view: px per mm on the detector, or 1
   std::optional<NormalPrior> aspect = {};                   ///< |fx| / fy: 1 for square pixels
-  std::optional<NormalPrior> skew = NormalPrior{0, 1e-12};  ///< over fy. Nothing: free
+  std::optional<NormalPrior> skew = NormalPrior{0, 1e-12};  ///< over fy; nothing: free
 };
 
-/// How a quantity departs from its nominal value: by an amount common to all views of a machine, and by what
-/// each view adds (sag). Standard deviations.
+/// Standard deviations of a quantity from nominal: common to all views of a C-arm, and of each view (sag).
 struct IntrinsicsVariation {
   double common;
   double of_view;
 };
 
-/// How far a machine's intrinsics may be from nominal, in each view's unit (mm on the receiver). Nothing: not
-/// known.
+/// Intrinsics variation of a C-arm, in each view's unit (mm on the detector). Nothing: unknown.
 struct CArmPrior {
   std::optional<IntrinsicsVariation> focal;
   std::optional<IntrinsicsVariation> principal;  ///< per axis
 };
 
-/// What all views share.
+/// Priors common to all views.
 struct CommonPrior {
   CArmPrior c_arm;
-  /// Of each ball's place about the file's, mm^2, without the error of the scale; empty: exact.
+  /// Of each fiducial's coordinates, mm^2, without the scale's error; empty: exact.
   std::vector<Eigen::Matrix3d> ball_covariance_mm2 = {};
-  double scale_sigma = 0;  ///< relative standard deviation of the calibrator's scale about the balls' mean
+  double scale_sigma = 0;  ///< of the calibrator's scale about the fiducials' mean, relative
 };
 
-/// A start whose intrinsics the balls hardly fix, brought to what is known of them; its images change
-/// little.
+/// `view` with its intrinsics set to the prior where one exists; its projections change little. For a start
+/// whose intrinsics are poorly constrained.
 CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior);
 
-/// The priors as rows of a least-squares problem: `residuals` over `jacobian` by the steps of all views. Each
-/// row is worth one observation.
+/// The priors as whitened rows of a least-squares problem in the steps of all views.
 struct PriorRows {
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include <Eigen/Cholesky>
+#include <fmt/format.h>
 
 namespace helicarm {
 namespace {
@@ -18,14 +19,15 @@ constexpr double most_damping = 1e12;
 Eigen::Index ball_count(const std::vector<ViewProblem>& problems) {
   std::size_t count = 0;
   for (const ViewProblem& problem : problems)
-    for (const Observation& seen : problem.observations) count = std::max(count, seen.ball + 1);
+    for (const Observation& observation : problem.observations) count = std::max(count, observation.ball + 1);
   return Eigen::Index(count);
 }
 
 bool is_tolerant(const std::vector<ViewProblem>& problems) {
   return std::ranges::any_of(problems, [](const ViewProblem& problem) {
-    return std::ranges::any_of(problem.observations,
-                               [](const Observation& seen) { return !seen.place_root.isZero(0); });
+    return std::ranges::any_of(problem.observations, [](const Observation& observation) {
+      return !observation.offset_root.isZero(0);
+    });
   });
 }
 
@@ -33,8 +35,8 @@ Eigen::Index map_modes(const ViewProblem& problem) {
   return problem.observations.empty() ? 0 : problem.observations.front().by_map.size();
 }
 
-/// Rows at given views and departures; false where a point is not before its source. Without priors rho may
-/// pass through zero on the way: nothing happens there.
+/// Rows at given views and offsets; false if a point is not in front of its source. Without priors on the
+/// intrinsics rho may pass through zero during the iteration.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
   std::vector<IntrinsicsPrior> normal_priors;
   Eigen::Index count = 0;
@@ -58,22 +60,23 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
   Eigen::Index map = tolerant ? 3 * ball_count(problems) : 0;
   for (std::size_t i = 0; i < problems.size(); ++i) {
     const Eigen::Index modes = map_modes(problems[i]);
-    for (const Observation& seen : problems[i].observations) {
-      const Eigen::Index ball = 3 * Eigen::Index(seen.ball);
-      Eigen::Vector3d place = seen.point_in_world;
-      if (tolerant) place += seen.place_root * at.variations.segment<3>(ball);
-      ImageCoordinates image = image_of(at.views[i], place);
+    for (const Observation& observation : problems[i].observations) {
+      const Eigen::Index ball = 3 * Eigen::Index(observation.ball);
+      Eigen::Vector3d position = observation.point_in_world;
+      if (tolerant) position += observation.offset_root * at.variations.segment<3>(ball);
+      ImageCoordinates image = image_of(at.views[i], position);
       if (!(image.relative_depth > 0)) return false;
       for (Eigen::Index axis = 0; axis < (modes > 0 ? 2 : 0); ++axis) {
         const Eigen::Index first = map + axis * modes;
-        image.pixel[axis] += seen.by_map.dot(at.variations.segment(first, modes));
-        at.jacobian.block(row + axis, steps + first, 1, modes) = seen.by_map / seen.sigma_px;
+        image.pixel[axis] += observation.by_map.dot(at.variations.segment(first, modes));
+        at.jacobian.block(row + axis, steps + first, 1, modes) = observation.by_map / observation.sigma_px;
       }
-      at.residuals.segment<2>(row) = (image.pixel - seen.pixel) / seen.sigma_px;
+      at.residuals.segment<2>(row) = (image.pixel - observation.pixel) / observation.sigma_px;
       at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
-          image.by_step / seen.sigma_px;
+          image.by_step / observation.sigma_px;
       if (tolerant)
-        at.jacobian.block<2, 3>(row, steps + ball) = image.by_place * seen.place_root / seen.sigma_px;
+        at.jacobian.block<2, 3>(row, steps + ball) =
+            image.by_point * observation.offset_root / observation.sigma_px;
       row += 2;
     }
     map += 2 * modes;
@@ -94,18 +97,24 @@ void move(const Refinement& from, const Eigen::VectorXd& step, Refinement& to) {
   to.variations = from.variations + step.tail(from.variations.size());
 }
 
-tl::unexpected<Failure> open_views(const Refinement& at) {
-  return fail(Reason::uncertain, "the balls' pictures do not fix the views", {{"chi2", at.chi2}});
+tl::unexpected<Failure> unconstrained(const Refinement& at, const std::string& why) {
+  return fail(Reason::uncertain, "the fiducials do not constrain the views' parameters: " + why,
+              {{"chi2", at.chi2}});
 }
 
-/// Nothing where the columns, scaled to unit length, are dependent.
-std::optional<Eigen::MatrixXd> covariance_of(const Eigen::MatrixXd& jacobian) {
+/// `uncertain` if the columns, scaled to unit length, are dependent.
+Expected<Eigen::MatrixXd> covariance_of(const Refinement& at) {
+  constexpr double least_rcond = 1e-15;
+  const Eigen::MatrixXd& jacobian = at.jacobian;
   const Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
   const Eigen::VectorXd root = normal.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LDLT<Eigen::MatrixXd> scaled(root.asDiagonal() * normal * root.asDiagonal());
-  if (scaled.info() != Eigen::Success || !(scaled.rcond() > 1e-15)) return std::nullopt;
+  if (scaled.info() != Eigen::Success || !(scaled.rcond() > least_rcond))
+    return unconstrained(at,
+                         fmt::format("reciprocal condition number {:.1g} of the normal equations, limit {:g}",
+                                     scaled.rcond(), least_rcond));
   const Eigen::MatrixXd inverse = scaled.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
-  return root.asDiagonal() * (inverse + inverse.transpose()) / 2 * root.asDiagonal();
+  return Eigen::MatrixXd(root.asDiagonal() * (inverse + inverse.transpose()) / 2 * root.asDiagonal());
 }
 
 }  // namespace
@@ -118,7 +127,9 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
     own += 2 * map_modes(problem);
   }
   at.variations = Eigen::VectorXd::Zero(own);
-  if (!evaluate(problems, common, at)) return open_views(at);
+  if (!evaluate(problems, common, at))
+    return unconstrained(
+        at, "in the starting views a fiducial lies behind the source, or a source distance is negative");
   double damping = 1e-3;
   bool done = false;
   for (int i = 0; i < most_iterations && !done; ++i) {
@@ -137,10 +148,11 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
       damping = lower ? std::max(least_damping, damping / 8) : damping * 5;
     }
   }
-  const auto covariance = done ? covariance_of(at.jacobian) : std::nullopt;
-  if (!covariance) return open_views(at);
-  at.covariance = *covariance;
-  return at;
+  if (!done) return unconstrained(at, fmt::format("no convergence in {} iterations", most_iterations));
+  return covariance_of(at).map([&](const Eigen::MatrixXd& covariance) {
+    at.covariance = covariance;
+    return at;
+  });
 }
 
 }  // namespace helicarm

@@ -10,15 +10,15 @@
 
 namespace helicarm {
 
-/// A ball's place (mm) and image (px), with the image's standard deviation per axis.
+/// A fiducial's position (mm) and image point (px, standard deviation per axis).
 struct Observation {
-  std::size_t ball;  ///< the same in all views
+  std::size_t ball;  ///< index, the same in all views
   Eigen::Vector3d point_in_world;
   Eigen::Vector2d pixel;
-  double sigma_px;                 ///< its own, without what the map does
-  Eigen::RowVectorXd by_map = {};  ///< what the map's independent errors of one sigma do to either axis
-  /// Square root of the covariance of the ball's place, mm: place = point_in_world + root * departure.
-  Eigen::Matrix3d place_root = Eigen::Matrix3d::Zero();
+  double sigma_px;                 ///< without the map's
+  Eigen::RowVectorXd by_map = {};  ///< effect of the map's independent unit errors on either axis
+  /// Square root of the covariance of the position, mm: position = point_in_world + root * offset.
+  Eigen::Matrix3d offset_root = Eigen::Matrix3d::Zero();
 };
 
 struct ViewProblem {
@@ -27,21 +27,20 @@ struct ViewProblem {
   IntrinsicsPrior prior;
 };
 
-/// The fit of all views at once. Rows are the observations' u and v, view by view, then the priors, each over
-/// its standard deviation. Columns are the steps of all views, then, each over its standard deviation: the
-/// balls' departures from the drawing, if there is a tolerance, and each view's errors of the map in u and in
-/// v.
+/// The joint fit of all views. Rows, each over its standard deviation: u and v of the observations, view by
+/// view, then the priors. Columns: the steps of all views, then, in standard deviations, the fiducials'
+/// offsets from the file if there is a tolerance, and each view's map errors in u and in v.
 struct Refinement {
   std::vector<CentredView> views;
-  Eigen::VectorXd variations;  ///< of balls and maps
+  Eigen::VectorXd variations;  ///< offsets of fiducials, errors of maps
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  Eigen::MatrixXd covariance;  ///< of all columns, the sigmas taken at their word
+  Eigen::MatrixXd covariance;  ///< of all columns, for the given sigmas
   double chi2 = 0;
   int dof = 0;
 };
 
-/// Maximum likelihood by Levenberg and Marquardt's method. `uncertain` where the observations do not fix the
+/// Maximum likelihood by Levenberg-Marquardt. Refuses `uncertain` if the observations do not constrain the
 /// views.
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common);
 

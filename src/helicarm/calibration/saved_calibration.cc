@@ -44,7 +44,7 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
     JsonReader reader(json, origin);
     reader.choice("format", {"helicarm-result/1"});
     if (reader.choice("status", {"ok", "refused"}) != 0)
-      reader.refuse(Reason::bad_value, "status", "this result was refused: it holds no calibration");
+      reader.refuse(Reason::bad_value, "status", "this result was refused and has no calibration");
     SavedCalibration saved;
     for (JsonReader& view : reader.objects("views", true, 100)) {
       saved.views.push_back(view_from(view));

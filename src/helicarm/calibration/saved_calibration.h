@@ -11,9 +11,9 @@
 
 namespace helicarm {
 
-/// A calibration as a result file holds it.
+/// A calibration read from a result file.
 struct SavedCalibration : Calibration {
-  std::vector<std::optional<DistortionMap>> maps;  ///< per view; nothing where the image was not rectified
+  std::vector<std::optional<DistortionMap>> maps;  ///< per view; nothing if the image was not rectified
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map) and "calibration"

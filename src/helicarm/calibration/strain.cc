@@ -12,7 +12,7 @@ namespace {
 
 constexpr double prior_sigma = 0.05;  // of the strain of a manufactured calibrator
 
-/// Orthonormal symmetric matrices without trace.
+/// Orthonormal basis of the symmetric traceless matrices.
 std::array<Eigen::Matrix3d, 5> strain_modes() {
   const double a = std::sqrt(0.5), b = std::sqrt(1.0 / 6);
   std::array<Eigen::Matrix3d, 5> modes;
@@ -29,8 +29,8 @@ Eigen::Vector3d centre_of(const std::vector<ViewProblem>& problems) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
   for (const ViewProblem& problem : problems)
-    for (const Observation& seen : problem.observations) {
-      sum += seen.point_in_world;
+    for (const Observation& observation : problem.observations) {
+      sum += observation.point_in_world;
       ++count;
     }
   return sum / std::max(1.0, count);
@@ -44,14 +44,14 @@ Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit
   Eigen::MatrixXd by_strain = Eigen::MatrixXd::Zero(fit.jacobian.rows(), 5);
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < problems.size(); ++i)
-    for (const Observation& seen : problems[i].observations) {
-      const ImageCoordinates image = image_of(fit.views[i], seen.point_in_world);
+    for (const Observation& observation : problems[i].observations) {
+      const ImageCoordinates image = image_of(fit.views[i], observation.point_in_world);
       for (std::size_t k = 0; k < modes.size(); ++k)
         by_strain.block<2, 1>(row, Eigen::Index(k)) =
-            image.by_place * (modes[k] * (seen.point_in_world - centre)) / seen.sigma_px;
+            image.by_point * (modes[k] * (observation.point_in_world - centre)) / observation.sigma_px;
       row += 2;
     }
-  // What the views and the other unknowns can take up of a strain does not count.
+  // Only the part of a strain that views and other unknowns cannot absorb counts.
   const Eigen::MatrixXd own =
       by_strain - fit.jacobian * (fit.covariance * (fit.jacobian.transpose() * by_strain));
   Eigen::Matrix<double, 5, 5> information = by_strain.transpose() * own;

@@ -9,19 +9,19 @@
 
 namespace helicarm {
 
-/// How the calibrator would have to be stretched, without change of volume, to fit the views best: to first
-/// order about a fit with the calibrator as in its file.
+/// Volume-preserving strain of the calibrator that best explains the views, to first order about the fit with
+/// the file's coordinates.
 struct Strain {
   Eigen::Matrix3d strain =
-      Eigen::Matrix3d::Zero();                      ///< place = centre + (1 + strain) (file's place - centre)
-  double chi2_gain = 0;                             ///< what it takes from chi2, for five degrees of freedom
-  double extension = 0;                             ///< its eigenvalue of largest amount, relative
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of that, in the calibrator
-  double sigma = 0;  ///< of an extension, relative, for the strain that the views show least
+      Eigen::Matrix3d::Zero();                      ///< point = centre + (1 + strain) (file's point - centre)
+  double chi2_gain = 0;                             ///< decrease of chi2 for five degrees of freedom
+  double extension = 0;                             ///< eigenvalue of largest magnitude, relative
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< its eigenvector, calibrator frame
+  double sigma = 0;  ///< of the extension, relative, for the least observable strain
 };
 
-/// `problems` are those of `fit`. The change of volume is left out: a larger calibrator farther away looks
-/// the same.
+/// `problems` are those of `fit`. The change of volume is excluded: it is not distinguishable from the source
+/// distance.
 Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit);
 
 }  // namespace helicarm

@@ -13,8 +13,7 @@
 
 namespace helicarm {
 
-/// The views of 2.3.3: f = 900 mm, 0.15 mm pixels, 800 mm from the source, seen about the calibrator's
-/// middle.
+/// The views of 2.3.3: f = 900 mm, pixel 0.15 mm, calibrator's middle 800 mm from the source.
 inline View paper_view(double alpha) {
   const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
   return {{6000, 6000, 512, 512, 0},
@@ -22,8 +21,8 @@ inline View paper_view(double alpha) {
 }
 
 /// The first n of twelve balls on the helix, with normal noise.
-inline ViewFiducials pictured(const std::string& name, const View& view, double sigma, RandomStream& random,
-                              int n = 12) {
+inline ViewFiducials observed_fiducials(const std::string& name, const View& view, double sigma,
+                                        RandomStream& random, int n = 12) {
   ViewFiducials result{name, {}};
   for (int k = 0; k < n; ++k) {
     const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2;

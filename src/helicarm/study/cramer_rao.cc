@@ -43,7 +43,7 @@ Eigen::Matrix<double, 2, numbers> by_numbers(const View& view, const Vector3d& p
   return jacobian;
 }
 
-Eigen::Matrix<double, 2, 3> by_place(const View& view, const Vector3d& point) {
+Eigen::Matrix<double, 2, 3> by_point(const View& view, const Vector3d& point) {
   Eigen::Matrix<double, 2, 3> jacobian;
   for (int k = 0; k < 3; ++k)
     jacobian.col(k) = slope([&](double step) { return view.project(point + step * Vector3d::Unit(k)); }, 1);
@@ -78,7 +78,7 @@ Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Ve
       own += jacobian.transpose() * jacobian / (ball_sigma_px * ball_sigma_px);
     }
     Eigen::Matrix<double, 2, numbers + 3> seen;
-    seen << by_numbers(view, point), by_place(view, point);
+    seen << by_numbers(view, point), by_point(view, point);
     seen /= point_sigma_px;
     const Eigen::Matrix<double, numbers + 3, numbers + 3> of_point = seen.transpose() * seen;
     information.block<numbers, numbers>(numbers * i, numbers * i) +=
