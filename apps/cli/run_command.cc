@@ -2,6 +2,7 @@
 #include "run_command.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include <fmt/format.h>
@@ -48,18 +49,21 @@ void forget(const std::filesystem::path& out) {
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
 }
 
-/// Each image once.
-Expected<void> remember(const std::filesystem::path& path, CArmHistory history,
-                        const std::vector<HistoryEntry>& entries, Console& console) {
+/// Adds each image once; nothing if the residuals are inconsistent with the noise model.
+Expected<void> add_to_c_arm_history(const std::filesystem::path& path, CArmHistory history,
+                                    const Result& result, Console& console) {
   const std::size_t earlier = history.entries.size();
-  for (const HistoryEntry& entry : entries)
+  for (const HistoryEntry& entry : result.entries)
     if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
       history.entries.push_back(entry);
   if (!console.quiet)
-    console.progress << fmt::format(
-        "helicarm: {}: {} earlier acquisitions, {} added{}\n", path.string(), earlier,
-        history.entries.size() - earlier,
-        entries.empty() ? ": the residuals of this case are inconsistent with the noise model" : "");
+    console.progress << (result.variance_scale > 1
+                             ? fmt::format(
+                                   "helicarm: {}: not added to the C-arm history: residuals are {:.2g} times "
+                                   "the noise model\n",
+                                   path.string(), std::sqrt(result.variance_scale))
+                             : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
+                                           earlier, history.entries.size() - earlier));
   return write_file(path, to_text(to_json(history)) + "\n");
 }
 
@@ -150,7 +154,7 @@ Expected<Result> run_and_write(const RunArguments& arguments, Console& console) 
     const Result result = value_or_throw(measure(arguments, console));
     value_or_throw(write(result, arguments));
     if (arguments.history && !result.failure)
-      value_or_throw(remember(*arguments.history, *result.options.history, result.entries, console));
+      value_or_throw(add_to_c_arm_history(*arguments.history, *result.options.history, result, console));
     return result;
   });
 }

@@ -15,19 +15,19 @@ struct Statistics {
   double rms = 0;
   double max = 0;
   double min = 0;
-  int n = 0;  ///< 0: nothing was measured, the other numbers mean nothing
+  int n = 0;  ///< 0: no data; the other members are invalid
 };
 
 Statistics statistics_of(std::span<const double> errors);
 
-/// Eq. 10 where the true pixels are not known: the residuals (px), enlarged for the degrees of freedom that
-/// the calibration took.
+/// Eq. 10 without the true pixels: the residuals (px), scaled by the square root of observations over degrees
+/// of freedom.
 Statistics fiducial_localization_error(const CalibrationResult& calibration);
 
-/// Eq. 11: each ball used in two views or more, projected back and compared with its place (mm).
+/// Eq. 11: distances (mm) of the fiducials used in two or more views, triangulated, from their coordinates.
 Statistics fiducial_registration_error(const CalibrationResult& calibration);
 
-/// Distance of a located target from its known place, the terms of Eq. 12 (mm).
+/// Distance of a located target from its known position, mm: a term of Eq. 12.
 double target_error(const LocatedPoint& located, const Eigen::Vector3d& true_point);
 
 }  // namespace helicarm

@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-TEST(StatisticsOf, KnowsItsNumbers) {
+TEST(StatisticsOf, TwoValues) {
   const std::vector<double> errors{3, 4};
   const Statistics s = statistics_of(errors);
   EXPECT_EQ(s.mean, 3.5);
@@ -23,7 +23,7 @@ TEST(StatisticsOf, KnowsItsNumbers) {
   EXPECT_EQ(statistics_of({}).n, 0);
 }
 
-std::vector<ViewFiducials> balls_seen(double sigma, std::uint64_t trial) {
+std::vector<ViewFiducials> observed_balls(double sigma, std::uint64_t trial) {
   std::vector<ViewFiducials> views;
   RandomStream random(31, 0, trial);
   for (double alpha : {0.0, 1.5}) {
@@ -43,13 +43,13 @@ std::vector<ViewFiducials> balls_seen(double sigma, std::uint64_t trial) {
   return views;
 }
 
-TEST(FiducialLocalizationError, IsThatOfTheNoiseHoweverManyParametersWereFitted) {
+TEST(FiducialLocalizationError, EqualsTheNoiseForBothMethods) {
   const double sigma = 0.4;
   for (auto method : {calibrate, calibrate_paper}) {
     double mean = 0, rms2 = 0;
     const int trials = 200;
     for (int trial = 0; trial < trials; ++trial) {
-      const auto result = method(balls_seen(sigma, std::uint64_t(trial)), {});
+      const auto result = method(observed_balls(sigma, std::uint64_t(trial)), {});
       ASSERT_TRUE(result.has_value());
       const Statistics fle = fiducial_localization_error(*result);
       mean += fle.mean / trials;
@@ -60,8 +60,8 @@ TEST(FiducialLocalizationError, IsThatOfTheNoiseHoweverManyParametersWereFitted)
   }
 }
 
-TEST(FiducialRegistrationError, BallsOfOneViewOnlyAreLeftOut) {
-  auto views = balls_seen(0.4, 0);
+TEST(FiducialRegistrationError, BallsUsedInOneViewAreExcluded) {
+  auto views = observed_balls(0.4, 0);
   views[0].fiducials[3].status = FiducialStatus::occluded;
   const auto result = calibrate(views, {});
   ASSERT_TRUE(result.has_value());

@@ -10,15 +10,15 @@
 
 namespace helicarm {
 
-/// How far from its known place a check point was found, and how far it was expected to be.
+/// Measured and predicted error of a check target.
 struct TargetError {
   std::string name;
   double error_mm;
   double predicted_mm;     ///< rms
-  double predicted_95_mm;  ///< exceeded by 5 % of errors
+  double predicted_95_mm;  ///< exceeded by 5 % of the errors
 };
 
-/// FLE (Eq. 10), FRE (Eq. 11) and TRE (Eq. 12); n = 0 where it was not measured.
+/// FLE (Eq. 10), FRE (Eq. 11) and TRE (Eq. 12); n = 0: not measured.
 struct Accuracy {
   Statistics fle_px;
   Statistics fre_mm;
@@ -26,8 +26,8 @@ struct Accuracy {
   std::vector<TargetError> targets;
 };
 
-/// The length that 95 % of the errors with this covariance do not exceed, within 2 % (Satterthwaite's
-/// chi-square of the same mean and variance, Wilson and Hilferty's quantile).
+/// 95 % quantile of the length of an error with this covariance, within 2 % (Satterthwaite's chi-square of
+/// the same mean and variance, Wilson and Hilferty's quantile).
 double length_at_95(const Eigen::Matrix3d& covariance);
 
 }  // namespace helicarm

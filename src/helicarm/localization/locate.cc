@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-/// What the views' parameters do to the images of a point: d pixels (2n) / d parameters.
+/// d pixels (2n) / d the views' parameters.
 Eigen::MatrixXd images_by_calibration(const Eigen::Vector3d& point_in_anchor,
                                       std::span<const PointObservation> observations,
                                       const Calibration& calibration) {
@@ -28,7 +28,7 @@ Eigen::MatrixXd images_by_calibration(const Eigen::Vector3d& point_in_anchor,
   return jacobian;
 }
 
-/// What the anchors' poses add to the noise of a point's images, px^2 (2n x 2n).
+/// Noise of the observations due to the anchors' poses, px^2 (2n x 2n).
 Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
                                  std::span<const PointObservation> observations,
                                  const Calibration& calibration) {
@@ -43,7 +43,7 @@ Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
   return noise;
 }
 
-/// What motion between the first acquisition and the others adds to the noise of a point's images, px^2.
+/// Noise of the observations due to motion between the first acquisition and each other one, px^2.
 Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
                                 std::span<const PointObservation> observations,
                                 const Calibration& calibration, double motion_sigma_mm) {
@@ -58,8 +58,8 @@ Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
   return noise;
 }
 
-/// Stands for a calibration without a covariance: its error at a point is about as large as its residuals at
-/// the fiducials, corrected for degrees of freedom. Imported views have no residuals.
+/// Approximation for a calibration without covariance: the residuals at the fiducials, corrected for degrees
+/// of freedom. Imported views have no residuals.
 Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
                                const Calibration& calibration) {
   constexpr double least_px = 0.05;  // rounding of a matrix or a pixel in a text file
@@ -82,14 +82,15 @@ void inflate_if_rays_miss(LocatedPoint& located) {
   located.by_calibration *= std::sqrt(excess);
   located.missing_rays = Warning{
       Reason::residual_too_large,
-      fmt::format("the rays of \"{}\" miss each other by {:.3g} mm, {:.3g} times what their errors explain: "
-                  "check its picks, or whether the bone moved between the acquisitions",
-                  located.name, located.ray_gap_mm, std::sqrt(excess)),
+      fmt::format(
+          "the ray gap of \"{}\" is {:.3g} mm, {:.3g} times what its errors explain: check its picks, "
+          "and whether the bone moved between the acquisitions",
+          located.name, located.ray_gap_mm, std::sqrt(excess)),
       {},
       {{"ray_gap_mm", located.ray_gap_mm}, {"chi2", located.chi2}}};
 }
 
-/// The point lies between the rays, so half their distance is an error that is seen.
+/// The point lies between the rays: its error is at least half the ray gap for one of them.
 void bound_by_ray_gap(LocatedPoint& located) {
   const double length = length_at_95(located.covariance_in_anchor), half = 0.5 * located.ray_gap_mm;
   if (length >= half) return;
@@ -126,7 +127,7 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
     found = intersect(ray_observations, noise);
     if (found) located.by_calibration = -found->by_pixels * slopes;
   } else if (found) {
-    const Eigen::Vector3d point = found->point;  // that of Eq. 8: the residuals weigh no ray
+    const Eigen::Vector3d point = found->point;  // of Eq. 8: the views' residuals do not weight the rays
     noise += noise_of_views(observations, calibration);
     found = intersect(ray_observations, noise);
     if (found && motion_sigma_mm == 0) found->point = point;
@@ -150,7 +151,7 @@ Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& poin
   return {
       Reason::unobservable_motion,
       fmt::format("\"{}\": motion between the acquisitions along {:.3f}, {:.3f}, {:.3f} (calibrator), the "
-                  "ray of {}, moves the located point by as much and leaves no ray gap; {}",
+                  "ray of {}, displaces the located point by the same amount without a ray gap; {}",
                   name, direction.x(), direction.y(), direction.z(), first.name,
                   motion_sigma_mm > 0
                       ? fmt::format("{:g} mm per axis is in its covariance", motion_sigma_mm)
@@ -169,7 +170,8 @@ Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_cal
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const View& view = calibration.views[i].view;
     if (!(view.depth(point_in_calibrator) > 0))
-      return fail(Reason::behind_source, "the point lies behind a source");
+      return fail(Reason::behind_source,
+                  fmt::format("the point lies behind the source of {}", calibration.views[i].name));
     observations.push_back(
         {i, view.project(point_in_calibrator), sigma_px * sigma_px * Eigen::Matrix2d::Identity()});
   }

@@ -25,7 +25,7 @@ View paper_view(double alpha) {
 const std::vector<View> truth{paper_view(0), paper_view(std::numbers::pi / 2)};
 const Eigen::Vector3d target(12, -20, 55);
 
-/// Twelve balls in each view, as in 2.3.3, and what the maker says of the c_arm.
+/// Twelve balls in each view, as in 2.3.3, with the nominal intrinsics as prior.
 Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
   std::vector<ViewFiducials> views;
   for (const View& view : truth) {
@@ -56,7 +56,7 @@ std::vector<PointObservation> images_of(const Eigen::Vector3d& point, double sig
   return observations;
 }
 
-TEST(Locate, EllipsoidsCoverAndErrorsReachThePredictedSize) {
+TEST(Locate, EllipsoidsCoverAtTheirNominalRate) {
   for (const auto& [ball_sigma, pixel_sigma] : {std::pair{0.5, 0.5}, {0.5, 0.0}}) {
     const int trials = 2000;
     int covered = 0;
@@ -127,7 +127,7 @@ TEST(Locate, LengthAt95IsNeverBelowHalfTheRayGap) {
       }
 }
 
-TEST(Locate, RaysThatMissAreNamedWithAndWithoutACovarianceOfTheCalibration) {
+TEST(Locate, RaysThatMissAreWarnedOfWithAndWithoutCovariance) {
   RandomStream random(25, 0);
   const auto calibrated = noisy_calibration(0.05, random);
   ASSERT_TRUE(calibrated.has_value());
@@ -141,7 +141,7 @@ TEST(Locate, RaysThatMissAreNamedWithAndWithoutACovarianceOfTheCalibration) {
   }
 }
 
-TEST(Locate, ResidualsOfAPublishedCalibrationWidenThePointAndLeaveItsPlace) {
+TEST(Locate, ResidualsOfAPaperCalibrationChangeOnlyTheCovariance) {
   Calibration paper = exact_calibration();
   const auto before = locate("T", PointSource::pick, wrong_images({0.4, 0.2}, 0.1), paper);
   paper.views[0].reprojection_rms_px = 0.7;
@@ -152,7 +152,7 @@ TEST(Locate, ResidualsOfAPublishedCalibrationWidenThePointAndLeaveItsPlace) {
   EXPECT_GT(after->predicted_rms_mm(), 2 * before->predicted_rms_mm());
 }
 
-TEST(Locate, MotionAlongTheFirstRayLeavesNoGapAndIsInTheCovarianceThatItIsGiven) {
+TEST(Locate, MotionAlongTheFirstRayLeavesNoGapAndIsInTheCovariance) {
   const Calibration calibration = exact_calibration();
   const Warning note = unobservable_motion("T", target, calibration.views[0], 0);
   const Eigen::Vector3d along(note.figures.at("direction_x"), note.figures.at("direction_y"),
@@ -180,7 +180,7 @@ TEST(Locate, OneViewIsNotEnough) {
             Reason::not_seen);
 }
 
-TEST(PredictCovariance, IsThatOfALocatedPointAndGrowsAwayFromTheBalls) {
+TEST(PredictCovariance, GrowsWithTheDistanceFromTheBalls) {
   RandomStream random(24, 0);
   const auto calibration = noisy_calibration(0.5, random);
   ASSERT_TRUE(calibration.has_value());

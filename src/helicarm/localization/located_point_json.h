@@ -8,11 +8,11 @@
 
 namespace helicarm {
 
-/// One of a result's "points", in the calibrator's frame; the places in bones and tool are null until
-/// guidance fills them.
+/// An element of a result's "points", in the calibrator's frame. Positions in bones and tool are null;
+/// guidance sets them.
 Json point_json(const LocatedPoint& located_in_calibrator);
 
-/// A point that was not located, and why.
+/// A point that was not located, with the reason.
 Json point_json(const std::string& name, PointSource source, Reason reason);
 
 }  // namespace helicarm

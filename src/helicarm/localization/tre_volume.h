@@ -12,10 +12,10 @@
 
 namespace helicarm {
 
-/// Predicted TRE (rms, mm) on a cubic lattice of points in the calibrator's frame; x runs fastest. NaN: no
-/// point can be located there.
+/// Predicted TRE (rms, mm) on a cubic lattice of points in the calibrator's frame; x is the fastest index.
+/// NaN where no point can be located.
 struct TreVolume {
-  Eigen::Vector3d first;  ///< place of the first point, mm
+  Eigen::Vector3d first;  ///< first point, mm
   double step_mm;
   int side;  ///< points along each edge
   std::vector<double> rms_mm;

@@ -23,7 +23,7 @@ Calibration exact_pair() {
   return calibration;
 }
 
-TEST(PredictTre, MiddleOfExactViewsHasTheErrorOfItsPixels) {
+TEST(PredictTre, CentreOfExactViewsHasThePixelsError) {
   const TreVolume volume = predict_tre(exact_pair(), {0, 0, 0}, 25, 10, 0.5, 1);
   ASSERT_EQ(volume.side, 5);
   ASSERT_EQ(volume.rms_mm.size(), 125u);
@@ -39,13 +39,13 @@ TEST(PredictTre, DoesNotDependOnThreads) {
             predict_tre(exact_pair(), {5, 6, 7}, 30, 10, 0.5, 3).rms_mm);
 }
 
-TEST(PredictTre, PlacesBehindASourceHaveNone) {
+TEST(PredictTre, PointsBehindASourceHaveNone) {
   const TreVolume volume = predict_tre(exact_pair(), {0, 0, -850}, 10, 10, 0.5, 1);
   EXPECT_TRUE(std::isnan(volume.at(1, 1, 1)));
   EXPECT_NE(to_csv(volume).find("\n0,0,-850,\n"), std::string::npos);
 }
 
-TEST(TreVolumeVtk, HoldsEveryPoint) {
+TEST(TreVolumeVtk, ContainsEveryPoint) {
   const std::string text = to_vtk(predict_tre(exact_pair(), {0, 0, 0}, 10, 10, 0.5, 1));
   EXPECT_NE(text.find("DIMENSIONS 3 3 3\nORIGIN -10 -10 -10\nSPACING 10 10 10\nPOINT_DATA 27"),
             std::string::npos);

@@ -19,13 +19,13 @@ CommonPrior common_prior(const Calibrator& calibrator) {
   return {unknown_c_arm(), ball_covariances(calibrator), calibrator.scale_sigma};
 }
 
-/// What a C-arm's history says of these views; images that are in it already do not count.
-Expected<LearnedIntrinsics> recall_history(const LabelledViews& views, const CArmHistory& history) {
+/// The prior of these views from a C-arm history, without entries of these images.
+Expected<LearnedIntrinsics> prior_from_history(const LabelledViews& views, const CArmHistory& history) {
   const IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
       return fail(Reason::bad_value,
-                  "a machine's history serves only images whose pixel size and source distance are known");
+                  "a C-arm history (--machine) requires images with pixel size and source distance");
   std::vector<HistoryEntry> earlier;
   std::ranges::copy_if(history.entries, std::back_inserter(earlier), [&](const HistoryEntry& entry) {
     return std::ranges::none_of(views, [&](const LabelledView& view) {
@@ -35,7 +35,8 @@ Expected<LearnedIntrinsics> recall_history(const LabelledViews& views, const CAr
   return learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
 }
 
-/// What these views add to their C-arm's history; nothing where their residuals contradict the noise model.
+/// Entries of these views for the C-arm history; none if their residuals are inconsistent with the noise
+/// model.
 std::vector<HistoryEntry> new_entries(const CaseCalibration& calibration, const CommonPrior& common) {
   std::vector<HistoryEntry> entries;
   if (calibration.variance_scale != 1) return entries;
@@ -49,7 +50,7 @@ std::vector<HistoryEntry> new_entries(const CaseCalibration& calibration, const 
   return entries;
 }
 
-/// Mean place of the balls that serve in any view.
+/// Mean position of the used fiducials over all views.
 Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
@@ -66,9 +67,9 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
                                      const RunOptions& options) {
   std::optional<LearnedIntrinsics> history;
   if (options.history) {
-    const auto recalled = recall_history(views, *options.history);
-    if (!recalled) return tl::unexpected<Failure>(recalled.error());
-    history = *recalled;
+    const auto prior = prior_from_history(views, *options.history);
+    if (!prior) return tl::unexpected<Failure>(prior.error());
+    history = *prior;
   }
   std::vector<ViewFiducials> fiducials;
   for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
@@ -87,10 +88,10 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
       });
 }
 
-/// With the changes of the images that explain the residuals as warnings. Refuses where one magnification
-/// fits all fiducials, without it only displacements of each: the wrong tag is the simpler cause.
-Expected<CaseCalibration> explained(CaseCalibration calibration, const LabelledViews& views,
-                                    const Case& given, const RunOptions& options) {
+/// Warns of image changes that explain the residuals. Refuses if one view's magnification explains them,
+/// which otherwise require offsets of the fiducials: a wrong tag is the simpler cause.
+Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const LabelledViews& views,
+                                            const Case& given, const RunOptions& options) {
   if (options.method == Method::paper) return calibration;
   for (Warning& warning : explain_residuals(views, calibration, common_prior(given.calibrator))) {
     if (warning.reason == Reason::intrinsics_inconsistent && calibration.found_tolerance_mm > 0) {
@@ -102,13 +103,15 @@ Expected<CaseCalibration> explained(CaseCalibration calibration, const LabelledV
   return calibration;
 }
 
-/// 2.2, Eq. 4-7: all views together, or each alone by the published recipe.
+/// 2.2, Eq. 4-7: all views jointly, or each alone by the paper's method.
 OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& given,
                                            const RunOptions& options) {
   auto calibration =
       calibrated(views, given, options)
           .and_then([&](CaseCalibration done) { return check_calibrator(std::move(done), views, given); })
-          .and_then([&](CaseCalibration done) { return explained(std::move(done), views, given, options); });
+          .and_then([&](CaseCalibration done) {
+            return with_explanations(std::move(done), views, given, options);
+          });
   if (!calibration) {
     Refusal refusal{calibration.error(), {}};
     for (const LabelledView& view : views) refusal.views.push_back(reported(view));

@@ -10,16 +10,16 @@
 
 namespace helicarm {
 
-/// The views of a case, calibrated together, with the images they belong to: all that points are observed and
-/// located in. Held, it serves any number of picks and poses.
+/// The jointly calibrated views of a case and their images: sufficient to observe and locate any picks and
+/// poses.
 struct CaseCalibration : CalibrationResult {
-  std::vector<LabelledView> images;          ///< one for each of `views`
-  std::optional<LearnedIntrinsics> history;  ///< of the C-arm's history, where one was given
-  std::vector<HistoryEntry> entries;         ///< what these views add to it
+  std::vector<LabelledView> images;          ///< one per view
+  std::optional<LearnedIntrinsics> history;  ///< from the C-arm history, if given
+  std::vector<HistoryEntry> entries;         ///< of these views, for the C-arm history
   Timing timing_ms;
 };
 
-/// The paper's method from image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7).
+/// From image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7).
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options);
 
 }  // namespace helicarm

@@ -15,7 +15,7 @@ Expected<std::string> digest_of(const std::filesystem::path& file) {
   return read_file(file, most_file_bytes).map([](const std::string& bytes) { return digest(bytes); });
 }
 
-/// All that the calibration of a case depends on, by content.
+/// Contents of all inputs of a case's calibration.
 Expected<std::string> key_of(const Case& given, Method method) {
   Json key = {{"calibrator", to_json(given.calibrator)},
               {"plate", given.plate ? to_json(*given.plate) : Json()},

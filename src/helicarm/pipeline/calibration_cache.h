@@ -8,13 +8,12 @@
 
 namespace helicarm {
 
-/// Runs cases, and calibrates only where images, maps, plate, calibrator or method differ from the last
-/// case's.
+/// Runs cases; calibrates only if images, maps, plate, calibrator or method differ from the previous case.
 class CalibrationCache {
  public:
-  /// As `run_case`, without a C-arm's history.
+  /// As `run_case`, without a C-arm history.
   Expected<Result> run(const Case& given, const RunOptions& options);
-  /// How many cases were calibrated.
+  /// Number of calibrations.
   int calibrations() const { return calibrations_; }
 
  private:

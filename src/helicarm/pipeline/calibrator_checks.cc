@@ -14,31 +14,30 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double diameter_sigma = 0.01;  // of all diameters together: edge model, tolerance of the balls
-constexpr double patient_sigma_mm = 60;  // the calibrator is beside the middle of the field
+constexpr double diameter_sigma = 0.01;  // common to all diameters: edge model, tolerance
+constexpr double patient_sigma_mm = 60;  // the calibrator is not at the patient's position
 constexpr double warn_sigmas = 3, refuse_sigmas = 10;
-constexpr double displaced_reach_mm = 6;  // around a ball's place where it is looked for
-constexpr double displaced_gap_mm = 0.4;  // between the rays of a displaced ball
+constexpr double displaced_reach_mm = 6;  // search radius around a fiducial's coordinates
+constexpr double displaced_gap_mm = 0.4;  // ray gap of a displaced fiducial
 
-bool looks_mirrored_unasked(const LabelledView& image, const CaseView& view) {
+bool is_mirrored_without_statement(const LabelledView& image, const CaseView& view) {
   return image.fiducials.mirrored && !view.mirrored && !image.xray_image->acquisition.flip_hint;
 }
 
 std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
   for (std::size_t i = 0; i < images.size(); ++i)
-    if (!looks_mirrored_unasked(images[i], given.views[i])) return std::nullopt;
+    if (!is_mirrored_without_statement(images[i], given.views[i])) return std::nullopt;
   return Failure{
       Reason::ambiguous_handedness,
-      "every image looks mirrored, and neither a tag nor the case says so. Either the C-arm stores "
-      "mirrored images: state \"mirrored\": true for each view. Or the calibrator's file is a mirror "
-      "image of the calibrator (the sign of one axis): correct the file. The two place points "
-      "differently",
+      "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
+      "mirrored images, state \"mirrored\": true for each view; if the calibrator's file is a mirror "
+      "image of the calibrator (the sign of one axis), correct the file. The located points differ",
       {},
       {{"views", double(images.size())}}};
 }
 
-/// False candidates among the used balls: no farther from their middle than the outermost of them.
-int false_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
+/// Unlabelled candidates within the used fiducials' largest distance from their centroid.
+int unlabelled_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
   std::vector<Eigen::Vector2d> used;
   for (const Fiducial& ball : balls)
     if (ball.status == FiducialStatus::used) used.push_back(ball.uv_raw);
@@ -50,8 +49,8 @@ int false_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
                                    [&](const Dot& dot) { return (dot.centre_px - middle).norm() <= reach; }));
 }
 
-/// Labels that leave a third of the balls in the field without an image, though as many candidates of their
-/// size are left over among the others, explain the image too badly.
+/// Refuses labels that leave at least a third of the fiducials, and as many candidates among them,
+/// unexplained.
 std::optional<Failure> check_labels(const CaseCalibration& calibration,
                                     const std::vector<LabelledView>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -60,24 +59,24 @@ std::optional<Failure> check_labels(const CaseCalibration& calibration,
     };
     const int used = count(FiducialStatus::used);
     const int rejected = count(FiducialStatus::rejected), missing = count(FiducialStatus::not_found);
-    const int left_over = false_among(calibration.fiducials[i], images[i]);
+    const int unlabelled = unlabelled_among(calibration.fiducials[i], images[i]);
     const int unexplained = rejected + missing;
-    if (2 * unexplained < used || left_over < unexplained) continue;
+    if (2 * unexplained < used || unlabelled < unexplained) continue;
     return Failure{
         Reason::ambiguous_labels,
         fmt::format("the labels explain {} fiducials, but {} are rejected and {} not found, while {} "
-                    "candidates of their size among them are left over",
-                    used, rejected, missing, left_over),
+                    "candidates of their size among them have no label",
+                    used, rejected, missing, unlabelled),
         images[i].name,
         {{"matched", double(used)},
          {"rejected", double(rejected)},
          {"not_found", double(missing)},
-         {"left_over", double(left_over)}}};
+         {"left_over", double(unlabelled)}}};
   }
   return std::nullopt;
 }
 
-/// Over all used balls, of ln(radius seen / radius expected at the ball's distance).
+/// Mean over all used fiducials of ln(measured / expected radius at the fiducial's distance).
 std::optional<double> mean_log_radius(const CalibrationResult& calibration, const Calibrator& calibrator) {
   double sum = 0, count = 0;
   for (std::size_t i = 0; i < calibration.views.size(); ++i)
@@ -93,14 +92,15 @@ std::optional<double> mean_log_radius(const CalibrationResult& calibration, cons
   return count > 0 ? std::optional(sum / count) : std::nullopt;
 }
 
-/// A false disc near where each of two views should show a ball, and where the two rays meet.
-struct Displaced {
+/// Position of a displaced fiducial, from unlabelled candidates near its projections in two views.
+struct DisplacedBall {
   Vector3d place;
   double gap_mm;
 };
 
-std::optional<Displaced> displaced_ball(const CaseCalibration& calibration,
-                                        const std::vector<LabelledView>& images, const CalibratorBall& ball) {
+std::optional<DisplacedBall> displaced_ball(const CaseCalibration& calibration,
+                                            const std::vector<LabelledView>& images,
+                                            const CalibratorBall& ball) {
   struct Near {
     std::size_t view;
     Eigen::Vector2d uv;
@@ -115,7 +115,7 @@ std::optional<Displaced> displaced_ball(const CaseCalibration& calibration,
       if (uv && (*uv - expected).norm() < displaced_reach_mm * per_mm) near.push_back({i, *uv});
     }
   }
-  std::optional<Displaced> best;
+  std::optional<DisplacedBall> best;
   for (const Near& a : near)
     for (const Near& b : near) {
       if (a.view >= b.view) continue;
@@ -125,12 +125,12 @@ std::optional<Displaced> displaced_ball(const CaseCalibration& calibration,
       const auto met = intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
       if (!met || met->ray_gap_mm > displaced_gap_mm) continue;
       if ((met->point - ball.centre_in_calibrator).norm() > displaced_reach_mm) continue;
-      if (!best || met->ray_gap_mm < best->gap_mm) best = Displaced{met->point, met->ray_gap_mm};
+      if (!best || met->ray_gap_mm < best->gap_mm) best = DisplacedBall{met->point, met->ray_gap_mm};
     }
   return best;
 }
 
-/// Balls that no view uses, though two show one near its place.
+/// Fiducials that no view uses, but two views show nearby.
 std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
                                        const std::vector<LabelledView>& images,
                                        const Calibrator& calibrator) {
@@ -146,8 +146,8 @@ std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
     const double off = (seen->place - ball.centre_in_calibrator).norm();
     warnings.push_back(
         {Reason::ball_displaced,
-         fmt::format("ball {} is not at its place in the calibrator's file: a ball is seen {:.2g} mm "
-                     "from it, at ({:.2f}, {:.2f}, {:.2f}). It is not used; measure the phantom",
+         fmt::format("fiducial {} is displaced by {:.2g} mm from the calibrator's file, to ({:.2f}, {:.2f}, "
+                     "{:.2f}). It is not used; measure the calibrator with `helicarm phantom measure`",
                      ball.label, off, seen->place.x(), seen->place.y(), seen->place.z()),
          {},
          {{"distance_mm", off},
@@ -184,8 +184,8 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
       images, [](const LabelledView& image) { return image.fiducials.assumed_tolerance_mm > 0; });
   if (assumed != images.end() && calibration.found_tolerance_mm == 0 && calibration.variance_scale != 1)
     return tl::unexpected<Failure>({Reason::calibrator_mismatch,
-                                    "the fiducials are displaced from the calibrator's coordinates, and not "
-                                    "by the same amount in all views",
+                                    "the fiducials are displaced from the calibrator's coordinates by "
+                                    "different amounts in the views",
                                     assumed->name,
                                     {{"variance_scale", calibration.variance_scale}}});
   const ScaleEvidence scale = scale_evidence(calibration, images, given.calibrator);
@@ -193,7 +193,7 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
   if (scale.sigma > 0 && std::abs(scale.excess) > warn_sigmas * sigma) {
     Failure disagreement{
         Reason::scale_disagrees,
-        fmt::format("the balls' diameters as seen imply that the calibrator is {:.1f} % {} than in its file "
+        fmt::format("the fiducials' diameters imply that the calibrator is {:.1f} % {} than in its file "
                     "(+-{:.1f} %): check coordinates, diameters and pixel size",
                     100 * std::abs(scale.excess), scale.excess > 0 ? "smaller" : "larger", 100 * sigma),
         {},
@@ -236,10 +236,9 @@ std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calib
     strain = fmt::format(", nor strains of it below {:.2g} %", 100 * warn_sigmas * calibration.strain_sigma);
   }
   note.message = fmt::format(
-      "images do not show the calibrator's absolute size{}: each per cent by which its file is too large "
-      "moves points by up to {:.2g} mm. Measure it and state scale_sigma, or compare the distances of the "
-      "balls' "
-      "middle from the source with a tape: {}",
+      "images do not show the calibrator's absolute size{}: an error of 1 % of its file moves points by "
+      "up to {:.2g} mm. Measure it and state scale_sigma, or compare the distances of the fiducials' centre "
+      "from the source with a tape measure: {}",
       strain, most, distances);
   return {note};
 }

@@ -8,27 +8,26 @@
 
 namespace helicarm {
 
-/// What the images say of the calibrator's scale, apart from its coordinates.
+/// Estimate of the calibrator's scale that is independent of its coordinates.
 struct ScaleEvidence {
   double excess = 0;  ///< the file's coordinates over the true ones, less 1
-  double sigma = 0;   ///< of that; 0: nothing is known
+  double sigma = 0;   ///< of `excess`; 0: not observable
 };
 
-/// From the balls' diameters as seen, which the file states, and Distance Source to Patient (0018,1111).
+/// From the fiducials' measured diameters and Distance Source to Patient (0018,1111).
 ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
                              const Calibrator& calibrator);
 
-/// Whether the calibrator's file can be the calibrator in the images. Refuses `ambiguous_labels` where the
-/// labels leave a third of the balls and as many candidates unexplained, `ambiguous_handedness` where every
-/// image looks mirrored and nothing says so, `scale_disagrees` where the scale is off by ten sigma,
-/// `calibrator_mismatch` where labels were found only with an assumed tolerance and the views disagree about
-/// the balls' offsets. Adds warnings: the scale off by three sigma, balls seen off their places.
+/// Checks the calibrator's file against the images. Refuses `ambiguous_labels` if a third of the fiducials
+/// and as many candidates are unexplained, `ambiguous_handedness` if every image is mirrored without a tag or
+/// `mirrored` in the case, `scale_disagrees` if the scale deviates by ten sigma, `calibrator_mismatch` if
+/// labels required an assumed tolerance and the offsets differ between views. Warns if the scale deviates by
+/// three sigma, and of displaced fiducials.
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given);
 
-/// What an error of the calibrator's scale does, which no image shows: the millimetres per per cent at each
-/// point, and the distances from the source for a tape measure. Empty where the file states its scale's
-/// sigma.
+/// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
+/// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points);
 

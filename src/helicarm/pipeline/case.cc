@@ -72,17 +72,17 @@ std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs:
   return value_or_throw(path_inside(folder, *name));
 }
 
-/// A tracker sees no marker within 10 mm of its origin; in metres all of them lie within 10 of it.
+/// Refuses poses in metres: no tracker measures within 10 mm of its origin, and all measure within 10 m.
 void refuse_metres(const Case& read) {
   constexpr double least_mm = 10;
   double farthest = 0;
-  const auto look = [&](const Poses& poses) {
+  const auto update = [&](const Poses& poses) {
     for (const auto* pose : {&poses.tracker_from_calibrator, &poses.tracker_from_femur,
                              &poses.tracker_from_tibia, &poses.tracker_from_tool})
       if (*pose) farthest = std::max(farthest, (*pose)->translation.norm());
   };
-  for (const CaseView& view : read.views) look(view.poses);
-  look(read.poses_now);
+  for (const CaseView& view : read.views) update(view.poses);
+  update(read.poses_now);
   if (farthest == 0 || farthest >= least_mm) return;
   throw BadInput(
       {Reason::bad_value,
@@ -101,7 +101,7 @@ CaseView view_from(JsonReader reader, const fs::path& folder) {
   view.plate_image = file_from(reader, "plate_image", folder);
   view.map = file_from(reader, "map", folder);
   if (view.plate_image && view.map)
-    reader.refuse(Reason::bad_value, "map", "is given beside \"plate_image\"");
+    reader.refuse(Reason::bad_value, "map", "cannot be combined with \"plate_image\"");
   if (reader.has("mirrored")) view.mirrored = reader.boolean("mirrored", false);
   if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
   reader.finish();
@@ -113,7 +113,7 @@ Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
   pick.name = name_from(reader, "name");
   pick.view = name_from(reader, "view");
   if (!find_named(views, pick.view, &CaseView::name))
-    reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is no view of the case", pick.view));
+    reader.refuse(Reason::bad_value, "view", fmt::format("\"{}\" is not a view of the case", pick.view));
   pick.uv_raw = Eigen::Vector2d(reader.numbers("uv", 2, pixel_range).data());
   if (!reader.raw("snap").is_null()) pick.snap = static_cast<Snap>(reader.choice("snap", {"none", "ball"}));
   pick.diameter_mm = reader.optional_number("diameter_mm", {0.5, 30}).value_or(pick.diameter_mm);
@@ -153,7 +153,7 @@ std::vector<TunnelPlan> tunnels_from(JsonReader& reader, const std::vector<Pick>
     take_name(entry, names, tunnel.name);
     for (const auto& [key, pick] : {std::pair{"start", &tunnel.start}, {"end", &tunnel.end}})
       if (!find_named(picks, *pick, &Pick::name))
-        entry.refuse(Reason::bad_value, key, fmt::format("\"{}\" is no pick of the case", *pick));
+        entry.refuse(Reason::bad_value, key, fmt::format("\"{}\" is not a pick of the case", *pick));
     entry.finish();
     tunnels.push_back(std::move(tunnel));
   }
@@ -168,7 +168,8 @@ std::vector<ToolLine> tool_lines_from(JsonReader& reader, const std::vector<Tunn
                   place_from(entry, "p2_in_calibrator")};
     take_name(entry, names, line.name);
     if (!find_named(tunnels, line.tunnel, &TunnelPlan::name))
-      entry.refuse(Reason::bad_value, "tunnel", fmt::format("\"{}\" is no tunnel of the case", line.tunnel));
+      entry.refuse(Reason::bad_value, "tunnel",
+                   fmt::format("\"{}\" is not a tunnel of the case", line.tunnel));
     if ((line.p2_in_calibrator - line.p1_in_calibrator).norm() < 1)
       entry.refuse(Reason::bad_value, "p2_in_calibrator", "is less than 1 mm from \"p1_in_calibrator\"");
     entry.finish();
@@ -187,7 +188,7 @@ TrackerNoise tracker_from(JsonReader reader) {
   return noise;
 }
 
-/// What a case is read for.
+/// Use of a case.
 enum class Purpose { run, phantom };
 
 std::vector<double> diameters_from(JsonReader& reader) {
@@ -224,12 +225,12 @@ std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::siz
   return views;
 }
 
-void warn_of_borrowed_name(Case& read) {
+void warn_of_name(Case& read) {
   if (read.calibrator.name == udcsc().name && !same_places(read.calibrator, udcsc()))
     read.warnings.push_back(
         {Reason::name_differs,
-         fmt::format("the calibrator calls itself \"{}\" but its balls are elsewhere; the file's "
-                     "places are used",
+         fmt::format("the calibrator is named \"{}\" but its coordinates differ from the built-in one's; the "
+                     "file's coordinates are used",
                      read.calibrator.name),
          {},
          {}});
@@ -256,7 +257,7 @@ Case case_from(const fs::path& path, Purpose purpose) {
   read.tool_lines = tool_lines_from(reader, read.tunnels);
   reader.finish();
   refuse_metres(read);
-  warn_of_borrowed_name(read);
+  warn_of_name(read);
   return read;
 }
 

@@ -48,7 +48,7 @@ class CaseFile : public testing::Test {
   Json json_;
 };
 
-TEST_F(CaseFile, NotesAreIgnoredAndAKnownHandednessIsKept) {
+TEST_F(CaseFile, NotesAreIgnoredAndMirroredIsRead) {
   json_["notes"] = "left knee of the phantom";
   json_["views"][1]["mirrored"] = true;
   const auto read_back = read();
@@ -68,14 +68,14 @@ TEST_F(CaseFile, PosesInMetresAreRefused) {
     EXPECT_EQ(failure().reason, Reason::bad_value);
     EXPECT_NE(failure().message.find("metres"), std::string::npos) << failure().message;
   }
-  // A tracker whose frame is a marker's own: all of its translations may be zero, or others far.
+  // The tracker's frame may be a marker's: zero translations, or one large one.
   json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse(identity);
   EXPECT_TRUE(read().has_value());
   json_["views"][0]["poses"]["tracker_from_femur"] = Json::parse("[[1,0,0,80],[0,1,0,0],[0,0,1,0]]");
   EXPECT_TRUE(read().has_value());
 }
 
-TEST_F(CaseFile, GivesWhatItHolds) {
+TEST_F(CaseFile, ReadsAllValues) {
   json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse("[[0,-1,0,5],[1,0,0,6],[0,0,1,7]]");
   json_["tracker"] = Json::parse(R"({"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"})");
   const auto read_back = read();
@@ -247,7 +247,7 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
-TEST(Case, PicksComeBackAsTheyWereWritten) {
+TEST(Case, RoundTripOfPicks) {
   std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, Bone::femur},
                           {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, Bone::femur}};
   Json json = Json::array();

@@ -12,7 +12,7 @@
 namespace helicarm {
 namespace {
 
-/// One view of a case, to be measured again with other tags.
+/// One view of a case, measured again with other tags.
 struct Trial {
   const Case& given;
   const RunOptions& options;
@@ -31,7 +31,7 @@ struct Trial {
   }
 };
 
-/// Mean spacing of the pixels on the receiver that a rectification by the plate implies.
+/// Mean pixel size on the detector that a rectification by the plate implies.
 std::optional<double> pixel_by_plate(const Trial& trial) {
   constexpr int least_dots = 20;
   const auto rectified = rectify_views({trial.with({}, 1)}, trial.given, trial.options);
@@ -45,10 +45,10 @@ std::optional<double> pixel_by_plate(const Trial& trial) {
          (in_plate && distance && height ? *distance / (*distance - *height) : 1);
 }
 
-/// The focal length (px) that the fiducials of one view imply by themselves, and their number.
+/// The focal length (px) estimated from one view's fiducials, and their number.
 struct FittedFocal {
   double focal_px;
-  double factor;  ///< of the trial, between the file's focal length and the one that was assumed
+  double factor;  ///< assumed focal length of the trial over the file's
   std::ptrdiff_t used;
 };
 
@@ -68,8 +68,8 @@ std::optional<FittedFocal> focal_of(const LabelledView& view, double factor) {
                      std::ranges::count(fit->fiducials[0], FiducialStatus::used, &Fiducial::status)};
 }
 
-/// The view labelled with assumed focal lengths from half to twice the file's; the most fiducials count. With
-/// a plate the source distance varies, without one the pixel size, by which the fiducials are found.
+/// Labels the view with assumed focal lengths from half to twice the file's and returns the fit with the most
+/// fiducials. With a plate the source distance varies, without one the pixel size.
 std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
   constexpr int each_way = 8;
   constexpr double ratio = 1.09;  // 8 steps: a factor of 2
@@ -92,7 +92,7 @@ std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
 }
 
 void add_pixel(Failure& failure, double file_mm, double fitting_mm) {
-  failure.message += fmt::format(". A pixel size of {:.4g} mm would fit, the file says {:.4g}: correct it",
+  failure.message += fmt::format(". A pixel size of {:.4g} mm fits, the file has {:.4g} mm: correct it",
                                  fitting_mm, file_mm);
   failure.figures["file_pixel_mm"] = file_mm;
   failure.figures["fitting_pixel_mm"] = fitting_mm;
@@ -100,13 +100,13 @@ void add_pixel(Failure& failure, double file_mm, double fitting_mm) {
 
 void add_distance(Failure& failure, double file_mm, double fitting_mm, std::optional<double> file_pixel_mm) {
   failure.message +=
-      fmt::format(". A source distance of {:.4g} mm would fit, the file says {:.4g}", fitting_mm, file_mm);
+      fmt::format(". A source distance of {:.4g} mm fits, the file has {:.4g} mm", fitting_mm, file_mm);
   failure.figures["file_source_detector_mm"] = file_mm;
   failure.figures["fitting_source_detector_mm"] = fitting_mm;
   if (file_pixel_mm) {
     const double fitting_pixel_mm = *file_pixel_mm * file_mm / fitting_mm;
-    failure.message +=
-        fmt::format(", or a pixel size of {:.4g} mm, the file says {:.4g}", fitting_pixel_mm, *file_pixel_mm);
+    failure.message += fmt::format(", or a pixel size of {:.4g} mm, the file has {:.4g} mm", fitting_pixel_mm,
+                                   *file_pixel_mm);
     failure.figures["file_pixel_mm"] = *file_pixel_mm;
     failure.figures["fitting_pixel_mm"] = fitting_pixel_mm;
   }

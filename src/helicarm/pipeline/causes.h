@@ -5,10 +5,10 @@
 
 namespace helicarm {
 
-/// The failure of a refusal. Where its view would be accepted with another pixel size or source distance
+/// The failure of a refusal. If its view would be accepted with another pixel size or source distance
 /// (`plate_mismatch`, `plate_not_found`, `calibrator_mismatch`, `ambiguous_labels`, `too_few_fiducials`), the
-/// message and the figures say which: `file_pixel_mm`, `fitting_pixel_mm`, `file_source_detector_mm`,
-/// `fitting_source_detector_mm`. Costs about twenty labellings.
+/// message states it and the figures are extended by `file_pixel_mm`, `fitting_pixel_mm`,
+/// `file_source_detector_mm`, `fitting_source_detector_mm`. Costs about twenty labellings.
 Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& options);
 
 }  // namespace helicarm

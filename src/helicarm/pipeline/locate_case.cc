@@ -16,7 +16,7 @@ void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, co
   }
 }
 
-/// What was warned of while the views were read, rectified and labelled.
+/// Warnings of reading, rectification and labelling.
 std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   for (const ViewResult& view : views) {
@@ -27,7 +27,7 @@ std::vector<Warning> warnings_of(const std::vector<ViewResult>& views) {
   return warnings;
 }
 
-Result begun(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
+Result initial_result(const Case& given, const RunOptions& options, std::vector<ViewResult> views) {
   Result result;
   result.options = options;
   result.calibrator = {given.calibrator.name, given.calibrator.tolerance_mm, given.calibrator.scale_sigma,
@@ -41,19 +41,20 @@ Result begun(const Case& given, const RunOptions& options, std::vector<ViewResul
   return result;
 }
 
-Result begun(const Case& given, const CaseCalibration& calibration, const RunOptions& options) {
+Result initial_result(const Case& given, const CaseCalibration& calibration, const RunOptions& options) {
   std::vector<ViewResult> views;
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
     views.push_back(reported(calibration.images[i]));
     views[i].found->fiducials = calibration.fiducials[i];
     views[i].calibrated = calibration.views[i];
   }
-  Result result = begun(given, options, std::move(views));
+  Result result = initial_result(given, options, std::move(views));
   append(result.warnings, calibration.warnings);
   append(result.notes, calibration.notes);
   result.joint_covariance = calibration.joint_covariance;
   result.history = calibration.history;
   result.entries = calibration.entries;
+  result.variance_scale = calibration.variance_scale;
   result.timing_ms = calibration.timing_ms;
   return result;
 }
@@ -63,7 +64,7 @@ Result begun(const Case& given, const CaseCalibration& calibration, const RunOpt
 Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
                              const RunOptions& options) {
   if (options.on_stage) options.on_stage("locate");
-  Result result = begun(given, calibration, options);
+  Result result = initial_result(given, calibration, options);
   const auto located = timed(result.timing_ms.locate, [&] {
     return observe_points(given, calibration, options.threads).map([&](std::vector<PointResult> points) {
       append(result.warnings,
@@ -95,7 +96,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
 
 Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options) {
   if (exit_code(refusal.failure.reason) == 2) return tl::unexpected<Failure>(refusal.failure);
-  Result result = begun(given, options, std::move(refusal.views));
+  Result result = initial_result(given, options, std::move(refusal.views));
   result.failure = std::move(refusal.failure);
   result.timing_ms = refusal.timing_ms;
   return result;

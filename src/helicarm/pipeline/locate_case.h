@@ -5,15 +5,13 @@
 
 namespace helicarm {
 
-/// The paper's method from calibrated views to points, tunnels and the check of a tool's line (Eq. 8, 10-12,
-/// 16, 17). Of `given` only what may differ from the calibrated case counts: picks, tunnels, tool lines,
-/// poses and the tracker's noise. Fails with `bad_value` for a pick outside its image; data that allow no
-/// trustworthy answer give a result that says so (`Result::failure`).
+/// From calibrated views to points, tunnels and the verification of tool lines (Eq. 8, 10-12, 16, 17). Uses
+/// from `given` what may differ from the calibrated case: picks, tunnels, tool lines, poses and the tracker's
+/// noise. Fails with `bad_value` for a pick outside its image; a refusal is in `Result::failure`.
 Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
                              const RunOptions& options);
 
-/// The result of a case that was refused before its views were calibrated; input that cannot be used (exit
-/// code 2) stays a failure.
+/// The result of a case that was refused before calibration; unreadable input (exit code 2) stays a failure.
 Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options);
 
 }  // namespace helicarm

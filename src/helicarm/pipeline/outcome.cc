@@ -92,7 +92,7 @@ std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
     for (std::size_t j = 0; j < i; ++j)
       if (const std::string uid = uid_of(views[i]); !uid.empty() && uid == uid_of(views[j]))
         warnings.push_back({Reason::uid_reused,
-                            fmt::format("{} and {} differ, but bear the same SOP Instance UID (0008,0018)",
+                            fmt::format("{} and {} differ, but have the same SOP Instance UID (0008,0018)",
                                         views[j].name, views[i].name)});
   return warnings;
 }
@@ -108,8 +108,8 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
     const double angle = *view.xray_image->acquisition.primary_angle_deg;
     warnings.push_back(
         {Reason::tag_disagrees,
-         fmt::format("the positioner's primary angle (0018,1510) is {:g} degrees, that of a view "
-                     "{}: are the images of {} and {} exchanged?",
+         fmt::format("the positioner's primary angle (0018,1510) is {:g} degrees, as of a view {}: check "
+                     "whether the images of {} and {} are exchanged",
                      angle, other, view.name, other),
          view.name,
          {{"primary_angle_deg", angle}}});
@@ -119,15 +119,16 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
 
 std::vector<Warning> diagnose(const Case& given, const Result& result) {
   const Calibrator& calibrator = given.calibrator;
-  constexpr double most_lengths = 3;
+  constexpr double largest_ratio = 3;
   std::vector<Warning> warnings;
   for (const TargetError& target : result.accuracy.targets)
-    if (target.error_mm > most_lengths * target.predicted_95_mm)
+    if (target.error_mm > largest_ratio * target.predicted_95_mm)
       warnings.push_back(
           {Reason::residual_too_large,
-           fmt::format("check target \"{}\" is found {:.3g} mm from its place, where 95 % of errors "
-                       "should be below {:.3g}: the calibrator is not as its file says",
-                       target.name, target.error_mm, target.predicted_95_mm),
+           fmt::format(
+               "the error of check target \"{}\" is {:.3g} mm, its 95 % bound {:.3g} mm: the calibrator "
+               "differs from its file",
+               target.name, target.error_mm, target.predicted_95_mm),
            {},
            {{"error_mm", target.error_mm}, {"predicted_95_mm", target.predicted_95_mm}}});
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
@@ -137,8 +138,7 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
     if (rejected > 1)
       warnings.push_back(
           {Reason::residual_too_large,
-           fmt::format("ball {} is out of place in {} views: is its place in the calibrator's file "
-                       "right?",
+           fmt::format("fiducial {} is rejected in {} views: check its coordinates in the calibrator's file",
                        calibrator.balls[k].label, rejected),
            {},
            {{"views", double(rejected)}}});
@@ -148,15 +148,15 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
 
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
                                              std::optional<double> max_error_mm) {
-  constexpr double usual_limit_mm = 2;
-  const double limit = max_error_mm.value_or(usual_limit_mm);
+  constexpr double default_limit_mm = 2;
+  const double limit = max_error_mm.value_or(default_limit_mm);
   std::vector<Warning> warnings;
   for (const PointResult& point : points) {
     if (!point.place) continue;
     const double error = length_at_95(point.place->covariance_in_calibrator);
     if (error <= limit) continue;
     const std::string message = fmt::format(
-        "\"{}\" may be off by {:.3g} mm (95 %), over the limit of {:g} mm", point.name, error, limit);
+        "the 95 % error of \"{}\" is {:.3g} mm, over the limit of {:g} mm", point.name, error, limit);
     const std::map<std::string, double> figures{{"error_95_mm", error}, {"limit_mm", limit}};
     if (max_error_mm) return fail(Reason::uncertain, message, figures);
     warnings.push_back({Reason::uncertain, message, {}, figures});

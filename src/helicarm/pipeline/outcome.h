@@ -10,7 +10,7 @@
 
 namespace helicarm {
 
-/// FLE and FRE of the balls, TRE of the check targets that were located.
+/// FLE and FRE of the fiducials, TRE of the located check targets.
 Accuracy measure_accuracy(const Calibrator& calibrator, const CalibrationResult& calibration,
                           const std::vector<PointResult>& points);
 
@@ -18,10 +18,10 @@ Accuracy measure_accuracy(const Calibrator& calibrator, const CalibrationResult&
 std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
                                     const std::vector<PointResult>& points);
 
-/// Eq. 16; a tunnel with an end that is not located has only a name. Refuses as `plan_tunnel`.
+/// Eq. 16; a tunnel with an unlocated end has only a name. Refuses as `plan_tunnel`.
 Expected<std::vector<Tunnel>> plan_tunnels(const Case& given, const Result& result);
 
-/// Eq. 17; an end that is not located is left out. Refuses as `distance_to_line`.
+/// Eq. 17; unlocated ends are omitted. Refuses as `distance_to_line`.
 Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
                                                       const std::vector<CalibratedView>& views,
                                                       const Result& result);
@@ -29,15 +29,14 @@ Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
 /// Different images with one SOP Instance UID (uid_reused).
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
 
-/// Views whose positioner angle is that of another view of the case (tag_disagrees).
+/// Views whose positioner angle agrees with another view's name (tag_disagrees).
 std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views);
 
-/// Diagnostics of a calibrated case: check targets far from their places, balls out of place in several
-/// views.
+/// Diagnostics of a calibrated case: errors of check targets, fiducials rejected in several views.
 std::vector<Warning> diagnose(const Case& given, const Result& result);
 
-/// `uncertain` where more than 5 % of a located point's errors would exceed the limit: refused over a limit
-/// that is given, warned of over the usual 2 mm.
+/// `uncertain` if a located point's 95 % error exceeds the limit: a failure for a given limit, a warning for
+/// the default of 2 mm.
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
                                              std::optional<double> max_error_mm);
 

@@ -13,7 +13,7 @@ RigidTransform motion(double x, double y, double z, double degrees, const Eigen:
           {x, y, z}};
 }
 
-/// A frontal and a lateral view, and a femur that bends between them.
+/// A frontal and a lateral view; the femur moves between them.
 class TwoViews : public testing::Test {
  protected:
   TwoViews() {
@@ -66,8 +66,8 @@ TEST_F(TwoViews, RaysThatMissInflateTheCovariance) {
   EXPECT_GT(points[0].place->covariance_in_calibrator.trace(), 0.1);
 }
 
-TEST_F(TwoViews, RaysMayMissByTheNoiseOfTheTracker) {
-  // The second exposure's reading of the femur is 0.7 mm wrong: far more than the pixels explain.
+TEST_F(TwoViews, TrackerNoiseExplainsARayGap) {
+  // The second view's pose of the femur is 0.7 mm wrong: far more than the pixels explain.
   given.views[1].poses.tracker_from_femur->translation += Eigen::Vector3d(0.4, 0.4, 0.4);
   PointResult seen = image_point(Bone::femur);
   given.views[1].poses.tracker_from_femur->translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
@@ -76,7 +76,7 @@ TEST_F(TwoViews, RaysMayMissByTheNoiseOfTheTracker) {
   given.tracker.sigma_mm = 0.4;
   points = {seen};
   EXPECT_TRUE(locate_points(given, calibration, points).empty());
-  given.tracker.samples = Samples::shared;  // one reading served both: then it cannot have been this noise
+  given.tracker.samples = Samples::shared;  // one sample for both: its noise does not explain the ray gap
   points = {seen};
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
 }
@@ -91,7 +91,7 @@ TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
   EXPECT_TRUE(points[0].place);
 }
 
-TEST_F(TwoViews, UntrackedPointHasANoteOfTheMotionThatItsRaysDoNotShow) {
+TEST_F(TwoViews, UntrackedPointHasANoteOfUnobservableMotion) {
   given.views[1].poses = given.views[0].poses;
   std::vector<PointResult> points = {image_point(Bone::femur), image_point(std::nullopt)};
   points[1].name = "bare";
@@ -117,7 +117,7 @@ TEST_F(TwoViews, MotionSigmaIsForUntrackedPointsOnly) {
   EXPECT_GT(variance(std::nullopt, 2), 3.9);
 }
 
-TEST_F(TwoViews, WarningsOfAPointAreAtThePointToo) {
+TEST_F(TwoViews, WarningsAreAlsoInThePoint) {
   std::vector<PointResult> points = {image_point(std::nullopt)};
   locate_points(given, calibration, points);
   ASSERT_EQ(points[0].warnings.size(), 1u);
@@ -125,7 +125,7 @@ TEST_F(TwoViews, WarningsOfAPointAreAtThePointToo) {
   EXPECT_TRUE(points[0].rays_miss);
 }
 
-TEST_F(TwoViews, PickOnAFiducialInAllViewsIsNamed) {
+TEST_F(TwoViews, PickOnAFiducialInAllViewsIsWarnedOf) {
   given.views[1].poses = given.views[0].poses;
   CaseCalibration calibrated;
   static_cast<Calibration&>(calibrated) = calibration;
@@ -142,12 +142,12 @@ TEST_F(TwoViews, PickOnAFiducialInAllViewsIsNamed) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].reason, Reason::pick_on_fiducial);
   EXPECT_NE(warnings[0].message.find("P2"), std::string::npos);
-  // In front of a ball in one view alone a pick may well lie.
+  // A pick may lie on a fiducial's image in one view.
   calibrated.fiducials[0][1].centre_in_calibrator.x() += 30;
   EXPECT_TRUE(picks_on_fiducials(given, calibrated, points).empty());
 }
 
-TEST_F(TwoViews, PointSeenOnceIsNotLocated) {
+TEST_F(TwoViews, PointObservedOnceIsNotLocated) {
   std::vector<PointResult> points = {image_point(Bone::femur)};
   points[0].seen[1].reset();
   locate_points(given, calibration, points);

@@ -6,14 +6,14 @@
 namespace helicarm {
 namespace {
 
-// A source distance about 1000 mm that is true to about 1 %; a central ray within 12 mm of the middle; and
-// sag of up to 2 mm in the distance and 6 mm in the place between two views.
+// About 1 % of a source distance of 1000 mm; a principal point within 12 mm of the centre; sag between two
+// views of up to 2 mm (source distance) and 6 mm (principal point).
 constexpr IntrinsicsVariation focal_mm{10, 1.4};
 constexpr IntrinsicsVariation principal_mm{7, 4.2};
-constexpr double field_mm = 230;  // a receiver's width, where the pixel's size is not known
+constexpr double field_mm = 230;  // width of a detector, for an unknown pixel size
 constexpr double aspect_sigma = 0.001;
 
-/// Size of a rectified pixel on the receiver.
+/// Size of a rectified pixel on the detector.
 std::optional<double> receiver_pixel_mm(const XrayImage& xray_image, const DistortionMap& map) {
   if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
     return map.rectified_pixel_mm;

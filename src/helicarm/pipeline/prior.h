@@ -7,11 +7,11 @@
 
 namespace helicarm {
 
-/// What the file and the plate say of a view's intrinsics. The file's source distance is nominal, and the
-/// central ray meets the receiver somewhere about its middle; square pixels are as good as the rectification.
+/// The intrinsics prior of a view from its file and rectification: nominal source distance, principal point
+/// at the image's centre, pixel aspect.
 IntrinsicsPrior intrinsics_prior(const XrayImage& xray_image, const DistortionMap& map);
 
-/// How far a C-arm that nobody knows may be from its file's word, and its views from each other (sag).
+/// Prior of a C-arm without history: deviation from nominal, and sag between views.
 CArmPrior unknown_c_arm();
 
 }  // namespace helicarm

@@ -11,7 +11,7 @@ namespace {
 
 using Kind = ImageChange::Kind;
 
-/// Where an image point would lie without the change.
+/// An image point with the change removed.
 Eigen::Vector2d without(const Eigen::Vector2d& uv, Kind kind, double amount, const Eigen::Vector2d& size_px) {
   const Eigen::Vector2d centre = (size_px - Eigen::Vector2d::Ones()) / 2, from = uv - centre;
   switch (kind) {
@@ -48,14 +48,14 @@ std::optional<Fit> fit_of(const std::vector<ViewFiducials>& views, const CommonP
   return fit ? std::optional(Fit{fit->chi2, fit->dof}) : std::nullopt;
 }
 
-/// Whether chi2 lies over three standard deviations above its degrees of freedom (Wilson and Hilferty 1931).
+/// Whether chi2 exceeds its degrees of freedom by three standard deviations (Wilson and Hilferty 1931).
 bool is_excessive(double chi2, int dof) {
   constexpr double most = 3;
   const double width = 2.0 / (9 * dof);
   return dof < 1 || (std::cbrt(chi2 / dof) - 1 + width) / std::sqrt(width) > most;
 }
 
-/// The amount of least chi2, by parabolas through three fits.
+/// The amount of least chi2, by iterated parabolic interpolation.
 std::optional<ImageChange> fitted(ImageChange change, const std::vector<ViewFiducials>& views,
                                   const std::vector<Eigen::Vector2d>& size_px, const CommonPrior& common) {
   constexpr double step = 1e-3;
@@ -101,9 +101,10 @@ Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& v
   if (change.kind == Kind::aspect)
     return {
         Reason::residual_distortion,
-        fmt::format("the fiducials' residuals imply rows {:.2g} % (sigma {:.1g}) farther apart than the file "
-                    "says: check the pixel spacing",
-                    percent, sigma),
+        fmt::format(
+            "the fiducials' residuals imply a row spacing {:.2g} % (sigma {:.1g}) larger than the file's: "
+            "check the pixel spacing",
+            percent, sigma),
         view, figures};
   return {
       Reason::intrinsics_inconsistent,

@@ -8,10 +8,10 @@
 
 namespace helicarm {
 
-/// A change of the images that would explain what the fiducials' residuals contradict.
+/// A change of the images that explains the fiducials' residuals.
 struct ImageChange {
   enum class Kind { radial, scale, aspect } kind;
-  std::optional<std::size_t> view;  ///< nothing: all views alike
+  std::optional<std::size_t> view;  ///< nothing: all views
   double amount = 0;                ///< radial: share at half the image's width; scale, aspect: factor - 1
   double sigma = 0;
   double chi2_before = 0;
@@ -19,15 +19,15 @@ struct ImageChange {
   int dof = 0;  ///< after
 };
 
-/// The change of one number that lowers chi2 most, by at least 25 (five standard deviations), and leaves a
-/// chi2 within three standard deviations of its degrees of freedom. Nothing where all labelled fiducials
-/// already fit, or where no such change explains them. `size_px`: of each image (width, height).
+/// The one-parameter change that lowers chi2 most, by at least 25 (five standard deviations), to within three
+/// standard deviations of its degrees of freedom. Nothing if the fiducials fit without, or no change explains
+/// them. `size_px`: of each image (width, height).
 std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& views,
                                              const std::vector<Eigen::Vector2d>& size_px,
                                              const CommonPrior& common);
 
-/// Warnings `residual_distortion` (radial distortion, pixels not square) and `intrinsics_inconsistent` (the
-/// magnifications of two views contradict each other) where the residuals imply them.
+/// Warnings `residual_distortion` (radial distortion, aspect) and `intrinsics_inconsistent` (magnifications
+/// of two views) if the residuals imply them.
 std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
                                        const CalibrationResult& calibration, const CommonPrior& common);
 

@@ -19,7 +19,7 @@ constexpr double sigma_px = 0.05;
 const Eigen::Vector2d size_px(1024, 1024);
 const Eigen::Vector2d centre = (size_px - Eigen::Vector2d::Ones()) / 2;
 
-/// Two views of a flat panel that see the paper's helix of twelve balls.
+/// Two flat-panel views of the paper's helix of twelve balls.
 std::vector<ViewFiducials> helix_views(std::uint64_t seed) {
   std::vector<ViewFiducials> views;
   RandomStream random(seed, 0);

@@ -70,8 +70,7 @@ Json json_of(const Fiducial& fiducial) {
           {"residual_px", if_seen(number(fiducial.residual_px))}};
 }
 
-/// The focal length in mm needs the pixel of the receiver: the rectified one where the plate's height and the
-/// source distance tell it, else the one of the file.
+/// f_mm uses the pixel size on the detector: of the rectified image if known there, else of the file.
 Json intrinsics_of(const ViewResult& view) {
   const Intrinsics& k = view.calibrated->view.intrinsics;
   const DistortionMap& map = view.rectification->map;

@@ -28,27 +28,25 @@ namespace helicarm {
 
 struct RunOptions {
   Method method = Method::best;
-  std::optional<double>
-      max_error_mm;      ///< refuse (uncertain) a point whose error exceeds this in more than 5 % of cases
-  unsigned threads = 0;  ///< 0: all cores
-  std::optional<CArmHistory> history = {};  ///< the C-arm's history, which then serves as a prior
-  /// Motion of an untracked bone between the acquisitions, per axis; enters the covariance of its points.
+  std::optional<double> max_error_mm;       ///< refuse (uncertain) if a point's 95 % error exceeds it
+  unsigned threads = 0;                     ///< 0: all cores
+  std::optional<CArmHistory> history = {};  ///< C-arm history, used as prior
+  /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;
-  /// Called before each stage, in the calling thread, with its name as in Timing. What it throws ends the
-  /// run.
+  /// Called before each stage, in the calling thread, with its name as in Timing. An exception ends the run.
   std::function<void(std::string_view stage)> on_stage = {};
 };
 
-/// All that the stages made of one exposure; what was not reached is absent.
+/// Results of the stages for one view; absent if not reached.
 struct ViewResult {
   std::string name;
   std::shared_ptr<const XrayImage> xray_image;
   std::optional<Rectification> rectification;
-  std::optional<LabelledFiducials> found;  ///< after calibration with its residuals and rejections
+  std::optional<LabelledFiducials> found;  ///< with residuals and rejections after calibration
   std::optional<CalibratedView> calibrated;
 };
 
-/// One pick or check target: where it was seen and where it is, or why it could not be located.
+/// One pick or check target: observations and position, or the reason why it was not located.
 struct PointResult {
   std::string name;
   PointSource source;
@@ -56,9 +54,9 @@ struct PointResult {
   std::vector<std::optional<ImagePoint>> seen;  ///< one per view
   std::optional<PointInFrames> place;
   double ray_gap_mm = 0;
-  std::optional<Failure> reason;                   ///< of an absent place
-  bool rays_miss = false;                          ///< by more than their errors explain
-  std::vector<Warning> warnings = {}, notes = {};  ///< that concern this point
+  std::optional<Failure> reason;                   ///< if not located
+  bool rays_miss = false;                          ///< ray gap larger than the errors explain
+  std::vector<Warning> warnings = {}, notes = {};  ///< of this point
 };
 
 /// A planned tunnel's start and end, as indices among the points.
@@ -67,30 +65,31 @@ struct TunnelEnds {
   std::size_t end;
 };
 
-/// Wall clock of each stage, ms; nothing where it was not reached.
+/// Wall-clock time of each stage, ms; nothing if not reached.
 struct Timing {
   std::optional<double> read, rectify, detect, label, calibrate, locate, total;
 };
 
-/// What the calibrator's file says of itself.
+/// Metadata of the calibrator's file.
 struct CalibratorSource {
   std::string name;
   double tolerance_mm = 0;
   double scale_sigma = 0;
-  Json measured = nullptr;  ///< how its coordinates were obtained, as written there
+  Json measured = nullptr;  ///< how its coordinates were obtained
 };
 
-/// The answer of `helicarm run`. A refused case holds all that was known before the refusal.
+/// Result of `helicarm run`; after a refusal, all results computed before it.
 struct Result {
   RunOptions options;
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
-  std::vector<Warning> notes;  ///< what holds for any data of this kind
+  std::vector<Warning> notes;  ///< valid for all data of this kind
   CalibratorSource calibrator;
   std::vector<ViewResult> views;
   Eigen::MatrixXd joint_covariance;          ///< of all views' parameters; as CalibratedView::covariance
-  std::optional<LearnedIntrinsics> history;  ///< what its history told, where one was given
-  std::vector<HistoryEntry> entries;         ///< what this case adds to it
+  double variance_scale = 1;                 ///< as CalibrationResult::variance_scale
+  std::optional<LearnedIntrinsics> history;  ///< from the C-arm history, if given
+  std::vector<HistoryEntry> entries;         ///< of this case, for the C-arm history
   std::vector<PointResult> points;
   Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;
@@ -100,10 +99,10 @@ struct Result {
   Timing timing_ms;
 };
 
-/// result.json (docs/formats.md): every key is there, null where not computed.
+/// result.json (docs/formats.md): all keys, null if not computed.
 Json to_json(const Result& result);
 
-/// As the key of result.json: code, message, view and figures.
+/// As in result.json: code, message, view and figures.
 Json to_json(const Failure& failure);
 
 /// A list of them.

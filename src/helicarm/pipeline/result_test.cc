@@ -28,7 +28,7 @@ Result two_views() {
   return result;
 }
 
-TEST(ResultJson, HoldsEveryKeyOfTheContract) {
+TEST(ResultJson, HasEveryKeyOfTheContract) {
   Result result = two_views();
   PointResult point{"FS", PointSource::pick, {}, {ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
   point.place = PointInFrames{};
@@ -66,14 +66,14 @@ TEST(ResultJson, HoldsEveryKeyOfTheContract) {
   expect_keys(json["timing_ms"], {"read", "rectify", "detect", "label", "calibrate", "locate", "total"});
 }
 
-TEST(ResultJson, UnseenFiducialHasNoPixels) {
+TEST(ResultJson, FiducialNotFoundHasNoPixels) {
   const Json fiducial = to_json(two_views())["views"][0]["fiducials"][1];
   EXPECT_EQ(fiducial["status"], "not_found");
   EXPECT_TRUE(fiducial["uv"].is_null());
   EXPECT_TRUE(fiducial["uv_raw"].is_null());
 }
 
-TEST(ResultJson, PointNotLocatedSaysWhy) {
+TEST(ResultJson, PointNotLocatedHasAReason) {
   Result result = two_views();
   result.points.push_back(
       {"T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, "no ball", "", {}}});
@@ -82,7 +82,7 @@ TEST(ResultJson, PointNotLocatedSaysWhy) {
   EXPECT_EQ(point["reason"], "target_not_found");
 }
 
-TEST(ResultJson, RefusalCarriesItsFiguresAndViewsNotReachedAreNull) {
+TEST(ResultJson, RefusalHasFiguresAndViewsNotReachedAreNull) {
   Result result;
   result.views.push_back({"AP", {}, {}, {}, {}});
   result.failure = Failure{Reason::too_few_fiducials, "5 balls", "AP", {{"found", 5}}};

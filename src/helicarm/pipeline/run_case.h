@@ -6,10 +6,8 @@
 
 namespace helicarm {
 
-/// The paper's method from images to tunnels. Data that allow no trustworthy answer give a result that says
-/// so
-/// (`Result::failure`) and keeps what was known until then; only input that cannot be used (exit code 2)
-/// fails.
+/// The paper's method from images to tunnels. A refusal is in `Result::failure`, with all results before it;
+/// unreadable input (exit code 2) fails.
 Expected<Result> run_case(const Case& given, const RunOptions& options);
 
 }  // namespace helicarm

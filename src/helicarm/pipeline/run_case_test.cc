@@ -15,7 +15,7 @@
 namespace helicarm {
 namespace {
 
-/// One simulated navigation for all tests: 512 pixels, tunnels' balls, tracker and tool lines.
+/// One simulated case for all tests: 512 x 512 pixels, tunnels, tracker and tool lines.
 class SimulatedNavigation : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -39,7 +39,7 @@ class SimulatedNavigation : public testing::Test {
 std::filesystem::path SimulatedNavigation::folder_;
 simulation::SimulatedCase SimulatedNavigation::truth_;
 
-TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirErrorBars) {
+TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   ASSERT_FALSE(result->failure) << result->failure->message;
@@ -70,7 +70,7 @@ TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
   EXPECT_NE(result->failure->message.find("\"mirrored\": true"), std::string::npos);
 }
 
-TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOfAndScaleIsNoted) {
+TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
   const auto untouched = run_case(given_, {});
   ASSERT_TRUE(untouched.has_value());
   EXPECT_FALSE(find_reason(untouched->warnings, Reason::scale_disagrees));
@@ -92,7 +92,7 @@ TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOfAndScaleIsNoted) {
   EXPECT_FALSE(find_reason(measured->notes, Reason::scale_unverified));
 }
 
-TEST_F(SimulatedNavigation, BallOffItsPlaceIsNamed) {
+TEST_F(SimulatedNavigation, DisplacedBallIsWarnedOf) {
   CalibratorBall& ball = given_.calibrator.balls[4];
   const Eigen::Vector3d seen = ball.centre_in_calibrator;
   ball.centre_in_calibrator += Eigen::Vector3d(1.5, -1, 1.2);
@@ -119,7 +119,7 @@ TEST_F(SimulatedNavigation, StagesAreAnnouncedInOrderAndMayBeStopped) {
   EXPECT_THROW((void)run_case(given_, options), std::runtime_error);
 }
 
-TEST_F(SimulatedNavigation, HeldCalibrationGivesWhatTheWholeRunGives) {
+TEST_F(SimulatedNavigation, CachedCalibrationGivesTheSameResult) {
   CalibrationCache cache;
   Case picked_later = given_;
   picked_later.picks.clear();
@@ -138,7 +138,7 @@ TEST_F(SimulatedNavigation, HeldCalibrationGivesWhatTheWholeRunGives) {
   EXPECT_EQ(cache.calibrations(), 1);
 }
 
-TEST_F(SimulatedNavigation, OtherImageOrCalibratorIsCalibratedAnew) {
+TEST_F(SimulatedNavigation, OtherImageOrCalibratorIsCalibratedAgain) {
   CalibrationCache cache;
   ASSERT_TRUE(cache.run(given_, {}));
   given_.calibrator.tolerance_mm = 0.01;
@@ -161,7 +161,7 @@ TEST_F(SimulatedNavigation, KnownHandednessIsTheOnlyOneTried) {
   EXPECT_EQ(wrong->failure->view, "AP");
 }
 
-TEST_F(SimulatedNavigation, ScaleErrorOfTheCalibratorIsInEveryCovariance) {
+TEST_F(SimulatedNavigation, ScaleErrorIsInEveryCovariance) {
   const auto exact = run_case(given_, {});
   given_.calibrator.scale_sigma = 0.01;
   const auto scaled = run_case(given_, {});
@@ -178,7 +178,7 @@ TEST_F(SimulatedNavigation, ScaleErrorOfTheCalibratorIsInEveryCovariance) {
   EXPECT_GT(*scaled->tunnels[0].length_sigma_mm, 0.0099 * length);
 }
 
-TEST_F(SimulatedNavigation, AnswerDoesNotDependOnTheThreads) {
+TEST_F(SimulatedNavigation, ResultDoesNotDependOnTheThreads) {
   const auto one = run_case(given_, {Method::best, {}, 1});
   const auto two = run_case(given_, {Method::best, {}, 2});
   for (std::size_t i = 0; i < one->points.size(); ++i)
@@ -203,14 +203,14 @@ std::shared_ptr<const XrayImage> image_with(const std::string& instance_key, con
   return std::make_shared<const XrayImage>(std::move(xray_image));
 }
 
-TEST(CheckImages, BlankImageTwiceIsBlankFirst) {
+TEST(CheckImages, BlankImageTwiceIsRefusedAsBlank) {
   const ReadView view{{"AP"}, image_with("one", "")};
   const auto checked = check_images_belong_together({view, view});
   ASSERT_FALSE(checked.has_value());
   EXPECT_EQ(checked.error().reason, Reason::blank_image);
 }
 
-TEST(CheckImages, DifferentImagesOfOneUidAreTwoWithAWarning) {
+TEST(CheckImages, DifferentImagesOfOneUidAreAcceptedWithAWarning) {
   const ReadView ap{{"AP"}, image_with("one", "same")}, lat{{"LAT"}, image_with("other", "same")};
   EXPECT_TRUE(check_images_belong_together({ap, lat}).has_value());
   const auto warnings = reused_uids({reported(ap), reported(lat)});
@@ -220,7 +220,7 @@ TEST(CheckImages, DifferentImagesOfOneUidAreTwoWithAWarning) {
       reused_uids({reported(ap), reported(ReadView{{"LAT"}, image_with("other", "another")})}).empty());
 }
 
-TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {
+TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsRefused) {
   given_.plate->kind = DotKind::holes;
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result.has_value());
@@ -228,7 +228,7 @@ TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsAMismatch) {
   EXPECT_EQ(result->failure->reason, Reason::plate_mismatch) << result->failure->message;
 }
 
-TEST_F(SimulatedNavigation, ExchangedImagesAreNamedByTheirAngles) {
+TEST_F(SimulatedNavigation, ExchangedImagesAreWarnedOf) {
   const auto named = [](const Result& result) {
     return std::ranges::count(result.warnings, Reason::tag_disagrees, &Warning::reason);
   };
@@ -277,7 +277,7 @@ TEST_F(SimulatedNavigation, WrongPixelSizeIsRefusedWithTheOneThatFits) {
   EXPECT_NEAR(failure.figures.at("fitting_pixel_mm") / right_mm, 1, 0.01);
 }
 
-TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsStaysAsItIs) {
+TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsIsUnchanged) {
   given_.calibrator = *calibrator_named("udcsc", folder_);
   for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   for (CaseView& view : given_.views) view.mirrored = false;

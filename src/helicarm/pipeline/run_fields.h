@@ -10,7 +10,7 @@ namespace helicarm {
 
 inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
 
-/// What a person may set of a measurement. `--threads` is a flag of all commands.
+/// Options of a run. `--threads` is a flag of all commands.
 inline constexpr std::array<Field<RunOptions>, 4> run_fields{
     bound<&RunOptions::method>({.name = "method",
                                 .flag = "--method",

@@ -14,7 +14,7 @@
 namespace helicarm {
 namespace {
 
-/// What a stage gives for each view, or why not.
+/// A stage's result for each view, or its failure.
 template <class Work>
 auto of_each(std::size_t count, unsigned threads, Work&& work) {
   using Given = std::invoke_result_t<Work, std::size_t>;
@@ -23,7 +23,7 @@ auto of_each(std::size_t count, unsigned threads, Work&& work) {
   return given;
 }
 
-/// Every view with what the stage gave for it; or, where it failed for one, what there is of all.
+/// Every view with the stage's result; if it failed for one, a refusal with all results.
 template <class Next, class View, class Added>
 OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expected<Added>> added) {
   std::vector<Next> next;
@@ -66,8 +66,7 @@ bool is_ambiguous(const Expected<LabelledFiducials>& labels) {
   return !labels && labels.error().reason == Reason::ambiguous_labels;
 }
 
-/// The plate's kind says how metal shows. Where metal of the other polarity shows the calibrator, the kind is
-/// wrong.
+/// The plate's kind determines the polarity of metal: it is wrong if the opposite polarity gives labels.
 bool is_plate_of_other_kind(const DetectedView& view, const Calibrator& calibrator,
                             const FiducialOptions& options) {
   if (view.rectification.dots_found == 0) return false;
@@ -79,7 +78,7 @@ bool is_plate_of_other_kind(const DetectedView& view, const Calibrator& calibrat
   return labels || is_ambiguous(labels);
 }
 
-/// The relative bias of the balls' radii in the view whose labels are surest; nothing where no view has any.
+/// Relative radius bias of the view whose labels have the largest margin; nothing if no view is labelled.
 std::optional<double> common_radius_bias(const std::vector<Expected<LabelledFiducials>>& views) {
   const LabelledFiducials* surest = nullptr;
   for (const auto& view : views)
@@ -169,10 +168,10 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
     auto labels = label_fiducials(*views[i].xray_image, views[i].rectification, views[i].candidates,
                                   given.calibrator, how);
     if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given.calibrator, how))
-      labels = fail(
-          Reason::plate_mismatch,
-          "the calibrator is visible if the plate's dots are taken for holes instead of balls or for balls "
-          "instead of holes");
+      labels = fail(Reason::plate_mismatch,
+                    "the calibrator is found with the opposite polarity of metal: exchange \"holes\" and "
+                    "\"balls\" in the "
+                    "plate's file");
     return labels;
   };
   auto labels = of_each(views.size(), options.threads, [&](std::size_t i) { return label(i, {}); });

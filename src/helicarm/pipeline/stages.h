@@ -13,7 +13,7 @@
 
 namespace helicarm {
 
-/// A view after each stage; every one holds what the stages before it gave.
+/// A view after each stage, with the results of the stages before it.
 struct NamedView {
   std::string name;
 };
@@ -30,13 +30,13 @@ struct LabelledView : DetectedView {
   LabelledFiducials fiducials;
 };
 
-/// As a result reports it.
+/// As reported in a result.
 ViewResult reported(const NamedView& view);
 ViewResult reported(const ReadView& view);
 ViewResult reported(const RectifiedView& view);
 ViewResult reported(const LabelledView& view);
 
-/// Why a case gives no answer, and all that the stages had computed until then.
+/// Reason of a refusal, and the results of all stages before it.
 struct Refusal {
   Failure failure;
   std::vector<ViewResult> views;
@@ -45,27 +45,26 @@ struct Refusal {
 template <class T>
 using OrRefusal = tl::expected<T, Refusal>;
 
-/// The images' files. Refuses `patient_mismatch` where two images name different patients or studies, and
-/// `views_too_close` where two are one and the same image; fails as `read_xray_image`.
+/// Reads the image files. Refuses `patient_mismatch` for images of different patients or studies, and
+/// `views_too_close` for two copies of one image; fails as `read_xray_image`.
 OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options);
 
 /// As `read_views` refuses.
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views);
 
-/// 2.1, Eq. 1-3: by the plate in the image, by a plate image taken apart, by a known map, or not at all (flat
-/// panel).
+/// 2.1, Eq. 1-3: by the plate in the image, a separate plate image, a known map, or none (flat panel).
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
                                                     const RunOptions& options);
 
-/// 2.1: each image is searched once.
+/// 2.1: candidates, once per image.
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
                                                      const RunOptions& options);
 
-/// What the calibration takes of a labelled view.
+/// The calibration's input from a labelled view.
 ViewFiducials fiducials_of(const LabelledView& view);
 
-/// 2.3.4. Where one view alone leaves its labels ambiguous, the size of the balls in the surest other view
-/// decides.
+/// 2.3.4. Ambiguous labels of a view are tried again with the radius bias of the view with the largest
+/// margin.
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
                                                  const RunOptions& options);
 

@@ -6,7 +6,7 @@
 
 namespace helicarm {
 
-/// Writes the wall clock (ms) of its own life.
+/// Writes its lifetime, ms, on destruction.
 class Stopwatch {
  public:
   explicit Stopwatch(std::optional<double>& ms) : ms_(ms) {}
