@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Crowds of peers that connect and say nothing, only echo, or never read: raw sockets against `helicarm receive`
-and `helicarm virtual-or`.
+"""Many peers that are silent, only echo, or never read, over raw sockets, against `helicarm receive` and
+`helicarm virtual-or`.
 
     tools/drill_crowds.py [--program build/bin/helicarm] [--seconds 20] [--only NAME]
 
-Prints how long a C-arm is shut out, the processor time without descriptors, and the resident memory (MiB) before, at
-most during and after each crowd. Exits 1 when a limit of docs/devices.md does not hold.
+Prints how long a C-arm cannot connect, the processor time without descriptors, and the resident memory (MiB) before,
+during (peak) and after each load. Exits 1 if a limit of docs/devices.md is exceeded.
 """
 
 import argparse
@@ -75,15 +75,15 @@ class Program:
             return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
         return 0
 
-    def wanted_s(self):
-        """Time on a processor and in the queue for one: a program that spins wants all, on a busy machine too."""
+    def processor_s(self):
+        """Processor time, used and queued for: a busy loop is visible on a loaded machine, too."""
         times = [path.read_text().split() for path in pathlib.Path(f"/proc/{self.process.pid}/task").glob("*/schedstat")]
         return sum(int(on) + int(waits) for on, waits, _ in times) / 1e9
 
     def watch(self):
         while not self.over.wait(0.1):
             self.peak = max(self.peak, self.memory_mib())
-            if self.peak > 4096:  # the drill must not take the machine's memory
+            if self.peak > 4096:  # limit of the drill's memory
                 self.process.kill()
 
     def stop(self):
@@ -112,9 +112,9 @@ def receiving(program, folder, *options, **more):
                    **more)
 
 
-def room(program, **more):
+def virtual_or(program, **more):
     ports = [word for name in ("tracker", "rtde", "dashboard", "script") for word in (f"--{name}-port", "0")]
-    return running([program, "virtual-or", "--size", "512", *ports], "say:", **more)
+    return running([program, "virtual-or", "--size", "512", *ports], "commands:", **more)
 
 
 # DICOM
@@ -158,16 +158,16 @@ def associated(port, patience=10):
     return None
 
 
-def shut_out_s(port, most_s):
-    """How long a C-arm tries in vain, once a tenth of a second."""
+def blocked_s(port, most_s):
+    """Seconds until a C-arm is served; one attempt each 0.1 s."""
     begin = time.monotonic()
     while time.monotonic() - begin < most_s:
         peer = associated(port, patience=1)
         if peer:
             peer.sendall(echo_request())
-            heard = answer_type(peer) == b"\4"
+            answered = answer_type(peer) == b"\4"
             peer.close()
-            if heard:
+            if answered:
                 return time.monotonic() - begin
         time.sleep(0.1)
     return float("inf")
@@ -177,8 +177,8 @@ def drill_silent(program, seconds):
     with tempfile.TemporaryDirectory() as folder, receiving(program, folder) as receiver:
         port = receiver.port_after("port ")
         crowd = [connect(port) for _ in range(500)]
-        waited = shut_out_s(port, 15)
-        check(f"500 silent connections shut a C-arm out for {waited:.1f} s", waited < 1)
+        waited = blocked_s(port, 15)
+        check(f"500 silent connections block a C-arm for {waited:.1f} s", waited < 1)
         close_all(crowd)
 
 
@@ -198,10 +198,10 @@ def drill_echoing(program, seconds):
         echoing = threading.Thread(target=echo_on)
         echoing.start()
         time.sleep(1)
-        waited = shut_out_s(port, 20)
+        waited = blocked_s(port, 20)
         over.set()
         echoing.join()
-        check(f"{len(crowd)} associations that only echo shut a C-arm out for {waited:.1f} s", waited < 5)
+        check(f"{len(crowd)} associations that only echo block a C-arm for {waited:.1f} s", waited < 5)
         close_all(crowd)
 
 
@@ -210,12 +210,12 @@ def drill_descriptors(program, seconds):
         port = receiver.port_after("port ")
         crowd = [connect(port) for _ in range(100)]
         time.sleep(1)
-        before = receiver.wanted_s()
+        before = receiver.processor_s()
         time.sleep(5)
-        used = receiver.wanted_s() - before
-        check(f"without descriptors the receiver wants {used:.2f} s of processor in 5 s", used < 2.5)
+        used = receiver.processor_s() - before
+        check(f"without descriptors the receiver uses {used:.2f} s of processor time in 5 s", used < 2.5)
         close_all(crowd)
-        check("and serves again", shut_out_s(port, 15) < 15)
+        check("and accepts associations again", blocked_s(port, 15) < 15)
 
 
 # OpenIGTLink
@@ -238,7 +238,7 @@ START = igtl("STT_TDATA", struct.pack(">i32s", 0, b""))
 
 
 def watch_memory(name, process, crowd, seconds, most_mib):
-    """Runs `crowd` and reports."""
+    """Runs `crowd` and checks that the memory grows by less than `most_mib`."""
     time.sleep(1)
     before, process.peak = process.memory_mib(), 0
     crowd(time.monotonic() + seconds)
@@ -283,7 +283,7 @@ def tracker_crowds(port):
             time.sleep(0.05)
 
     def halves(until):
-        """Volumes of 64 MiB that never come whole."""
+        """Volumes of 64 MiB that remain incomplete."""
         peers = [connect(port) for _ in range(32)]
         chunk = bytes(1 << 20)
         for peer in peers:
@@ -298,7 +298,7 @@ def tracker_crowds(port):
 
 
 def drill_tracker(program, seconds):
-    with room(program) as virtual:
+    with virtual_or(program) as virtual:
         port = virtual.port_after("(OpenIGTLink) port ")
         for name, crowd in tracker_crowds(port).items():
             watch_memory(f"tracker, {name}", virtual, crowd, seconds, 64)
@@ -362,45 +362,45 @@ def robot_crowds(rtde_port, dashboard_port, script_port):
 
 
 def drill_robot(program, seconds):
-    with room(program) as virtual:
+    with virtual_or(program) as virtual:
         ports = [virtual.port_after(f"{name} ") for name in ("RTDE", "dashboard", "script")]
         for name, crowd in robot_crowds(*ports).items():
             watch_memory(f"robot, {name}", virtual, crowd, seconds, 64)
 
 
-def drill_room_descriptors(program, seconds):
-    with room(program, descriptors=40) as virtual:
+def drill_virtual_or_descriptors(program, seconds):
+    with virtual_or(program, descriptors=40) as virtual:
         crowd = []
         for name in ("(OpenIGTLink) port", "RTDE", "dashboard", "script"):
             crowd += [connect(virtual.port_after(f"{name} ")) for _ in range(10)]
-        def wanted(seconds):
-            before = virtual.wanted_s()
+        def processor_time(seconds):
+            before = virtual.processor_s()
             time.sleep(seconds)
-            return virtual.wanted_s() - before
+            return virtual.processor_s() - before
 
-        used = wanted(5)
+        used = processor_time(5)
         close_all(crowd)
         time.sleep(1)
-        usual = wanted(5)
-        check(f"without descriptors the virtual room wants {used:.2f} s of processor in 5 s, else {usual:.2f}",
+        usual = processor_time(5)
+        check(f"without descriptors virtual-or uses {used:.2f} s of processor time in 5 s, otherwise {usual:.2f}",
               used < usual + 2.5)
 
 
 def drill_input(program, seconds):
-    with open("/dev/zero", "rb") as endless, room(program, stdin=endless) as virtual:
+    with open("/dev/zero", "rb") as endless, virtual_or(program, stdin=endless) as virtual:
         watch_memory("standard input without an end of line", virtual,
                      lambda until: time.sleep(max(0, until - time.monotonic())), seconds, 64)
 
 
 DRILLS = {"silent": drill_silent, "echoing": drill_echoing, "descriptors": drill_descriptors,
-          "tracker": drill_tracker, "robot": drill_robot, "room_descriptors": drill_room_descriptors,
+          "tracker": drill_tracker, "robot": drill_robot, "virtual_or_descriptors": drill_virtual_or_descriptors,
           "input": drill_input}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", default=ROOT / "build" / "bin" / "helicarm", type=pathlib.Path)
-    parser.add_argument("--seconds", default=20, type=int, help="of each crowd at tracker and robot")
+    parser.add_argument("--seconds", default=20, type=int, help="of each load on tracker and robot")
     parser.add_argument("--only", choices=DRILLS)
     arguments = parser.parse_args()
     for name, drill in DRILLS.items():

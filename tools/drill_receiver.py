@@ -1,12 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Sends X-rays to `helicarm receive` with programs that are not ours: DCMTK's echoscu and storescu (package dcmtk).
+"""Sends images to `helicarm receive` with DCMTK's echoscu and storescu (package dcmtk).
 
     tools/drill_receiver.py [--build build] [--kills 200]
 
-Plain and TLS, wrong titles, strangers' and expired certificates, old versions of TLS, twenty senders at once, an abort,
-SIGTERM, and SIGKILL at random instants: after each restart every acknowledged picture must be there, whole. Exits 1
-when anything differs.
+Plain and TLS, wrong titles, unknown and expired certificates, old versions of TLS, twenty senders at once, an abort,
+SIGTERM, and SIGKILL at random times, after which every acknowledged image must be complete. Exits 1 on a failed check.
 """
 
 import argparse
@@ -31,7 +30,7 @@ def check(name, good):
 
 class Receiver:
     def __init__(self, program, inbox, *options):
-        # A file: a pipe that nobody reads would hold the receiver up once its log has filled it.
+        # A file: an unread pipe would block the receiver once full.
         self.log = tempfile.NamedTemporaryFile("r")
         with open(self.log.name, "w") as log:
             self.process = subprocess.Popen([program, "receive", "--out", inbox, "--port", "0", *options],
@@ -45,8 +44,8 @@ class Receiver:
     def lines(self):
         return pathlib.Path(self.log.name).read_text()
 
-    def told(self, words):
-        """Whether a line of the log holds these words, within ten seconds."""
+    def logs(self, words):
+        """Whether the log contains these words within 10 s."""
         for _ in range(100):
             if words in self.lines():
                 return True
@@ -83,17 +82,17 @@ def echo(port, *words, called="HELICARM"):
     return dcmtk("echoscu", port, *words, "", called=called)
 
 
-def store(port, picture, *words, called="HELICARM"):
-    return dcmtk("storescu", port, *words, str(picture), called=called)
+def store(port, image, *words, called="HELICARM"):
+    return dcmtk("storescu", port, *words, str(image), called=called)
 
 
-def make_pictures(program, folder, count):
-    pictures = []
+def simulate_images(program, folder, count):
+    images = []
     for seed in range(1, count // 2 + 1):
         case = folder / f"case{seed}"
         subprocess.run([program, "simulate", case, "--seed", str(seed), "--size", "512", "--quiet"], check=True)
-        pictures += [case / "AP.dcm", case / "LAT.dcm"]
-    return pictures
+        images += [case / "AP.dcm", case / "LAT.dcm"]
+    return images
 
 
 def certificates(folder):
@@ -112,24 +111,24 @@ def certificates(folder):
                 "-CAcreateserial", "-out", f"{name}.pem", "-days", days)
 
 
-def drill_plain(program, folder, pictures):
+def drill_plain(program, folder, images):
     with receiving(program, folder / "plain", "--peer", "STORESCU", "--peer", "ECHOSCU") as receiver:
         check("echo", echo(receiver.port))
-        check("store", store(receiver.port, pictures[0]))
-        check("store again", store(receiver.port, pictures[0]))
+        check("store", store(receiver.port, images[0]))
+        check("store again", store(receiver.port, images[0]))
         check("one file of it", len(list((folder / "plain").glob("*.dcm"))) == 1)
         check("wrong called title is rejected", not echo(receiver.port, called="OTHER"))
         check("unknown calling title is rejected", not echo(receiver.port, "-aet", "STRANGER"))
-        store(receiver.port, pictures[1], "--abort")
-        check("an abort is told", receiver.told("cut: ") and receiver.told("aborted by the peer"))
-        check("alive after an abort", echo(receiver.port))
-        senders = [subprocess.Popen(["storescu", "-aec", "HELICARM", "127.0.0.1", receiver.port, picture],
-                                    stderr=subprocess.DEVNULL) for picture in pictures[:20]]
+        store(receiver.port, images[1], "--abort")
+        check("an abort is logged", receiver.logs("cut: ") and receiver.logs("aborted by the peer"))
+        check("accepts associations after an abort", echo(receiver.port))
+        senders = [subprocess.Popen(["storescu", "-aec", "HELICARM", "127.0.0.1", receiver.port, image],
+                                    stderr=subprocess.DEVNULL) for image in images[:20]]
         check("twenty senders at once", all(sender.wait(60) == 0 for sender in senders))
-        check("all their pictures", len(list((folder / "plain").glob("*.dcm"))) == len(pictures[:20]))
+        check("all their images are stored", len(list((folder / "plain").glob("*.dcm"))) == len(images[:20]))
 
 
-def drill_tls(program, folder, picture):
+def drill_tls(program, folder, image):
     certificates(folder)
 
     def tls(name, authority="ca"):
@@ -139,18 +138,18 @@ def drill_tls(program, folder, picture):
                folder / "ca.pem"]
     with receiving(program, folder / "tls", *options) as receiver:
         check("TLS echo", echo(receiver.port, *tls("client")))
-        check("TLS store", store(receiver.port, picture, *tls("client")))
+        check("TLS store", store(receiver.port, image, *tls("client")))
         check("certificate of another authority is refused", not echo(receiver.port, *tls("stranger")))
-        check("and told", receiver.told("TLS handshake: certificate: "))
+        check("and logged", receiver.logs("TLS handshake: certificate: "))
         check("expired certificate is refused", not echo(receiver.port, *tls("expired")))
-        check("and told", receiver.told("TLS handshake: certificate: certificate has expired"))
-        for version, spoken in (("-tls1", False), ("-tls1_1", False), ("-tls1_2", True)):
-            shaken = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{receiver.port}", version, "-cipher",
+        check("and logged", receiver.logs("TLS handshake: certificate: certificate has expired"))
+        for version, accepted in (("-tls1", False), ("-tls1_1", False), ("-tls1_2", True)):
+            handshake = subprocess.run(["openssl", "s_client", "-connect", f"127.0.0.1:{receiver.port}", version, "-cipher",
                                      "ALL:@SECLEVEL=0", "-cert", folder / "client.pem", "-key", folder / "client.key"],
                                     stdin=subprocess.DEVNULL, capture_output=True, text=True).stdout
-            check(f"s_client {version} is {'heard' if spoken else 'refused'}", ("Cipher is (NONE)" not in shaken) == spoken)
+            check(f"s_client {version} is {'accepted' if accepted else 'refused'}", ("Cipher is (NONE)" not in handshake) == accepted)
         check("no certificate is refused", not echo(receiver.port, "+tla", "+cf", str(folder / "ca.pem")))
-        check("plain talk is refused", not echo(receiver.port))
+        check("a connection without TLS is refused", not echo(receiver.port))
         check("TLS still answers", echo(receiver.port, *tls("client")))
 
 
@@ -164,29 +163,29 @@ def drill_stop(program, folder):
         check("a port that is taken: " + second.stderr.strip(), second.returncode == 2 and "port_taken" in second.stderr)
 
 
-def drill_kills(program, folder, pictures, kills):
+def drill_kills(program, folder, images, kills):
     inbox = folder / "kills"
-    acknowledged, lost, torn = {}, 0, 0
+    acknowledged, lost, incomplete = {}, 0, 0
     draw = random.Random(1)
     for _ in range(kills):
         for file in inbox.glob("*.dcm") if inbox.exists() else []:
             file.unlink()
         receiver = Receiver(program, inbox)
-        sender = subprocess.Popen(["storescu", "-v", "-aec", "HELICARM", "127.0.0.1", receiver.port, *pictures],
+        sender = subprocess.Popen(["storescu", "-v", "-aec", "HELICARM", "127.0.0.1", receiver.port, *images],
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         time.sleep(draw.uniform(0.01, 0.25))
         receiver.kill()
-        heard, _ = sender.communicate(timeout=60)
-        count = heard.count("Received Store Response (Success)")
+        output, _ = sender.communicate(timeout=60)
+        count = output.count("Received Store Response (Success)")
         acknowledged[count] = acknowledged.get(count, 0) + 1
-        whole = 0
+        complete = 0
         for file in inbox.glob("*.dcm"):
             detected = subprocess.run(["dcmdump", "-q", "+P", "SOPInstanceUID", file], capture_output=True)
-            whole += detected.returncode == 0 and file.stat().st_size > 512 * 512 * 2
-            torn += file.stat().st_size <= 512 * 512 * 2
-        lost += whole < count
+            complete += detected.returncode == 0 and file.stat().st_size > 512 * 512 * 2
+            incomplete += file.stat().st_size <= 512 * 512 * 2
+        lost += complete < count
     print(f"     acknowledged before the kill: {dict(sorted(acknowledged.items()))}")
-    check(f"{kills} kills: nothing acknowledged is lost ({lost}), nothing is half ({torn})", lost == 0 and torn == 0)
+    check(f"{kills} kills: {lost} acknowledged images lost, {incomplete} incomplete", lost == 0 and incomplete == 0)
 
 
 def main():
@@ -197,11 +196,11 @@ def main():
     program = arguments.build / "bin" / "helicarm"
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        pictures = make_pictures(program, folder, 20)
-        drill_plain(program, folder, pictures)
-        drill_tls(program, folder, pictures[0])
+        images = simulate_images(program, folder, 20)
+        drill_plain(program, folder, images)
+        drill_tls(program, folder, images[0])
         drill_stop(program, folder)
-        drill_kills(program, folder, pictures, arguments.kills)
+        drill_kills(program, folder, images, arguments.kills)
     print(f"{len(failures)} failures")
     sys.exit(1 if failures else 0)
 

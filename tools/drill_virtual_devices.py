@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""For drill_operation.py: programs whose lines can be waited for, and a virtual room with a navigation in it."""
+"""For drill_operation.py: programs with output to wait for, and `virtual-or` with `navigate`."""
 
 import os
 import pty
@@ -11,7 +11,7 @@ import subprocess
 import threading
 import time
 
-EXPOSURE_S = 2  # an exposure's poses are taken from the second and a half before it
+POSE_WINDOW_S = 2  # poses of an acquisition are taken from the 1.5 s before it
 failures = []
 
 
@@ -28,13 +28,13 @@ def free_port():
 
 
 class Program:
-    """A running helicarm whose lines can be waited for."""
+    """A running helicarm program with output to wait for."""
 
     def __init__(self, program, *words, **options):
         self.process = subprocess.Popen([program, *map(str, words)], text=True,
                                         **{"stdin": subprocess.PIPE, **options}, stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE)
-        self.lines, self.heard = queue.Queue(), []
+        self.lines, self.output_lines = queue.Queue(), []
         for stream in (self.process.stdout, self.process.stderr):
             threading.Thread(target=self._read, args=(stream,), daemon=True).start()
 
@@ -43,52 +43,53 @@ class Program:
             self.lines.put(line.rstrip())
 
     def wait_for(self, pattern, seconds=60):
-        """The first line from now on that holds the pattern; fails the drill if none comes."""
+        """The first new line that matches; TimeoutError after `seconds`."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
             try:
-                self.heard.append(self.lines.get(timeout=min(left, 0.1)))
+                self.output_lines.append(self.lines.get(timeout=min(left, 0.1)))
             except queue.Empty:
                 if self.process.poll() is not None and self.lines.empty():
                     break
                 continue
-            if re.search(pattern, self.heard[-1]):
-                return self.heard[-1]
-        raise TimeoutError(f"no \"{pattern}\" among:\n  " + "\n  ".join(self.heard[-8:]))
+            if re.search(pattern, self.output_lines[-1]):
+                return self.output_lines[-1]
+        raise TimeoutError(f"no \"{pattern}\" among:\n  " + "\n  ".join(self.output_lines[-8:]))
 
     def end(self, how=signal.SIGTERM, seconds=10):
-        """Its exit code and how long it took to end."""
+        """Exit code and seconds until the end."""
         begun = time.monotonic()
         if self.process.poll() is None:
             self.process.send_signal(how)
         code = self.process.wait(seconds)
         return code, time.monotonic() - begun
 
-    def said(self):
+    def output(self):
         self.process.wait(60)
         time.sleep(0.1)
         while not self.lines.empty():
-            self.heard.append(self.lines.get())
-        return "\n".join(self.heard)
+            self.output_lines.append(self.lines.get())
+        return "\n".join(self.output_lines)
 
 
 class VirtualDevices:
-    """A virtual room and a navigation in it; at a terminal where orders are to be confirmed by typing."""
+    """`virtual-or` and a `navigate` connected to it, at a terminal if orders are confirmed by typing."""
 
-    def __init__(self, program, folder, *options, room=(), begins="waiting for AP", terminal=False):
+    def __init__(self, program, folder, *options, virtual_or=(), begins="waiting for AP", terminal=False):
         self.program, self.folder = program, folder
         folder.mkdir()
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
-        self.room = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan, "--receiver-port",
-                            self.port, "--tracker-port", 0, "--rtde-port", 0, "--dashboard-port", 0, "--script-port", 0, *room)
-        self.room.wait_for("^commands: ")
+        self.virtual_or = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan,
+                                  "--receiver-port", self.port, "--tracker-port", 0, "--rtde-port", 0,
+                                  "--dashboard-port", 0, "--script-port", 0, *virtual_or)
+        self.virtual_or.wait_for("^commands: ")
         self.terminal = pty.openpty() if terminal else None
         self.navigation = self.navigate(*options)
         self.navigation.wait_for(begins)
-        time.sleep(EXPOSURE_S)
+        time.sleep(POSE_WINDOW_S)
 
     def navigate(self, *options):
-        # So that SIGXFSZ stays ignored, as Python has it, and a limit on files is like a full disk.
+        # Python's ignored SIGXFSZ is inherited, so that a file size limit acts like a full disk.
         words = ["navigate", self.plan, "--out", self.session, "--port", self.port, *options]
         if self.terminal:
             return Program(self.program, *words, stdin=self.terminal[1], restore_signals=False)
@@ -98,21 +99,21 @@ class VirtualDevices:
         os.write(self.terminal[0], words.encode())
 
     def confirm(self):
-        """Types "go" once it is asked for: what is typed before is discarded."""
+        """Types "go" after the prompt; earlier input is discarded."""
         self.navigation.wait_for("Type \"go\"", 120)
         self.type("go\n")
 
     def register(self):
-        """Both X-rays, and each motion of the robot's registration confirmed."""
-        self.expose()
+        """Both acquisitions, and the robot's registration with each motion confirmed."""
+        self.acquire_both()
         self.navigation.wait_for("^ *9: tip", 120)
         for pose in range(1, 10):
             self.confirm()
             self.navigation.wait_for(f"register: pose {pose}")
 
     def plan_again(self, name, withdrawn=False):
-        """After a refusal at the terminal, which waits for Enter: until the tool is at the femur's tunnel."""
-        time.sleep(EXPOSURE_S)
+        """After a refusal at the terminal, which waits for Enter, until the tool is at the femur's tunnel."""
+        time.sleep(POSE_WINDOW_S)
         self.type("\n")
         if withdrawn:
             self.navigation.wait_for("femur: withdraw")
@@ -126,66 +127,66 @@ class VirtualDevices:
         return self
 
     def __exit__(self, *_):
-        if self.room.process.poll() not in (None, 0):
-            check(f"virtual-or ended with {self.room.process.poll()}", False)
-        for each in (self.navigation, self.room):
+        if self.virtual_or.process.poll() not in (None, 0):
+            check(f"virtual-or ended with {self.virtual_or.process.poll()}", False)
+        for each in (self.navigation, self.virtual_or):
             each.end(signal.SIGKILL)
         for end in self.terminal or ():
             os.close(end)
 
-    def say(self, line, answer):
-        self.room.process.stdin.write(line + "\n")
-        self.room.process.stdin.flush()
-        return self.room.wait_for(answer, 30)
+    def command(self, line, answer):
+        self.virtual_or.process.stdin.write(line + "\n")
+        self.virtual_or.process.stdin.flush()
+        return self.virtual_or.wait_for(answer, 30)
 
-    def shoot(self, view, then):
-        """Shoots until it is taken: on a busy machine the tracker may stutter."""
+    def acquire(self, view, then):
+        """Acquires until accepted: on a loaded machine tracker data may be late."""
         for _ in range(5):
-            self.say(f"shoot {view}", f"shot {view}")
+            self.command(f"shoot {view}", f"shot {view}")
             if "expose again" not in self.navigation.wait_for(f"expose again|{then}"):
                 return
-            time.sleep(EXPOSURE_S)
-        raise TimeoutError(f"{view} is never taken")
+            time.sleep(POSE_WINDOW_S)
+        raise TimeoutError(f"{view} was not accepted in 5 acquisitions")
 
     def touch(self, bone, then):
-        """Holds the pointer there and presses Enter until it is seen at rest."""
-        self.say(f"touch {bone}", f"touching {bone}")
+        """Touches a check point and presses Enter until the pointer is measured at rest."""
+        self.command(f"touch {bone}", f"touching {bone}")
         for _ in range(5):
-            time.sleep(EXPOSURE_S)
+            time.sleep(POSE_WINDOW_S)
             self.navigation.process.stdin.write("\n")
             self.navigation.process.stdin.flush()
             if not self.navigation.wait_for(f"; again$|{then}").endswith("; again"):
                 return
-        raise TimeoutError(f"{bone} is never seen touched")
+        raise TimeoutError(f"{bone}: no touch was accepted in 5 attempts")
 
-    def expose(self):
-        self.shoot("AP", "waiting for LAT")
-        self.shoot("LAT", "^measure: ")
+    def acquire_both(self):
+        self.acquire("AP", "waiting for LAT")
+        self.acquire("LAT", "^measure: ")
 
     def rested_s(self):
-        """How long the arm has been at rest; nothing while it moves."""
-        found = re.search(r"at rest for ([\d.]+) s", self.say("where", "^tip "))
+        """Seconds at rest; None while the robot moves."""
+        found = re.search(r"at rest for ([\d.]+) s", self.command("where", "^tip "))
         return float(found.group(1)) if found else None
 
     def wait_moving(self):
         for _ in range(1000):
-            if "moving" in self.say("where", "^tip "):
+            if "moving" in self.command("where", "^tip "):
                 return
             time.sleep(0.005)
-        raise TimeoutError("the robot never moves")
+        raise TimeoutError("the robot did not start to move")
 
     def stop_s(self, begun):
-        """How long the arm moved on after that moment."""
+        """Seconds from `begun` until the robot was at rest."""
         time.sleep(1)
         rested = self.rested_s()
         return 9.9 if rested is None else time.monotonic() - begun - rested
 
     def expect_end(self, name, reason, code=3):
         ended = self.navigation.process.wait(30)
-        said = self.navigation.said()
-        check(f"{name}: ends with {reason}", ended == code and reason in said, said.splitlines()[-1])
+        output = self.navigation.output()
+        check(f"{name}: ends with {reason}", ended == code and reason in output, output.splitlines()[-1])
 
     def expect_replay(self, name):
         replayed = subprocess.run([self.program, "replay", self.session], capture_output=True, text=True)
-        check(f"{name}: the record is whole and comes out the same", replayed.returncode == 0,
+        check(f"{name}: the record is complete and reproduced", replayed.returncode == 0,
               (replayed.stdout + replayed.stderr).strip().splitlines()[-1])
