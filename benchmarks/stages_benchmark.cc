@@ -60,8 +60,8 @@ void fit_one_ball(benchmark::State& state) {
     for (const Fiducial& ball : found.fiducials)
       if (ball.status == FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
-  const DotLook look = estimate_look(xray_image(), rectification().noise, balls);
-  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(xray_image(), {balls.front()}, look, {}));
+  const DotAppearance appearance = estimate_appearance(xray_image(), rectification().noise, balls);
+  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(xray_image(), {balls.front()}, appearance, {}));
 }
 BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
 

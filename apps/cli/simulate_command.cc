@@ -90,7 +90,7 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
 Json summary(const SimulateArguments& arguments, const simulation::SimulatedCase& simulated) {
   Json json = {{"folder", arguments.folder.string()},
                {"kind", arguments.kind},
-               {"preset", simulation::word(simulated.options.machine())},
+               {"preset", simulation::word(simulated.options.c_arm_preset())},
                {"seed", simulated.options.seed},
                {"views", Json::array()}};
   for (const simulation::SimulatedView& view : simulated.views) {
@@ -122,7 +122,7 @@ CommandResult simulate_command(const SimulateArguments& arguments, Console& cons
     }
     if (console.quiet) return;
     console.out << fmt::format("{}: case of kind {}, preset {}, seed {}\n", arguments.folder.string(),
-                               arguments.kind, simulation::word(options.machine()), options.seed);
+                               arguments.kind, simulation::word(options.c_arm_preset()), options.seed);
     const bool grid = options.kind == simulation::CaseKind::grid;
     const std::string things = grid ? "crosses" : "balls";
     for (const Json& view : written["views"]) {

@@ -19,7 +19,7 @@ struct Equipment;
 /// The live data of the window at one time.
 struct LiveState {
   double at_s = 0;  ///< monotonic
-  std::vector<Lamp> lamps;
+  std::vector<StatusIndicator> indicators;
   RobotLinkStatus robot;
   Bone bone = Bone::femur;                    ///< reference bone of the tool
   std::optional<Expected<ToolOverlay>> tool;  ///< empty before registration

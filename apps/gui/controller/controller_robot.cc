@@ -143,10 +143,10 @@ LiveState Controller::live() const {
   now.at_s = monotonic_seconds();
   if (!equipment_ || !equipment_->operation) return now;
   const PoseBoard& board = equipment_->devices->board();
-  now.lamps = tracker_lamps(equipment_->tracker, board.tools(now.at_s));
+  now.indicators = tracker_indicators(equipment_->tracker, board.tools(now.at_s));
   now.robot = equipment_->devices->robot().status();
-  now.lamps.push_back(robot_lamp(now.robot));
-  now.lamps.push_back(c_arm_lamp(equipment_->devices->c_arm(), now.at_s));
+  now.indicators.push_back(robot_indicator(now.robot));
+  now.indicators.push_back(c_arm_indicator(equipment_->devices->c_arm(), now.at_s));
   if (state_.order && !state_.busy && plan_watch_) {
     const auto holds = plan_watch_->holds(board, equipment_->devices->robot().track(), now.at_s);
     if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();

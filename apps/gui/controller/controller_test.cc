@@ -42,7 +42,7 @@ const StepCard& card_of(const std::array<StepCard, phases.size()>& cards, Phase 
 }
 
 TEST(Steps, WithoutASourceAllWait) {
-  for (const StepCard& card : steps_of({})) EXPECT_EQ(card.mood, StepMood::waiting);
+  for (const StepCard& card : steps_of({})) EXPECT_EQ(card.status, StepStatus::waiting);
 }
 
 TEST(Steps, NameTheNextImage) {
@@ -51,14 +51,14 @@ TEST(Steps, NameTheNextImage) {
   const auto cards = steps_of(state_with({exposed("AP"), missing}));
   EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 of 2 X-ray images");
   EXPECT_EQ(card_of(cards, Phase::acquire).why, "LAT is next");
-  EXPECT_EQ(card_of(cards, Phase::acquire).mood, StepMood::waiting);
+  EXPECT_EQ(card_of(cards, Phase::acquire).status, StepStatus::waiting);
 }
 
 TEST(Steps, RefusalNamesItsReasonAndIsCleared) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.refusals[Phase::rectify] = {Reason::plate_not_found, "no plate", "LAT"};
   const StepCard card = card_of(steps_of(state), Phase::rectify);
-  EXPECT_EQ(card.mood, StepMood::refused);
+  EXPECT_EQ(card.status, StepStatus::refused);
   EXPECT_EQ(card.why, "LAT: no plate (plate_not_found)");
 }
 
@@ -66,7 +66,7 @@ TEST(Steps, WorkInProgressIsShown) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   state.busy = Phase::calibrate;
   state.doing = "measuring";
-  EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).mood, StepMood::running);
+  EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).status, StepStatus::running);
   EXPECT_EQ(card_of(steps_of(state), Phase::calibrate).why, "measuring");
 }
 
@@ -76,7 +76,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).why, "click FS in AP");
   for (const char* end : {"FS", "FE"})
     for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
-  EXPECT_EQ(card_of(steps_of(state), Phase::plan).mood, StepMood::waiting);  // not measured with them yet
+  EXPECT_EQ(card_of(steps_of(state), Phase::plan).status, StepStatus::waiting);  // not measured with them yet
   auto result = std::make_shared<Result>(*state.result);
   for (const double sigma_mm : {0.1, 0.2}) {
     PointResult point{"FS", PointSource::pick, {}, {}, PointInFrames{}, 0, {}};
@@ -85,7 +85,7 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
   }
   state.result = result;
   const StepCard card = card_of(steps_of(state), Phase::plan);
-  EXPECT_EQ(card.mood, StepMood::good);
+  EXPECT_EQ(card.status, StepStatus::good);
   EXPECT_EQ(card.figure, "within 0.56 mm (95 %)");  // 0.2 sqrt(7.815)
 }
 
@@ -98,7 +98,7 @@ TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
   result->points.push_back(
       {"FE", PointSource::pick, {}, {}, {}, 0, Failure{Reason::parallel_rays, "rays are parallel"}});
   state.result = result;
-  EXPECT_EQ(card_of(steps_of(state), Phase::plan).mood, StepMood::refused);
+  EXPECT_EQ(card_of(steps_of(state), Phase::plan).status, StepStatus::refused);
   EXPECT_THAT(card_of(steps_of(state), Phase::plan).why.toStdString(), HasSubstr("parallel_rays"));
 }
 
@@ -109,43 +109,44 @@ TEST(Picks, NextOneGoesThroughViewsThenEnds) {
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSLAT");
 }
 
-TEST(Lamps, OldPoseIsNotGreen) {
+TEST(StatusIndicators, OldPoseIsNotGreen) {
   TrackerPlan plan;
-  const auto lamps = tracker_lamps(plan, {{.name = "femur", .rejected = {}, .age_s = 0.02},
-                                          {.name = "tibia", .rejected = {}, .age_s = 0.4},
-                                          {.name = "tool", .rejected = {}, .age_s = 7.0}});
-  EXPECT_EQ(lamps[0].light, Light::off);
-  EXPECT_EQ(lamps[1].light, Light::green);
-  EXPECT_EQ(lamps[1].text, "20 ms");
-  EXPECT_EQ(lamps[2].light, Light::amber);
-  EXPECT_EQ(lamps[3].light, Light::red);
-  EXPECT_EQ(lamps[3].text, "7.0 s");
+  const auto indicators = tracker_indicators(plan, {{.name = "femur", .rejected = {}, .age_s = 0.02},
+                                                    {.name = "tibia", .rejected = {}, .age_s = 0.4},
+                                                    {.name = "tool", .rejected = {}, .age_s = 7.0}});
+  EXPECT_EQ(indicators[0].light, Light::off);
+  EXPECT_EQ(indicators[1].light, Light::green);
+  EXPECT_EQ(indicators[1].text, "20 ms");
+  EXPECT_EQ(indicators[2].light, Light::amber);
+  EXPECT_EQ(indicators[3].light, Light::red);
+  EXPECT_EQ(indicators[3].text, "7.0 s");
 }
 
-TEST(Lamps, CalibratorIsVisibleByOneFacet) {
+TEST(StatusIndicators, CalibratorIsVisibleByOneFacet) {
   TrackerPlan plan;
   plan.facets = {{"calibrator/1", {}}, {"calibrator/2", {}}};
-  const auto lamps = tracker_lamps(plan, {{.name = "calibrator/1", .rejected = {}, .age_s = 30.0},
-                                          {.name = "calibrator/2", .rejected = {}, .age_s = 0.03}});
-  EXPECT_EQ(lamps[0].light, Light::green);
+  const auto indicators = tracker_indicators(plan, {{.name = "calibrator/1", .rejected = {}, .age_s = 30.0},
+                                                    {.name = "calibrator/2", .rejected = {}, .age_s = 0.03}});
+  EXPECT_EQ(indicators[0].light, Light::green);
 }
 
-TEST(Lamps, StoppedRobotIsRedWithTheReason) {
+TEST(StatusIndicators, StoppedRobotIsRedWithTheReason) {
   RobotLinkStatus status;
   status.phase = LinkPhase::stopped;
   status.why = Failure{Reason::robot_stopped, "emergency stop"};
-  const Lamp lamp = robot_lamp(status);
-  EXPECT_EQ(lamp.light, Light::red);
-  EXPECT_THAT(lamp.why.toStdString(), HasSubstr("emergency stop"));
+  const StatusIndicator indicator = robot_indicator(status);
+  EXPECT_EQ(indicator.light, Light::red);
+  EXPECT_THAT(indicator.why.toStdString(), HasSubstr("emergency stop"));
 }
 
-TEST(Lamps, CArmIsGreenByItsLastImageAndRedAfterAFailure) {
-  EXPECT_EQ(c_arm_lamp({}, 100).light, Light::off);
-  const Lamp well = c_arm_lamp({.last_image_s = 93, .refused = {}}, 100);
+TEST(StatusIndicators, CArmIsGreenByItsLastImageAndRedAfterAFailure) {
+  EXPECT_EQ(c_arm_indicator({}, 100).light, Light::off);
+  const StatusIndicator well = c_arm_indicator({.last_image_s = 93, .refused = {}}, 100);
   EXPECT_EQ(well.light, Light::green);
   EXPECT_EQ(well.text, "7.0 s ago");
-  EXPECT_EQ(c_arm_lamp({.last_image_s = 93, .refused = {}, .broke_off = true}, 100).light, Light::red);
-  const Lamp refused = c_arm_lamp({.last_image_s = 93, .refused = Failure{Reason::bad_value, "cut"}}, 100);
+  EXPECT_EQ(c_arm_indicator({.last_image_s = 93, .refused = {}, .broke_off = true}, 100).light, Light::red);
+  const StatusIndicator refused =
+      c_arm_indicator({.last_image_s = 93, .refused = Failure{Reason::bad_value, "cut"}}, 100);
   EXPECT_EQ(refused.light, Light::red);
   EXPECT_THAT(refused.why.toStdString(), HasSubstr("cut"));
 }

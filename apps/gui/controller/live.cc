@@ -19,7 +19,7 @@ std::optional<double> least_age(const std::vector<ToolState>& tools, const std::
   return least;
 }
 
-Lamp marker_lamp(const QString& name, const std::optional<double>& age_s) {
+StatusIndicator marker_indicator(const QString& name, const std::optional<double>& age_s) {
   if (!age_s) return {name, Light::off, age_text(age_s), tr("no pose from the tracker yet")};
   if (*age_s <= fresh_s) return {name, Light::green, age_text(age_s), {}};
   return {name, *age_s <= late_s ? Light::amber : Light::red, age_text(age_s),
@@ -35,53 +35,55 @@ QString age_text(const std::optional<double>& age_s) {
   return *age_s < 1 ? tr("%1 ms").arg(*age_s * 1000, 0, 'f', 0) : tr("%1 s").arg(*age_s, 0, 'f', 1);
 }
 
-std::vector<Lamp> tracker_lamps(const TrackerPlan& plan, const std::vector<ToolState>& tools) {
+std::vector<StatusIndicator> tracker_indicators(const TrackerPlan& plan,
+                                                const std::vector<ToolState>& tools) {
   std::vector<std::string> facets;
   for (const Facet& facet : plan.facets) facets.push_back(facet.name);
-  return {marker_lamp(tr("calibrator"), least_age(tools, facets)),
-          marker_lamp(tr("femur"), least_age(tools, {plan.femur})),
-          marker_lamp(tr("tibia"), least_age(tools, {plan.tibia})),
-          marker_lamp(tr("tool"), least_age(tools, {plan.tool}))};
+  return {marker_indicator(tr("calibrator"), least_age(tools, facets)),
+          marker_indicator(tr("femur"), least_age(tools, {plan.femur})),
+          marker_indicator(tr("tibia"), least_age(tools, {plan.tibia})),
+          marker_indicator(tr("tool"), least_age(tools, {plan.tool}))};
 }
 
-Lamp robot_lamp(const RobotLinkStatus& status) {
-  Lamp lamp{tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
+StatusIndicator robot_indicator(const RobotLinkStatus& status) {
+  StatusIndicator indicator{tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
   const QString age = age_text(status.state ? std::optional(status.age_s) : std::nullopt);
   switch (status.phase) {
     case LinkPhase::disconnected:
     case LinkPhase::stopped:
-      lamp.light = Light::red;
+      indicator.light = Light::red;
       break;
     case LinkPhase::idle:
-      lamp.light = Light::amber;
+      indicator.light = Light::amber;
       break;
     case LinkPhase::ready:
     case LinkPhase::starting:
     case LinkPhase::moving:
-      lamp.light = Light::green;
+      indicator.light = Light::green;
       break;
   }
   const QString phase = status.phase == LinkPhase::idle ? tr("locked") : words(name(status.phase));
-  lamp.text = status.phase == LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
-  if (status.phase == LinkPhase::idle) lamp.why = tr("locked until a person unlocks it");
-  return lamp;
+  indicator.text = status.phase == LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
+  if (status.phase == LinkPhase::idle) indicator.why = tr("locked until a person unlocks it");
+  return indicator;
 }
 
-Lamp c_arm_lamp(const CArmStatus& status, double now_s) {
-  Lamp lamp{tr("C-arm"), Light::off, tr("no image yet"), tr("it connects when it has an image")};
+StatusIndicator c_arm_indicator(const CArmStatus& status, double now_s) {
+  StatusIndicator indicator{tr("C-arm"), Light::off, tr("no image yet"),
+                            tr("it connects when it has an image")};
   if (status.last_image_s)
-    lamp = {lamp.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
+    indicator = {indicator.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
   if (status.broke_off) {
-    lamp.light = Light::red;
-    lamp.text = tr("disconnected");
-    lamp.why = tr("a connection was lost or rejected before an image was sent");
+    indicator.light = Light::red;
+    indicator.text = tr("disconnected");
+    indicator.why = tr("a connection was lost or rejected before an image was sent");
   }
   if (status.refused) {
-    lamp.light = Light::red;
-    lamp.text = tr("refused");
-    lamp.why = sentence_of(*status.refused);
+    indicator.light = Light::red;
+    indicator.text = tr("refused");
+    indicator.why = sentence_of(*status.refused);
   }
-  return lamp;
+  return indicator;
 }
 
 }  // namespace helicarm::gui

@@ -13,22 +13,22 @@ namespace helicarm::gui {
 enum class Light { off, red, amber, green };
 
 /// State of a device or marker at one time.
-struct Lamp {
+struct StatusIndicator {
   QString name;
   Light light = Light::off;
   QString text;  ///< age or state, as text
   QString why;   ///< reason for red and amber
 };
 
-/// Greatest pose age for robot motion; up to the second limit the lamp is amber.
+/// Greatest pose age for robot motion; up to the second limit the indicator is amber.
 inline constexpr double fresh_s = 0.1;
 inline constexpr double late_s = 1;
 
 /// The markers of the plan; the calibrator is visible if one of its facets is.
-std::vector<Lamp> tracker_lamps(const TrackerPlan& plan, const std::vector<ToolState>& tools);
-Lamp robot_lamp(const RobotLinkStatus& status);
+std::vector<StatusIndicator> tracker_indicators(const TrackerPlan& plan, const std::vector<ToolState>& tools);
+StatusIndicator robot_indicator(const RobotLinkStatus& status);
 /// At this time, monotonic seconds.
-Lamp c_arm_lamp(const CArmStatus& status, double now_s);
+StatusIndicator c_arm_indicator(const CArmStatus& status, double now_s);
 
 /// "23 ms", "4.1 s", "not visible".
 QString age_text(const std::optional<double>& age_s);

@@ -32,9 +32,9 @@ std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points
   return of_them;
 }
 
-void settle(StepCard& card, const QString& doubt) {
-  card.mood = doubt.isEmpty() ? StepMood::good : StepMood::warning;
-  card.why = doubt;
+void settle(StepCard& card, const QString& warning) {
+  card.status = warning.isEmpty() ? StepStatus::good : StepStatus::warning;
+  card.why = warning;
 }
 
 void acquire(StepCard& card, const ApplicationState& state) {
@@ -85,7 +85,7 @@ void plan(StepCard& card, const ApplicationState& state) {
   for (const PointResult& point : state.result->points) {
     if (point.source != PointSource::pick) continue;
     if (point.reason) {
-      card.mood = StepMood::refused;
+      card.status = StepStatus::refused;
       card.why = text(point.name + ": ") + sentence_of(*point.reason);
       return;
     }
@@ -167,11 +167,11 @@ std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
     const bool possible = i < 3 || state.measured;
     if (state.result && possible) judges[i](card, state);
     if (const auto refusal = state.refusals.find(card.phase); refusal != state.refusals.end()) {
-      card.mood = StepMood::refused;
+      card.status = StepStatus::refused;
       card.why = sentence_of(refusal->second);
     }
     if (state.busy == card.phase) {
-      card.mood = StepMood::running;
+      card.status = StepStatus::running;
       card.why = text(state.doing);
     }
   }

@@ -7,13 +7,13 @@
 
 namespace helicarm::gui {
 
-enum class StepMood { waiting, running, good, warning, refused };
+enum class StepStatus { waiting, running, good, warning, refused };
 
-/// A step as shown: its mood, the decisive number, and the reason or the next action.
+/// A step as shown: its status, the decisive number, and the reason or the next action.
 struct StepCard {
   Phase phase = Phase::acquire;
   QString name;
-  StepMood mood = StepMood::waiting;
+  StepStatus status = StepStatus::waiting;
   QString figure;
   QString why;
 };

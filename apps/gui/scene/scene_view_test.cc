@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Needs a display with OpenGL: CTest runs it under Xvfb. HELICARM_SHOTS=folder saves the images.
+// Needs a display with OpenGL: CTest runs it under Xvfb. HELICARM_SCREENSHOTS=folder saves the images.
 #include "gui/scene/scene_view.h"
 
 #include <QApplication>
@@ -28,8 +28,8 @@ class ShownScene : public testing::Test {
 
   QImage acquired_view(const char* name) {
     const QImage image = view_.grab().toImage().convertToFormat(QImage::Format_RGB32);
-    if (qEnvironmentVariableIsSet("HELICARM_SHOTS"))
-      image.save(qEnvironmentVariable("HELICARM_SHOTS") + "/" + name + ".png");
+    if (qEnvironmentVariableIsSet("HELICARM_SCREENSHOTS"))
+      image.save(qEnvironmentVariable("HELICARM_SCREENSHOTS") + "/" + name + ".png");
     return image;
   }
 

@@ -11,7 +11,7 @@
 namespace helicarm::gui {
 namespace {
 
-constexpr int least_lamp = 88, beside_lamp = 46;
+constexpr int least_indicator = 88, beside_indicator = 46;
 /// Part of the depth bar before the tunnel's entry, mm.
 constexpr double before_entry_mm = 60;
 /// At a larger distance from the axis the depth is drawn without colour.
@@ -31,18 +31,18 @@ QColor colour_of(Light light) {
   return {};
 }
 
-void paint_lamp(QPainter& painter, const QRectF& box, const Lamp& lamp) {
+void paint_indicator(QPainter& painter, const QRectF& box, const StatusIndicator& indicator) {
   painter.setPen(Qt::NoPen);
-  painter.setBrush(colour_of(lamp.light));
+  painter.setBrush(colour_of(indicator.light));
   const QRectF disc(box.left() + 4, box.center().y() - 9, 18, 18);
-  if (lamp.light == Light::red)
+  if (indicator.light == Light::red)
     painter.drawRect(disc);  // a distinct shape, for colour-blind users
   else
     painter.drawEllipse(disc);
   painter.setPen(style::quiet);
-  painter.drawText(box.adjusted(30, 6, 0, 0), Qt::AlignLeft | Qt::AlignTop, lamp.name);
+  painter.drawText(box.adjusted(30, 6, 0, 0), Qt::AlignLeft | Qt::AlignTop, indicator.name);
   painter.setPen(style::text);
-  painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, lamp.text);
+  painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, indicator.text);
 }
 
 QString aim_words(const QString& tunnel, const TunnelAim& aim) {
@@ -87,7 +87,8 @@ void LiveBar::show_live(const LiveState& live) {
 
 QString LiveBar::words() const {
   QStringList all;
-  for (const Lamp& lamp : live_.lamps) all << QString("%1: %2").arg(lamp.name, lamp.text);
+  for (const StatusIndicator& indicator : live_.indicators)
+    all << QString("%1: %2").arg(indicator.name, indicator.text);
   if (live_.aim) all << (*live_.aim ? aim_words(live_.tunnel, **live_.aim) : sentence_of(live_.aim->error()));
   return all.join("; ");
 }
@@ -97,15 +98,15 @@ void LiveBar::paintEvent(QPaintEvent*) {
   painter.setRenderHint(QPainter::Antialiasing);
   painter.fillRect(rect(), style::panel);
   double left = 8;
-  for (const Lamp& lamp : live_.lamps) {
-    const int words = std::max(painter.fontMetrics().horizontalAdvance(lamp.name),
-                               painter.fontMetrics().horizontalAdvance(lamp.text));
+  for (const StatusIndicator& indicator : live_.indicators) {
+    const int words = std::max(painter.fontMetrics().horizontalAdvance(indicator.name),
+                               painter.fontMetrics().horizontalAdvance(indicator.text));
     const double width =
-        std::max(least_lamp, words / 20 * 20 + beside_lamp + 20);  // in steps, for a stable layout
-    paint_lamp(painter, {left, 0, width, double(height())}, lamp);
+        std::max(least_indicator, words / 20 * 20 + beside_indicator + 20);  // in steps, for a stable layout
+    paint_indicator(painter, {left, 0, width, double(height())}, indicator);
     left += width;
   }
-  if (live_.lamps.empty()) {
+  if (live_.indicators.empty()) {
     painter.setPen(style::quiet);
     painter.drawText(rect().adjusted(12, 0, 0, 0), Qt::AlignVCenter, tr("no tracker, no robot"));
   }
@@ -128,8 +129,8 @@ void LiveBar::paintEvent(QPaintEvent*) {
 bool LiveBar::event(QEvent* event) {
   if (event->type() == QEvent::ToolTip) {
     QStringList all;
-    for (const Lamp& lamp : live_.lamps)
-      if (!lamp.why.isEmpty()) all << QString("%1: %2").arg(lamp.name, lamp.why);
+    for (const StatusIndicator& indicator : live_.indicators)
+      if (!indicator.why.isEmpty()) all << QString("%1: %2").arg(indicator.name, indicator.why);
     QToolTip::showText(static_cast<QHelpEvent*>(event)->globalPos(), all.join("\n"), this);
     return true;
   }

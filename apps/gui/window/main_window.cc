@@ -32,10 +32,10 @@ QString text(const std::string& words) { return QString::fromStdString(words); }
 /// The first step that is not done.
 Phase open_phase(const std::array<StepCard, phases.size()>& cards, bool registered) {
   for (const StepCard& card : cards) {
-    if (card.mood == StepMood::good || (card.mood == StepMood::warning && card.phase != Phase::plan))
+    if (card.status == StepStatus::good || (card.status == StepStatus::warning && card.phase != Phase::plan))
       continue;
     // A plan with warnings is inspected before any motion.
-    if (card.mood != StepMood::warning || !registered) return card.phase;
+    if (card.status != StepStatus::warning || !registered) return card.phase;
   }
   return Phase::verify;
 }

@@ -11,23 +11,23 @@
 namespace helicarm::gui {
 namespace {
 
-struct Look {
+struct Appearance {
   QColor colour;
   QString sign;  ///< for colour-blind users
   QString word;
 };
 
-Look look_of(StepMood mood) {
-  switch (mood) {
-    case StepMood::waiting:
+Appearance appearance_of(StepStatus status) {
+  switch (status) {
+    case StepStatus::waiting:
       return {style::quiet, QStringLiteral("○"), StepStrip::tr("waiting")};
-    case StepMood::running:
+    case StepStatus::running:
       return {style::blue, QStringLiteral("◐"), StepStrip::tr("working")};
-    case StepMood::good:
+    case StepStatus::good:
       return {style::green, QStringLiteral("✓"), StepStrip::tr("good")};
-    case StepMood::warning:
+    case StepStatus::warning:
       return {style::amber, QStringLiteral("!"), StepStrip::tr("warning")};
-    case StepMood::refused:
+    case StepStatus::refused:
       return {style::red, QStringLiteral("✕"), StepStrip::tr("refused")};
   }
   return {};
@@ -45,7 +45,7 @@ StepButton::StepButton(Phase phase, QWidget* parent) : QToolButton(parent) {
 
 void StepButton::show_card(const StepCard& card) {
   card_ = card;
-  const QString word = look_of(card.mood).word;
+  const QString word = appearance_of(card.status).word;
   setAccessibleName(QString("%1: %2").arg(card.name, word));
   setAccessibleDescription(QString("%1 %2").arg(card.figure, card.why));
   setToolTip(
@@ -54,27 +54,27 @@ void StepButton::show_card(const StepCard& card) {
 }
 
 void StepButton::paintEvent(QPaintEvent*) {
-  const Look look = look_of(card_.mood);
+  const Appearance appearance = appearance_of(card_.status);
   QPainter painter(this);
   painter.setRenderHint(QPainter::Antialiasing);
   const QRectF frame = QRectF(rect()).adjusted(1.5, 1.5, -1.5, -1.5);
   QPainterPath shape;
   shape.addRoundedRect(frame, 6, 6);
   painter.fillPath(shape, isChecked() ? style::raised : style::panel);
-  painter.setPen(QPen(isChecked() ? look.colour : style::line, isChecked() ? 3 : 1));
+  painter.setPen(QPen(isChecked() ? appearance.colour : style::line, isChecked() ? 3 : 1));
   painter.drawPath(shape);
   if (hasFocus()) {
     painter.setPen(QPen(style::text, 1, Qt::DotLine));
     painter.drawRoundedRect(frame.adjusted(4, 4, -4, -4), 4, 4);
   }
-  painter.fillRect(QRectF(frame.left(), frame.top() + 6, 4, frame.height() - 12), look.colour);
+  painter.fillRect(QRectF(frame.left(), frame.top() + 6, 4, frame.height() - 12), appearance.colour);
 
   QFont font = this->font();
   const QRectF inner = frame.adjusted(12, 6, -8, -4);
   font.setPixelSize(16), font.setBold(true);
   painter.setFont(font);
-  painter.setPen(look.colour);
-  painter.drawText(inner, Qt::AlignRight | Qt::AlignTop, look.sign);
+  painter.setPen(appearance.colour);
+  painter.drawText(inner, Qt::AlignRight | Qt::AlignTop, appearance.sign);
   painter.setPen(style::text);
   painter.drawText(inner, Qt::AlignLeft | Qt::AlignTop, card_.name);
   font.setPixelSize(13), font.setBold(false);
@@ -85,8 +85,8 @@ void StepButton::paintEvent(QPaintEvent*) {
                      Qt::AlignLeft | Qt::AlignVCenter,
                      painter.fontMetrics().elidedText(text, Qt::ElideRight, int(inner.width())));
   };
-  line(card_.figure.isEmpty() ? look.word : card_.figure, 22, style::text);
-  line(card_.why, 40, card_.mood == StepMood::good ? style::quiet : look.colour);
+  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 22, style::text);
+  line(card_.why, 40, card_.status == StepStatus::good ? style::quiet : appearance.colour);
 }
 
 StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {

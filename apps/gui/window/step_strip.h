@@ -8,7 +8,7 @@
 
 namespace helicarm::gui {
 
-/// One card of the strip: name, mood (by colour, sign and word), number and reason.
+/// One card of the strip: name, status (by colour, sign and word), number and reason.
 class StepButton : public QToolButton {
   Q_OBJECT
 

@@ -24,7 +24,7 @@ void drop(QWidget& onto, const std::vector<fs::path>& paths) {
 
 TEST_F(Window, SilentTrackerIsShownUntilItSendsAgain) {
   open_rehearsal();
-  const auto light = [&](const char* name) { return lamp(name).light; };
+  const auto light = [&](const char* name) { return indicator(name).light; };
   ASSERT_TRUE(wait("tool is green and the robot locked",
                    [&] { return light("tool") == Light::green && light("robot") == Light::amber; }));
   window_->controller().set_fault("silent", true);
@@ -39,9 +39,9 @@ TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
   ASSERT_NO_FATAL_FAILURE(
       stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); }, "no robot state received"));
   ASSERT_TRUE(wait_for_phase(LinkPhase::disconnected));
-  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
-  EXPECT_EQ(lamp("robot").light, Light::red);
-  EXPECT_FALSE(lamp("robot").why.isEmpty());
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
+  EXPECT_EQ(indicator("robot").light, Light::red);
+  EXPECT_FALSE(indicator("robot").why.isEmpty());
   for (const char* forbidden : {"register", "planWay", "go", "withdraw"})
     EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
   window_->controller().set_fault("cut_cable", false);
@@ -52,26 +52,26 @@ TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
 
 TEST_F(Window, CArmThatDisconnectsIsShownAndTheNextImageIsAccepted) {
   open_rehearsal();
-  EXPECT_EQ(lamp("C-arm").light, Light::off);
+  EXPECT_EQ(indicator("C-arm").light, Light::off);
   window_->controller().set_fault("breaks_off", true);
   click("shootAP");
   ASSERT_TRUE(wait_idle());
-  EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
-  EXPECT_TRUE(wait("the C-arm is red", [&] { return lamp("C-arm").light == Light::red; }));
-  EXPECT_EQ(lamp("C-arm").text, "disconnected");
+  EXPECT_EQ(card(Phase::acquire).status, StepStatus::refused);
+  EXPECT_TRUE(wait("the C-arm is red", [&] { return indicator("C-arm").light == Light::red; }));
+  EXPECT_EQ(indicator("C-arm").text, "disconnected");
   window_->controller().set_fault("breaks_off", false);
   ASSERT_TRUE(attempt(
       "AP is acquired", [&] { click("shootAP"); },
       [&] { return state().result->views[0].xray_image != nullptr; }));
-  EXPECT_EQ(lamp("C-arm").light, Light::green);
-  EXPECT_NE(card(Phase::acquire).mood, StepMood::refused);
+  EXPECT_EQ(indicator("C-arm").light, Light::green);
+  EXPECT_NE(card(Phase::acquire).status, StepStatus::refused);
 }
 
 TEST_F(Window, TrackerThatStopsSendingInMotionStopsTheRobot) {
   window_->controller().set_virtual_freshness({});
   ASSERT_NO_FATAL_FAILURE(stop_in_motion([&] { window_->controller().set_fault("silent", true); },
                                          "the newest pose of \"tool\""));
-  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
   EXPECT_FALSE(state().hand_eye_rms_mm);
   window_->controller().set_fault("silent", false);
 }
@@ -110,7 +110,7 @@ TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNoNextStep) {
   ASSERT_TRUE(simulation::write_case(folder_ / "blank", simulated));
   drop(*window_, {folder_ / "blank"});
   ASSERT_TRUE(wait("the case is read", [&] { return state().source == Source::files && !state().busy; }));
-  EXPECT_EQ(card(Phase::rectify).mood, StepMood::refused);
+  EXPECT_EQ(card(Phase::rectify).status, StepStatus::refused);
   EXPECT_THAT(card(Phase::rectify).why.toStdString(), HasSubstr("blank_image"));
   EXPECT_FALSE(state().measured);
   window_->controller().export_to(folder_ / "export");
@@ -127,7 +127,7 @@ TEST_F(Window, InvalidDroppedFilesAreRefusedByName) {
                             {folder_}}) {
     drop(*window_, paths);
     ASSERT_TRUE(wait_idle());
-    EXPECT_EQ(card(Phase::acquire).mood, StepMood::refused);
+    EXPECT_EQ(card(Phase::acquire).status, StepStatus::refused);
     EXPECT_FALSE(card(Phase::acquire).why.isEmpty());
   }
 }

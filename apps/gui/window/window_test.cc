@@ -12,11 +12,11 @@ namespace {
 TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
   screenshot("0-start");
   open_rehearsal();
-  EXPECT_EQ(card(Phase::acquire).mood, StepMood::waiting);
+  EXPECT_EQ(card(Phase::acquire).status, StepStatus::waiting);
   screenshot("1-acquire");
   shoot_both();
   for (const Phase phase : {Phase::acquire, Phase::rectify, Phase::calibrate})
-    EXPECT_TRUE(card(phase).mood == StepMood::good || card(phase).mood == StepMood::warning);
+    EXPECT_TRUE(card(phase).status == StepStatus::good || card(phase).status == StepStatus::warning);
   const Json first = result_file();
   EXPECT_THAT(
       card(Phase::calibrate).figure.toStdString(),
@@ -31,7 +31,7 @@ TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
   ASSERT_TRUE(
       wait("the plan's page is chosen", [&] { return window_->strip().button(Phase::plan)->isChecked(); }));
   pick_all();
-  ASSERT_TRUE(card(Phase::plan).mood == StepMood::good || card(Phase::plan).mood == StepMood::warning)
+  ASSERT_TRUE(card(Phase::plan).status == StepStatus::good || card(Phase::plan).status == StepStatus::warning)
       << card(Phase::plan).why.toStdString();
   const Json second = result_file();
   ASSERT_EQ(second["points"].size(), state().result->points.size());
@@ -62,8 +62,8 @@ TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
     screenshot("6-navigate");
     ASSERT_TRUE(make_ready());
   }
-  EXPECT_EQ(card(Phase::navigate).mood, StepMood::good);
-  EXPECT_EQ(card(Phase::verify).mood, StepMood::good);
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::good);
+  EXPECT_EQ(card(Phase::verify).status, StepStatus::good);
   QTest::keyClick(window_.get(), Qt::Key_6, Qt::AltModifier);
   ASSERT_TRUE(wait("the verification's page is chosen",
                    [&] { return window_->strip().button(Phase::verify)->isChecked(); }));
@@ -102,7 +102,7 @@ TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
 TEST_F(Window, SpaceBarStopsTheRobotWhateverHasTheFocus) {
   ASSERT_NO_FATAL_FAILURE(
       stop_in_motion([&] { QTest::keyClick(find("shootAP"), Qt::Key_Space); }, "stopped by the user"));
-  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
   EXPECT_FALSE(find<HoldButton>("go")->isEnabled());
 }
 
@@ -117,7 +117,7 @@ TEST_F(Window, DisplayedPathIsWithdrawnWhenTheBoneMovesAndCannotBeConfirmed) {
   window_->controller().move_bone("femur", {3, 0, 0});
   ASSERT_TRUE(wait("the path is withdrawn", [&] { return !state().order && !state().busy; }));
   EXPECT_FALSE(go->isEnabled());
-  EXPECT_EQ(card(Phase::navigate).mood, StepMood::refused);
+  EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
   EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));
   EXPECT_NE(window_->controller().live().robot.phase, LinkPhase::moving);
 }

@@ -68,10 +68,10 @@ class Window : public testing::Test {
   const ApplicationState& state() { return window_->controller().state(); }
   StepCard card(Phase phase) { return window_->strip().button(phase)->card(); }
   LiveState live() { return window_->controller().live(); }
-  Lamp lamp(const QString& name) {
-    for (const Lamp& lamp : live().lamps)
-      if (lamp.name == name) return lamp;
-    ADD_FAILURE() << "no lamp " << name.toStdString();
+  StatusIndicator indicator(const QString& name) {
+    for (const StatusIndicator& indicator : live().indicators)
+      if (indicator.name == name) return indicator;
+    ADD_FAILURE() << "no indicator " << name.toStdString();
     return {};
   }
   /// The window's state for the message of a failed wait.
@@ -80,12 +80,12 @@ class Window : public testing::Test {
     const LiveState devices = live();
     std::string text = now.busy ? fmt::format("busy: \"{}\"", now.doing) : "idle";
     for (const StepCard& step : steps_of(now))
-      text += fmt::format("; {} [{}] {} {}", step.name.toStdString(), int(step.mood),
+      text += fmt::format("; {} [{}] {} {}", step.name.toStdString(), int(step.status),
                           step.figure.toStdString(), step.why.toStdString());
     text += fmt::format("; robot {}, state {:.3f} s old", name(devices.robot.phase), devices.robot.age_s);
     if (devices.robot.why) text += ", " + sentence_of(*devices.robot.why).toStdString();
-    for (const Lamp& lamp : devices.lamps)
-      text += fmt::format("; {}: {}", lamp.name.toStdString(), lamp.text.toStdString());
+    for (const StatusIndicator& indicator : devices.indicators)
+      text += fmt::format("; {}: {}", indicator.name.toStdString(), indicator.text.toStdString());
     return text + fmt::format("; {} measurements, {} picks, {} outcomes, tool {}", now.measurements,
                               now.picks.size(), now.outcomes.size(), now.tool_is_out ? "out" : "at rest");
   }

@@ -213,11 +213,11 @@ class OverlapLimit : public testing::TestWithParam<Situation> {};
 TEST_P(OverlapLimit, OverlapOfHalfARadiusHasLittleEffect) {
   const Situation s = GetParam();
   const Vector2d beside = 1.5 * s.radius * Vector2d(0.8, 0.6);
-  DotLook look{profile_of(s), {}};
+  DotAppearance appearance{profile_of(s), {}};
   const Answer answer = tried(s, {beside}, [&](const XrayImage& xray_image, const Vector2d& place) {
-    look.options = fit_options_for(xray_image);
+    appearance.options = fit_options_for(xray_image);
     const std::vector<Dot> both{start_at(place, s.radius), start_at(place + beside, s.radius)};
-    const auto dots = refit_dots(xray_image, {both[0]}, look, both);
+    const auto dots = refit_dots(xray_image, {both[0]}, appearance, both);
     return dots.empty() ? std::nullopt : std::optional(dots[0]);
   });
   record(answer);

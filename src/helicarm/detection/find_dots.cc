@@ -43,9 +43,10 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
 
 /// Fits with the neighbours masked, or jointly with those that overlap, whichever gives the smaller centre
 /// error.
-std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotLook& look,
+std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotAppearance& appearance,
                          const std::vector<Dot>& neighbours) {
-  auto best = fit_dot(xray_image.pixels, dot, look.profile, discs_beside(dot, neighbours), look.options);
+  auto best =
+      fit_dot(xray_image.pixels, dot, appearance.profile, discs_beside(dot, neighbours), appearance.options);
   std::vector<Dot> group{dot};
   std::vector<Dot> others;
   for (const Dot& other : neighbours) {
@@ -58,11 +59,11 @@ std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotL
   std::vector<Disc> discs;
   for (const Dot& member : group) {
     const double ratio = member.radius_px / dot.radius_px;  // same metal and blur
-    profiles.emplace_back(look.profile.blur() / ratio, look.profile.absorbance() * ratio);
+    profiles.emplace_back(appearance.profile.blur() / ratio, appearance.profile.absorbance() * ratio);
     const auto beside = discs_beside(member, others);
     discs.insert(discs.end(), beside.begin(), beside.end());
   }
-  const auto together = fit_dots_together(xray_image.pixels, group, profiles, discs, look.options);
+  const auto together = fit_dots_together(xray_image.pixels, group, profiles, discs, appearance.options);
   if (together && (!best || together->front().sigma_px < best->sigma_px)) best = together->front();
   return best;
 }
@@ -81,7 +82,8 @@ NoiseCorrelation noise_correlation(const XrayImage& xray_image) {
   return noise_correlation(xray_image, limits.floor, limits.ceiling);
 }
 
-DotLook estimate_look(const XrayImage& xray_image, const NoiseCorrelation& noise, std::vector<Dot> dots) {
+DotAppearance estimate_appearance(const XrayImage& xray_image, const NoiseCorrelation& noise,
+                                  std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(),
                    [](const Dot& a, const Dot& b) { return a.sigma_px < b.sigma_px; });
@@ -171,18 +173,18 @@ std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& 
     const auto last = std::find_if(
         first, found.end(), [&](const Dot& dot) { return dot.radius_px > same_size * first->radius_px; });
     const std::vector<Dot> size(first, last);
-    for (const Dot& dot : refit_dots(xray_image, size, estimate_look(xray_image, noise, size), found))
+    for (const Dot& dot : refit_dots(xray_image, size, estimate_appearance(xray_image, noise, size), found))
       if (dot.sigma_px < clear_sigma_px && dot.misfit < options.max_misfit) clear.push_back(dot);
     first = last;
   }
   return clear;
 }
 
-std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots, const DotLook& look,
-                            const std::vector<Dot>& neighbours) {
+std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots,
+                            const DotAppearance& appearance, const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
-    if (const auto better = refit(xray_image, dot, look, neighbours)) refitted.push_back(*better);
+    if (const auto better = refit(xray_image, dot, appearance, neighbours)) refitted.push_back(*better);
   return refitted;
 }
 

@@ -23,13 +23,14 @@ struct DotOptions {
 DotFitOptions fit_options_for(const XrayImage& xray_image);
 
 /// Appearance of dots of one size and material in one image.
-struct DotLook {
+struct DotAppearance {
   BallProfile profile;
   DotFitOptions options;
 };
 
 /// The appearance (blur and absorbance of least total sigma) of the given dots of one size.
-DotLook estimate_look(const XrayImage& xray_image, const NoiseCorrelation& noise, std::vector<Dot> dots);
+DotAppearance estimate_appearance(const XrayImage& xray_image, const NoiseCorrelation& noise,
+                                  std::vector<Dot> dots);
 
 /// All round dots of one polarity, each with sub-pixel centre, standard deviation and radius.
 std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& options);
@@ -44,7 +45,7 @@ std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& 
 
 /// Refits every dot with the appearance of its kind and its neighbours masked; dots whose fit fails are
 /// dropped.
-std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots, const DotLook& look,
-                            const std::vector<Dot>& neighbours);
+std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots,
+                            const DotAppearance& appearance, const std::vector<Dot>& neighbours);
 
 }  // namespace helicarm

@@ -112,16 +112,16 @@ TEST(EstimateLook, RefitWithTheEstimatedLookIsExact) {
   for (Ball& ball : balls) ball.radius = 6;
   const XrayImage xray_image = noisy(drawn::grey(shade_of(balls), 1200), 4);
   const auto rough = find_dots(xray_image, {});
-  const DotLook look = estimate_look(xray_image, noise_correlation(xray_image), rough);
-  EXPECT_NEAR(look.profile.blur() * 6, std::sqrt(0.81 + 1.0 / 12), 0.3);
-  const auto dots = refit_dots(xray_image, rough, look, rough);
+  const DotAppearance appearance = estimate_appearance(xray_image, noise_correlation(xray_image), rough);
+  EXPECT_NEAR(appearance.profile.blur() * 6, std::sqrt(0.81 + 1.0 / 12), 0.3);
+  const auto dots = refit_dots(xray_image, rough, appearance, rough);
   ASSERT_EQ(dots.size(), balls.size());
   for (const Ball& ball : balls) EXPECT_LT(distance(dots, ball.centre), 0.02);
 }
 
 TEST(EstimateLook, WithoutDotsTheDefaultLookIsReturned) {
-  const DotLook look = estimate_look(drawn::xray_image(Image<float>(64, 64, 1000)), {}, {});
-  EXPECT_GT(look.profile.blur(), 0);
+  const DotAppearance appearance = estimate_appearance(drawn::xray_image(Image<float>(64, 64, 1000)), {}, {});
+  EXPECT_GT(appearance.profile.blur(), 0);
 }
 
 TEST(FindBlobs, DiscPositionAndSizeWithinAPixel) {

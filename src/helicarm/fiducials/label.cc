@@ -169,9 +169,8 @@ std::optional<Failure> refusal_of(const LabelSearch& search, const LabellingOpti
   const Hypothesis loose = loose_best(search, options);
   if ((loose.log_odds > best.log_odds && loose.matched >= least_balls) || is_inconsistent(scene, best)) {
     return fail(Reason::calibrator_mismatch,
-                fmt::format("the fiducials deviate from the calibrator's coordinates by {:.2f} px rms: wrong "
-                            "calibrator file, "
-                            "pixel size or source distance",
+                fmt::format("the fiducials deviate from the calibrator's coordinates by {:.2f} px rms: check "
+                            "the calibrator's file, pixel size and source distance",
                             std::sqrt(loose.residual2_px2 / loose.matched)),
                 {{"matched", best.matched},
                  {"chi2", best.fit.chi2},

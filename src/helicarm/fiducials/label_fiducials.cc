@@ -69,7 +69,7 @@ class BallFitter {
   BallFitter(const XrayImage& xray_image, const Rectification& rectification, const Candidates& candidates,
              const std::vector<Dot>& labelled_dots)
       : image_(xray_image),
-        look_(estimate_look(xray_image, rectification.noise, labelled_dots)),
+        appearance_(estimate_appearance(xray_image, rectification.noise, labelled_dots)),
         neighbours_(candidates.dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
@@ -79,7 +79,7 @@ class BallFitter {
   }
 
   std::optional<Dot> fit(const Dot& start) const {
-    const auto fitted = refit_dots(image_, {start}, look_, neighbours_);
+    const auto fitted = refit_dots(image_, {start}, appearance_, neighbours_);
     return fitted.empty() ? std::nullopt : std::optional(fitted.front());
   }
 
@@ -94,12 +94,12 @@ class BallFitter {
 
   bool is_black(const Vector2d& raw) const {
     return image_.pixels(static_cast<int>(std::lround(raw.x())), static_cast<int>(std::lround(raw.y()))) <=
-           look_.options.floor;
+           appearance_.options.floor;
   }
 
  private:
   const XrayImage& image_;
-  DotLook look_;
+  DotAppearance appearance_;
   std::vector<Dot> neighbours_;
   double typical_contrast_ = 0;
 };

@@ -76,7 +76,7 @@ std::vector<std::optional<Observed>> observe(const DetectedView& detected, const
   const XrayImage& xray_image = *detected.xray_image;
   const DistortionMap& map = detected.rectification.map;
   std::vector<std::optional<Observed>> observed(centres.size());
-  // Balls of one size share a look (blur and absorbance).
+  // Balls of one size share an appearance (blur and absorbance).
   std::vector<double> kinds = diameters_mm;
   std::ranges::sort(kinds);
   kinds.erase(std::unique(kinds.begin(), kinds.end()), kinds.end());
@@ -93,8 +93,8 @@ std::vector<std::optional<Observed>> observe(const DetectedView& detected, const
     for (std::size_t ball = 0; ball < centres.size(); ++ball)
       if (diameters_mm[ball] == kind && candidate_of[ball] >= 0)
         labelled.push_back(prepared.dots[std::size_t(candidate_of[ball])]);
-    const DotLook look =
-        estimate_look(xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
+    const DotAppearance appearance =
+        estimate_appearance(xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
     for (std::size_t ball = 0; ball < centres.size(); ++ball) {
       if (diameters_mm[ball] != kind) continue;
       const Eigen::Vector2d predicted = pose.project(centres[ball]);
@@ -107,7 +107,7 @@ std::vector<std::optional<Observed>> observe(const DetectedView& detected, const
       const bool has_candidate = candidate_of[ball] >= 0;
       if (has_candidate) start = prepared.dots[std::size_t(candidate_of[ball])];
       if (!map.shows(start.centre_px)) continue;
-      const auto fitted = refit_dots(xray_image, {start}, look, neighbours);
+      const auto fitted = refit_dots(xray_image, {start}, appearance, neighbours);
       if (fitted.empty() || (!has_candidate && !is_plausible(fitted[0], expected, contrast))) continue;
       const Eigen::Vector2d raw =
           fitted[0].centre_px - blob_offset(map, pose, predicted, depth, diameters_mm[ball]);

@@ -28,8 +28,8 @@ struct Observed {
   double diameter_mm;  ///< as seen, at the fiducial's depth
 };
 
-/// Fits every fiducial's image with the look of this image's balls: at its candidate, or where the pose puts
-/// it. Nothing for one that is not seen.
+/// Fits every fiducial's image with the appearance of this image's balls: at its candidate, or where the pose
+/// puts it. Nothing for one that is not seen.
 std::vector<std::optional<Observed>> observe(const DetectedView& detected, const PreparedView& prepared,
                                              const View& pose, const std::vector<Eigen::Vector3d>& centres,
                                              const std::vector<double>& diameters_mm,

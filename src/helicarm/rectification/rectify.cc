@@ -72,18 +72,19 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
-DotLook refit_lattice_dots(const XrayImage& xray_image, const NoiseCorrelation& noise,
-                           const std::vector<Dot>& all, SeenLattice& seen) {
+DotAppearance refit_lattice_dots(const XrayImage& xray_image, const NoiseCorrelation& noise,
+                                 const std::vector<Dot>& all, SeenLattice& seen) {
   std::vector<Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
-  const DotLook look = estimate_look(xray_image, noise, members);
+  const DotAppearance appearance = estimate_appearance(xray_image, noise, members);
   for (const IndexedDot& d : seen.lattice.dots) {
-    const auto refitted = refit_dots(xray_image, {seen.dots[d.dot]}, look, all.size() > 500 ? members : all);
+    const auto refitted =
+        refit_dots(xray_image, {seen.dots[d.dot]}, appearance, all.size() > 500 ? members : all);
     if (!refitted.empty() &&
         (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
   }
-  return look;
+  return appearance;
 }
 
 Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, std::optional<double> scale,
@@ -109,9 +110,9 @@ void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& pl
 }
 
 /// Fits plate dots that the search missed at the positions predicted by the map.
-void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const MapFit& fit, const DotLook& look,
-                      const std::vector<Dot>& all, std::vector<Dot>& plate_dots,
-                      std::vector<Correspondence>& seen) {
+void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const MapFit& fit,
+                      const DotAppearance& appearance, const std::vector<Dot>& all,
+                      std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
   for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
@@ -122,7 +123,7 @@ void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const Map
     Dot start;
     start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
     start.radius_px = radius;
-    const auto dot = refit_dots(xray_image, {start}, look, all);
+    const auto dot = refit_dots(xray_image, {start}, appearance, all);
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
     if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
@@ -199,8 +200,9 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
     return tl::unexpected<Failure>(without_lattice(xray_image, plate, options.method, scale, attempt.size()));
 
   const NoiseCorrelation noise = noise_correlation(xray_image);
-  std::optional<DotLook> look;
-  if (options.method == Method::best) look = refit_lattice_dots(xray_image, noise, attempt.all, attempt.seen);
+  std::optional<DotAppearance> appearance;
+  if (options.method == Method::best)
+    appearance = refit_lattice_dots(xray_image, noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
@@ -220,8 +222,8 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
   if (!fit) return tl::unexpected<Failure>(fit.error());
   if (auto pitch = check_pitch(attempt.seen.lattice, plate, scale, *fit); !pitch)
     return tl::unexpected<Failure>(pitch.error());
-  if (look && dots.size() < plate.dots_mm.size()) {
-    fit_missing_dots(xray_image, plate, *fit, *look, attempt.all, dots, seen);
+  if (appearance && dots.size() < plate.dots_mm.size()) {
+    fit_missing_dots(xray_image, plate, *fit, *appearance, attempt.all, dots, seen);
     if (auto again = fit_map(seen, width, height, map_options)) fit = std::move(again);
   }
 

@@ -22,7 +22,7 @@ Matrix3d turn(double degrees, const Vector3d& axis) {
 }
 
 Imaging draw_imaging(const SimulationOptions& options, double field_radius_px, double pixel_mm) {
-  const bool intensifier = model_of(options.machine()).intensifier;
+  const bool intensifier = model_of(options.c_arm_preset()).intensifier;
   Imaging imaging;
   imaging.quanta_per_pixel = 20000 * pixel_mm * pixel_mm * (options.has(Fault::low_dose) ? 0.05 : 1);
   imaging.scatter_sigma_px = 26 / pixel_mm;
@@ -115,8 +115,8 @@ Vector2d TrueView::raw_image(const Vector3d& point_in_calibrator) const {
 
 std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_height_mm,
                                  const RigidTransform& calibrator_from_patient) {
-  if (options.machine() == Preset::paper_sim) return paper_stand(options);
-  const CArmModel model = model_of(options.machine());
+  if (options.c_arm_preset() == Preset::paper_sim) return paper_stand(options);
+  const CArmModel model = model_of(options.c_arm_preset());
   const ArmFlex arm = draw_arm(options.arm_seed.value_or(options.seed), model, options.size);
   RandomStream random(options.seed, stream::c_arm);
   const double pixel_mm = model.receiver_mm / options.size;

@@ -25,7 +25,7 @@ constexpr double most_distance_mm = 500;
 
 Expected<void> check_grid(const SimulationOptions& options) {
   if (options.ct) return fail(Reason::usage, "CT: kind grid has no knee");
-  if (options.machine() == Preset::paper_sim)
+  if (options.c_arm_preset() == Preset::paper_sim)
     return fail(Reason::bad_value,
                 "preset: paper-sim has no distortion, and its image does not contain the plate; "
                 "kind grid is for ii-9in and flat-panel");
@@ -83,9 +83,9 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
     return fail(Reason::bad_value, fmt::format("bits: {}, must be 8, 10, 12, 14 or 16", options.bits));
   if (const auto checked = check_views(options); !checked) return checked;
-  if (options.kind == CaseKind::flat && model_of(options.machine()).intensifier)
+  if (options.kind == CaseKind::flat && model_of(options.c_arm_preset()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
-                                               word(options.machine())));
+                                               word(options.c_arm_preset())));
   if (options.ct && !options.knee) return fail(Reason::usage, "CT: --no-knee cannot be combined with --ct");
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
@@ -189,7 +189,7 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   }
   const bool tunnels = options.kind == CaseKind::tunnels;
   if (!tunnels) simulated_case.calibrator.targets = check_targets(simulated_case.calibrator);
-  if (model_of(options.machine()).intensifier) simulated_case.plate = plate48();
+  if (model_of(options.c_arm_preset()).intensifier) simulated_case.plate = plate48();
 
   RandomStream random(options.seed, stream::patient);
   const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);

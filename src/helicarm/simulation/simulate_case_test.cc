@@ -99,10 +99,10 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePaper) {
 
 TEST(SimulateCase, PresetOverridesTheDefaultOfTheKind) {
   SimulationOptions options = small(CaseKind::flat);
-  EXPECT_EQ(options.machine(), Preset::flat_panel);
+  EXPECT_EQ(options.c_arm_preset(), Preset::flat_panel);
   const SimulatedCase flat = *simulate_case(options);
   options.kind = CaseKind::accuracy;
-  EXPECT_EQ(options.machine(), Preset::ii_9in);
+  EXPECT_EQ(options.c_arm_preset(), Preset::ii_9in);
   options.preset = Preset::flat_panel;
   EXPECT_TRUE(same(flat.views[0].pixels, simulate_case(options)->views[0].pixels));
   options = small(CaseKind::flat);

@@ -59,7 +59,7 @@ bool SimulationOptions::logarithmic() const {
   return response.value_or(knee ? Response::logarithmic : Response::linear) == Response::logarithmic;
 }
 
-Preset SimulationOptions::machine() const {
+Preset SimulationOptions::c_arm_preset() const {
   return preset.value_or(kind == CaseKind::flat ? Preset::flat_panel : Preset::ii_9in);
 }
 

@@ -83,7 +83,7 @@ struct SimulationOptions {
   unsigned threads = 0;
 
   bool has(Fault fault) const;
-  Preset machine() const;
+  Preset c_arm_preset() const;
   bool logarithmic() const;
 };
 

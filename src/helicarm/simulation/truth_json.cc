@@ -145,7 +145,7 @@ Json matrix_json(const Eigen::MatrixXd& matrix) {
 Json truth_json(const SimulatedCase& simulated) {
   Json json = {{"format", "helicarm-truth/1"},
                {"kind", word(simulated.options.kind)},
-               {"preset", word(simulated.options.machine())},
+               {"preset", word(simulated.options.c_arm_preset())},
                {"seed", simulated.options.seed},
                {"arm_seed", simulated.options.arm_seed.value_or(simulated.options.seed)},
                {"knee", simulated.options.knee},

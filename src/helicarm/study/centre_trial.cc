@@ -94,15 +94,16 @@ class TileFit {
         xray_image_(xray_image),
         found_(find_dots(xray_image, {})),
         alone_(dots_alone(scene, found_)),
-        look_(estimate_look(xray_image, noise_correlation(xray_image), alone_)) {
-    look_.profile = BallProfile(situation.blur_factor * look_.profile.blur(), look_.profile.absorbance());
-    look_.options.free_radius = !situation.held_radius;
+        appearance_(estimate_appearance(xray_image, noise_correlation(xray_image), alone_)) {
+    appearance_.profile =
+        BallProfile(situation.blur_factor * appearance_.profile.blur(), appearance_.profile.absorbance());
+    appearance_.options.free_radius = !situation.held_radius;
     for (const Dot& dot : alone_) contrasts_.push_back(dot.contrast);
     std::ranges::sort(contrasts_);
   }
 
   double window_px() const {
-    return look_.options.margin_share * scene_.radius_px() + look_.options.margin_px;
+    return appearance_.options.margin_share * scene_.radius_px() + appearance_.options.margin_px;
   }
 
   std::optional<Dot> operator()(const BallTile& tile, RandomStream random) const {
@@ -117,7 +118,7 @@ class TileFit {
         situation_.places_known ? nullptr : nearest(found_, scene_.view.project(tile.ball), radius);
     Dot start = seen ? *seen : expected;
     if (situation_.held_radius) start.radius_px = *situation_.held_radius * radius;
-    const std::vector<Dot> fitted = refit_dots(xray_image_, {start}, look_, neighbours);
+    const std::vector<Dot> fitted = refit_dots(xray_image_, {start}, appearance_, neighbours);
     if (fitted.empty()) return std::nullopt;
     const bool plausible = seen || (!contrasts_.empty() && is_plausible(fitted.front(), expected,
                                                                         contrasts_[contrasts_.size() / 2]));
@@ -138,7 +139,7 @@ class TileFit {
   const XrayImage& xray_image_;
   std::vector<Dot> found_;
   std::vector<Dot> alone_;
-  DotLook look_;
+  DotAppearance appearance_;
   std::vector<double> contrasts_;
 };
 

@@ -12,7 +12,7 @@ constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
 
 }  // namespace
 
-std::vector<fs::path> FolderLook::at_rest() {
+std::vector<fs::path> FolderScan::unchanged_files() {
   std::vector<fs::path> resting;
   std::map<fs::path, Trace> now;
   std::error_code ec;
@@ -37,7 +37,7 @@ std::vector<fs::path> FolderLook::at_rest() {
 
 WatchedFolder::WatchedFolder(fs::path folder, Inbox& inbox, ReceiverHooks hooks,
                              std::chrono::milliseconds pause, std::optional<std::uint64_t> most)
-    : look_(std::move(folder)),
+    : scan_(std::move(folder)),
       inbox_(inbox),
       hooks_(std::move(hooks)),
       pause_(pause),
@@ -46,7 +46,7 @@ WatchedFolder::WatchedFolder(fs::path folder, Inbox& inbox, ReceiverHooks hooks,
 
 void WatchedFolder::watch(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    for (const fs::path& path : look_.at_rest()) {
+    for (const fs::path& path : scan_.unchanged_files()) {
       const std::string origin = path.filename().string();
       const auto arrival = read_file(path, most_file_bytes).and_then([&](const std::string& file) {
         return inbox_.store(file, origin);

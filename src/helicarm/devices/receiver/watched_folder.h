@@ -15,13 +15,13 @@
 namespace helicarm {
 
 /// Files of a folder that did not change between two polls. Polling works on network shares too.
-class FolderLook {
+class FolderScan {
  public:
-  explicit FolderLook(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  explicit FolderScan(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// Regular files, without links and hidden files, each once per modification. Empty while the folder is
   /// missing.
-  std::vector<std::filesystem::path> at_rest();
+  std::vector<std::filesystem::path> unchanged_files();
 
  private:
   struct Trace {
@@ -45,7 +45,7 @@ class WatchedFolder {
  private:
   void watch(const std::stop_token& stop);
 
-  FolderLook look_;
+  FolderScan scan_;
   Inbox& inbox_;
   ReceiverHooks hooks_;
   std::chrono::milliseconds pause_;

@@ -28,41 +28,41 @@ class FolderOnDisk : public testing::Test {
 };
 
 TEST_F(FolderOnDisk, FileIsTakenOnceUnchanged) {
-  FolderLook look(folder_);
+  FolderScan scan(folder_);
   put("a", "half");
-  EXPECT_THAT(look.at_rest(), IsEmpty());
+  EXPECT_THAT(scan.unchanged_files(), IsEmpty());
   put("a", "half and half");
-  EXPECT_THAT(look.at_rest(), IsEmpty());
-  EXPECT_THAT(look.at_rest(), ElementsAre(folder_ / "a"));
-  EXPECT_THAT(look.at_rest(), IsEmpty());
+  EXPECT_THAT(scan.unchanged_files(), IsEmpty());
+  EXPECT_THAT(scan.unchanged_files(), ElementsAre(folder_ / "a"));
+  EXPECT_THAT(scan.unchanged_files(), IsEmpty());
 }
 
 TEST_F(FolderOnDisk, ModifiedFileIsTakenAgain) {
-  FolderLook look(folder_);
+  FolderScan scan(folder_);
   put("a", "one");
-  look.at_rest();
-  EXPECT_THAT(look.at_rest(), ElementsAre(folder_ / "a"));
+  scan.unchanged_files();
+  EXPECT_THAT(scan.unchanged_files(), ElementsAre(folder_ / "a"));
   put("a", "another");
-  look.at_rest();
-  EXPECT_THAT(look.at_rest(), ElementsAre(folder_ / "a"));
+  scan.unchanged_files();
+  EXPECT_THAT(scan.unchanged_files(), ElementsAre(folder_ / "a"));
 }
 
 TEST_F(FolderOnDisk, LinksFoldersAndHiddenFilesAreIgnored) {
-  FolderLook look(folder_);
+  FolderScan scan(folder_);
   put(".part", "x");
   fs::create_directory(folder_ / "sub");
   fs::create_symlink("/dev/zero", folder_ / "link");
-  look.at_rest();
-  EXPECT_THAT(look.at_rest(), IsEmpty());
+  scan.unchanged_files();
+  EXPECT_THAT(scan.unchanged_files(), IsEmpty());
 }
 
 TEST_F(FolderOnDisk, MissingFolderThatReturnsIsNotAnError) {
-  FolderLook look(folder_ / "share");
-  EXPECT_THAT(look.at_rest(), IsEmpty());
+  FolderScan scan(folder_ / "share");
+  EXPECT_THAT(scan.unchanged_files(), IsEmpty());
   fs::create_directory(folder_ / "share");
   put("share/a", "x");
-  look.at_rest();
-  EXPECT_EQ(look.at_rest().size(), 1u);
+  scan.unchanged_files();
+  EXPECT_EQ(scan.unchanged_files().size(), 1u);
 }
 
 TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
