@@ -7,8 +7,8 @@ namespace helicarm {
 namespace {
 
 /// 256 voxels of 1 mm per side, none empty: every ray crosses all slabs.
-Volume full_volume() {
-  Volume volume;
+volume::Volume full_volume() {
+  volume::Volume volume;
   volume.size.setConstant(256);
   volume.voxels.resize(std::size_t{256} * 256 * 256);
   for (std::size_t i = 0; i < volume.voxels.size(); ++i) volume.voxels[i] = static_cast<float>(i * 7 % 613);
@@ -17,8 +17,8 @@ Volume full_volume() {
 }
 
 /// Along an axis, then rotated about an oblique one by this many degrees.
-View view_along(int axis, double turn_deg) {
-  View view;
+geometry::View view_along(int axis, double turn_deg) {
+  geometry::View view;
   view.intrinsics = {4000, 4000, 511.5, 511.5, 0};
   const Eigen::Vector3d ray = Eigen::Vector3d::Unit(axis);
   const Eigen::Vector3d right = Eigen::Vector3d::Unit(axis == 0 ? 1 : 0);
@@ -31,10 +31,11 @@ View view_along(int axis, double turn_deg) {
 
 /// 1024 x 1024 rays that all (unrotated) meet the volume: axis, rotation, threads.
 void drr_of_256(benchmark::State& state) {
-  const Absorber absorber(full_volume(), attenuation_from_hu);
-  const View view = view_along(static_cast<int>(state.range(0)), static_cast<double>(state.range(1)));
+  const volume::Absorber absorber(full_volume(), attenuation_from_hu);
+  const geometry::View view =
+      view_along(static_cast<int>(state.range(0)), static_cast<double>(state.range(1)));
   for (auto _ : state)
-    benchmark::DoNotOptimize(drr(absorber, view, 1024, 1024, static_cast<unsigned>(state.range(2))));
+    benchmark::DoNotOptimize(volume::drr(absorber, view, 1024, 1024, static_cast<unsigned>(state.range(2))));
 }
 BENCHMARK(drr_of_256)
     ->ArgsProduct({{0, 1, 2}, {0, 20}, {1, 2}})
@@ -42,10 +43,11 @@ BENCHMARK(drr_of_256)
     ->UseRealTime();
 
 void prepare_256(benchmark::State& state) {
-  const Volume volume = full_volume();
+  const volume::Volume volume = full_volume();
   for (auto _ : state)
-    benchmark::DoNotOptimize(Absorber(volume, attenuation_from_hu, static_cast<unsigned>(state.range(0)))
-                                 .contains(Eigen::Vector3d::Zero()));
+    benchmark::DoNotOptimize(
+        volume::Absorber(volume, attenuation_from_hu, static_cast<unsigned>(state.range(0)))
+            .contains(Eigen::Vector3d::Zero()));
 }
 BENCHMARK(prepare_256)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 

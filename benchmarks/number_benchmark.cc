@@ -17,8 +17,8 @@ namespace {
 constexpr std::size_t groups = 10000;
 constexpr int balls = 12;
 
-NumberOptions yardstick() {
-  NumberOptions options;
+study::NumberOptions yardstick() {
+  study::NumberOptions options;
   options.groups = groups;
   options.balls = {balls};
   options.sigmas = {SigmaReading::std};
@@ -26,12 +26,12 @@ NumberOptions yardstick() {
   return options;
 }
 
-void run_study(benchmark::State& state, const NumberOptions& options) {
-  const Ranks alone;
-  EngineOptions engine;
+void run_study(benchmark::State& state, const study::NumberOptions& options) {
+  const study::Ranks alone;
+  study::EngineOptions engine;
   engine.threads = static_cast<unsigned>(state.range(0));
   for (auto _ : state) {
-    const auto rows = study_number(options, engine, alone).value();
+    const auto rows = study::study_number(options, engine, alone).value();
     state.counters["median_fre_mm"] = rows.front().of_groups.median;
   }
 }
@@ -42,7 +42,7 @@ BENCHMARK(number_simd)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTi
 
 /// One sigma, independent noise, FRE and TRE of 43 targets.
 void number_with_targets(benchmark::State& state) {
-  NumberOptions options = yardstick();
+  study::NumberOptions options = yardstick();
   options.readings = {PixelReading::fresh_noise};
   run_study(state, options);
 }
@@ -50,7 +50,7 @@ BENCHMARK(number_with_targets)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->U
 
 /// All readings of sigma and of the pixels.
 void number_of_all_readings(benchmark::State& state) {
-  NumberOptions options;
+  study::NumberOptions options;
   options.groups = groups;
   options.balls = {balls};
   run_study(state, options);
@@ -58,7 +58,8 @@ void number_of_all_readings(benchmark::State& state) {
 BENCHMARK(number_of_all_readings)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 /// Eq. 7 by normal equations, with centred pixels.
-Projection calibrated(const std::vector<Eigen::Vector3d>& world, const std::vector<Eigen::Vector2d>& pixels) {
+geometry::Projection calibrated(const std::vector<Eigen::Vector3d>& world,
+                                const std::vector<Eigen::Vector2d>& pixels) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const auto& pixel : pixels) mean += pixel / balls;
   Eigen::Matrix<double, 2 * balls, 11> e = Eigen::Matrix<double, 2 * balls, 11>::Zero();
@@ -73,7 +74,7 @@ Projection calibrated(const std::vector<Eigen::Vector3d>& world, const std::vect
   }
   const Eigen::Matrix<double, 11, 11> normal = e.transpose() * e;
   const Eigen::Matrix<double, 11, 1> a = normal.ldlt().solve(e.transpose() * c);
-  Projection p;
+  geometry::Projection p;
   p.row(2) << a.segment<3>(4).transpose() / 64, 1;
   p.row(0) << 8 * a.head<3>().transpose(), 512 * a(3);
   p.row(1) << 8 * a.segment<3>(7).transpose(), 512 * a(10);
@@ -81,13 +82,13 @@ Projection calibrated(const std::vector<Eigen::Vector3d>& world, const std::vect
   return p;
 }
 
-double fre_of_group(std::mt19937_64& engine, const std::array<View, 2>& views) {
-  std::uniform_real_distribution<double> angle(0, ConicalHelix().t_end);
+double fre_of_group(std::mt19937_64& engine, const std::array<geometry::View, 2>& views) {
+  std::uniform_real_distribution<double> angle(0, phantom::ConicalHelix().t_end);
   std::normal_distribution<double> noise(0, printed_fle);
   std::vector<Eigen::Vector3d> world(balls);
   std::vector<Eigen::Vector2d> pixels[2];
-  for (auto& ball : world) ball = ConicalHelix().point(angle(engine));
-  Projection p[2];
+  for (auto& ball : world) ball = phantom::ConicalHelix().point(angle(engine));
+  geometry::Projection p[2];
   for (std::size_t view = 0; view < 2; ++view) {
     for (const auto& ball : world)
       pixels[view].push_back(views[view].project(ball) + Eigen::Vector2d(noise(engine), noise(engine)));
@@ -110,7 +111,7 @@ double fre_of_group(std::mt19937_64& engine, const std::array<View, 2>& views) {
 }
 
 void number_in_eigen(benchmark::State& state) {
-  const auto views = paper_views(WorldOrigin::base);
+  const auto views = paper_views(study::WorldOrigin::base);
   for (auto _ : state) {
     std::mt19937_64 engine(1);
     std::vector<double> fre(groups);

@@ -10,27 +10,29 @@ namespace helicarm {
 namespace {
 
 std::string message_at(double time_s) {
-  IgtlTracking tracking;
+  tracker::IgtlTracking tracking;
   for (const char* tool : {"femur", "tibia", "tool"}) {
-    RigidTransform pose{rotation_from_euler(0.3, 0.2, 0.1), {100, 50 + 0.01 * time_s, 900}};
+    geometry::RigidTransform pose{geometry::rotation_from_euler(0.3, 0.2, 0.1),
+                                  {100, 50 + 0.01 * time_s, 900}};
     pose.translation.x() += 0.1 * std::sin(1e4 * time_s);
     tracking.tools.push_back({tool, 2, pose.matrix()});
   }
-  IgtlMessage message;
+  tracker::IgtlMessage message;
   message.device = "tracker";
-  message.stamp = stamp_from_seconds(1.7e9 + time_s);
+  message.stamp = tracker::stamp_from_seconds(1.7e9 + time_s);
   message.content = tracking;
   return encode(message);
 }
 
 void message_to_lines_in_xrays(benchmark::State& state) {
-  PoseBoard board;
-  Poses xray_image;
-  xray_image.tracker_from_calibrator = RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 900}};
-  xray_image.tracker_from_femur = RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
-  const View views[2] = {{{4000, 4000, 511, 511, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 700}}},
-                         {{4000, 4000, 511, 511, 0}, {rotation_from_euler(1.57, 0, 0), {0, 0, 700}}}};
-  const double begin = monotonic_seconds();
+  tracker::PoseBoard board;
+  guidance::Poses xray_image;
+  xray_image.tracker_from_calibrator = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, 900}};
+  xray_image.tracker_from_femur = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {100, 50, 900}};
+  const geometry::View views[2] = {
+      {{4000, 4000, 511, 511, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 700}}},
+      {{4000, 4000, 511, 511, 0}, {geometry::rotation_from_euler(1.57, 0, 0), {0, 0, 700}}}};
+  const double begin = tracker::monotonic_seconds();
   double time_s = 0;
   for (auto _ : state) {
     state.PauseTiming();
@@ -39,11 +41,12 @@ void message_to_lines_in_xrays(benchmark::State& state) {
     state.ResumeTiming();
     const IgtlHeader header = decode_header(bytes).value();
     board.take(decode(header, std::string_view(bytes).substr(IgtlHeader::size)).value(), begin + time_s);
-    Poses now;
+    guidance::Poses now;
     now.tracker_from_tool = board.latest("tool", begin + time_s).value().tracker_from_tool;
     now.tracker_from_femur = board.latest("femur", begin + time_s).value().tracker_from_tool;
-    const ToolLine line = tool_line("femur", Bone::femur, xray_image, now, {}).value();
-    for (const View& view : views) benchmark::DoNotOptimize(line_in_xray(view, line));
+    const verification::ToolLine line =
+        tool_line("femur", guidance::Bone::femur, xray_image, now, {}).value();
+    for (const geometry::View& view : views) benchmark::DoNotOptimize(verification::line_in_xray(view, line));
   }
 }
 BENCHMARK(message_to_lines_in_xrays)->Unit(benchmark::kMicrosecond);

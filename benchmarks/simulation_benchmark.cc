@@ -12,15 +12,15 @@
 namespace helicarm::simulation {
 namespace {
 
-TrueView true_view() { return take_stand({}, *plate48().height_above_receiver_mm, {}).front(); }
+TrueView true_view() { return take_stand({}, *phantom::plate48().height_above_receiver_mm, {}).front(); }
 
 Scene scene_before(const TrueView& true_view) {
-  Calibrator calibrator = udcsc();
+  phantom::Calibrator calibrator = phantom::udcsc();
   calibrator.targets = check_targets(calibrator);
   Scene scene = calibrator_body(calibrator);
   for (const Body& body : knee_body())
     scene.push_back(moved(body, {Eigen::Matrix3d::Identity(), {10, 0, 14}}));
-  for (const Body& body : plate_body(plate48(), true_view.camera_from_plate, true_view.view))
+  for (const Body& body : plate_body(phantom::plate48(), true_view.camera_from_plate, true_view.view))
     scene.push_back(body);
   return scene;
 }
@@ -36,7 +36,7 @@ BENCHMARK(render_knee)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTi
 
 void knee_image(benchmark::State& state) {
   const TrueView taken = true_view();
-  const Image<float> signal = render_view(scene_before(taken), taken.detector, taken.view);
+  const image::Image<float> signal = render_view(scene_before(taken), taken.detector, taken.view);
   for (auto _ : state)
     benchmark::DoNotOptimize(
         detector_response(signal, taken.imaging, 1, stream::noise, static_cast<unsigned>(state.range(0))));

@@ -18,30 +18,32 @@ namespace helicarm {
 namespace {
 
 /// One simulated case on disk, made once.
-const Case& simulated_case() {
-  static const Case given = [] {
+const pipeline::Case& simulated_case() {
+  static const pipeline::Case given = [] {
     const auto folder = std::filesystem::temp_directory_path() / "helicarm_benchmark_case";
     simulation::SimulationOptions options;
     const auto simulated = value_or_throw(simulation::simulate_case(options));
     value_or_throw(simulation::write_case(folder, simulated));
-    return value_or_throw(read_case(folder));
+    return value_or_throw(pipeline::read_case(folder));
   }();
   return given;
 }
 
-const XrayImage& xray_image() {
-  static const XrayImage read = value_or_throw(read_xray_image(simulated_case().views[0].image, "AP", {}));
+const xray::XrayImage& xray_image() {
+  static const xray::XrayImage read =
+      value_or_throw(xray::read_xray_image(simulated_case().views[0].image, "AP", {}));
   return read;
 }
 
-const Rectification& rectification() {
-  static const Rectification rectified = value_or_throw(rectify(xray_image(), *simulated_case().plate, {}));
+const rectification::Rectification& rectification() {
+  static const rectification::Rectification rectified =
+      value_or_throw(rectification::rectify(xray_image(), *simulated_case().plate, {}));
   return rectified;
 }
 
 void read_file(benchmark::State& state) {
   const std::filesystem::path& image = simulated_case().views[0].image;
-  for (auto _ : state) benchmark::DoNotOptimize(read_xray_image(image, "AP", {}));
+  for (auto _ : state) benchmark::DoNotOptimize(xray::read_xray_image(image, "AP", {}));
 }
 BENCHMARK(read_file)->Unit(benchmark::kMillisecond);
 
@@ -52,41 +54,43 @@ BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
 /// The final fit of the balls: from the detected centres, with the image's estimated blur.
 void fit_one_ball(benchmark::State& state) {
-  const Candidates candidates = detect_candidates(xray_image(), rectification());
+  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification());
   const auto found = value_or_throw(
-      label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
-  std::vector<Dot> balls;
-  for (const Dot& dot : candidates.dots)
-    for (const Fiducial& ball : found.fiducials)
-      if (ball.status == FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
+      fiducials::label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
+  std::vector<detection::Dot> balls;
+  for (const detection::Dot& dot : candidates.dots)
+    for (const fiducials::Fiducial& ball : found.fiducials)
+      if (ball.status == fiducials::FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
-  const DotAppearance appearance = estimate_appearance(xray_image(), rectification().noise, balls);
-  for (auto _ : state) benchmark::DoNotOptimize(refit_dots(xray_image(), {balls.front()}, appearance, {}));
+  const detection::DotAppearance appearance = detection::estimate_appearance(xray_image(), rectification().noise, balls);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(detection::refit_dots(xray_image(), {balls.front()}, appearance, {}));
 }
 BENCHMARK(fit_one_ball)->Unit(benchmark::kMicrosecond);
 
 void rectify_view(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(rectify(xray_image(), *simulated_case().plate, {}));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(rectification::rectify(xray_image(), *simulated_case().plate, {}));
 }
 BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
 void label_candidates(benchmark::State& state) {
-  const Candidates candidates = detect_candidates(xray_image(), rectification());
+  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification());
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
+    benchmark::DoNotOptimize(fiducials::label_fiducials(xray_image(), rectification(), candidates,
+                                                        simulated_case().calibrator, {}));
 }
 BENCHMARK(label_candidates)->Unit(benchmark::kMillisecond);
 
 void resample_image(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(resample(xray_image(), rectification().map));
+  for (auto _ : state) benchmark::DoNotOptimize(rectification::resample(xray_image(), rectification().map));
 }
 BENCHMARK(resample_image)->Unit(benchmark::kMillisecond);
 
 void run_whole_case(benchmark::State& state) {
-  RunOptions options;
+  pipeline::RunOptions options;
   options.threads = static_cast<unsigned>(state.range(0));
-  for (auto _ : state) benchmark::DoNotOptimize(run_case(simulated_case(), options));
+  for (auto _ : state) benchmark::DoNotOptimize(pipeline::run_case(simulated_case(), options));
 }
 BENCHMARK(run_whole_case)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
 

@@ -12,18 +12,21 @@ namespace {
 
 /// Splits the stream into PDUs as the socket does; a length beyond the input takes the rest.
 void converse(Association& association, std::string_view bytes) {
-  while (!association.over() && bytes.size() >= dicom::pdu_header_bytes) {
+  while (!association.over() && bytes.size() >= receiver::dicom::pdu_header_bytes) {
     Choices choices(bytes);
-    const auto [type, length] = dicom::read_pdu_header(choices.take(dicom::pdu_header_bytes));
+    const auto [type, length] =
+        receiver::dicom::read_pdu_header(choices.take(receiver::dicom::pdu_header_bytes));
     const std::string_view body = choices.take(length);
     if (type < 1 || type > 7 || body.size() > association.most_pdu_bytes()) return;
     std::string_view answers;
     const std::string sent = association.take(type, body);
     for (answers = sent; !answers.empty();) {
-      check(answers.size() >= dicom::pdu_header_bytes, "an answer is a PDU");
-      const auto header = dicom::read_pdu_header(answers.substr(0, dicom::pdu_header_bytes));
-      check(header.length <= answers.size() - dicom::pdu_header_bytes, "an answer is a complete PDU");
-      answers.remove_prefix(dicom::pdu_header_bytes + header.length);
+      check(answers.size() >= receiver::dicom::pdu_header_bytes, "an answer is a PDU");
+      const auto header =
+          receiver::dicom::read_pdu_header(answers.substr(0, receiver::dicom::pdu_header_bytes));
+      check(header.length <= answers.size() - receiver::dicom::pdu_header_bytes,
+            "an answer is a complete PDU");
+      answers.remove_prefix(receiver::dicom::pdu_header_bytes + header.length);
     }
   }
 }
@@ -31,8 +34,8 @@ void converse(Association& association, std::string_view bytes) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  static const auto inbox = Inbox::open(folder() / "inbox").value();
-  ReceiverOptions options;
+  static const auto inbox = receiver::Inbox::open(folder() / "inbox").value();
+  receiver::ReceiverOptions options;
   options.most_object_bytes = 4096;  // so that inputs reach the limit
   ReceiverShared shared(options, *inbox, {});
   const auto id = shared.admission
@@ -54,7 +57,7 @@ void run(std::string_view bytes) {
   for (const auto& entry : std::filesystem::directory_iterator(inbox->folder())) {
     if (entry.path().extension() != ".dcm") continue;
     ++images;
-    check(read_dicom(read_file(entry.path(), 1 << 20).value(), "stored", 1).has_value(),
+    check(xray::read_dicom(read_file(entry.path(), 1 << 20).value(), "stored", 1).has_value(),
           "stored images are readable");
     std::filesystem::remove(entry.path());
   }
@@ -62,11 +65,11 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  const std::string request = peer::Request().bytes(), store = peer::store(DicomBuilder());
+  const std::string request = peer::Request().bytes(), store = peer::store(xray::DicomBuilder());
   return {request + peer::echo() + peer::release(),
           request + store + peer::release(),
           request + store + store + peer::echo() + peer::release(),
-          request + peer::store(DicomBuilder(), "2.25.18"),
+          request + peer::store(xray::DicomBuilder(), "2.25.18"),
           request + peer::pdu(7, std::string(4, '\0')),
           peer::Request{.called = peer::padded("OTHER")}.bytes()};
 }

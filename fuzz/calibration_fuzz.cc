@@ -8,11 +8,11 @@ namespace helicarm::fuzz {
 void run(std::string_view bytes) {
   const auto json = parse_json(bytes, "result.json");
   if (!json) return;
-  const auto saved = saved_calibration_from_json(*json, "result.json");
+  const auto saved = calibration::saved_calibration_from_json(*json, "result.json");
   if (!saved) return;
   check(saved->maps.size() == saved->views.size(), "each view has one map or none");
-  for (const CalibratedView& view : saved->views) {
-    const View& camera = view.view;
+  for (const calibration::CalibratedView& view : saved->views) {
+    const geometry::View& camera = view.view;
     check(camera.camera_from_world.matrix().allFinite(), "the camera's position is finite");
     check(
         (camera.camera_from_world.rotation.transpose() * camera.camera_from_world.rotation).isIdentity(1e-6),
@@ -26,18 +26,19 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   Json views = Json::array();
   for (const double x_mm : {0.0, 40.0}) {
-    View view{{4000, 4000, 512, 384}, {}};
+    geometry::View view{{4000, 4000, 512, 384}, {}};
     view.camera_from_world.translation = {x_mm, -5, 700};
     views.push_back({{"name", x_mm > 0 ? "LAT" : "AP"},
-                     {"projection", json_rows(view.projection())},
-                     {"camera_from_calibrator", json_rows(view.camera_from_world.matrix())}});
+                     {"projection", geometry::json_rows(view.projection())},
+                     {"camera_from_calibrator", geometry::json_rows(view.camera_from_world.matrix())}});
   }
-  views[0]["rectification"] = {{"map", to_json(identity_map(64, 48, 0.3))}};
+  views[0]["rectification"] = {{"map", to_json(rectification::identity_map(64, 48, 0.3))}};
   const auto n = Eigen::Index(view_parameters * 2);
-  const Json result{{"format", "helicarm-result/1"},
-                    {"status", "ok"},
-                    {"views", views},
-                    {"calibration", {{"joint_covariance", json_rows(Eigen::MatrixXd::Identity(n, n))}}}};
+  const Json result{
+      {"format", "helicarm-result/1"},
+      {"status", "ok"},
+      {"views", views},
+      {"calibration", {{"joint_covariance", geometry::json_rows(Eigen::MatrixXd::Identity(n, n))}}}};
   return {result.dump()};
 }
 

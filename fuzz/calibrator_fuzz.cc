@@ -5,32 +5,36 @@
 namespace helicarm::fuzz {
 namespace {
 
-Json write(const Calibrator& calibrator) { return to_json(calibrator); }
+Json write(const phantom::Calibrator& calibrator) { return to_json(calibrator); }
 
 }  // namespace
 
 void run(std::string_view bytes) {
   const auto json = parse_json(bytes, "calibrator.json");
   if (!json) return;
-  const auto calibrator = calibrator_from_json(*json, "calibrator.json");
+  const auto calibrator = phantom::calibrator_from_json(*json, "calibrator.json");
   if (!calibrator) return;
   const Json written = write(*calibrator);
   check(all_finite(written) && calibrator->balls.size() >= 6, "a calibrator has balls at finite positions");
-  for (const CalibratorTarget& target : calibrator->targets)
+  for (const phantom::CalibratorTarget& target : calibrator->targets)
     for (const auto& direction : target.directions)
       check(std::abs(direction.norm() - 1) < 1e-9, "directions have unit length");
-  const auto again = calibrator_from_json(written, "written.json");
-  check(again.has_value() && same_places(*again, *calibrator), "written data read back equal");
+  const auto again = phantom::calibrator_from_json(written, "written.json");
+  check(again.has_value() && phantom::same_places(*again, *calibrator), "written data read back equal");
 }
 
 std::vector<std::string> seeds() {
-  Calibrator full = udcsc();
+  phantom::Calibrator full = phantom::udcsc();
   full.tolerance_mm = 0.02;
-  full.targets = {
-      {"T1", {1, 2, 3}, TargetKind::ball, 3, {}},
-      {"T2", {4, 5, 6}, TargetKind::cross, 1, {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()}, 20},
-      {"T3", {7, 8, 9}, TargetKind::line_end, 1, {Eigen::Vector3d::UnitZ()}}};
-  return {write(udcsc()).dump(), write(full).dump()};
+  full.targets = {{"T1", {1, 2, 3}, phantom::TargetKind::ball, 3, {}},
+                  {"T2",
+                   {4, 5, 6},
+                   phantom::TargetKind::cross,
+                   1,
+                   {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()},
+                   20},
+                  {"T3", {7, 8, 9}, phantom::TargetKind::line_end, 1, {Eigen::Vector3d::UnitZ()}}};
+  return {write(phantom::udcsc()).dump(), write(full).dump()};
 }
 
 }  // namespace helicarm::fuzz

@@ -8,7 +8,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-void check_pose(const std::optional<RigidTransform>& pose) {
+void check_pose(const std::optional<geometry::RigidTransform>& pose) {
   if (!pose) return;
   check(pose->matrix().allFinite(), "poses are finite");
   check((pose->rotation.transpose() * pose->rotation).isIdentity(1e-9), "poses are rigid");
@@ -17,23 +17,23 @@ void check_pose(const std::optional<RigidTransform>& pose) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  put_file("calibrator.json", to_json(udcsc()).dump());
-  put_file("plate.json", to_json(plate48()).dump());
+  put_file("calibrator.json", to_json(phantom::udcsc()).dump());
+  put_file("plate.json", to_json(phantom::plate48()).dump());
   put_file("case.json", bytes);
-  const auto read = read_case(folder());
+  const auto read = pipeline::read_case(folder());
   if (!read) return;
   check(read->views.size() >= 2 && read->calibrator.balls.size() >= 6, "a case has views and a calibrator");
   std::set<std::string> names;
-  for (const CaseView& view : read->views) {
+  for (const pipeline::CaseView& view : read->views) {
     check(names.insert(view.name).second, "names are unique");
     check(view.image.lexically_relative(folder()).begin()->string() != "..", "images lie in the folder");
     check_pose(view.poses.tracker_from_calibrator);
     check_pose(view.poses.tracker_from_femur);
   }
   check_pose(read->poses_now.tracker_from_tool);
-  for (const Pick& pick : read->picks)
+  for (const pipeline::Pick& pick : read->picks)
     check(pick.uv_raw.allFinite() && names.contains(pick.view), "picks are positions in views");
-  for (const ToolLine& line : read->tool_lines)
+  for (const verification::ToolLine& line : read->tool_lines)
     check((line.p2_in_calibrator - line.p1_in_calibrator).norm() >= 1, "lines have a direction");
   check(std::isfinite(read->tracker.sigma_mm), "the tracker's noise is finite");
 }

@@ -11,8 +11,8 @@
 namespace helicarm::fuzz {
 namespace {
 
-DicomBuilder slice(double z, const std::string& series = "2.25.7") {
-  DicomBuilder builder;
+xray::DicomBuilder slice(double z, const std::string& series = "2.25.7") {
+  xray::DicomBuilder builder;
   builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.2").text(0x00080060, "CS", "CT");
   builder.text(0x0020000E, "UI", series).text(0x00200032, "DS", fmt::format("-3\\4\\{}", z));
   builder.text(0x00200037, "DS", "1\\0\\0\\0\\1\\0").text(0x00280030, "DS", "0.5\\0.25");
@@ -20,9 +20,9 @@ DicomBuilder slice(double z, const std::string& series = "2.25.7") {
 }
 
 /// Files in sequence, each preceded by its length.
-std::string joined(const std::vector<DicomBuilder>& slices) {
+std::string joined(const std::vector<xray::DicomBuilder>& slices) {
   std::string bytes;
-  for (const DicomBuilder& one : slices) {
+  for (const xray::DicomBuilder& one : slices) {
     const std::string file = one.bytes();
     bytes += {static_cast<char>(file.size() & 0xFF), static_cast<char>(file.size() >> 8)};
     bytes += file;
@@ -43,7 +43,7 @@ void run(std::string_view bytes) {
     const std::size_t size = low + 256 * choices.byte();
     put_file(fmt::format("series/{}", i), choices.take(size));
   }
-  check_volume(read_volume(series));
+  check_volume(volume::read_volume(series));
 }
 
 std::vector<std::string> seeds() {

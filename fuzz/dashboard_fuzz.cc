@@ -13,7 +13,7 @@ void run(std::string_view bytes) {
   Choices choices(bytes);
   const auto command = static_cast<DashboardCommand>(choices.byte() % 10);
   const std::size_t segment = 1 + choices.byte();
-  VirtualController controller(ur5(), drill(), resting_joints());
+  robot::VirtualController controller(robot::ur5(), robot::drill(), robot::resting_joints());
   std::string received;
   while (!bytes.empty()) {
     received += bytes.substr(0, segment);

@@ -11,17 +11,17 @@ namespace helicarm::fuzz {
 namespace {
 
 /// Written as an image of 16 bits, the values read back equal.
-void check_written_again(const XrayImage& xray_image) {
-  DerivedImage image;
-  image.pixels = Image<std::uint16_t>(xray_image.pixels.width(), xray_image.pixels.height());
+void check_written_again(const xray::XrayImage& xray_image) {
+  xray::DerivedImage image;
+  image.pixels = image::Image<std::uint16_t>(xray_image.pixels.width(), xray_image.pixels.height());
   for (int v = 0; v < xray_image.pixels.height(); ++v)
     for (int u = 0; u < xray_image.pixels.width(); ++u)
       image.pixels(u, v) = static_cast<std::uint16_t>(xray_image.pixels(u, v) - xray_image.lowest);
   image.acquisition = xray_image.acquisition;
   image.rle = xray_image.pixels.width() % 2 == 0;
   const auto path = folder() / "written.dcm";
-  check(write_dicom(path, image).has_value(), "an image that was read can be written");
-  const auto again = read_dicom(read_file(path, 1 << 30).value(), "written.dcm", {});
+  check(xray::write_dicom(path, image).has_value(), "an image that was read can be written");
+  const auto again = xray::read_dicom(read_file(path, 1 << 30).value(), "written.dcm", {});
   check(again.has_value(), "an image that was written can be read");
   check(again->acquisition.pixel_mm.has_value() == xray_image.acquisition.pixel_mm.has_value(),
         "the spacing is kept");
@@ -33,14 +33,14 @@ void check_written_again(const XrayImage& xray_image) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto xray_image = read_dicom(bytes, "input.dcm", 1);
+  const auto xray_image = xray::read_dicom(bytes, "input.dcm", 1);
   if (!xray_image) return;
   const auto pixels = xray_image->pixels.pixels();
   check(!pixels.empty(), "an image has pixels");
   for (const float pixel : pixels)
     check(pixel >= xray_image->lowest && pixel <= xray_image->highest,
           "pixels are between lowest and highest");
-  const Acquisition& acquisition = xray_image->acquisition;
+  const xray::Acquisition& acquisition = xray_image->acquisition;
   if (acquisition.pixel_mm)
     check(acquisition.pixel_mm->minCoeff() >= 0.01 && acquisition.pixel_mm->maxCoeff() <= 2,
           "the spacing is in range");
@@ -53,7 +53,7 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  DicomBuilder dated, implicit, bytes, cine;
+  xray::DicomBuilder dated, implicit, bytes, cine;
   dated.text(0x0008002A, "DT", "20240229235960.123456+0100").text(0x00080201, "SH", "+0100");
   dated.text(0x00181510, "DS", "12.5").text(0x00181511, "DS", "-3").text(0x00280030, "DS", "0.3\\0.2");
   dated.text(0x00187034, "CS", "YES").text(0x00187032, "DS", "90").word(0x00281041, -1, "SS");
@@ -65,16 +65,16 @@ std::vector<std::string> seeds() {
       .raw(0x7FE00010, "OB", std::string(48, 'x'));
   std::vector<std::uint16_t> values(144, 7);
   cine.text(0x00280008, "IS", "3").pixels(values).word(0x00280103, 1);
-  std::vector<std::string> all{DicomBuilder().bytes(), dated.bytes(), implicit.bytes(), bytes.bytes(),
+  std::vector<std::string> all{xray::DicomBuilder().bytes(), dated.bytes(), implicit.bytes(), bytes.bytes(),
                                cine.bytes()};
   for (const bool rle : {false, true}) {
-    DerivedImage image;
-    image.pixels = Image<std::uint16_t>(20, 10, 300);
+    xray::DerivedImage image;
+    image.pixels = image::Image<std::uint16_t>(20, 10, 300);
     for (int i = 0; i < 10; ++i) image.pixels(i, i) = static_cast<std::uint16_t>(7 * i);
     image.acquisition.pixel_mm = {0.2, 0.3};
     image.acquisition.source_detector_mm = 1000;
     image.rle = rle;
-    if (write_dicom(folder() / "seed.dcm", image))
+    if (xray::write_dicom(folder() / "seed.dcm", image))
       all.push_back(read_file(folder() / "seed.dcm", 1 << 20).value());
   }
   return all;

@@ -5,7 +5,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-Json write(const CArmHistory& history) { return to_json(history); }
+Json write(const calibration::CArmHistory& history) { return to_json(history); }
 
 }  // namespace
 
@@ -16,18 +16,18 @@ void run(std::string_view bytes) {
   if (!json) return;
   const auto history = read(*json);
   if (!history) return;
-  CArmPrior unknown;
-  unknown.focal = IntrinsicsVariation{40, 5};
-  unknown.principal = IntrinsicsVariation{10, 2};
-  check(learn_intrinsics(history->entries, {1000, 0, 0}, unknown).mean_mm.allFinite(),
+  calibration::CArmPrior unknown;
+  unknown.focal = calibration::IntrinsicsVariation{40, 5};
+  unknown.principal = calibration::IntrinsicsVariation{10, 2};
+  check(calibration::learn_intrinsics(history->entries, {1000, 0, 0}, unknown).mean_mm.allFinite(),
         "accepted values are finite");
 }
 
 std::vector<std::string> seeds() {
-  CArmHistory history;
+  calibration::CArmHistory history;
   history.entries.push_back({"00112233", "AP", {1000, 2, -3}, Eigen::Vector3d(0.1, 0.2, 0.3).asDiagonal()});
   history.entries.push_back({"44556677", "LAT", {1010, 1, -2}, 0.5 * Eigen::Matrix3d::Identity()});
-  return {write(CArmHistory{}).dump(), write(history).dump()};
+  return {write(calibration::CArmHistory{}).dump(), write(history).dump()};
 }
 
 }  // namespace helicarm::fuzz

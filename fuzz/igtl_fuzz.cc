@@ -31,9 +31,9 @@ void run(std::string_view bytes) {
   const std::size_t segment = 1 + choices.byte();
   const std::string stream_bytes = mode & 1 ? std::string(bytes) : with_check_sums(std::string(bytes));
   IgtlStream stream;
-  PoseBoard board;
+  tracker::PoseBoard board;
   double now_s = 1000;
-  const auto sink = [&](IgtlMessage&& message) {
+  const auto sink = [&](tracker::IgtlMessage&& message) {
     now_s += 0.02;
     board.take(message, now_s);
     const std::string once = encode(message);
@@ -49,7 +49,7 @@ void run(std::string_view bytes) {
     rest.remove_prefix(std::min(segment, rest.size()));
   }
   check(stream.held() <= stream_bytes.size(), "the buffer does not exceed the input");
-  for (const ToolState& tool : board.tools(now_s)) {
+  for (const tracker::ToolState& tool : board.tools(now_s)) {
     if (!tool.tracker_from_tool) continue;
     const Eigen::Matrix3d& rotation = tool.tracker_from_tool->rotation;
     check(tool.tracker_from_tool->matrix().allFinite(), "a pose on the board is finite");
@@ -60,7 +60,7 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   std::vector<std::string> all;
   std::string together("\0\x40", 2);
-  for (IgtlMessage message : sample_messages()) {
+  for (tracker::IgtlMessage message : sample_messages()) {
     all.push_back(std::string("\0\xff", 2) + encode(message));
     together += encode(message);
     message.version = 2;

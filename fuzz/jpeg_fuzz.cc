@@ -22,8 +22,8 @@ constexpr int width = 24, height = 16;
 std::string compressed(int bits, E_TransferSyntax syntax, const DcmRepresentationParameter& how) {
   std::string pixels;
   for (int i = 0; i < width * height; ++i)
-    pixels += DicomBuilder::number(i * 37 % (1 << bits), bits > 8 ? 2 : 1);
-  DicomBuilder builder;
+    pixels += xray::DicomBuilder::number(i * 37 % (1 << bits), bits > 8 ? 2 : 1);
+  xray::DicomBuilder builder;
   builder.word(0x00280010, height).word(0x00280011, width).word(0x00280100, bits > 8 ? 16 : 8);
   builder.word(0x00280101, bits).word(0x00280102, bits - 1).raw(0x7FE00010, bits > 8 ? "OW" : "OB", pixels);
   const std::string plain = builder.bytes();
@@ -43,7 +43,7 @@ std::string compressed(int bits, E_TransferSyntax syntax, const DcmRepresentatio
   offile_off_t size = 0;
   stream.flushBuffer(written, size);
   out.resize(static_cast<std::size_t>(size));
-  const auto elements = walk_dicom(out, "seed");
+  const auto elements = xray::walk_dicom(out, "seed");
   return elements && elements->fragments.size() > 1 ? std::string(elements->fragments[1]) : std::string{};
 }
 

@@ -5,8 +5,10 @@
 namespace helicarm::fuzz {
 namespace {
 
-Json write(const DistortionMap& map) { return to_json(map); }
-Expected<DistortionMap> read(const Json& json) { return distortion_map_from_json(json, "map.json"); }
+Json write(const rectification::DistortionMap& map) { return to_json(map); }
+Expected<rectification::DistortionMap> read(const Json& json) {
+  return rectification::distortion_map_from_json(json, "map.json");
+}
 
 }  // namespace
 
@@ -19,14 +21,14 @@ void run(std::string_view bytes) {
   for (const Eigen::Vector2d& at : {Eigen::Vector2d(0, 0), Eigen::Vector2d(100, 200), map->centre}) {
     const auto rectified = map->rectified_from_raw(at);
     check(!rectified || rectified->allFinite(), "a rectified position is finite");
-    (void)raw_in_image(*map, at);
+    (void)rectification::raw_in_image(*map, at);
     check(!(map->sigma_px(at) < 0), "a standard deviation is not negative");
     (void)map->covariance_px2(std::vector{at, map->centre});
   }
 }
 
 std::vector<std::string> seeds() {
-  DistortionMap cubic = identity_map(1024, 1024, 0.3);
+  rectification::DistortionMap cubic = rectification::identity_map(1024, 1024, 0.3);
   cubic.model = "kriging";
   cubic.order = 3;
   cubic.centre = {511.5, 511.5};
@@ -34,13 +36,13 @@ std::vector<std::string> seeds() {
   cubic.coefficients = Eigen::MatrixX2d::Zero(10, 2);
   cubic.coefficients.row(0) = cubic.centre.transpose();
   cubic.coefficients(1, 0) = cubic.coefficients(2, 1) = 512;
-  DistortionMap knotted = cubic;
+  rectification::DistortionMap knotted = cubic;
   knotted.knots = Eigen::MatrixX2d::Random(3, 2);
   knotted.weights = Eigen::MatrixX2d::Random(3, 2);
   knotted.kernel_length = 0.5;
   knotted.kernel_sigma_px = 1;
   knotted.coefficient_covariance = 1e-4 * Eigen::MatrixXd::Identity(13, 13);
-  return {write(identity_map(64, 48, {})).dump(), write(cubic).dump(), write(knotted).dump()};
+  return {write(rectification::identity_map(64, 48, {})).dump(), write(cubic).dump(), write(knotted).dump()};
 }
 
 }  // namespace helicarm::fuzz

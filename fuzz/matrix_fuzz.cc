@@ -5,7 +5,7 @@
 namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
-  const auto matrix = import_matrix(put_file("input.txt", bytes), 10);
+  const auto matrix = geometry::import_matrix(put_file("input.txt", bytes), 10);
   if (!matrix) return;
   check(matrix->view.camera_from_world.matrix().allFinite(), "the camera's position is finite");
   check(std::isfinite(matrix->view.intrinsics.fx) && std::isfinite(matrix->view.intrinsics.fy),

@@ -7,7 +7,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-Json write(const RobotOrder& order) { return to_json(order); }
+Json write(const robot::RobotOrder& order) { return to_json(order); }
 
 }  // namespace
 
@@ -23,6 +23,6 @@ void run(std::string_view bytes) {
   (void)check_order(*order, resting_state());
 }
 
-std::vector<std::string> seeds() { return {write(planned()).dump()}; }
+std::vector<std::string> seeds() { return {write(robot::planned()).dump()}; }
 
 }  // namespace helicarm::fuzz

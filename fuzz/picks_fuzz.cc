@@ -5,14 +5,14 @@
 namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
-  std::vector<CaseView> views(2);
+  std::vector<pipeline::CaseView> views(2);
   views[0].name = "AP";
   views[1].name = "LAT";
   run_round_trip(
-      bytes, [&](const Json& json) { return picks_from(json, "picks", views); },
-      [](const std::vector<Pick>& picks) {
+      bytes, [&](const Json& json) { return pipeline::picks_from(json, "picks", views); },
+      [](const std::vector<pipeline::Pick>& picks) {
         Json list = Json::array();
-        for (const Pick& pick : picks) list.push_back(to_json(pick));
+        for (const pipeline::Pick& pick : picks) list.push_back(to_json(pick));
         return list;
       });
 }

@@ -5,24 +5,24 @@
 namespace helicarm::fuzz {
 namespace {
 
-Json write(const OperationPlan& plan) { return to_json(plan); }
+Json write(const operation::OperationPlan& plan) { return to_json(plan); }
 
 }  // namespace
 
 void run(std::string_view bytes) {
   run_round_trip(
-      bytes, [](const Json& json) { return plan_from(json, "plan.json"); }, write);
+      bytes, [](const Json& json) { return operation::plan_from(json, "plan.json"); }, write);
 }
 
 std::vector<std::string> seeds() {
-  OperationPlan plan;
+  operation::OperationPlan plan;
   plan.tracker.facets = {{"calibrator/1", {Eigen::Matrix3d::Identity(), {85, 0, 10}}}};
   plan.robot.tool = {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2};
-  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end}};
-  OperationPlan full = plan;
+  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", operation::TunnelEnd::end}};
+  operation::OperationPlan full = plan;
   full.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
-  full.tracker.pointer = Pointer{"pointer", {0, 0, 120}};
-  full.check_points = {{"divot", Bone::tibia, 1}};
+  full.tracker.pointer = operation::Pointer{"pointer", {0, 0, 120}};
+  full.check_points = {{"divot", guidance::Bone::tibia, 1}};
   full.picks = Json::array({{{"name", "FS"}, {"view", "AP"}, {"uv", {10, 20}}}});
   full.plate.reset();
   return {write(plan).dump(), write(full).dump()};

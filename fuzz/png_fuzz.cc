@@ -25,8 +25,8 @@ std::string with_check_sums(std::string bytes) {
 }
 
 template <class T>
-Image<T> as(const Image<std::uint16_t>& pixels) {
-  Image<T> image(pixels.width(), pixels.height());
+image::Image<T> as(const image::Image<std::uint16_t>& pixels) {
+  image::Image<T> image(pixels.width(), pixels.height());
   std::ranges::transform(pixels.pixels(), image.pixels().begin(),
                          [](std::uint16_t v) { return static_cast<T>(v); });
   return image;
@@ -35,7 +35,7 @@ Image<T> as(const Image<std::uint16_t>& pixels) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto grey_image = decode_png(with_check_sums(std::string(bytes)), "input.png");
+  const auto grey_image = image::decode_png(with_check_sums(std::string(bytes)), "input.png");
   if (!grey_image) return;
   check(grey_image->bits == 8 || grey_image->bits == 16, "an image has 8 or 16 bits");
   const auto pixels = grey_image->pixels.pixels();
@@ -43,19 +43,21 @@ void run(std::string_view bytes) {
         "values are in range");
   constexpr std::size_t small = 4096;
   if (pixels.size() > small) return;
-  const std::string written = grey_image->bits == 8 ? encode_png(as<std::uint8_t>(grey_image->pixels))
-                                                    : encode_png(as<std::uint16_t>(grey_image->pixels));
-  const auto again = decode_png(written, "written.png");
+  const std::string written = grey_image->bits == 8
+                                  ? image::encode_png(as<std::uint8_t>(grey_image->pixels))
+                                  : image::encode_png(as<std::uint16_t>(grey_image->pixels));
+  const auto again = image::decode_png(written, "written.png");
   check(again.has_value() && std::ranges::equal(again->pixels.pixels(), pixels), "an image reads back equal");
 }
 
 std::vector<std::string> seeds() {
-  Image<std::uint8_t> narrow(7, 5, 9);
-  Image<std::uint16_t> wide(6, 4, 40000);
+  image::Image<std::uint8_t> narrow(7, 5, 9);
+  image::Image<std::uint16_t> wide(6, 4, 40000);
   for (int i = 0; i < 4; ++i)
     narrow(i, i) = static_cast<std::uint8_t>(60 * i), wide(i, i) = static_cast<std::uint16_t>(257 * i);
   cv::Mat rgb(3, 5, CV_8UC3, cv::Scalar(7, 7, 7)), colour(3, 5, CV_8UC3, cv::Scalar(1, 2, 3));
-  return {encode_png(narrow), encode_png(wide), encode_png(rgb), encode_png(colour)};
+  return {image::encode_png(narrow), image::encode_png(wide), image::encode_png(rgb),
+          image::encode_png(colour)};
 }
 
 }  // namespace helicarm::fuzz

@@ -20,14 +20,14 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   std::vector<std::string> all;
   for (const int bits : {8, 16}) {
-    DerivedImage image;
-    image.pixels = Image<std::uint16_t>(17, 1, 200);
+    xray::DerivedImage image;
+    image.pixels = image::Image<std::uint16_t>(17, 1, 200);
     for (int u = 0; u < 9; ++u) image.pixels(u, 0) = static_cast<std::uint16_t>(20 * u);
     image.bits_stored = bits;
     image.rle = true;
-    if (!write_dicom(folder() / "seed.dcm", image)) continue;
+    if (!xray::write_dicom(folder() / "seed.dcm", image)) continue;
     const std::string file = read_file(folder() / "seed.dcm", 1 << 20).value();
-    const auto elements = walk_dicom(file, "seed");
+    const auto elements = xray::walk_dicom(file, "seed");
     if (elements && elements->fragments.size() > 1)
       all.push_back(std::string{static_cast<char>(bits / 8 - 1), 1} + std::string(elements->fragments[1]));
   }

@@ -21,7 +21,7 @@ void run_message(const RtdeMessage& message) {
         "poses are finite");
   check((state->base_from_tcp.rotation.transpose() * state->base_from_tcp.rotation).isIdentity(1e-6),
         "poses are rigid");
-  (void)why_stopped(*state);
+  (void)robot::why_stopped(*state);
   (void)to_json(*state).dump();
   const auto again = read_state(state_message(recipe, *state), recipe);
   check(again.has_value() && again->joints == state->joints && again->safety_mode == state->safety_mode,
@@ -47,7 +47,7 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  RobotState state;
+  robot::RobotState state;
   state.time_s = 12.5;
   state.joints << 0.1, -1.2, 1.3, -0.4, 0.5, 0.6;
   state.base_from_tcp.translation = {400, -100, 300};

@@ -17,14 +17,14 @@ bool same(const RecordedPose& a, const RecordedPose& b) {
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto frames = read_sequence(put_file("input.mha", bytes));
+  const auto frames = tracker::read_sequence(put_file("input.mha", bytes));
   if (!frames) return;
   const auto path = folder() / "written.mha";
-  if (!write_sequence(path, *frames)) return;  // a name with invalid characters
-  const auto again = read_sequence(path);
+  if (!tracker::write_sequence(path, *frames)) return;  // a name with invalid characters
+  const auto again = tracker::read_sequence(path);
   check(again.has_value() && again->size() == frames->size(), "frames read back equal");
   for (std::size_t i = 0; i < frames->size(); ++i) {
-    const SequenceFrame &one = (*frames)[i], &other = (*again)[i];
+    const tracker::SequenceFrame &one = (*frames)[i], &other = (*again)[i];
     check(std::abs(one.time_s) < 1e10, "times are bounded");
     check(one.poses.size() == other.poses.size(), "poses read back equal");
     for (const auto& [name, pose] : one.poses)
@@ -33,7 +33,7 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  std::vector<SequenceFrame> frames(3);
+  std::vector<tracker::SequenceFrame> frames(3);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     frames[i].time_s = 0.1 * double(i);
     frames[i].poses["FemurToTracker"] = {Eigen::Matrix4d::Identity() * 1.5, i != 1};
@@ -41,7 +41,7 @@ std::vector<std::string> seeds() {
   std::vector<std::string> all{
       "ObjectType = Image\r\nDimSize = 0 0 2          \nSeq_Frame0000_ToolToTrackerTransform = 1 0 0 10 0 1 "
       "0 20 0 0 1 -3e-018 0 0 0 1 \nSeq_Frame0000_Timestamp = 12.5\nElementDataFile = LOCAL\nbinary"};
-  if (write_sequence(folder() / "seed.mha", frames))
+  if (tracker::write_sequence(folder() / "seed.mha", frames))
     all.push_back(read_file(folder() / "seed.mha", 1 << 20).value());
   return all;
 }

@@ -34,10 +34,10 @@ std::string written(int bits, int channels, int compression, int photometric, in
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto pages = count_tiff_pages(bytes, "input.tif");
+  const auto pages = image::count_tiff_pages(bytes, "input.tif");
   if (!pages) return;
   check(*pages >= 1, "a file has pages");
-  const auto image = decode_tiff(bytes, *pages - 1, "input.tif");
+  const auto image = image::decode_tiff(bytes, *pages - 1, "input.tif");
   if (!image) return;
   check(image->bits == 8 || image->bits == 16, "an image has 8 or 16 bits");
   check(!image->pixels.empty(), "an image has pixels");

@@ -10,7 +10,7 @@
 
 namespace helicarm::fuzz {
 
-void check_volume(const Expected<Volume>& volume) {
+void check_volume(const Expected<volume::Volume>& volume) {
   if (!volume) return;
   check(volume->size.minCoeff() >= 1, "a volume has voxels");
   check(volume->voxels.size() == std::size_t(volume->size.cast<std::int64_t>().prod()),
@@ -21,7 +21,7 @@ void check_volume(const Expected<Volume>& volume) {
   check(std::abs(cell.determinant()) > 1e-10, "the voxel-to-patient transform is not singular");
 }
 
-void run_volume(std::string_view bytes) { check_volume(read_volume(put_file("input", bytes))); }
+void run_volume(std::string_view bytes) { check_volume(volume::read_volume(put_file("input", bytes))); }
 
 std::string voxels16(int count) {
   std::string bytes;

@@ -11,7 +11,7 @@ namespace helicarm::fuzz {
 
 /// Reads a volume file and checks what was accepted.
 void run_volume(std::string_view bytes);
-void check_volume(const Expected<Volume>& volume);
+void check_volume(const Expected<volume::Volume>& volume);
 
 /// `count` voxels 0, 1, ... of 16 bits, little endian.
 std::string voxels16(int count);

@@ -24,7 +24,7 @@ void discard_input() { ::tcflush(STDIN_FILENO, TCIFLUSH); }
 
 }  // namespace
 
-Ending::Ending(StopSignal& signal, RobotLink& robot, Operation& operation)
+Ending::Ending(StopSignal& signal, robot::RobotLink& robot, operation::Operation& operation)
     : thread_([this, &signal, &robot, &operation](const std::stop_token& over) {
         while (!over.stop_requested())
           if (signal.wait(glance_s)) {
@@ -38,7 +38,7 @@ void Ending::check() const {
   if (reported_) throw BadInput(Reason::interrupted, "stopped by signal");
 }
 
-Expected<std::string> Consent::operator()(const RobotOrder& order,
+Expected<std::string> Consent::operator()(const robot::RobotOrder& order,
                                           const std::function<Expected<void>()>& holds) {
   ending_.check();
   if (!yes_ && !agreed(order, holds))
@@ -46,10 +46,10 @@ Expected<std::string> Consent::operator()(const RobotOrder& order,
   return robot_.confirm(order);
 }
 
-bool Consent::agreed(const RobotOrder& order, const std::function<Expected<void>()>& holds) {
+bool Consent::agreed(const robot::RobotOrder& order, const std::function<Expected<void>()>& holds) {
   if (!at_terminal()) return false;
   discard_input();
-  const RigidTransform& last = order.waypoints.back().base_from_tcp;
+  const geometry::RigidTransform& last = order.waypoints.back().base_from_tcp;
   console_.progress << fmt::format(
                            "order \"{}\": {} moves, tip to {:.0f} {:.0f} {:.0f} mm in the robot's base "
                            "frame; keep clear of the robot. Type \"go\" to confirm:\n",

@@ -16,7 +16,7 @@ namespace helicarm::cli {
 /// Stops the robot and every wait for the tracker on a stop signal, at any time.
 class Ending {
  public:
-  Ending(StopSignal& signal, RobotLink& robot, Operation& operation);
+  Ending(StopSignal& signal, robot::RobotLink& robot, operation::Operation& operation);
 
   /// Throws BadInput (interrupted) after a stop signal.
   void check() const;
@@ -36,22 +36,22 @@ class Ending {
 class Consent {
  public:
   /// `yes`: every order is confirmed without a question.
-  Consent(RobotLink& robot, const Ending& ending, bool yes, Console& console)
+  Consent(robot::RobotLink& robot, const Ending& ending, bool yes, Console& console)
       : robot_(robot), ending_(ending), yes_(yes), console_(console) {}
 
   /// The order's token. Throws BadInput (plan_stale) once the plan no longer holds, without waiting for the
   /// answer.
   Expected<std::string> operator()(
-      const RobotOrder& order,
+      const robot::RobotOrder& order,
       const std::function<Expected<void>()>& holds = [] { return Expected<void>(); });
 
   /// Whether to unlock the robot and plan again after this refusal.
   bool plans_again(const Failure& why);
 
  private:
-  bool agreed(const RobotOrder& order, const std::function<Expected<void>()>& holds);
+  bool agreed(const robot::RobotOrder& order, const std::function<Expected<void>()>& holds);
 
-  RobotLink& robot_;
+  robot::RobotLink& robot_;
   const Ending& ending_;
   bool yes_;
   Console& console_;

@@ -21,18 +21,18 @@ struct Comparison {
   std::map<std::string, double> point_error_mm;
 };
 
-Comparison compare(const Result& result, const SimulatedCase& truth) {
+Comparison compare(const pipeline::Result& result, const SimulatedCase& truth) {
   Comparison comparison;
   double squares = 0;
   for (std::size_t i = 0; i < result.views.size(); ++i)
-    for (const Fiducial& ball : result.views[i].found->fiducials)
+    for (const fiducials::Fiducial& ball : result.views[i].found->fiducials)
       for (const simulation::TruePoint& real : truth.views[i].balls)
-        if (ball.status == FiducialStatus::used && ball.label == real.name) {
+        if (ball.status == fiducials::FiducialStatus::used && ball.label == real.name) {
           squares += (ball.uv_raw - real.raw).squaredNorm();
           ++comparison.balls;
         }
   comparison.ball_rms_px = std::sqrt(squares / std::max(comparison.balls, 1));
-  for (const PointResult& point : result.points)
+  for (const pipeline::PointResult& point : result.points)
     for (const auto* known : {&truth.views[0].targets, &truth.views[0].tunnel_points})
       for (const simulation::TruePoint& real : *known)
         if (point.place && point.name == real.name)
@@ -70,7 +70,7 @@ CommandResult demo_command(const DemoArguments& arguments, Console& console) {
     value_or_throw(simulation::check_case_folder(run.folder));
     value_or_throw(simulation::write_case(run.folder, truth));
     if (!console.quiet) console.progress << "helicarm: measuring\n\n";
-    const Result result = value_or_throw(run_and_write(run, console));
+    const pipeline::Result result = value_or_throw(run_and_write(run, console));
     if (result.failure) throw BadInput(*result.failure);
     if (!console.json) console.out << summary_of(result);
     print(compare(result, truth), std::filesystem::absolute(run.out / "report.html"), console);

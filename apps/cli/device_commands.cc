@@ -29,7 +29,7 @@ void add_receive(CLI::App& app, Action& action) {
                       ->add_option("--address", a.receiver.address,
                                    "Address to listen on; other than 127.0.0.1 opens the port to the network")
                       ->capture_default_str();
-  add_fields(command, a.receiver, receiver_fields);
+  add_fields(command, a.receiver, receiver::receiver_fields);
   auto* port = command->get_option("--port");
   auto* title =
       command
@@ -126,12 +126,12 @@ void add_navigate(CLI::App& app, Action& action) {
   command->add_option("--picks", a.picks, "JSON with \"picks\" as in case.json; awaited after the images");
   command->add_option("--address", a.receiver.address, "Address to listen on for images")
       ->capture_default_str();
-  constexpr auto& age = field_named<OperationPlan>(plan_fields, "plan_stale_s");
+  constexpr auto& age = field_named<operation::OperationPlan>(operation::plan_fields, "plan_stale_s");
   command
       ->add_option("--plan-age", a.plan_age_s,
                    "Age in s at which an unconfirmed plan expires; overrides the plan's plan_stale_s")
       ->check(within(age.range.low, age.range.high));
-  add_fields(command, a.receiver, receiver_fields);
+  add_fields(command, a.receiver, receiver::receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
       ->capture_default_str();
   command->add_flag("--yes", a.yes, "Confirm every order automatically; only where no person can be injured");

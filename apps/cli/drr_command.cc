@@ -20,20 +20,20 @@ namespace {
 
 using Eigen::Vector3d;
 
-Ramp ramp_of(const std::string& values) {
+volume::Ramp ramp_of(const std::string& values) {
   if (values == "raw") return {};
   if (values != "hu")
     throw BadInput(Reason::usage, fmt::format("--values: \"{}\" is neither hu nor raw", values));
-  return attenuation_from_hu;
+  return volume::attenuation_from_hu;
 }
 
 /// Rows run from head to foot; at angle 0 the patient's left is on the right.
-View view_of(const DrrArguments& arguments, const Vector3d& centre) {
+geometry::View view_of(const DrrArguments& arguments, const Vector3d& centre) {
   const double angle = arguments.angle_deg * EIGEN_PI / 180;
   const double tilt = arguments.tilt_deg * EIGEN_PI / 180;
   const Vector3d ray(-std::sin(angle) * std::cos(tilt), std::cos(angle) * std::cos(tilt), -std::sin(tilt));
   const Vector3d right = ray.cross(Vector3d::UnitZ()).normalized();
-  View view;
+  geometry::View view;
   const double focal = arguments.source_detector_mm / arguments.pixel_mm;
   const double middle = 0.5 * (arguments.size - 1);
   view.intrinsics = {focal, focal, middle, middle, 0};
@@ -43,13 +43,13 @@ View view_of(const DrrArguments& arguments, const Vector3d& centre) {
   return view;
 }
 
-std::string grey_png(const Image<float>& integrals, float greatest) {
-  Image<std::uint16_t> grey(integrals.width(), integrals.height());
+std::string grey_png(const image::Image<float>& integrals, float greatest) {
+  image::Image<std::uint16_t> grey(integrals.width(), integrals.height());
   std::ranges::transform(integrals.pixels(), grey.pixels().begin(), [&](float value) {
     return static_cast<std::uint16_t>(
         std::lround(65535 * std::clamp(value / std::max(greatest, 1e-30F), 0.0F, 1.0F)));
   });
-  return encode_png(grey);
+  return image::encode_png(grey);
 }
 
 void check_outputs(const DrrArguments& arguments, const Console& console) {
@@ -68,22 +68,22 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 CommandResult drr_command(const DrrArguments& arguments, Console& console) {
   return guarded([&] {
-    const Ramp ramp = ramp_of(arguments.values);
+    const volume::Ramp ramp = ramp_of(arguments.values);
     if (!arguments.centre_mm.empty() && arguments.centre_mm.size() != 3)
       throw BadInput(Reason::usage, "--centre takes three numbers");
     check_outputs(arguments, console);
-    const Volume volume = value_or_throw(read_volume(arguments.volume));
+    const volume::Volume volume = value_or_throw(volume::read_volume(arguments.volume));
     for (const Warning& warning : volume.warnings)
       console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
     const Vector3d centre =
         arguments.centre_mm.empty() ? volume.centre() : Vector3d::Map(arguments.centre_mm.data());
-    const View view = view_of(arguments, centre);
+    const geometry::View view = view_of(arguments, centre);
     const auto start = std::chrono::steady_clock::now();
-    const Absorber absorber(volume, ramp, console.threads);
+    const volume::Absorber absorber(volume, ramp, console.threads);
     const double prepare_ms = milliseconds_since(start);
     const auto prepared = std::chrono::steady_clock::now();
-    const Image<float> integrals =
-        value_or_throw(drr(absorber, view, arguments.size, arguments.size, console.threads));
+    const image::Image<float> integrals =
+        value_or_throw(volume::drr(absorber, view, arguments.size, arguments.size, console.threads));
     const double project_ms = milliseconds_since(prepared);
     const auto [least, greatest] = std::ranges::minmax(integrals.pixels());
     if (!arguments.out.empty()) value_or_throw(write_file(arguments.out, grey_png(integrals, greatest)));
@@ -96,8 +96,8 @@ CommandResult drr_command(const DrrArguments& arguments, Console& console) {
                               {"size", {arguments.size, arguments.size}},
                               {"minimum", least},
                               {"maximum", greatest},
-                              {"source_mm", json_list(view.source_in_world())},
-                              {"projection", json_rows(view.projection())},
+                              {"source_mm", geometry::json_list(view.source_in_world())},
+                              {"projection", geometry::json_rows(view.projection())},
                               {"prepare_ms", prepare_ms},
                               {"project_ms", project_ms}})
                   << '\n';

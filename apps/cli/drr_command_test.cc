@@ -36,7 +36,7 @@ TEST(DrrCommand, LeftAndHeadAgreeWithTheHelp) {
   arguments.pixel_mm = 0.5;
   const auto done = drr_command(arguments, console);
   const std::string raw = *read_file(folder / "a.f32", 9999);
-  const auto png = decode_png(*read_file(folder / "a.png", 9999), "a.png");
+  const auto png = image::decode_png(*read_file(folder / "a.png", 9999), "a.png");
   arguments.values = "hounsfield";
   const auto refused = drr_command(arguments, console);
   arguments.values = "raw";

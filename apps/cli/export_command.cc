@@ -11,16 +11,16 @@
 namespace helicarm::cli {
 namespace {
 
-std::vector<Export> exports_named(const std::vector<std::string>& words) {
-  std::vector<Export> kinds;
+std::vector<report::Export> exports_named(const std::vector<std::string>& words) {
+  std::vector<report::Export> kinds;
   for (const std::string& word : words) {
-    const auto found = std::ranges::find(export_words, word);
-    if (found == export_words.end())
+    const auto found = std::ranges::find(report::export_words, word);
+    if (found == report::export_words.end())
       throw BadInput(Reason::usage,
-                     fmt::format("--as: \"{}\" is none of: {}", word, fmt::join(export_words, ", ")));
-    kinds.push_back(every_export[std::size_t(found - export_words.begin())]);
+                     fmt::format("--as: \"{}\" is none of: {}", word, fmt::join(report::export_words, ", ")));
+    kinds.push_back(report::every_export[std::size_t(found - report::export_words.begin())]);
   }
-  if (kinds.empty()) kinds.assign(every_export.begin(), every_export.end());
+  if (kinds.empty()) kinds.assign(report::every_export.begin(), report::every_export.end());
   return kinds;
 }
 
@@ -28,14 +28,14 @@ std::vector<Export> exports_named(const std::vector<std::string>& words) {
 
 CommandResult export_command(const ExportArguments& arguments, Console& console) {
   return guarded([&] {
-    const std::vector<Export> kinds = exports_named(arguments.as);
+    const std::vector<report::Export> kinds = exports_named(arguments.as);
     const std::filesystem::path& folder = arguments.run.folder;
     if (std::filesystem::exists(folder / "result.json") && !std::filesystem::exists(folder / "case.json"))
       throw BadInput(Reason::usage,
                      fmt::format("{}: holds a result; give the case of this result, which is measured again",
                                  folder.string()));
-    const Result result = value_or_throw(measure(arguments.run, console));
-    const auto written = value_or_throw(write_exports(result, arguments.run.out, kinds));
+    const pipeline::Result result = value_or_throw(measure(arguments.run, console));
+    const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds));
     if (console.json) {
       Json files = Json::array();
       for (const auto& path : written) files.push_back(path.string());

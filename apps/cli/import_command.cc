@@ -10,21 +10,21 @@
 namespace helicarm::cli {
 namespace {
 
-Json json_of(const ImportedMatrix& imported) {
-  const View& view = imported.view;
+Json json_of(const geometry::ImportedMatrix& imported) {
+  const geometry::View& view = imported.view;
   Json json;
-  json["K"] = json_rows(view.intrinsics.matrix());
-  json["R"] = json_rows(view.camera_from_world.rotation);
-  json["t"] = json_list(view.camera_from_world.translation);
-  json["projection"] = json_rows(view.projection());
+  json["K"] = geometry::json_rows(view.intrinsics.matrix());
+  json["R"] = geometry::json_rows(view.camera_from_world.rotation);
+  json["t"] = geometry::json_list(view.camera_from_world.translation);
+  json["projection"] = geometry::json_rows(view.projection());
   json["image_size"] = nullptr;
   if (const auto& size = imported.image_size) json["image_size"] = {size->x(), size->y()};
   return json;
 }
 
-void print_table(const ImportedMatrix& imported, std::ostream& out) {
+void print_table(const geometry::ImportedMatrix& imported, std::ostream& out) {
   const Eigen::IOFormat rows(8, 0, "  ", "\n", "  ");
-  const View& view = imported.view;
+  const geometry::View& view = imported.view;
   out << "K (px)\n"
       << view.intrinsics.matrix().format(rows) << "\nR\n"
       << view.camera_from_world.rotation.format(rows) << "\nt (mm)\n"
@@ -38,7 +38,7 @@ void print_table(const ImportedMatrix& imported, std::ostream& out) {
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
   if (arguments.unit != "mm" && arguments.unit != "cm")
     return fail(Reason::usage, fmt::format("--unit: \"{}\" is neither mm nor cm", arguments.unit));
-  const auto imported = import_matrix(arguments.file, arguments.unit == "cm" ? 10 : 1);
+  const auto imported = geometry::import_matrix(arguments.file, arguments.unit == "cm" ? 10 : 1);
   if (!imported) return tl::unexpected<Failure>(imported.error());
   if (console.json)
     console.out << to_text(json_of(*imported)) << '\n';

@@ -20,15 +20,17 @@ namespace {
 /// A point of the picks, in the order of first occurrence.
 struct PickedPoint {
   std::string name;
-  std::vector<PointObservation> images;
+  std::vector<localization::PointObservation> images;
   std::optional<Failure> unseen = {};  ///< the last failure of one of its picks
 };
 
 /// Converts picks as `run` does for its case; rectified ones are used unchanged.
-Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
-                                      const SavedCalibration& calibration, bool raw) {
+Expected<localization::PointObservation> image_from(const CsvTable& table, std::size_t row,
+                                                    const calibration::SavedCalibration& calibration,
+                                                    bool raw) {
   const std::string where = fmt::format("picks: row {}", row + 1);
-  const auto found = std::ranges::find(calibration.views, table.text(row, "view"), &CalibratedView::name);
+  const auto found =
+      std::ranges::find(calibration.views, table.text(row, "view"), &calibration::CalibratedView::name);
   if (found == calibration.views.end())
     throw BadInput(Reason::bad_value, fmt::format("{}: view: the calibration has no view \"{}\"", where,
                                                   table.text(row, "view")));
@@ -41,14 +43,16 @@ Expected<PointObservation> image_from(const CsvTable& table, std::size_t row,
   if (raw && map && !map->shows(uv))
     throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the image of {} x {} pixels",
                                                   where, uv.x(), uv.y(), map->width, map->height));
-  return (raw && map ? point_of_click(*map, uv, given_sigma)
-                     : ImagePoint{uv, uv, given_sigma.value_or(click_sigma_px)})
-      .map([&](const ImagePoint& seen) {
-        return PointObservation{view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
+  return (raw && map ? fiducials::point_of_click(*map, uv, given_sigma)
+                     : fiducials::ImagePoint{uv, uv, given_sigma.value_or(fiducials::click_sigma_px)})
+      .map([&](const fiducials::ImagePoint& seen) {
+        return localization::PointObservation{view, seen.uv,
+                                              seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
       });
 }
 
-std::vector<PickedPoint> picked_points(const CsvTable& table, const SavedCalibration& calibration, bool raw) {
+std::vector<PickedPoint> picked_points(const CsvTable& table,
+                                       const calibration::SavedCalibration& calibration, bool raw) {
   std::vector<PickedPoint> points;
   std::set<std::pair<std::string, std::string>> clicks;
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -70,29 +74,33 @@ std::vector<PickedPoint> picked_points(const CsvTable& table, const SavedCalibra
 /// {"points", "warnings", "notes"}.
 Json located(const LocateArguments& arguments, std::ostream& progress) {
   const Json result = value_or_throw(read_json(arguments.calibration));
-  const auto calibration =
-      value_or_throw(saved_calibration_from_json(result, arguments.calibration.filename().string()));
+  const auto calibration = value_or_throw(
+      calibration::saved_calibration_from_json(result, arguments.calibration.filename().string()));
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   Json points = Json::array();
   std::vector<Warning> warnings, notes;
   for (const auto& [name, images, unseen] : picked_points(table, calibration, arguments.raw)) {
     const double motion = arguments.motion_sigma_mm;
-    const auto point = locate(name, PointSource::pick, images, calibration, motion);
+    const auto point =
+        localization::locate(name, localization::PointSource::pick, images, calibration, motion);
     const auto why = point ? point->missing_rays : unseen ? unseen : std::optional(point.error());
-    points.push_back(point ? point_json(*point) : point_json(name, PointSource::pick, why->reason));
+    points.push_back(point ? localization::point_json(*point)
+                           : localization::point_json(name, localization::PointSource::pick, why->reason));
     if (why) progress << fmt::format("{}: {}\n", name, why->message);
     std::vector<Warning> own_warnings, own_notes;
     if (point && why) own_warnings.push_back(*why);
     if (point)
-      own_notes.push_back(
-          unobservable_motion(name, point->point_in_anchor, calibration.views[images.front().view], motion));
-    points.back()["warnings"] = json_list_of(own_warnings);
-    points.back()["notes"] = json_list_of(own_notes);
+      own_notes.push_back(localization::unobservable_motion(name, point->point_in_anchor,
+                                                            calibration.views[images.front().view], motion));
+    points.back()["warnings"] = pipeline::json_list_of(own_warnings);
+    points.back()["notes"] = pipeline::json_list_of(own_notes);
     warnings.insert(warnings.end(), own_warnings.begin(), own_warnings.end());
     notes.insert(notes.end(), own_notes.begin(), own_notes.end());
   }
-  return {{"points", points}, {"warnings", json_list_of(warnings)}, {"notes", json_list_of(notes)}};
+  return {{"points", points},
+          {"warnings", pipeline::json_list_of(warnings)},
+          {"notes", pipeline::json_list_of(notes)}};
 }
 
 void print_table(const Json& points, std::ostream& out) {

@@ -16,17 +16,18 @@ namespace helicarm::cli {
 namespace {
 namespace fs = std::filesystem;
 
-View view_at(double alpha) {
-  return {{6000, 6000, 512, 500, 0}, {rotation_from_euler(alpha, 0, 0), {0, 0, 800}}};
+geometry::View view_at(double alpha) {
+  return {{6000, 6000, 512, 500, 0}, {geometry::rotation_from_euler(alpha, 0, 0), {0, 0, 800}}};
 }
 
 Json result_json() {
   Json views = Json::array();
   for (const auto& [name, alpha] : {std::pair{"AP", 0.0}, {"LAT", 1.5}}) {
     Json view{{"name", name}};
-    view["rectification"] = {{"map", to_json(identity_map(1024, 1024, std::nullopt))}};
-    view["projection"] = json_rows(view_at(alpha).projection());
-    view["camera_from_calibrator"] = json_rows(view_at(alpha).camera_from_world.matrix());
+    view["rectification"] = {
+        {"map", rectification::to_json(rectification::identity_map(1024, 1024, std::nullopt))}};
+    view["projection"] = geometry::json_rows(view_at(alpha).projection());
+    view["camera_from_calibrator"] = geometry::json_rows(view_at(alpha).camera_from_world.matrix());
     views.push_back(view);
   }
   return {{"format", "helicarm-result/1"}, {"status", "ok"}, {"views", views}};
@@ -93,13 +94,14 @@ TEST(LocateCommand, EachPointHasTheNoteOfUnobservableMotion) {
 
 TEST(LocateCommand, CovarianceOfTheCalibrationAddsToThatOfThePoint) {
   Json calibrated = result_json();
-  calibrated["calibration"]["joint_covariance"] = json_rows(1e-4 * Eigen::MatrixXd::Identity(22, 22));
+  calibrated["calibration"]["joint_covariance"] =
+      geometry::json_rows(1e-4 * Eigen::MatrixXd::Identity(22, 22));
   const double with =
       locate_in(calibrated, picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
   const double without =
       locate_in(result_json(), picks_of({10, 20, 30})).json["points"][0]["predicted_mm"].get<double>();
   EXPECT_GT(with, 2 * without);
-  calibrated["calibration"]["joint_covariance"] = json_rows(Eigen::MatrixXd::Identity(11, 11));
+  calibrated["calibration"]["joint_covariance"] = geometry::json_rows(Eigen::MatrixXd::Identity(11, 11));
   EXPECT_EQ(locate_in(calibrated, picks_of({10, 20, 30})).result.error().reason, Reason::bad_value);
 }
 

@@ -23,7 +23,8 @@ int report(const Failure& failure, const Console& console) {
   console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
                                   without_control_characters(failure.message));
   if (console.json)
-    console.out << to_text({{"status", exit == 3 ? "refused" : "failed"}, {"failure", to_json(failure)}})
+    console.out << to_text({{"status", exit == 3 ? "refused" : "failed"},
+                            {"failure", pipeline::to_json(failure)}})
                 << '\n';
   return exit;
 }

@@ -15,7 +15,8 @@ namespace helicarm::cli {
 namespace {
 
 void add_motion(CLI::App* command, double& motion_sigma_mm) {
-  constexpr Field<RunOptions> field = field_named<RunOptions>(run_fields, "motion_sigma_mm");
+  constexpr Field<pipeline::RunOptions> field =
+      field_named<pipeline::RunOptions>(pipeline::run_fields, "motion_sigma_mm");
   command->add_option(std::string(field.flag), motion_sigma_mm, std::string(field.help))
       ->check(within(field.range.low, field.range.high))
       ->capture_default_str();
@@ -29,7 +30,7 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
       ->capture_default_str();
-  add_fields(command, a.options, run_fields);
+  add_fields(command, a.options, pipeline::run_fields);
   command->add_option("--machine", a.history,
                       "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
@@ -43,11 +44,11 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("CASE", a.run.folder, "Folder that holds case.json")->required();
   command->add_option("--out", a.run.out, "Folder for the files")->capture_default_str();
   command
-      ->add_option(
-          "--as", a.as,
-          fmt::format("One or more of {}, separated by commas (default: all)", fmt::join(export_words, ", ")))
+      ->add_option("--as", a.as,
+                   fmt::format("One or more of {}, separated by commas (default: all)",
+                               fmt::join(report::export_words, ", ")))
       ->delimiter(',');
-  add_fields(command, a.run.options, run_fields);
+  add_fields(command, a.run.options, pipeline::run_fields);
   command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
 }
 

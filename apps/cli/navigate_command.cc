@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 constexpr std::chrono::seconds robot_patience{10};
 
 /// Checks for errors that can be detected before the first X-ray image.
-void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
+void check_plan(const operation::OperationPlan& plan, const NavigateArguments& arguments) {
   const auto refuse = [&](Reason reason, const std::string& problem) {
     throw BadInput(reason, fmt::format("{}: {}", arguments.plan.string(), problem));
   };
@@ -34,12 +34,12 @@ void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
     throw BadInput(Reason::order_not_confirmed,
                    "no terminal to confirm orders; --yes confirms all, only where no person can be injured");
   if (plan.tunnels.empty()) refuse(Reason::bad_value, "\"tunnels\" is empty");
-  if (plan.calibrator != udcsc().name && !fs::exists(plan.calibrator))
+  if (plan.calibrator != phantom::udcsc().name && !fs::exists(plan.calibrator))
     refuse(Reason::missing_file, fmt::format("\"calibrator\": {}: no such file", plan.calibrator));
-  if (plan.plate && *plan.plate != plate48().name && !fs::exists(*plan.plate))
+  if (plan.plate && *plan.plate != phantom::plate48().name && !fs::exists(*plan.plate))
     refuse(Reason::missing_file, fmt::format("\"plate\": {}: no such file", *plan.plate));
   if (!arguments.picks.empty()) return;
-  for (const PlannedTunnel& tunnel : plan.tunnels)
+  for (const operation::PlannedTunnel& tunnel : plan.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end})
       if (std::ranges::none_of(plan.picks, [&](const Json& pick) {
             return pick.is_object() && pick.value("name", Json()) == Json(end);
@@ -48,21 +48,22 @@ void check_plan(const OperationPlan& plan, const NavigateArguments& arguments) {
 }
 
 /// Markers of the plan that the tracker does not report now; one facet suffices.
-std::string not_seen(const OperationPlan& plan, const PoseBoard& board) {
+std::string not_seen(const operation::OperationPlan& plan, const tracker::PoseBoard& board) {
   const auto seen = [&](const std::string& tool) {
-    return board.latest(tool, monotonic_seconds()).has_value();
+    return board.latest(tool, tracker::monotonic_seconds()).has_value();
   };
   std::string missing;
   for (const std::string& tool : {plan.tracker.femur, plan.tracker.tibia, plan.tracker.tool})
     if (!seen(tool)) missing += " " + tool;
-  if (std::ranges::none_of(plan.tracker.facets, [&](const Facet& facet) { return seen(facet.name); }))
+  if (std::ranges::none_of(plan.tracker.facets,
+                           [&](const tracker::Facet& facet) { return seen(facet.name); }))
     missing += " calibrator";
   return missing;
 }
 
 /// Waits for tracker and robot, and prints what is missing.
-void wait_for_devices(const OperationPlan& plan, Connections& devices, const Ending& ending,
-                      Console& console) {
+void wait_for_devices(const operation::OperationPlan& plan, operation::Connections& devices,
+                      const Ending& ending, Console& console) {
   std::string last_printed;
   ending.wait_until([&] {
     std::string wants;
@@ -71,7 +72,7 @@ void wait_for_devices(const OperationPlan& plan, Connections& devices, const End
           fmt::format("tracker {} port {}: not visible:{}", plan.tracker.address, plan.tracker.port, missing);
     else if (const auto state = devices.robot().wait_connected({}); !state)
       wants = fmt::format("robot {}: {}", plan.robot.address, state.error().message);
-    else if (const auto why = why_stopped(*state))
+    else if (const auto why = robot::why_stopped(*state))
       wants = fmt::format("robot {}: {}", plan.robot.address, why->message);
     if (!wants.empty() && wants != last_printed && !console.quiet)
       console.progress << "waiting: " << without_control_characters(wants) << std::endl;
@@ -89,8 +90,8 @@ Json picks_of(const fs::path& file) {
   return reader.has("picks") ? reader.raw("picks") : Json::array();
 }
 
-void print_points(const Result& result, Console& console) {
-  for (const PointResult& point : result.points)
+void print_points(const pipeline::Result& result, Console& console) {
+  for (const pipeline::PointResult& point : result.points)
     if (point.place) {
       const Eigen::Vector3d& at = point.place->in_calibrator;
       console.out << fmt::format("  {:<8} {:9.3f} {:9.3f} {:9.3f}  +- {:.3f} mm\n", point.name, at.x(),
@@ -99,14 +100,14 @@ void print_points(const Result& result, Console& console) {
 }
 
 /// Prints the robot's moves for hand-eye calibration, relative to its present pose.
-void print_tour(const std::vector<RobotOrder>& orders, Console& console) {
+void print_tour(const std::vector<robot::RobotOrder>& orders, Console& console) {
   if (console.quiet || orders.empty()) return;
-  const RigidTransform home = orders.back().waypoints.back().base_from_tcp;  // where it stands now
+  const geometry::RigidTransform home = orders.back().waypoints.back().base_from_tcp;  // where it stands now
   console.progress << fmt::format(
       "hand-eye calibration: {} moves at {:g} mm/s about the tool's present pose\n", orders.size(),
       orders.front().waypoints.back().speed_mm_s);
   for (std::size_t i = 0; i < orders.size(); ++i) {
-    const RigidTransform there = orders[i].waypoints.back().base_from_tcp;
+    const geometry::RigidTransform there = orders[i].waypoints.back().base_from_tcp;
     const Eigen::Vector3d shift = there.translation - home.translation;
     const double turn_rad = Eigen::AngleAxisd(home.rotation.transpose() * there.rotation).angle();
     console.progress << fmt::format(
@@ -124,7 +125,7 @@ bool is_of_poses(const Failure& failure) {
 }
 
 /// Waits until the pointer is held still in view of the tracker.
-void touch(Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
+void touch(operation::Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
            Console& console) {
   console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
                                   without_control_characters(name))
@@ -145,7 +146,7 @@ void touch(Operation& operation, const std::string& name, LineInput& input, cons
   }
 }
 
-void print_outcome(const TunnelOutcome& outcome, Console& console) {
+void print_outcome(const operation::TunnelOutcome& outcome, Console& console) {
   console.out << fmt::format(
       "{}: distance from the tool's axis: start {:.2f} mm (predicted {:.2f}), end {:.2f} mm (predicted "
       "{:.2f}), after {} corrections\n",
@@ -153,7 +154,7 @@ void print_outcome(const TunnelOutcome& outcome, Console& console) {
       outcome.end.predicted_mm(), outcome.loop.empty() ? 0 : outcome.loop.size() - 1);
 }
 
-bool is_near(const RobotLink& robot, const RobotState& rest) {
+bool is_near(const robot::RobotLink& robot, const robot::RobotState& rest) {
   constexpr double near_mm = 1;
   const auto state = robot.status().state;
   return state && (state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() <= near_mm;
@@ -161,19 +162,20 @@ bool is_near(const RobotLink& robot, const RobotState& rest) {
 
 /// To a tunnel and back to where the tool was. Once the plan is stale or poses are missing, the person at the
 /// terminal may unlock the robot, bring the tool back and have the tunnel planned again.
-void go_to(const PlannedTunnel& tunnel, Operation& operation, RobotLink& robot, const fs::path& out,
-           Consent& consent, LineInput& input, const Ending& ending, Console& console) {
-  const RobotState rest = value_or_throw(robot.wait_connected(std::chrono::seconds(5)));
-  std::optional<RobotOrder> begun;  // the tool is on its way by this order, or there
+void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operation, robot::RobotLink& robot,
+           const fs::path& out, Consent& consent, LineInput& input, const Ending& ending, Console& console) {
+  const robot::RobotState rest = value_or_throw(robot.wait_connected(std::chrono::seconds(5)));
+  std::optional<robot::RobotOrder> begun;  // the tool is on its way by this order, or there
   bool reached = false;
   const auto withdraw = [&] {
-    value_or_throw(operation.withdraw(*begun, rest, [&](const RobotOrder& order) { return consent(order); }));
+    value_or_throw(
+        operation.withdraw(*begun, rest, [&](const robot::RobotOrder& order) { return consent(order); }));
     begun.reset();
   };
   const auto approach = [&] {
     for (const std::string& name : operation.checks_to_come(tunnel.bone))
       touch(operation, name, input, ending, console);
-    const RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+    const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
     console.progress << fmt::format("preview: {}\n", (out / ("preview-" + tunnel.name + "-*.png")).string())
                      << std::flush;
     const std::string token = value_or_throw(consent(order, [&] { return operation.check_plan(order); }));
@@ -196,30 +198,33 @@ void go_to(const PlannedTunnel& tunnel, Operation& operation, RobotLink& robot, 
 
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console) {
   return guarded([&] {
-    OperationPlan plan =
-        value_or_throw(plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
+    operation::OperationPlan plan = value_or_throw(
+        operation::plan_from(value_or_throw(read_json(arguments.plan)), arguments.plan.string()));
     if (arguments.plan_age_s) plan.limits.age_s = *arguments.plan_age_s;
     check_plan(plan, arguments);
     StopSignal stop;
-    Connections devices(plan, value_or_throw(Inbox::open(arguments.out / "inbox")));
+    operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(arguments.out / "inbox")));
     value_or_throw(devices.listen(arguments.receiver));
-    const auto operation = value_or_throw(Operation::begin(
-        plan, arguments.out, devices.board(), devices.robot(), [&](Step step, const std::string& what) {
-          if (!console.quiet)
-            console.progress << fmt::format("{}: {}\n", name_of(step), without_control_characters(what))
-                             << std::flush;
-        }));
+    const auto operation = value_or_throw(
+        operation::Operation::begin(plan, arguments.out, devices.board(), devices.robot(),
+                                    [&](operation::Step step, const std::string& what) {
+                                      if (!console.quiet)
+                                        console.progress << fmt::format("{}: {}\n", operation::name_of(step),
+                                                                        without_control_characters(what))
+                                                         << std::flush;
+                                    }));
     const Ending ending(stop, devices.robot(), *operation);
     operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
     wait_for_devices(plan, devices, ending, console);
     LineInput input(STDIN_FILENO);
-    for (const PlannedCheck& each : plan.check_points) touch(*operation, each.name, input, ending, console);
+    for (const operation::PlannedCheck& each : plan.check_points)
+      touch(*operation, each.name, input, ending, console);
     while (!operation->views_to_come().empty()) {
       const std::string view = operation->views_to_come().front();
       if (!console.quiet)
         console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
                          << std::flush;
-      std::optional<DatedArrival> image;
+      std::optional<operation::DatedArrival> image;
       ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
       const auto taken = operation->take(view, image->arrival, image->time_s);
       if (!taken)
@@ -240,8 +245,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
         [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
     value_or_throw(devices.robot().unlock("the operator at the terminal"));
     print_tour(value_or_throw(operation->preview_tour()), console);
-    value_or_throw(operation->register_robot([&](const RobotOrder& order) { return consent(order); }));
-    for (const PlannedTunnel& tunnel : plan.tunnels)
+    value_or_throw(operation->register_robot([&](const robot::RobotOrder& order) { return consent(order); }));
+    for (const operation::PlannedTunnel& tunnel : plan.tunnels)
       go_to(tunnel, *operation, devices.robot(), arguments.out, consent, input, ending, console);
     value_or_throw(operation->finish());
   });

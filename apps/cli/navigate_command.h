@@ -14,7 +14,7 @@ struct NavigateArguments {
   std::filesystem::path out = "session";
   std::filesystem::path picks;       ///< awaited after the images; empty: those of the plan
   std::optional<double> plan_age_s;  ///< overrides the plan's plan_stale_s
-  ReceiverOptions receiver;
+  receiver::ReceiverOptions receiver;
   bool yes = false;  ///< confirm every order automatically: for rehearsals
 };
 

@@ -49,11 +49,11 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
             fmt::format("stopped by signal; the sessions in {} are incomplete", arguments.out.string()));
     };
     std::mutex telling;
-    std::vector<Expected<Rehearsal>> done(static_cast<std::size_t>(arguments.cases),
-                                          fail(Reason::not_connected, "not started"));
+    std::vector<Expected<rehearsal::Rehearsal>> done(static_cast<std::size_t>(arguments.cases),
+                                                     fail(Reason::not_connected, "not started"));
     const unsigned crew = console.threads == 0 ? most_at_once : console.threads;
     parallel_for(done.size(), crew, [&](std::size_t i) {
-      RehearsalOptions options;
+      rehearsal::RehearsalOptions options;
       options.image_size = arguments.size;
       options.tracker_rate_hz = arguments.rate_hz;
       const auto say = [&](const std::string& what) {
@@ -68,22 +68,23 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
       for (int attempt = 1; attempt <= most_attempts; ++attempt) {
         const std::string folder =
             attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
-        done[i] = guarded(
-            [&] { return value_or_throw(rehearse(console.seed + i, arguments.out / folder, options)); });
+        done[i] = guarded([&] {
+          return value_or_throw(rehearsal::rehearse(console.seed + i, arguments.out / folder, options));
+        });
         if (done[i] || told || !is_timing_failure(done[i].error())) break;
         say(fmt::format("aborted ({}: {})", code(done[i].error().reason), done[i].error().message));
       }
     });
     check();
-    std::vector<Rehearsal> rehearsals;
-    for (Expected<Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));
-    const Json json = to_json(rehearsals);
+    std::vector<rehearsal::Rehearsal> rehearsals;
+    for (Expected<rehearsal::Rehearsal>& each : done) rehearsals.push_back(value_or_throw(std::move(each)));
+    const Json json = rehearsal::to_json(rehearsals);
     value_or_throw(write_file(arguments.out / "operate.json", to_text(json)));
-    value_or_throw(write_file(arguments.out / "operate.csv", to_csv(rehearsals)));
+    value_or_throw(write_file(arguments.out / "operate.csv", rehearsal::to_csv(rehearsals)));
     if (console.json)
       console.out << to_text(json) << '\n';
     else
-      console.out << table_of(rehearsals);
+      console.out << rehearsal::table_of(rehearsals);
   });
 }
 

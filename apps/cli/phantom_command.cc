@@ -24,19 +24,21 @@ namespace {
 
 using Files = std::vector<std::pair<std::filesystem::path, std::string>>;
 
-Calibrator calibrator_of(const PhantomArguments& arguments) {
-  if (arguments.name_or_file.empty() || arguments.name_or_file == udcsc().name) return udcsc();
-  return value_or_throw(read_calibrator(arguments.name_or_file));
+phantom::Calibrator calibrator_of(const PhantomArguments& arguments) {
+  if (arguments.name_or_file.empty() || arguments.name_or_file == phantom::udcsc().name)
+    return phantom::udcsc();
+  return value_or_throw(phantom::read_calibrator(arguments.name_or_file));
 }
 
-Plate plate_of(const PhantomArguments& arguments) {
-  if (arguments.name_or_file.empty() || arguments.name_or_file == plate48().name) return plate48();
-  return value_or_throw(read_plate(arguments.name_or_file));
+phantom::Plate plate_of(const PhantomArguments& arguments) {
+  if (arguments.name_or_file.empty() || arguments.name_or_file == phantom::plate48().name)
+    return phantom::plate48();
+  return value_or_throw(phantom::read_plate(arguments.name_or_file));
 }
 
-void show(const Calibrator& calibrator, Console& console) {
+void show(const phantom::Calibrator& calibrator, Console& console) {
   if (console.json) {
-    console.out << to_text(to_json(calibrator)) << "\n";
+    console.out << to_text(phantom::to_json(calibrator)) << "\n";
     return;
   }
   console.out << fmt::format("{}: {} balls, {} targets\n\n{:<12}{:>10}{:>10}{:>10}{:>12}\n", calibrator.name,
@@ -51,9 +53,9 @@ void show(const Calibrator& calibrator, Console& console) {
     row(target.name, target.point_in_calibrator, target.diameter_mm);
 }
 
-void show(const Plate& plate, Console& console) {
+void show(const phantom::Plate& plate, Console& console) {
   if (console.json) {
-    console.out << to_text(to_json(plate)) << "\n";
+    console.out << to_text(phantom::to_json(plate)) << "\n";
     return;
   }
   const auto number = [](const std::optional<double>& value) {
@@ -62,18 +64,18 @@ void show(const Plate& plate, Console& console) {
   console.out << fmt::format("{}: {} {} of {} mm, {} lattice, pitch {}, height above the receiver {}\n",
                              plate.name,
                              plate.dots_mm.empty() ? "unbounded," : fmt::to_string(plate.dots_mm.size()),
-                             plate.kind == DotKind::balls ? "balls" : "holes", plate.diameter_mm,
-                             plate.lattice == Lattice::square ? "square" : "hexagonal",
+                             plate.kind == phantom::DotKind::balls ? "balls" : "holes", plate.diameter_mm,
+                             plate.lattice == phantom::Lattice::square ? "square" : "hexagonal",
                              number(plate.pitch_mm), number(plate.height_above_receiver_mm));
   for (const auto& dot : plate.dots_mm) console.out << fmt::format("{:>10.3f}{:>10.3f}\n", dot.x(), dot.y());
 }
 
-void check(const Calibrator& calibrator, Console& console) {
-  const auto findings = check_rules(calibrator);
+void check(const phantom::Calibrator& calibrator, Console& console) {
+  const auto findings = phantom::check_rules(calibrator);
   const bool passed = std::all_of(findings.begin(), findings.end(), [](const auto& f) { return f.passed(); });
   std::vector<Eigen::Vector3d> centres;
   for (const auto& ball : calibrator.balls) centres.push_back(ball.centre_in_calibrator);
-  const double spread = uniformity(centres);
+  const double spread = phantom::uniformity(centres);
   if (console.json) {
     Json json{
         {"name", calibrator.name}, {"passed", passed}, {"uniformity", spread}, {"rules", Json::array()}};
@@ -81,7 +83,7 @@ void check(const Calibrator& calibrator, Console& console) {
       json["rules"].push_back({{"rule", f.rule},
                                {"sentence", f.sentence},
                                {"figure", f.figure},
-                               {"bound", f.bound == Bound::at_most ? "at_most" : "at_least"},
+                               {"bound", f.bound == phantom::Bound::at_most ? "at_most" : "at_least"},
                                {"limit", f.limit},
                                {"unit", f.unit},
                                {"passed", f.passed()}});
@@ -89,7 +91,7 @@ void check(const Calibrator& calibrator, Console& console) {
   } else {
     for (const auto& f : findings)
       console.out << fmt::format("{:<7}{:>9.3f} {} {:>6.2f} {:<6} {}\n", f.passed() ? "kept" : "BROKEN",
-                                 f.figure, f.bound == Bound::at_most ? "<=" : ">=", f.limit, f.unit,
+                                 f.figure, f.bound == phantom::Bound::at_most ? "<=" : ">=", f.limit, f.unit,
                                  f.sentence);
     console.out << fmt::format("\n{}: {}; uniformity (Eq. 13) {:.3f}\n", calibrator.name,
                                passed ? "keeps all rules" : "breaks a rule", spread);
@@ -97,19 +99,20 @@ void check(const Calibrator& calibrator, Console& console) {
   if (!passed) throw BadInput(Reason::rules_broken, fmt::format("{} breaks a design rule", calibrator.name));
 }
 
-Files exported(const Calibrator& calibrator, const PhantomArguments& arguments) {
+Files exported(const phantom::Calibrator& calibrator, const PhantomArguments& arguments) {
   Files files;
-  if (arguments.stl) files.emplace_back(*arguments.stl, to_stl(value_or_throw(printable_body(calibrator))));
-  if (arguments.svg) files.emplace_back(*arguments.svg, drawing_of(calibrator));
-  if (arguments.file) files.emplace_back(*arguments.file, to_text(to_json(calibrator)) + "\n");
+  if (arguments.stl)
+    files.emplace_back(*arguments.stl, phantom::to_stl(value_or_throw(phantom::printable_body(calibrator))));
+  if (arguments.svg) files.emplace_back(*arguments.svg, phantom::drawing_of(calibrator));
+  if (arguments.file) files.emplace_back(*arguments.file, to_text(phantom::to_json(calibrator)) + "\n");
   return files;
 }
 
-Files exported(const Plate& plate, const PhantomArguments& arguments) {
+Files exported(const phantom::Plate& plate, const PhantomArguments& arguments) {
   if (arguments.stl) throw BadInput(Reason::usage, "--stl: only the calibrator has a printable body");
   Files files;
-  if (arguments.svg) files.emplace_back(*arguments.svg, value_or_throw(drawing_of(plate)));
-  if (arguments.file) files.emplace_back(*arguments.file, to_text(to_json(plate)) + "\n");
+  if (arguments.svg) files.emplace_back(*arguments.svg, value_or_throw(phantom::drawing_of(plate)));
+  if (arguments.file) files.emplace_back(*arguments.file, to_text(phantom::to_json(plate)) + "\n");
   return files;
 }
 
@@ -134,8 +137,8 @@ void notify(const std::vector<Warning>& warnings, Console& console) {
                                     warning.view.empty() ? "" : ": ", warning.message);
 }
 
-PhantomOptions options_of(const PhantomArguments& arguments, const Console& console) {
-  PhantomOptions options;
+phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments, const Console& console) {
+  phantom_calibration::PhantomOptions options;
   options.from_scratch = arguments.from_scratch;
   if (arguments.distance_sigma_mm) options.distance_sigma_mm = *arguments.distance_sigma_mm;
   if (arguments.distance_is != "centres" && arguments.distance_is != "outer")
@@ -143,32 +146,34 @@ PhantomOptions options_of(const PhantomArguments& arguments, const Console& cons
                    fmt::format("--distance-is: \"{}\" is none of: centres, outer", arguments.distance_is));
   options.outer = arguments.distance_is == "outer";
   for (const std::string& distance : arguments.distances)
-    options.distances.push_back(value_or_throw(hand_distance_from(distance, arguments.from_scratch)));
+    options.distances.push_back(
+        value_or_throw(phantom_calibration::hand_distance_from(distance, arguments.from_scratch)));
   options.threads = console.threads;
   options.date = today();
   return options;
 }
 
 /// A case whose calibrator allows no answer is refused like any other.
-PhantomResult measured(const PhantomArguments& arguments, const Console& console) {
-  const PhantomOptions options = options_of(arguments, console);
-  const auto given = read_phantom_case(arguments.name_or_file);
+phantom_calibration::PhantomResult measured(const PhantomArguments& arguments, const Console& console) {
+  const phantom_calibration::PhantomOptions options = options_of(arguments, console);
+  const auto given = pipeline::read_phantom_case(arguments.name_or_file);
   if (!given && exit_code(given.error().reason) == 3) {
-    PhantomResult refused;
+    phantom_calibration::PhantomResult refused;
     refused.failure = given.error();
     return refused;
   }
   if (!given) throw BadInput(given.error());
-  return value_or_throw(measure_phantom(*given, options));
+  return value_or_throw(phantom_calibration::measure_phantom(*given, options));
 }
 
-void print(const PhantomResult& result, const std::filesystem::path& out, Console& console) {
+void print(const phantom_calibration::PhantomResult& result, const std::filesystem::path& out,
+           Console& console) {
   console.out << fmt::format("  {} balls, {} views, {:.3f} px rms per axis, scale by {} to {:.2g} %\n\n",
                              result.balls.size(), result.views.size(), result.rms_px, result.scale.source,
                              100 * result.scale.relative_sigma);
   console.out << fmt::format("  {:<10}{:>10}{:>10}{:>10}{:>14}{:>16}\n", "ball", "x mm", "y mm", "z mm",
                              "sigma mm", "from nominal mm");
-  for (const MeasuredBall& ball : result.balls)
+  for (const phantom_calibration::MeasuredBall& ball : result.balls)
     console.out << fmt::format("  {:<10}{:>10.3f}{:>10.3f}{:>10.3f}{:>14.4f}{:>16}\n", ball.label,
                                ball.centre.x(), ball.centre.y(), ball.centre.z(),
                                std::sqrt(ball.covariance_mm2.trace() / 3),
@@ -184,32 +189,36 @@ void measure(const PhantomArguments& arguments, Console& console) {
   std::error_code ignored;
   for (const char* file : {"calibrator.json", "result.json", "report.html"})
     std::filesystem::remove(out / file, ignored);
-  const PhantomResult result = measured(arguments, console);
+  const phantom_calibration::PhantomResult result = measured(arguments, console);
   notify(result.warnings, console);
   if (!result.failure)
-    value_or_throw(write_file(out / "calibrator.json", to_text(to_json(result.calibrator)) + "\n"));
-  value_or_throw(write_file(out / "report.html", phantom_report_html(result)));
-  value_or_throw(write_file(out / "result.json", to_text(to_json(result)) + "\n"));
+    value_or_throw(write_file(out / "calibrator.json", to_text(phantom::to_json(result.calibrator)) + "\n"));
+  value_or_throw(write_file(out / "report.html", phantom_calibration::phantom_report_html(result)));
+  value_or_throw(write_file(out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   if (result.failure) throw BadInput(*result.failure);
   if (console.json)
-    console.out << to_text(to_json(result)) << "\n";
+    console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   else if (!console.quiet)
     print(result, out, console);
 }
 
 void verify(const PhantomArguments& arguments, Console& console) {
-  const Case given = value_or_throw(read_case(arguments.name_or_file));
-  PhantomVerification result = value_or_throw(verify_phantom(given, console.threads));
+  const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.name_or_file));
+  phantom_calibration::PhantomVerification result =
+      value_or_throw(phantom_calibration::verify_phantom(given, console.threads));
   result.date = today();
-  if (arguments.history && !result.balls.empty()) value_or_throw(add_to_history(*arguments.history, result));
+  if (arguments.history && !result.balls.empty())
+    value_or_throw(phantom_calibration::add_to_history(*arguments.history, result));
   if (arguments.out)
-    value_or_throw(write_file(*arguments.out / "result.json", to_text(to_json(result)) + "\n"));
+    value_or_throw(
+        write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   notify(result.warnings, console);
-  if (console.json) console.out << to_text(to_json(result)) << "\n";
+  if (console.json) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) {
-    for (const VerifiedBall& ball : result.balls)
+    for (const phantom_calibration::VerifiedBall& ball : result.balls)
       console.out << fmt::format("  {:<10}{:>9.3f} mm from the file, {:.3f} mm possible (95 %)   {}\n",
-                                 ball.label, ball.distance_mm.value_or(0), ball.bound_mm, word(ball.state));
+                                 ball.label, ball.distance_mm.value_or(0), ball.bound_mm,
+                                 phantom_calibration::word(ball.state));
     if (!result.failure && !result.balls.empty())
       console.out << fmt::format("\n  still as in the file, to within {:.3f} mm\n", result.within_mm);
   }

@@ -36,29 +36,29 @@ Eigen::Vector3d place_from(const std::string& word) {
   return place;
 }
 
-Json prediction(const Eigen::Vector3d& place, const Calibration& calibration,
+Json prediction(const Eigen::Vector3d& place, const calibration::Calibration& calibration,
                 const PredictArguments& arguments) {
   Json json{{"xyz_mm", {place.x(), place.y(), place.z()}}};
   const auto covariance =
-      predict_covariance(place, arguments.sigma_px, calibration, arguments.motion_sigma_mm);
+      localization::predict_covariance(place, arguments.sigma_px, calibration, arguments.motion_sigma_mm);
   if (!covariance) {
     json["decision"] = "refuse";
     json["reason"] = code(covariance.error().reason);
     return json;
   }
-  const double within = length_at_95(*covariance);
+  const double within = localization::length_at_95(*covariance);
   json["tre_mm"] = std::sqrt(covariance->trace());
   json["error_95_mm"] = within;
-  json["covariance_mm2"] = json_rows(*covariance);
+  json["covariance_mm2"] = geometry::json_rows(*covariance);
   json["decision"] = within <= arguments.max_error_mm ? "accept" : "refuse";
   json["reason"] = within <= arguments.max_error_mm ? Json(nullptr) : Json(code(Reason::uncertain));
   return json;
 }
 
-void write_map(const TreVolume& volume, const std::filesystem::path& folder) {
-  value_or_throw(write_file(folder / "tre.csv", to_csv(volume)));
-  value_or_throw(write_file(folder / "tre.vtk", to_vtk(volume)));
-  value_or_throw(write_file(folder / "tre.svg", tre_figure(volume)));
+void write_map(const localization::TreVolume& volume, const std::filesystem::path& folder) {
+  value_or_throw(write_file(folder / "tre.csv", localization::to_csv(volume)));
+  value_or_throw(write_file(folder / "tre.vtk", localization::to_vtk(volume)));
+  value_or_throw(write_file(folder / "tre.svg", report::tre_figure(volume)));
 }
 
 }  // namespace
@@ -71,36 +71,37 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
                                  arguments.step_mm, arguments.half_mm, most_points_per_edge));
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));
-    const Case given = value_or_throw(read_case(arguments.folder));
-    const Eigen::Vector3d middle = middle_of(given.calibrator);
+    const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.folder));
+    const Eigen::Vector3d middle = phantom::middle_of(given.calibrator);
     if (places.empty()) places.push_back(middle);
-    RunOptions options;
+    pipeline::RunOptions options;
     options.threads = console.threads;
-    if (arguments.history) options.history = value_or_throw(read_history(*arguments.history));
-    const auto calibrated = calibrate_case(given, options);
+    if (arguments.history) options.history = value_or_throw(calibration::read_history(*arguments.history));
+    const auto calibrated = pipeline::calibrate_case(given, options);
     if (!calibrated) throw BadInput(calibrated.error().failure);
-    const Calibration& calibration = *calibrated;
+    const calibration::Calibration& calibration = *calibrated;
 
     Json points = Json::array();
     std::vector<Warning> notes;
     for (const Eigen::Vector3d& place : places) {
       points.push_back(prediction(place, calibration, arguments));
-      notes.push_back(unobservable_motion(fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()),
-                                          place, calibration.views.front(), arguments.motion_sigma_mm));
+      notes.push_back(
+          localization::unobservable_motion(fmt::format("{:g},{:g},{:g}", place.x(), place.y(), place.z()),
+                                            place, calibration.views.front(), arguments.motion_sigma_mm));
     }
     if (!console.quiet)
       for (const Warning& warning : calibrated->warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason), warning.message);
     if (arguments.map)
-      write_map(predict_tre(calibration, middle, arguments.half_mm, arguments.step_mm, arguments.sigma_px,
-                            console.threads, arguments.motion_sigma_mm),
+      write_map(localization::predict_tre(calibration, middle, arguments.half_mm, arguments.step_mm,
+                                          arguments.sigma_px, console.threads, arguments.motion_sigma_mm),
                 *arguments.map);
     if (console.json) {
       console.out << to_text(Json{{"sigma_px", arguments.sigma_px},
                                   {"motion_sigma_mm", arguments.motion_sigma_mm},
                                   {"max_error_mm", arguments.max_error_mm},
-                                  {"warnings", json_list_of(calibrated->warnings)},
-                                  {"notes", json_list_of(notes)},
+                                  {"warnings", pipeline::json_list_of(calibrated->warnings)},
+                                  {"notes", pipeline::json_list_of(notes)},
                                   {"points", points}})
                   << '\n';
       return;

@@ -18,18 +18,18 @@ class ReceptionLog {
   ReceptionLog(Console& console, std::optional<std::uint64_t> count, StopSignal& stop)
       : console_(console), left_(count), stop_(stop) {}
 
-  ReceiverHooks hooks() {
-    return {[this](const Arrival& arrival) { notify(arrival); },
+  receiver::ReceiverHooks hooks() {
+    return {[this](const receiver::Arrival& arrival) { notify(arrival); },
             [this](const Failure& why) { notify("refused", why); },
             [this](const Failure& why) { notify("cut", why); }};
   }
 
  private:
-  void notify(const Arrival& arrival) {
+  void notify(const receiver::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
     if (console_.json) {
       Json warnings = Json::array();
-      for (const Warning& warning : arrival.warnings) warnings.push_back(to_json(warning));
+      for (const Warning& warning : arrival.warnings) warnings.push_back(pipeline::to_json(warning));
       console_.out << Json{{"file", arrival.path.string()},
                            {"digest", arrival.digest},
                            {"repeated", arrival.repeated},
@@ -56,9 +56,9 @@ class ReceptionLog {
   std::mutex mutex_;
 };
 
-void check_titles(const dicom::NegotiationOptions& options) {
+void check_titles(const receiver::dicom::NegotiationOptions& options) {
   const auto check = [](const char* option, const std::string& title) {
-    if (!dicom::is_title(title))
+    if (!receiver::dicom::is_title(title))
       throw BadInput(Reason::usage,
                      fmt::format("{}: \"{}\" is not a title: 1 to 16 printable characters, no backslash",
                                  option, without_control_characters(title)));
@@ -71,17 +71,17 @@ void check_titles(const dicom::NegotiationOptions& options) {
 
 CommandResult receive_command(const ReceiveArguments& arguments, Console& console) {
   return guarded([&] {
-    ReceiverOptions options = arguments.receiver;
+    receiver::ReceiverOptions options = arguments.receiver;
     check_titles(options.negotiation);
     if (!arguments.certificate.empty())
-      options.tls = TlsFiles{arguments.certificate, arguments.key, arguments.authorities};
+      options.tls = receiver::TlsFiles{arguments.certificate, arguments.key, arguments.authorities};
     StopSignal stop;
     ReceptionLog tale(console, arguments.count, stop);
-    const auto inbox = value_or_throw(Inbox::open(arguments.out));
-    std::unique_ptr<DicomReceiver> receiver;
-    std::optional<WatchedFolder> watched;
+    const auto inbox = value_or_throw(receiver::Inbox::open(arguments.out));
+    std::unique_ptr<receiver::DicomReceiver> receiver;
+    std::optional<receiver::WatchedFolder> watched;
     if (arguments.watch.empty()) {
-      receiver = value_or_throw(DicomReceiver::open(options, *inbox, tale.hooks()));
+      receiver = value_or_throw(receiver::DicomReceiver::open(options, *inbox, tale.hooks()));
       if (!console.quiet)
         console.progress << fmt::format("{} listens on {} port {}{}; Ctrl-C ends\n",
                                         options.negotiation.title, options.address, receiver->port(),
@@ -93,7 +93,8 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
       if (std::filesystem::equivalent(arguments.watch, arguments.out))
         throw BadInput(Reason::usage, "--watch: is the folder of --out; give another folder");
-      watched.emplace(arguments.watch, *inbox, tale.hooks(), WatchedFolder::usual_pause, arguments.count);
+      watched.emplace(arguments.watch, *inbox, tale.hooks(), receiver::WatchedFolder::usual_pause,
+                      arguments.count);
     }
     stop.wait(arguments.seconds);
   });

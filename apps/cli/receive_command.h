@@ -11,7 +11,7 @@ namespace helicarm::cli {
 
 struct ReceiveArguments {
   std::filesystem::path out = "inbox";
-  ReceiverOptions receiver;
+  receiver::ReceiverOptions receiver;
   std::filesystem::path certificate, key, authorities;  ///< all or none
   std::filesystem::path watch;                          ///< empty: listen
   std::optional<std::uint64_t> count;

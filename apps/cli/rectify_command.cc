@@ -19,38 +19,39 @@
 namespace helicarm::cli {
 namespace {
 
-XrayImage image_of(const RectifyArguments& arguments) {
+xray::XrayImage image_of(const RectifyArguments& arguments) {
   return value_or_throw(
-      read_xray_image(*arguments.image, arguments.image->filename().string(), arguments.frame));
+      xray::read_xray_image(*arguments.image, arguments.image->filename().string(), arguments.frame));
 }
 
-DistortionMap map_of(const RectifyArguments& arguments) {
-  return value_or_throw(distortion_map_from_json(value_or_throw(read_json(*arguments.map)),
-                                                 arguments.map->filename().string()));
+rectification::DistortionMap map_of(const RectifyArguments& arguments) {
+  return value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*arguments.map)),
+                                                                arguments.map->filename().string()));
 }
 
-Plate plate_of(const std::string& name) {
-  return name == plate48().name ? plate48() : value_or_throw(read_plate(name));
+phantom::Plate plate_of(const std::string& name) {
+  return name == phantom::plate48().name ? phantom::plate48() : value_or_throw(phantom::read_plate(name));
 }
 
-DerivedImage rectified_image(const XrayImage& xray_image, const DistortionMap& map, std::string description) {
-  const Image<float> view_image = resample(xray_image, map);
-  DerivedImage image;
+xray::DerivedImage rectified_image(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
+                                   std::string description) {
+  const image::Image<float> view_image = rectification::resample(xray_image, map);
+  xray::DerivedImage image;
   const auto range =
       std::clamp(static_cast<long>(std::lround(xray_image.highest - xray_image.lowest)), 1l, 65535l);
   image.bits_stored = std::max(8, static_cast<int>(std::bit_width(static_cast<unsigned>(range))));
-  image.pixels = Image<std::uint16_t>(view_image.width(), view_image.height());
+  image.pixels = image::Image<std::uint16_t>(view_image.width(), view_image.height());
   std::ranges::transform(view_image.pixels(), image.pixels.pixels().begin(), [&](float value) {
     return static_cast<std::uint16_t>(std::clamp(std::lround(value - xray_image.lowest), 0l, range));
   });
   image.acquisition = xray_image.acquisition;
-  if (map.rectified_plane == RectifiedPlane::detector && map.rectified_pixel_mm)
+  if (map.rectified_plane == rectification::RectifiedPlane::detector && map.rectified_pixel_mm)
     image.acquisition.pixel_mm = Eigen::Vector2d::Constant(*map.rectified_pixel_mm);
   image.series_description = std::move(description);
   return image;
 }
 
-Json figures_of(const Rectification& r) {
+Json figures_of(const rectification::Rectification& r) {
   return {{"model", r.map.model},
           {"dots_found", r.dots_found},
           {"dots_expected", r.dots_expected ? Json(*r.dots_expected) : Json(nullptr)},
@@ -62,20 +63,20 @@ Json figures_of(const Rectification& r) {
 }
 
 void rectify_image(const RectifyArguments& arguments, Console& console) {
-  const XrayImage xray_image = image_of(arguments);
-  const Rectification r = value_or_throw(
-      rectify(xray_image, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
+  const xray::XrayImage xray_image = image_of(arguments);
+  const rectification::Rectification r = value_or_throw(rectification::rectify(
+      xray_image, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
   value_or_throw(
-      write_dicom(arguments.out / "rectified.dcm", rectified_image(xray_image, r.map, "rectified")));
-  XrayImage without_dots = xray_image;
-  without_dots.pixels = inpainted(xray_image.pixels, r.plate_dots);
-  value_or_throw(write_dicom(arguments.out / "inpainted.dcm",
-                             rectified_image(without_dots, r.map, "rectified, plate hidden")));
-  value_or_throw(write_file(arguments.out / "map.json", to_text(to_json(r.map)) + "\n"));
+      xray::write_dicom(arguments.out / "rectified.dcm", rectified_image(xray_image, r.map, "rectified")));
+  xray::XrayImage without_dots = xray_image;
+  without_dots.pixels = rectification::inpainted(xray_image.pixels, r.plate_dots);
+  value_or_throw(xray::write_dicom(arguments.out / "inpainted.dcm",
+                                   rectified_image(without_dots, r.map, "rectified, plate hidden")));
+  value_or_throw(write_file(arguments.out / "map.json", to_text(rectification::to_json(r.map)) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)
     console.out << to_text(figures_of(r)) << '\n';
@@ -87,12 +88,13 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
 }
 
 void map_points(const RectifyArguments& arguments, Console& console) {
-  const DistortionMap map = map_of(arguments);
+  const rectification::DistortionMap map = map_of(arguments);
   const CsvTable table = value_or_throw(read_csv(*arguments.points, {"u_px", "v_px"}, {}));
   Json points = Json::array();
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const Eigen::Vector2d given{table.number(row, "u_px"), table.number(row, "v_px")};
-    const auto mapped = arguments.inverse ? raw_in_image(map, given) : rectified_in_image(map, given);
+    const auto mapped = arguments.inverse ? rectification::raw_in_image(map, given)
+                                          : rectification::rectified_in_image(map, given);
     points.push_back(mapped ? Json{{"u", mapped->x()}, {"v", mapped->y()}}
                             : Json{{"u", nullptr}, {"v", nullptr}});
   }
@@ -105,9 +107,10 @@ void map_points(const RectifyArguments& arguments, Console& console) {
 }
 
 void measure_grid(const RectifyArguments& arguments, Console& console) {
-  const DistortionMap map = map_of(arguments);
-  const TestGrid grid = value_or_throw(measure_test_grid(find_grid(image_of(arguments)), map));
-  const auto json_of = [](const GridError& error) {
+  const rectification::DistortionMap map = map_of(arguments);
+  const rectification::TestGrid grid =
+      value_or_throw(rectification::measure_test_grid(rectification::find_grid(image_of(arguments)), map));
+  const auto json_of = [](const rectification::GridError& error) {
     return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
   };
   if (console.json)

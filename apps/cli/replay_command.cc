@@ -10,7 +10,7 @@ namespace helicarm::cli {
 
 CommandResult replay_command(const ReplayArguments& arguments, Console& console) {
   return guarded([&] {
-    const ReplayReport report = value_or_throw(replay(arguments.session));
+    const operation::ReplayReport report = value_or_throw(operation::replay(arguments.session));
     if (console.json) {
       console.out << to_text({{"records", report.records},
                               {"torn", report.torn},

@@ -20,14 +20,14 @@ std::string coordinates(const Eigen::Vector3d& p) {
   return fmt::format("{:9.3f} {:9.3f} {:9.3f}", p.x(), p.y(), p.z());
 }
 
-std::string statistics_line(std::string_view what, const Statistics& s) {
+std::string statistics_line(std::string_view what, const localization::Statistics& s) {
   if (s.n == 0) return {};
   return fmt::format("  {:<8} mean {:7.3f}   rms {:7.3f}   max {:7.3f}   n {}\n", what, s.mean, s.rms, s.max,
                      s.n);
 }
 
 /// The codes of a point's warnings, for the end of its line.
-std::string marks_of(const PointResult& point) {
+std::string marks_of(const pipeline::PointResult& point) {
   std::string marks;
   for (const Warning& warning : point.warnings) marks += fmt::format("   {}", code(warning.reason));
   return marks;
@@ -50,11 +50,12 @@ void forget(const std::filesystem::path& out) {
 }
 
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
-Expected<void> add_to_c_arm_history(const std::filesystem::path& path, CArmHistory history,
-                                    const Result& result, Console& console) {
+Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibration::CArmHistory history,
+                                    const pipeline::Result& result, Console& console) {
   const std::size_t earlier = history.entries.size();
-  for (const HistoryEntry& entry : result.entries)
-    if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
+  for (const calibration::HistoryEntry& entry : result.entries)
+    if (std::ranges::find(history.entries, entry.image, &calibration::HistoryEntry::image) ==
+        history.entries.end())
       history.entries.push_back(entry);
   if (!console.quiet)
     console.progress << (result.variance_scale > 1
@@ -64,27 +65,28 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, CArmHisto
                                    path.string(), std::sqrt(result.variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
                                            earlier, history.entries.size() - earlier));
-  return write_file(path, to_text(to_json(history)) + "\n");
+  return write_file(path, to_text(calibration::to_json(history)) + "\n");
 }
 
 /// result.json is written last, so that its presence implies the other files.
-Expected<void> write(const Result& result, const RunArguments& arguments) {
-  auto written = arguments.no_report ? Expected<void>() : write_report(result, arguments.out);
-  if (written) written = write_file(arguments.out / "result.json", to_text(to_json(result)) + "\n");
+Expected<void> write(const pipeline::Result& result, const RunArguments& arguments) {
+  auto written = arguments.no_report ? Expected<void>() : report::write_report(result, arguments.out);
+  if (written) written = write_file(arguments.out / "result.json", to_text(pipeline::to_json(result)) + "\n");
   if (written) return written;
   forget(arguments.out);
   std::error_code ignored;
   for (std::size_t i = 0; i < result.views.size(); ++i)
-    std::filesystem::remove(arguments.out / overlay_name(result.views[i].name, i), ignored);
+    std::filesystem::remove(arguments.out / report::overlay_name(result.views[i].name, i), ignored);
   return written;
 }
 
 /// A case whose description excludes an answer (a flat calibrator, for example) is refused like any other.
-Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions& options) {
-  const auto given = read_case(folder);
-  if (given) return run_case(*given, options);
+Expected<pipeline::Result> result_of(const std::filesystem::path& folder,
+                                     const pipeline::RunOptions& options) {
+  const auto given = pipeline::read_case(folder);
+  if (given) return pipeline::run_case(*given, options);
   if (exit_code(given.error().reason) == 2) return tl::unexpected<Failure>(given.error());
-  Result refused;
+  pipeline::Result refused;
   refused.options = options;
   refused.failure = given.error();
   return refused;
@@ -92,38 +94,41 @@ Expected<Result> result_of(const std::filesystem::path& folder, const RunOptions
 
 }  // namespace
 
-Expected<std::optional<CArmHistory>> history_at(const std::optional<std::filesystem::path>& path) {
-  if (!path) return std::optional<CArmHistory>();
-  if (!std::filesystem::exists(*path)) return std::optional(CArmHistory());
-  return read_history(*path).map([](CArmHistory history) { return std::optional(std::move(history)); });
+Expected<std::optional<calibration::CArmHistory>> history_at(
+    const std::optional<std::filesystem::path>& path) {
+  if (!path) return std::optional<calibration::CArmHistory>();
+  if (!std::filesystem::exists(*path)) return std::optional(calibration::CArmHistory());
+  return calibration::read_history(*path).map(
+      [](calibration::CArmHistory history) { return std::optional(std::move(history)); });
 }
 
-Expected<Method> method_named(const std::string& name) {
-  if (name == "best") return Method::best;
-  if (name == "paper") return Method::paper;
+Expected<rectification::Method> method_named(const std::string& name) {
+  if (name == "best") return rectification::Method::best;
+  if (name == "paper") return rectification::Method::paper;
   return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
 }
 
-std::string summary_of(const Result& result) {
+std::string summary_of(const pipeline::Result& result) {
   std::string text = statistics_line("FLE px", result.accuracy.fle_px) +
                      statistics_line("FRE mm", result.accuracy.fre_mm) +
                      statistics_line("TRE mm", result.accuracy.tre_mm);
   if (!result.points.empty())
     text += fmt::format("\n  {:<12} {:>9} {:>9} {:>9}  mm, calibrator frame\n", "point", "x", "y", "z");
-  for (const PointResult& point : result.points)
-    text += point.place
-                ? fmt::format("  {:<12} {}   within {:.3f} (95 %){}\n", point.name,
-                              coordinates(point.place->in_calibrator),
-                              length_at_95(point.place->covariance_in_calibrator), marks_of(point))
-                : fmt::format("  {:<12} {}\n", point.name, point.reason ? code(point.reason->reason) : "");
-  for (const Tunnel& tunnel : result.tunnels)
+  for (const pipeline::PointResult& point : result.points)
+    text +=
+        point.place
+            ? fmt::format("  {:<12} {}   within {:.3f} (95 %){}\n", point.name,
+                          coordinates(point.place->in_calibrator),
+                          localization::length_at_95(point.place->covariance_in_calibrator), marks_of(point))
+            : fmt::format("  {:<12} {}\n", point.name, point.reason ? code(point.reason->reason) : "");
+  for (const guidance::Tunnel& tunnel : result.tunnels)
     if (tunnel.start_in_tool && tunnel.end_in_tool)
       text += fmt::format(
           "\n  tunnel {:<8} in the tool's frame, length {:.2f} mm, axis sigma {:.2f} degrees\n"
           "    start {}\n    end   {}\n",
           tunnel.name, tunnel.length_mm.value_or(0), tunnel.axis_sigma_deg().value_or(0),
           coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
-  for (const Verification& v : result.verifications)
+  for (const verification::Verification& v : result.verifications)
     for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
       if (*error)
         text += fmt::format(
@@ -132,12 +137,12 @@ std::string summary_of(const Result& result) {
   return text + (result.verifications.empty() ? "" : "\n");
 }
 
-Expected<Result> measure(const RunArguments& arguments, Console& console) {
+Expected<pipeline::Result> measure(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    RunOptions options = arguments.options;
+    pipeline::RunOptions options = arguments.options;
     options.threads = console.threads;
     options.history = value_or_throw(history_at(arguments.history));
-    Result result = value_or_throw(result_of(arguments.folder, options));
+    pipeline::Result result = value_or_throw(result_of(arguments.folder, options));
     if (!console.quiet) {
       for (const Warning& warning : result.warnings)
         console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
@@ -148,10 +153,10 @@ Expected<Result> measure(const RunArguments& arguments, Console& console) {
   });
 }
 
-Expected<Result> run_and_write(const RunArguments& arguments, Console& console) {
+Expected<pipeline::Result> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
     forget(arguments.out);
-    const Result result = value_or_throw(measure(arguments, console));
+    const pipeline::Result result = value_or_throw(measure(arguments, console));
     value_or_throw(write(result, arguments));
     if (arguments.history && !result.failure)
       value_or_throw(add_to_c_arm_history(*arguments.history, *result.options.history, result, console));
@@ -164,7 +169,7 @@ CommandResult run_command(const RunArguments& arguments, Console& console) {
   if (!result) return tl::unexpected<Failure>(result.error());
   if (result->failure) return tl::unexpected<Failure>(*result->failure);
   if (console.json)
-    console.out << to_text(to_json(*result)) << '\n';
+    console.out << to_text(pipeline::to_json(*result)) << '\n';
   else if (!console.quiet)
     console.out << summary_of(*result) << fmt::format("\n  written to {}\n", arguments.out.string());
   return {};

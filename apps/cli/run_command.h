@@ -13,7 +13,7 @@ namespace helicarm::cli {
 struct RunArguments {
   std::filesystem::path folder;  ///< holds case.json
   std::filesystem::path out = "helicarm-result";
-  RunOptions options = {};                            ///< threads and C-arm history are filled in
+  pipeline::RunOptions options = {};                  ///< threads and C-arm history are filled in
   bool no_report = false;                             ///< only result.json
   std::optional<std::filesystem::path> history = {};  ///< the C-arm's history: read and extended
 };
@@ -23,18 +23,19 @@ struct RunArguments {
 CommandResult run_command(const RunArguments& arguments, Console& console);
 
 /// Only measures the case, with warnings on `console.progress`; a refusal is in the result.
-Expected<Result> measure(const RunArguments& arguments, Console& console);
+Expected<pipeline::Result> measure(const RunArguments& arguments, Console& console);
 
 /// As `run_command`, and returns the result; prints nothing to `console.out`.
-Expected<Result> run_and_write(const RunArguments& arguments, Console& console);
+Expected<pipeline::Result> run_and_write(const RunArguments& arguments, Console& console);
 
 /// A C-arm's history from the named file; empty if the file does not exist or none is named.
-Expected<std::optional<CArmHistory>> history_at(const std::optional<std::filesystem::path>& path);
+Expected<std::optional<calibration::CArmHistory>> history_at(
+    const std::optional<std::filesystem::path>& path);
 
 /// "best" or "paper"; usage otherwise.
-Expected<Method> method_named(const std::string& name);
+Expected<rectification::Method> method_named(const std::string& name);
 
 /// Accuracy, points, tunnels and verification as a table for a terminal.
-std::string summary_of(const Result& result);
+std::string summary_of(const pipeline::Result& result);
 
 }  // namespace helicarm::cli

@@ -20,7 +20,7 @@ Eigen::Vector3d three(const std::vector<double>& numbers, const char* option) {
   return Eigen::Vector3d::Map(numbers.data());
 }
 
-void check_inside(const Volume& volume, const Eigen::Vector3d& centre) {
+void check_inside(const volume::Volume& volume, const Eigen::Vector3d& centre) {
   const Eigen::Vector3d last = (volume.size.cast<double>().array() - 1).matrix();
   const Eigen::Array3d voxel = (volume.patient_from_voxel.inverse() * centre).array();
   if ((voxel >= -0.5).all() && (voxel <= last.array() + 0.5).all()) return;
@@ -45,7 +45,7 @@ std::shared_ptr<const simulation::CtOptions> ct_from(const SimulateArguments& ar
   if (arguments.kind == "grid")
     throw BadInput(Reason::usage, "simulate: --ct cannot be combined with --kind grid");
   simulation::CtOptions ct;
-  ct.volume = value_or_throw(read_volume(arguments.ct));
+  ct.volume = value_or_throw(volume::read_volume(arguments.ct));
   for (const Warning& warning : ct.volume.warnings)
     console.progress << fmt::format("helicarm: {}: {}\n", code(warning.reason), warning.message);
   const std::filesystem::path whole = std::filesystem::absolute(arguments.ct).lexically_normal();

@@ -17,18 +17,18 @@ namespace helicarm::cli {
 namespace {
 
 struct Solution {
-  View view;
-  std::optional<DltFactors> dlt;
+  geometry::View view;
+  std::optional<geometry::DltFactors> dlt;
   std::optional<Eigen::MatrixXd> covariance;
   double condition = 0;
 };
 
-std::vector<Fiducial> points_from(const CsvTable& table) {
-  std::vector<Fiducial> points;
+std::vector<fiducials::Fiducial> points_from(const CsvTable& table) {
+  std::vector<fiducials::Fiducial> points;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto number = [&](const char* column) { return table.number(row, column); };
-    Fiducial point{table.text(row, "label"), {number("x_mm"), number("y_mm"), number("z_mm")}};
-    point.status = FiducialStatus::used;
+    fiducials::Fiducial point{table.text(row, "label"), {number("x_mm"), number("y_mm"), number("z_mm")}};
+    point.status = fiducials::FiducialStatus::used;
     point.uv = {number("u_px"), number("v_px")};
     point.sigma_px = table.has("sigma_px") ? number("sigma_px") : 1;
     if (!(point.sigma_px > 0))
@@ -39,45 +39,45 @@ std::vector<Fiducial> points_from(const CsvTable& table) {
   return points;
 }
 
-Expected<Solution> most_likely(const std::vector<Fiducial>& points, bool sigmas_given) {
-  CalibrationOptions options;
+Expected<Solution> most_likely(const std::vector<fiducials::Fiducial>& points, bool sigmas_given) {
+  calibration::CalibrationOptions options;
   options.rejection_probability = 0;
   options.largest_rms_px = std::numeric_limits<double>::infinity();
-  const auto result = calibrate({{"", points}}, options);
+  const auto result = calibration::calibrate({{"", points}}, options);
   if (!result) return tl::unexpected<Failure>(result.error());
-  const CalibratedView& view = result->views.front();
+  const calibration::CalibratedView& view = result->views.front();
   const double scale = sigmas_given ? 1 : result->chi2 / result->dof / result->variance_scale;
   return Solution{view.view, view.dlt, result->joint_covariance * scale, view.condition};
 }
 
-Expected<Solution> solve(const std::string& method, const std::vector<Fiducial>& points,
-                         const std::vector<PointPair>& pairs, bool sigmas_given) {
+Expected<Solution> solve(const std::string& method, const std::vector<fiducials::Fiducial>& points,
+                         const std::vector<geometry::PointPair>& pairs, bool sigmas_given) {
   if (method == "ml") return most_likely(points, sigmas_given);
   if (method != "dlt" && method != "homogeneous")
     return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: dlt, homogeneous, ml", method));
-  const auto result = method == "dlt" ? dlt_least_squares(pairs) : dlt_homogeneous(pairs);
-  return result.map([](const DltResult& dlt) {
+  const auto result = method == "dlt" ? geometry::dlt_least_squares(pairs) : geometry::dlt_homogeneous(pairs);
+  return result.map([](const geometry::DltResult& dlt) {
     return Solution{dlt.view, dlt.factors, std::nullopt, dlt.condition};
   });
 }
 
 Json json_of(const Solution& solution, double rms_px) {
   Json json;
-  json["dlt"] = solution.dlt ? json_list(*solution.dlt) : Json();
-  json["projection"] = json_rows(solution.view.projection());
-  json["intrinsics"] = intrinsics_json(solution.view.intrinsics, std::nullopt);
-  json["camera_from_world"] = json_rows(solution.view.camera_from_world.matrix());
-  json["covariance"] = solution.covariance ? json_rows(*solution.covariance) : Json();
+  json["dlt"] = solution.dlt ? geometry::json_list(*solution.dlt) : Json();
+  json["projection"] = geometry::json_rows(solution.view.projection());
+  json["intrinsics"] = geometry::intrinsics_json(solution.view.intrinsics, std::nullopt);
+  json["camera_from_world"] = geometry::json_rows(solution.view.camera_from_world.matrix());
+  json["covariance"] = solution.covariance ? geometry::json_rows(*solution.covariance) : Json();
   json["reprojection_rms_px"] = rms_px;
   json["condition"] = solution.condition;
   return json;
 }
 
-void print_table(const Solution& solution, double rms_px, const std::vector<Fiducial>& points,
+void print_table(const Solution& solution, double rms_px, const std::vector<fiducials::Fiducial>& points,
                  std::ostream& out) {
-  const Intrinsics& k = solution.view.intrinsics;
-  const RigidTransform& pose = solution.view.camera_from_world;
-  const EulerAngles angles = euler_from_rotation(pose.rotation);
+  const geometry::Intrinsics& k = solution.view.intrinsics;
+  const geometry::RigidTransform& pose = solution.view.camera_from_world;
+  const geometry::EulerAngles angles = geometry::euler_from_rotation(pose.rotation);
   const Eigen::Vector3d source = solution.view.source_in_world();
   const double degrees = 180 / std::acos(-1.0);
   const auto sigma = [&](Eigen::Index i) {
@@ -93,7 +93,7 @@ void print_table(const Solution& solution, double rms_px, const std::vector<Fidu
       << fmt::format("source         {:.4f} {:.4f} {:.4f} mm\n", source.x(), source.y(), source.z())
       << fmt::format("condition      {:.3g}\nreprojection   {:.4g} px rms over {} points\n",
                      solution.condition, rms_px, points.size());
-  for (const Fiducial& point : points)
+  for (const fiducials::Fiducial& point : points)
     out << fmt::format("  {:<12} {:.4g} px\n", point.label,
                        (solution.view.project(point.centre_in_calibrator) - point.uv).norm());
 }
@@ -106,11 +106,11 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   if (!table) return tl::unexpected<Failure>(table.error());
   const auto points = guarded([&] { return points_from(*table); });
   if (!points) return tl::unexpected<Failure>(points.error());
-  std::vector<PointPair> pairs;
-  for (const Fiducial& point : *points) pairs.push_back({point.centre_in_calibrator, point.uv});
+  std::vector<geometry::PointPair> pairs;
+  for (const fiducials::Fiducial& point : *points) pairs.push_back({point.centre_in_calibrator, point.uv});
   const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
   if (!solution) return tl::unexpected<Failure>(solution.error());
-  const double rms_px = reprojection_rms(solution->view, pairs);
+  const double rms_px = geometry::reprojection_rms(solution->view, pairs);
   if (console.json)
     console.out << to_text(json_of(*solution, rms_px)) << '\n';
   else

@@ -17,7 +17,8 @@ namespace helicarm::cli {
 namespace {
 namespace fs = std::filesystem;
 
-const View view{{-6000, 6000, 512, 500, 0}, {rotation_from_euler(0.3, -0.2, 1), {5, -8, 800}}};
+const geometry::View view{{-6000, 6000, 512, 500, 0},
+                          {geometry::rotation_from_euler(0.3, -0.2, 1), {5, -8, 800}}};
 
 std::string table_of(int n, bool flat, const std::string& sigma = "") {
   std::string text = "label,x_mm,y_mm,z_mm,u_px,v_px" + std::string(sigma.empty() ? "" : ",sigma_px") + "\n";

@@ -28,8 +28,8 @@ namespace {
 struct StudyRun {
   const StudyArguments& arguments;
   Console& console;
-  const Ranks& ranks;
-  EngineOptions engine;
+  const study::Ranks& ranks;
+  study::EngineOptions engine;
 };
 
 [[noreturn]] void refuse(const std::string& message) { throw BadInput(Reason::usage, "study: " + message); }
@@ -83,10 +83,11 @@ Options options_of(const StudyRun& run) {
     if (a.fle) options.fle = *a.fle;
   if constexpr (requires { options.origin; })
     if (!a.origin.empty())
-      options.origin = named("--origin", a.origin, std::array{WorldOrigin::base, WorldOrigin::centre});
+      options.origin =
+          named("--origin", a.origin, std::array{study::WorldOrigin::base, study::WorldOrigin::centre});
   if constexpr (requires { options.sigma; }) {
     if (a.sigmas.size() > 1) refuse(fmt::format("{} takes one --sigma", a.name));
-    if (!a.sigmas.empty()) options.sigma = named("--sigma", a.sigmas[0], sigma_readings);
+    if (!a.sigmas.empty()) options.sigma = named("--sigma", a.sigmas[0], study::sigma_readings);
   }
   if constexpr (requires { options.balls = 12; }) {
     if (a.balls.size() > 1) refuse(fmt::format("{} takes one number of --balls", a.name));
@@ -96,67 +97,68 @@ Options options_of(const StudyRun& run) {
 }
 
 template <auto study, class Options>
-StudyFiles files_by(const StudyRun& run, const Options& options) {
+study::StudyFiles files_by(const StudyRun& run, const Options& options) {
   const auto answer = value_or_throw(study(options, run.engine, run.ranks));
-  return run.ranks.leads() ? files_of(answer, options) : StudyFiles{};
+  return run.ranks.leads() ? study::files_of(answer, options) : study::StudyFiles{};
 }
 
 /// A study with shared options only.
 template <class Options, auto study>
-StudyFiles run_plain(const StudyRun& run) {
+study::StudyFiles run_plain(const StudyRun& run) {
   return files_by<study>(run, options_of<Options>(run));
 }
 
-StudyFiles run_number(const StudyRun& run) {
-  auto options = options_of<NumberOptions>(run);
+study::StudyFiles run_number(const StudyRun& run) {
+  auto options = options_of<study::NumberOptions>(run);
   if (!run.arguments.balls.empty()) options.balls = run.arguments.balls;
-  choose(options.sigmas, "--sigma", run.arguments.sigmas, sigma_readings);
-  choose(options.readings, "--reading", run.arguments.readings, pixel_readings);
-  return files_by<study_number>(run, options);
+  choose(options.sigmas, "--sigma", run.arguments.sigmas, study::sigma_readings);
+  choose(options.readings, "--reading", run.arguments.readings, study::pixel_readings);
+  return files_by<study::study_number>(run, options);
 }
 
-StudyFiles run_uniformity(const StudyRun& run) {
-  auto options = options_of<UniformityOptions>(run);
+study::StudyFiles run_uniformity(const StudyRun& run) {
+  auto options = options_of<study::UniformityOptions>(run);
   if (run.arguments.draws) options.draws = *run.arguments.draws;
-  return files_by<study_uniformity>(run, options);
+  return files_by<study::study_uniformity>(run, options);
 }
 
-StudyFiles run_location(const StudyRun& run) {
-  auto options = options_of<LocationOptions>(run);
+study::StudyFiles run_location(const StudyRun& run) {
+  auto options = options_of<study::LocationOptions>(run);
   if (!run.arguments.calibrator.empty())
-    for (const CalibratorBall& ball : value_or_throw(calibrator_named(run.arguments.calibrator, ".")).balls)
+    for (const phantom::CalibratorBall& ball :
+         value_or_throw(phantom::calibrator_named(run.arguments.calibrator, ".")).balls)
       options.balls.push_back(ball.centre_in_calibrator);
-  return files_by<study_location>(run, options);
+  return files_by<study::study_location>(run, options);
 }
 
-StudyFiles run_calibration(const StudyRun& run) {
-  auto options = options_of<CalibrationStudyOptions>(run);
+study::StudyFiles run_calibration(const StudyRun& run) {
+  auto options = options_of<study::CalibrationStudyOptions>(run);
   options.folder = run.arguments.out;
-  return files_by<study_calibration>(run, options);
+  return files_by<study::study_calibration>(run, options);
 }
 
-StudyFiles run_design(const StudyRun& run) {
-  auto options = options_of<DesignOptions>(run);
+study::StudyFiles run_design(const StudyRun& run) {
+  auto options = options_of<study::DesignOptions>(run);
   if (!run.arguments.surface.empty())
-    options.surface = named("--surface", run.arguments.surface, design_surfaces);
-  return files_by<study_design>(run, options);
+    options.surface = named("--surface", run.arguments.surface, study::design_surfaces);
+  return files_by<study::study_design>(run, options);
 }
 
 struct KnownStudy {
   std::string_view name;
-  StudyFiles (*run)(const StudyRun&);
+  study::StudyFiles (*run)(const StudyRun&);
   std::vector<std::string_view> options = {};  ///< besides the common ones
 };
 const std::array<KnownStudy, 9> studies{
     {{"number", run_number, {"--balls", "--sigma", "--reading", "--fle", "--origin"}},
      {"uniformity", run_uniformity, {"--balls", "--sigma", "--fle", "--origin", "--draws"}},
      {"location", run_location, {"--calibrator", "--sigma", "--fle", "--origin"}},
-     {"biplane", run_plain<BiplaneOptions, study_biplane>, {"--sigma", "--fle"}},
+     {"biplane", run_plain<study::BiplaneOptions, study::study_biplane>, {"--sigma", "--fle"}},
      {"calibration", run_calibration},
-     {"rectification", run_plain<RectificationStudyOptions, study_rectification>},
+     {"rectification", run_plain<study::RectificationStudyOptions, study::study_rectification>},
      {"design", run_design, {"--balls", "--surface", "--sigma", "--fle"}},
-     {"limit", run_plain<LimitOptions, study_limit>},
-     {"centres", run_plain<CentreOptions, study_centres>}}};
+     {"limit", run_plain<study::LimitOptions, study::study_limit>},
+     {"centres", run_plain<study::CentreOptions, study::study_centres>}}};
 
 const KnownStudy& study_named(const std::string& name) {
   std::vector<std::string_view> names;
@@ -177,14 +179,14 @@ CommandResult study_command(const StudyArguments& arguments, Console& console) {
     std::error_code error;
     if (std::filesystem::create_directories(out, error); error)
       throw BadInput(Reason::cannot_write, fmt::format("{}: {}", out.string(), error.message()));
-    const Ranks ranks;
+    const study::Ranks ranks;
     if (ranks.count() > 1 && ranks.leads() && !console.quiet)
       console.progress << fmt::format("helicarm: {} ranks\n", ranks.count());
     StudyRun run{arguments, console, ranks, {}};
     run.engine.threads = console.threads;
     run.engine.journal = out / (arguments.name + ".partial");
     run.engine.resume = arguments.resume;
-    StudyFiles files;
+    study::StudyFiles files;
     {
       ProgressLine line(console);
       run.engine.progress = [&](double share) { line.notify(share); };

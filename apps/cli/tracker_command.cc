@@ -23,17 +23,18 @@ namespace {
 /// Calls `report` each second until the time is over or the user interrupts.
 template <class Notify>
 void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Notify notify) {
-  const double until = seconds ? monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
+  const double until =
+      seconds ? tracker::monotonic_seconds() + *seconds : std::numeric_limits<double>::infinity();
   while (true) {
-    const double left = until - monotonic_seconds();
+    const double left = until - tracker::monotonic_seconds();
     if (left <= 0 || interrupt.wait(std::min(left, 1.0))) return;
     notify();
   }
 }
 
 /// Options with the address and port of "address:port".
-Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
-  IgtlClientOptions options = arguments.options;
+Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
+  tracker::IgtlClientOptions options = arguments.options;
   const std::string& peer = arguments.peer;
   const auto colon = peer.rfind(':');
   if (colon != peer.npos) {
@@ -48,27 +49,28 @@ Expected<IgtlClientOptions> client_options(const TrackerLinkArguments& arguments
   return options;
 }
 
-Json json_of(const TrackerLinkStatus& link, const std::vector<ToolState>& tools) {
+Json json_of(const tracker::TrackerLinkStatus& link, const std::vector<tracker::ToolState>& tools) {
   Json json;
   json["state"] = code(link.state);
   json["trouble"] = link.trouble;
   json["counters"] = link.counters;
   json["tools"] = Json::array();
-  for (const ToolState& tool : tools) {
+  for (const tracker::ToolState& tool : tools) {
     Json& one = json["tools"].emplace_back();
     one["name"] = tool.name;
     one["age_s"] = tool.age_s ? Json(*tool.age_s) : Json();
     one["rate_hz"] = tool.rate_hz;
     one["accepted"] = tool.accepted;
     one["rejected"] = tool.rejected;
-    one["tracker_from_tool"] = tool.tracker_from_tool ? json_rows(tool.tracker_from_tool->matrix()) : Json();
+    one["tracker_from_tool"] =
+        tool.tracker_from_tool ? geometry::json_rows(tool.tracker_from_tool->matrix()) : Json();
   }
   return json;
 }
 
-std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>& tools) {
+std::string table_of(const tracker::TrackerLinkStatus& link, const std::vector<tracker::ToolState>& tools) {
   std::string table = fmt::format("{}  {}\n", code(link.state), link.trouble);
-  for (const ToolState& tool : tools) {
+  for (const tracker::ToolState& tool : tools) {
     table +=
         fmt::format("  {:20} {:>9} {:6.1f} Hz {:9} accepted", tool.name,
                     tool.age_s ? fmt::format("{:.3f} s", *tool.age_s) : "never", tool.rate_hz, tool.accepted);
@@ -78,9 +80,10 @@ std::string table_of(const TrackerLinkStatus& link, const std::vector<ToolState>
   return table;
 }
 
-Expected<void> check_tool(const std::vector<SequenceFrame>& frames, const TrackerPivotArguments& arguments) {
+Expected<void> check_tool(const std::vector<tracker::SequenceFrame>& frames,
+                          const TrackerPivotArguments& arguments) {
   std::set<std::string> names;
-  for (const SequenceFrame& frame : frames)
+  for (const tracker::SequenceFrame& frame : frames)
     for (const auto& [name, pose] : frame.poses) names.insert(name);
   if (names.contains(arguments.tool)) return {};
   return fail(Reason::bad_value, without_control_characters(fmt::format(
@@ -94,17 +97,18 @@ CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Conso
   const auto options = client_options(arguments);
   if (!options) return tl::unexpected(options.error());
   StopSignal interrupt;
-  PoseBoard board;
-  const auto client = IgtlClient::start(
-      *options, [&](const IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
+  tracker::PoseBoard board;
+  const auto client = tracker::IgtlClient::start(
+      *options,
+      [&](const tracker::IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
       [&] { board.forget_time(); });
   if (!client) return tl::unexpected(client.error());
-  const auto tools = [&] { return board.tools(monotonic_seconds()); };
+  const auto tools = [&] { return board.tools(tracker::monotonic_seconds()); };
   wait_telling(interrupt, arguments.seconds, [&] {
     if (!console.json && !console.quiet)
       console.progress << table_of((*client)->status(), tools()) << std::flush;
   });
-  const TrackerLinkStatus link = (*client)->status();
+  const tracker::TrackerLinkStatus link = (*client)->status();
   if (console.json)
     console.out << to_text(json_of(link, tools())) << '\n';
   else
@@ -117,17 +121,18 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
   if (!options) return tl::unexpected(options.error());
   StopSignal interrupt;
   std::mutex mutex;
-  SequenceRecorder recorder;
+  tracker::SequenceRecorder recorder;
   bool full = false;
-  const auto client = IgtlClient::start(*options, [&](const IgtlMessage& message, double arrival_s) {
-    SequenceFrame frame = frame_of(message, arrival_s);
-    const std::lock_guard lock(mutex);
-    if (!full && !recorder.take(std::move(frame))) full = true, interrupt.raise();
-  });
+  const auto client =
+      tracker::IgtlClient::start(*options, [&](const tracker::IgtlMessage& message, double arrival_s) {
+        tracker::SequenceFrame frame = tracker::frame_of(message, arrival_s);
+        const std::lock_guard lock(mutex);
+        if (!full && !recorder.take(std::move(frame))) full = true, interrupt.raise();
+      });
   if (!client) return tl::unexpected(client.error());
   wait_telling(interrupt, arguments.seconds, [] {});
   (*client)->stop();
-  const std::vector<SequenceFrame>& frames = recorder.frames();
+  const std::vector<tracker::SequenceFrame>& frames = recorder.frames();
   if (full)
     console.progress << fmt::format("recording ended: limit of {} poses per file reached\n",
                                     recorder.most_poses())
@@ -137,7 +142,7 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
     return fail(Reason::no_pose, fmt::format("{}: no pose received, no file written{}{}", arguments.peer,
                                              trouble.empty() ? "" : ": ", trouble));
   }
-  if (auto written = write_sequence(arguments.file, frames); !written) return written;
+  if (auto written = tracker::write_sequence(arguments.file, frames); !written) return written;
   if (console.json)
     console.out << to_text({{"frames", frames.size()}}) << '\n';
   else if (!console.quiet)
@@ -146,38 +151,39 @@ CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Cons
 }
 
 CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Console& console) {
-  const auto frames = read_sequence(arguments.file);
+  const auto frames = tracker::read_sequence(arguments.file);
   if (!frames) return tl::unexpected(frames.error());
   StopSignal interrupt;
-  const auto server = IgtlServer::start(arguments.options);
+  const auto server = tracker::IgtlServer::start(arguments.options);
   if (!server) return tl::unexpected(server.error());
   if (!console.quiet)
     console.progress << fmt::format("{} frames at {} port {}\n", frames->size(), arguments.options.address,
                                     (*server)->port())
                      << std::flush;
   const std::jthread player([&](std::stop_token stop) {
-    replay(
-        *frames, arguments.as_tracking, [&](const IgtlMessage& message) { (*server)->send(message); }, stop);
+    tracker::replay(
+        *frames, arguments.as_tracking,
+        [&](const tracker::IgtlMessage& message) { (*server)->send(message); }, stop);
   });
   wait_telling(interrupt, arguments.seconds, [] {});
-  const IgtlServerStatus status = (*server)->status();
+  const tracker::IgtlServerStatus status = (*server)->status();
   if (console.json)
     console.out << to_text({{"clients", status.clients}, {"counters", status.counters}}) << '\n';
   return {};
 }
 
 CommandResult tracker_pivot_command(const TrackerPivotArguments& arguments, Console& console) {
-  const auto frames = read_sequence(arguments.file);
+  const auto frames = tracker::read_sequence(arguments.file);
   if (!frames) return tl::unexpected(frames.error());
   if (auto known = check_tool(*frames, arguments); !known) return known;
-  const GatedPoses poses = gated_poses(*frames, arguments.tool);
-  const auto pivot = calibrate_pivot(poses.tracker_from_tool, arguments.options);
+  const tracker::GatedPoses poses = tracker::gated_poses(*frames, arguments.tool);
+  const auto pivot = tracker::calibrate_pivot(poses.tracker_from_tool, arguments.options);
   if (!pivot) return tl::unexpected(pivot.error());
   if (console.json) {
     Json json;
-    json["tip_in_tool"] = json_list(pivot->tip_in_tool);
-    json["pivot_in_tracker"] = json_list(pivot->pivot_in_tracker);
-    json["covariance_mm2"] = json_rows(pivot->covariance);
+    json["tip_in_tool"] = geometry::json_list(pivot->tip_in_tool);
+    json["pivot_in_tracker"] = geometry::json_list(pivot->pivot_in_tracker);
+    json["covariance_mm2"] = geometry::json_rows(pivot->covariance);
     json["rms_mm"] = pivot->rms_mm;
     json["turn_deg"] = pivot->turn_deg;
     json["used"] = pivot->used;

@@ -16,20 +16,20 @@ struct TrackerLinkArguments {
   std::string peer;  ///< address:port
   std::filesystem::path file;
   std::optional<double> seconds;  ///< empty: until interrupted
-  IgtlClientOptions options;
+  tracker::IgtlClientOptions options;
 };
 
 struct TrackerReplayArguments {
   std::filesystem::path file;
   std::optional<double> seconds;
   bool as_tracking = false;  ///< TDATA instead of one TRANSFORM per tool
-  IgtlServerOptions options;
+  tracker::IgtlServerOptions options;
 };
 
 struct TrackerPivotArguments {
   std::filesystem::path file;
   std::string tool;
-  PivotOptions options;
+  tracker::PivotOptions options;
 };
 
 /// Prints a tracker's poses, tool by tool.

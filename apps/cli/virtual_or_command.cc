@@ -92,7 +92,7 @@ std::string execute(const std::string& line, VirtualDevices& virtual_or,
   }
   if (verb == "where") {
     const Eigen::Vector3d tip = virtual_or.tracker_from_tip().translation;
-    const VirtualTruth robot = virtual_or.robot().truth();
+    const robot::VirtualTruth robot = virtual_or.robot().truth();
     const std::string motion =
         robot.moving         ? "moving"
         : robot.rest_since_s ? fmt::format("at rest for {:.3f} s", robot.state.time_s - *robot.rest_since_s)
@@ -140,11 +140,11 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     };
     const auto virtual_or = value_or_throw(VirtualDevices::open(options));
     if (!arguments.plan.empty()) {
-      OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
+      operation::OperationPlan plan = rehearsal::plan_for(*virtual_or, virtual_or->tracker().port());
       if (arguments.check_points)
-        plan.check_points = {{"femur notch", Bone::femur, notch_limit_mm},
-                             {"tibia notch", Bone::tibia, notch_limit_mm}};
-      value_or_throw(write_file(arguments.plan, to_text(to_json(plan))));
+        plan.check_points = {{"femur notch", guidance::Bone::femur, notch_limit_mm},
+                             {"tibia notch", guidance::Bone::tibia, notch_limit_mm}};
+      value_or_throw(write_file(arguments.plan, to_text(operation::to_json(plan))));
     }
     if (!console.quiet)
       console.progress << fmt::format(

@@ -16,8 +16,8 @@ static_assert(alignof(Eigen::Matrix2d) == 32 && alignof(Eigen::Vector4d) == 32);
 
 namespace {
 
-View view_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre) {
-  View view;
+geometry::View view_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre) {
+  geometry::View view;
   view.intrinsics = {4500, 4500, 511.5, 511.5, 0};
   const Eigen::Vector3d z = direction.normalized();
   const Eigen::Vector3d x = Eigen::Vector3d::UnitZ().cross(z).normalized();
@@ -26,12 +26,13 @@ View view_along(const Eigen::Vector3d& direction, const Eigen::Vector3d& centre)
   return view;
 }
 
-ViewFiducials seen(const std::string& name, const View& view, const Calibrator& calibrator) {
-  ViewFiducials given{name, {}};
-  for (const CalibratorBall& ball : calibrator.balls) {
+calibration::ViewFiducials seen(const std::string& name, const geometry::View& view,
+                                const phantom::Calibrator& calibrator) {
+  calibration::ViewFiducials given{name, {}};
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
     const Eigen::Vector2d pixel = view.project(ball.centre_in_calibrator);
     given.fiducials.push_back(
-        {ball.label, ball.centre_in_calibrator, FiducialStatus::used, pixel, pixel, 0.05});
+        {ball.label, ball.centre_in_calibrator, fiducials::FiducialStatus::used, pixel, pixel, 0.05});
   }
   return given;
 }
@@ -39,18 +40,19 @@ ViewFiducials seen(const std::string& name, const View& view, const Calibrator& 
 }  // namespace
 
 int main() {
-  const Calibrator calibrator = udcsc();
-  const Eigen::Vector3d centre = middle_of(calibrator), point = centre + Eigen::Vector3d(5, -8, 12);
-  const View ap = view_along({0, 1, 0.05}, centre), lateral = view_along({1, 0, 0.05}, centre);
-  const auto calibration =
-      calibrate({seen("AP", ap, calibrator), seen("LAT", lateral, calibrator)}, CalibrationOptions{});
+  const phantom::Calibrator calibrator = phantom::udcsc();
+  const Eigen::Vector3d centre = phantom::middle_of(calibrator), point = centre + Eigen::Vector3d(5, -8, 12);
+  const geometry::View ap = view_along({0, 1, 0.05}, centre), lateral = view_along({1, 0, 0.05}, centre);
+  const auto calibration = calibration::calibrate(
+      {seen("AP", ap, calibrator), seen("LAT", lateral, calibrator)}, calibration::CalibrationOptions{});
   if (!calibration) {
     std::cerr << code(calibration.error().reason) << ": " << calibration.error().message << '\n';
     return exit_code(calibration.error().reason);
   }
   const Eigen::Matrix2d noise = 0.25 * Eigen::Matrix2d::Identity();  // 0.5 px
-  const PointObservation images[] = {{0, ap.project(point), noise}, {1, lateral.project(point), noise}};
-  const auto located = locate("point", PointSource::pick, images, *calibration);
+  const localization::PointObservation images[] = {{0, ap.project(point), noise},
+                                                   {1, lateral.project(point), noise}};
+  const auto located = localization::locate("point", localization::PointSource::pick, images, *calibration);
   if (!located) {
     std::cerr << code(located.error().reason) << ": " << located.error().message << '\n';
     return exit_code(located.error().reason);

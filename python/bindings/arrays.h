@@ -82,7 +82,7 @@ inline Eigen::MatrixXd matrix_of(const Doubles& array, py::ssize_t rows, py::ssi
 /// (height, width), rows from top to bottom. Without a copy: `owner` keeps the pixels alive, which are read
 /// only.
 template <class T>
-py::array view_of(const Image<T>& image, const py::handle& owner) {
+py::array view_of(const image::Image<T>& image, const py::handle& owner) {
   py::array_t<T> array({py::ssize_t(image.height()), py::ssize_t(image.width())}, image.pixels().data(),
                        owner);
   py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
@@ -91,9 +91,9 @@ py::array view_of(const Image<T>& image, const py::handle& owner) {
 
 /// The same for an image that nothing else holds.
 template <class T>
-py::array moved_to_array(Image<T> image) {
-  auto* held = new Image<T>(std::move(image));
-  const py::capsule owner(held, [](void* memory) { delete static_cast<Image<T>*>(memory); });
+py::array moved_to_array(image::Image<T> image) {
+  auto* held = new image::Image<T>(std::move(image));
+  const py::capsule owner(held, [](void* memory) { delete static_cast<image::Image<T>*>(memory); });
   return py::array_t<T>({py::ssize_t(held->height()), py::ssize_t(held->width())}, held->pixels().data(),
                         owner);
 }

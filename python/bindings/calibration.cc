@@ -29,14 +29,16 @@ std::size_t index_of(const HeldCalibration& calibration, const ViewKey& key) {
   raise({Reason::bad_value, fmt::format("view: the calibration has no view {}", text), {}, {}});
 }
 
-const CalibratedView& view_of(const HeldCalibration& calibration, const ViewKey& key) {
+const calibration::CalibratedView& view_of(const HeldCalibration& calibration, const ViewKey& key) {
   return calibration.views[index_of(calibration, key)];
 }
 
 /// The points of one view as calibrate takes them.
-ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
-                          const Doubles& sigma_px, const std::optional<std::vector<std::string>>& labels,
-                          const IntrinsicsPrior& prior, const std::optional<Doubles>& map_covariance_px2) {
+calibration::ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
+                                       const Doubles& sigma_px,
+                                       const std::optional<std::vector<std::string>>& labels,
+                                       const calibration::IntrinsicsPrior& prior,
+                                       const std::optional<Doubles>& map_covariance_px2) {
   const auto points = rows_of<3>(xyz_mm, "xyz_mm");
   const auto pixels = rows_of<2>(uv, "uv");
   const std::size_t n = points.size();
@@ -46,10 +48,10 @@ ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const 
            fmt::format("view {}: xyz_mm, uv, sigma_px and labels are not of one length", name),
            {},
            {}});
-  ViewFiducials view{name, {}, prior, {}, {}};
+  calibration::ViewFiducials view{name, {}, prior, {}, {}};
   for (std::size_t i = 0; i < n; ++i) {
-    Fiducial fiducial{labels ? (*labels)[i] : fmt::format("P{}", i + 1), points[i], FiducialStatus::used,
-                      pixels[i], pixels[i]};
+    fiducials::Fiducial fiducial{labels ? (*labels)[i] : fmt::format("P{}", i + 1), points[i],
+                                 fiducials::FiducialStatus::used, pixels[i], pixels[i]};
     fiducial.sigma_px = sigma_px.data()[sigma_px.ndim() == 0 ? 0 : i];
     view.fiducials.push_back(fiducial);
   }
@@ -59,21 +61,23 @@ ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const 
   return view;
 }
 
-HeldCalibration calibrated(const std::vector<ViewFiducials>& views, const CArmPrior& c_arm,
+HeldCalibration calibrated(const std::vector<calibration::ViewFiducials>& views,
+                           const calibration::CArmPrior& c_arm,
                            const std::optional<std::vector<Doubles>>& ball_covariance_mm2, double scale_sigma,
                            double rejection_probability, double largest_rms_px) {
-  CalibrationOptions options{{c_arm, {}, scale_sigma}, rejection_probability, largest_rms_px};
+  calibration::CalibrationOptions options{{c_arm, {}, scale_sigma}, rejection_probability, largest_rms_px};
   if (ball_covariance_mm2)
     for (const Doubles& one : *ball_covariance_mm2)
       options.common.ball_covariance_mm2.emplace_back(matrix_of(one, 3, 3, "ball_covariance_mm2"));
-  for (const ViewFiducials& view : views)
+  for (const calibration::ViewFiducials& view : views)
     if (ball_covariance_mm2 && view.fiducials.size() != ball_covariance_mm2->size())
       raise({Reason::bad_value,
              fmt::format("ball_covariance_mm2: {} matrices for the {} balls of view {}",
                          ball_covariance_mm2->size(), view.fiducials.size(), view.name),
              {},
              {}});
-  CalibrationResult result = value_or_raise(without_gil([&] { return calibrate(views, options); }));
+  calibration::CalibrationResult result =
+      value_or_raise(without_gil([&] { return calibration::calibrate(views, options); }));
   HeldCalibration held{result,         {}, result.fiducials, result.chi2, result.dof, result.variance_scale,
                        result.warnings};
   held.maps.resize(held.views.size());
@@ -81,52 +85,54 @@ HeldCalibration calibrated(const std::vector<ViewFiducials>& views, const CArmPr
 }
 
 HeldCalibration loaded(const std::filesystem::path& path) {
-  SavedCalibration saved =
-      value_or_raise(saved_calibration_from_json(value_or_raise(read_json(path)), path.filename().string()));
+  calibration::SavedCalibration saved = value_or_raise(
+      calibration::saved_calibration_from_json(value_or_raise(read_json(path)), path.filename().string()));
   return {saved, std::move(saved.maps), {}, {}, {}, {}, {}};
 }
 
 py::array projected(const HeldCalibration& calibration, const Doubles& xyz_mm, const ViewKey& key, bool raw) {
   const std::size_t which = index_of(calibration, key);
-  const View& view = calibration.views[which].view;
+  const geometry::View& view = calibration.views[which].view;
   const auto& map = calibration.maps[which];
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& point : rows_of<3>(xyz_mm, "xyz_mm")) {
     std::optional<Eigen::Vector2d> uv;
     if (view.depth(point) > 0) uv = view.project(point);
-    if (uv && raw && map) uv = raw_in_image(*map, *uv);
+    if (uv && raw && map) uv = rectification::raw_in_image(*map, *uv);
     pixels.push_back(uv.value_or(Eigen::Vector2d::Constant(nan)));
   }
   return rows_array<2>(pixels, xyz_mm.ndim() == 1);
 }
 
-PointObservation observation_from(const HeldCalibration& calibration, const ViewKey& key, const Doubles& uv,
-                                  std::optional<double> sigma_px, bool raw) {
+localization::PointObservation observation_from(const HeldCalibration& calibration, const ViewKey& key,
+                                                const Doubles& uv, std::optional<double> sigma_px, bool raw) {
   const auto pixels = rows_of<2>(uv, "observations");
   if (pixels.size() != 1) raise({Reason::bad_value, "observations: is not one (u, v) for each view", {}, {}});
   if (sigma_px && !(*sigma_px >= 0)) raise({Reason::bad_value, "sigma_px: is negative", {}, {}});
   const std::size_t view = index_of(calibration, key);
   const auto& map = calibration.maps[view];
-  const ImagePoint seen = raw && map ? value_or_raise(see_click(*map, pixels[0], sigma_px))
-                                     : ImagePoint{pixels[0], pixels[0], sigma_px.value_or(click_sigma_px)};
+  const fiducials::ImagePoint seen =
+      raw && map ? value_or_raise(fiducials::point_of_click(*map, pixels[0], sigma_px))
+                 : fiducials::ImagePoint{pixels[0], pixels[0], sigma_px.value_or(fiducials::click_sigma_px)};
   return {view, seen.uv, seen.sigma_px * seen.sigma_px * Eigen::Matrix2d::Identity()};
 }
 
-LocatedPoint located(const HeldCalibration& calibration, const std::map<ViewKey, Doubles>& observations,
-                     std::optional<double> sigma_px, bool raw, const std::string& name) {
-  std::vector<PointObservation> observed;
+localization::LocatedPoint located(const HeldCalibration& calibration,
+                                   const std::map<ViewKey, Doubles>& observations,
+                                   std::optional<double> sigma_px, bool raw, const std::string& name) {
+  std::vector<localization::PointObservation> observed;
   for (const auto& [key, uv] : observations)
     observed.push_back(observation_from(calibration, key, uv, sigma_px, raw));
-  return value_or_raise(locate(name, PointSource::pick, observed, calibration));
+  return value_or_raise(localization::locate(name, localization::PointSource::pick, observed, calibration));
 }
 
 py::array predicted(const HeldCalibration& calibration, const Doubles& xyz_mm, double sigma_px) {
   const auto points = rows_of<3>(xyz_mm, "xyz_mm");
   if (xyz_mm.ndim() == 1)
-    return matrix_array(value_or_raise(predict_covariance(points[0], sigma_px, calibration)));
+    return matrix_array(value_or_raise(localization::predict_covariance(points[0], sigma_px, calibration)));
   py::array_t<double> covariances({py::ssize_t(points.size()), py::ssize_t{3}, py::ssize_t{3}});
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto one = predict_covariance(points[i], sigma_px, calibration);
+    const auto one = localization::predict_covariance(points[i], sigma_px, calibration);
     const Eigen::Matrix3d covariance = one ? *one : Eigen::Matrix3d(Eigen::Matrix3d::Constant(nan));
     Eigen::Map<Eigen::Matrix3d>(covariances.mutable_data(py::ssize_t(i))) = covariance;
   }
@@ -138,9 +144,10 @@ py::dict tre_map(const HeldCalibration& calibration, const Doubles& centre_mm, d
   const auto centre = rows_of<3>(centre_mm, "centre_mm");
   if (centre.size() != 1 || !(half_mm > 0) || !(step_mm > 0) || half_mm / step_mm > 100)
     raise({Reason::bad_value, "tre_map: one centre, half_mm > 0, step_mm at least half_mm / 100", {}, {}});
-  auto* volume = new TreVolume(
-      without_gil([&] { return predict_tre(calibration, centre[0], half_mm, step_mm, sigma_px, threads); }));
-  const py::capsule owner(volume, [](void* memory) { delete static_cast<TreVolume*>(memory); });
+  auto* volume = new localization::TreVolume(without_gil([&] {
+    return localization::predict_tre(calibration, centre[0], half_mm, step_mm, sigma_px, threads);
+  }));
+  const py::capsule owner(volume, [](void* memory) { delete static_cast<localization::TreVolume*>(memory); });
   const py::ssize_t side = volume->side, size = sizeof(double);
   py::dict map;
   map["first_mm"] = rows_array<3>({volume->first}, true);
@@ -155,8 +162,9 @@ py::list fiducials(const HeldCalibration& calibration, const ViewKey& key) {
   py::list list;
   const std::size_t view = index_of(calibration, key);
   if (calibration.fiducials.empty()) return list;
-  for (const Fiducial& fiducial : calibration.fiducials[view]) {
-    const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+  for (const fiducials::Fiducial& fiducial : calibration.fiducials[view]) {
+    const bool seen = fiducial.status == fiducials::FiducialStatus::used ||
+                      fiducial.status == fiducials::FiducialStatus::rejected;
     const auto pixel = [&](const Eigen::Vector2d& uv) {
       return seen ? py::object(rows_array<2>({uv}, true)) : py::object(py::none());
     };
@@ -174,45 +182,49 @@ py::list fiducials(const HeldCalibration& calibration, const ViewKey& key) {
 }
 
 void add_priors(py::module_& module) {
-  const IntrinsicsPrior usual;
-  const auto pair_of = [](const std::optional<NormalPrior>& b) -> std::optional<std::pair<double, double>> {
+  const calibration::IntrinsicsPrior usual;
+  const auto pair_of =
+      [](const std::optional<calibration::NormalPrior>& b) -> std::optional<std::pair<double, double>> {
     if (!b) return std::nullopt;
     return std::pair(b->value, b->sigma);
   };
-  py::class_<IntrinsicsPrior>(module, "IntrinsicsPrior",
-                              R"(What is known of one view's intrinsics beforehand, rectified pixels.
+  py::class_<calibration::IntrinsicsPrior>(
+      module, "IntrinsicsPrior",
+      R"(What is known of one view's intrinsics beforehand, rectified pixels.
 
 focal_px: nominal mean of |fx| and fy; principal_px: (u, v); unit_px: the unit of CArmPrior in this view, px per mm on
 the receiver, or 1; aspect: (value, sigma) of |fx| / fy; skew: (value, sigma) over fy, None: free.)")
       .def(py::init([](std::optional<double> focal_px, const std::optional<Doubles>& principal_px,
                        double unit_px, const std::optional<std::pair<double, double>>& aspect,
                        const std::optional<std::pair<double, double>>& skew) {
-             IntrinsicsPrior prior;
+             calibration::IntrinsicsPrior prior;
              prior.focal_px = focal_px;
              if (principal_px) prior.principal_px = rows_of<2>(*principal_px, "principal_px").at(0);
              prior.unit_px = unit_px;
              prior.aspect.reset();
              prior.skew.reset();
-             if (aspect) prior.aspect = NormalPrior{aspect->first, aspect->second};
-             if (skew) prior.skew = NormalPrior{skew->first, skew->second};
+             if (aspect) prior.aspect = calibration::NormalPrior{aspect->first, aspect->second};
+             if (skew) prior.skew = calibration::NormalPrior{skew->first, skew->second};
              return prior;
            }),
            py::kw_only(), py::arg("focal_px") = usual.focal_px, py::arg("principal_px") = py::none(),
            py::arg("unit_px") = usual.unit_px, py::arg("aspect") = pair_of(usual.aspect),
            py::arg("skew") = pair_of(usual.skew));
-  py::class_<CArmPrior>(module, "CArmPrior",
-                        R"(How far a C-arm's intrinsics may be from nominal: standard deviations.
+  py::class_<calibration::CArmPrior>(module, "CArmPrior",
+                                     R"(How far a C-arm's intrinsics may be from nominal: standard deviations.
 
 focal, principal: (common to all views, of each view: sag), in units of IntrinsicsPrior.unit_px; None: not known.)")
       .def(py::init([](const std::optional<std::pair<double, double>>& focal,
                        const std::optional<std::pair<double, double>>& principal) {
-             CArmPrior prior;
-             if (focal) prior.focal = IntrinsicsVariation{focal->first, focal->second};
-             if (principal) prior.principal = IntrinsicsVariation{principal->first, principal->second};
+             calibration::CArmPrior prior;
+             if (focal) prior.focal = calibration::IntrinsicsVariation{focal->first, focal->second};
+             if (principal)
+               prior.principal = calibration::IntrinsicsVariation{principal->first, principal->second};
              return prior;
            }),
            py::kw_only(), py::arg("focal") = py::none(), py::arg("principal") = py::none());
-  py::class_<ViewFiducials>(module, "ViewPoints", R"(Labelled image points of one view, for calibrate.
+  py::class_<calibration::ViewFiducials>(module, "ViewPoints",
+                                         R"(Labelled image points of one view, for calibrate.
 
 ViewPoints(name, xyz_mm, uv, *, sigma_px, labels=None, prior=IntrinsicsPrior(), map_covariance_px2=None)
   xyz_mm: (N, 3) world, mm; uv: (N, 2) pixels free of distortion; sigma_px: per axis, one number or (N,)
@@ -221,37 +233,44 @@ Raises InputError: bad_value, not_finite.)")
       .def(py::init(&view_points), py::arg("name"), py::arg("xyz_mm"), py::arg("uv"), py::kw_only(),
            py::arg("sigma_px"), py::arg("labels") = py::none(), py::arg("prior") = usual,
            py::arg("map_covariance_px2") = py::none())
-      .def_readonly("name", &ViewFiducials::name)
-      .def("__len__", [](const ViewFiducials& view) { return view.fiducials.size(); });
+      .def_readonly("name", &calibration::ViewFiducials::name)
+      .def("__len__", [](const calibration::ViewFiducials& view) { return view.fiducials.size(); });
 }
 
 void add_points(py::module_& module) {
-  py::class_<LocatedPoint>(module, "LocatedPoint", "A point in space with its confidence region.")
-      .def_readonly("name", &LocatedPoint::name)
+  py::class_<localization::LocatedPoint>(module, "LocatedPoint",
+                                         "A point in space with its confidence region.")
+      .def_readonly("name", &localization::LocatedPoint::name)
       .def_property_readonly(
-          "xyz_mm", [](const LocatedPoint& p) { return rows_array<3>({p.point_in_anchor}, true); },
+          "xyz_mm",
+          [](const localization::LocatedPoint& p) { return rows_array<3>({p.point_in_anchor}, true); },
           "(3,) calibrator frame, mm.")
       .def_property_readonly(
-          "covariance_mm2", [](const LocatedPoint& p) { return matrix_array(p.covariance_in_anchor); },
+          "covariance_mm2",
+          [](const localization::LocatedPoint& p) { return matrix_array(p.covariance_in_anchor); },
           "(3, 3) mm^2.")
       .def_property_readonly(
-          "error_95_mm", [](const LocatedPoint& p) { return length_at_95(p.covariance_in_anchor); },
+          "error_95_mm",
+          [](const localization::LocatedPoint& p) {
+            return localization::length_at_95(p.covariance_in_anchor);
+          },
           "95 % of the errors with this covariance are no longer, mm.")
-      .def_property_readonly("predicted_rms_mm", &LocatedPoint::predicted_rms_mm,
+      .def_property_readonly("predicted_rms_mm", &localization::LocatedPoint::predicted_rms_mm,
                              "Root of the covariance's trace, mm.")
-      .def_readonly("ray_gap_mm", &LocatedPoint::ray_gap_mm, "Largest distance between two of the rays, mm.")
-      .def_readonly("chi2", &LocatedPoint::chi2, "2n - 3 degrees of freedom with n views.")
-      .def_readonly("views", &LocatedPoint::views)
+      .def_readonly("ray_gap_mm", &localization::LocatedPoint::ray_gap_mm,
+                    "Largest distance between two of the rays, mm.")
+      .def_readonly("chi2", &localization::LocatedPoint::chi2, "2n - 3 degrees of freedom with n views.")
+      .def_readonly("views", &localization::LocatedPoint::views)
       .def_property_readonly(
           "warning",
-          [](const LocatedPoint& p) {
+          [](const localization::LocatedPoint& p) {
             return p.missing_rays ? py::object(warning_dict(*p.missing_rays)) : py::object(py::none());
           },
           "residual_too_large where the rays miss each other and the covariance was enlarged; else None.")
-      .def("__repr__", [](const LocatedPoint& p) {
+      .def("__repr__", [](const localization::LocatedPoint& p) {
         return fmt::format("<LocatedPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %)>", p.name,
                            p.point_in_anchor.x(), p.point_in_anchor.y(), p.point_in_anchor.z(),
-                           length_at_95(p.covariance_in_anchor));
+                           localization::length_at_95(p.covariance_in_anchor));
       });
 }
 
@@ -328,7 +347,7 @@ a click. Returns a LocatedPoint. Raises RefusedError: not_seen, parallel_rays, p
 
 Returns {"first_mm": (3,), "step_mm", "rms_mm": (n, n, n) indexed [x, y, z], not copied, NaN where no point can be
 located}. Releases the GIL. Raises InputError: bad_value.)");
-  const CalibrationOptions usual;
+  const calibration::CalibrationOptions usual;
   module.def("calibrate", &calibrated, py::arg("views"), py::kw_only(), py::arg("c_arm") = usual.common.c_arm,
              py::arg("ball_covariance_mm2") = py::none(), py::arg("scale_sigma") = usual.common.scale_sigma,
              py::arg("rejection_probability") = usual.rejection_probability,

@@ -20,21 +20,21 @@ namespace {
 
 using ViewKey = std::variant<std::size_t, std::string>;
 
-std::size_t index_of(const Result& result, const ViewKey& key) {
+std::size_t index_of(const pipeline::Result& result, const ViewKey& key) {
   for (std::size_t i = 0; i < result.views.size(); ++i)
     if (key == ViewKey(i) || key == ViewKey(result.views[i].name)) return i;
   raise({Reason::bad_value, "view: the result has no such view", {}, {}});
 }
 
-Result run(const std::filesystem::path& folder, const std::string& method, std::optional<double> max_error_mm,
-           unsigned threads, const std::optional<std::filesystem::path>& history,
-           const py::object& progress) {
-  RunOptions options;
+pipeline::Result run(const std::filesystem::path& folder, const std::string& method,
+                     std::optional<double> max_error_mm, unsigned threads,
+                     const std::optional<std::filesystem::path>& history, const py::object& progress) {
+  pipeline::RunOptions options;
   options.method = method_of(method);
   options.max_error_mm = max_error_mm;
   options.threads = threads;
-  value_or_raise(check_fields<RunOptions>(run_fields, options, "run_case"));
-  if (history) options.history = value_or_raise(read_history(*history));
+  value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options, "run_case"));
+  if (history) options.history = value_or_raise(calibration::read_history(*history));
   if (!progress.is_none())
     options.on_stage = [&](std::string_view stage) {
       const py::gil_scoped_acquire acquire;
@@ -45,17 +45,18 @@ Result run(const std::filesystem::path& folder, const std::string& method, std::
       const py::gil_scoped_acquire acquire;
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C ends the run between stages
     };
-  Result result = value_or_raise(without_gil([&] {
-    return read_case(folder).and_then([&](const Case& given) { return run_case(given, options); });
+  pipeline::Result result = value_or_raise(without_gil([&] {
+    return pipeline::read_case(folder).and_then(
+        [&](const pipeline::Case& given) { return pipeline::run_case(given, options); });
   }));
   result.options.on_stage = nullptr;
   if (result.failure) raise(*result.failure, py::cast(result));
   return result;
 }
 
-HeldCalibration calibration_of(const Result& result) {
+HeldCalibration calibration_of(const pipeline::Result& result) {
   HeldCalibration held{{{}, result.joint_covariance}, {}, {}, {}, {}, {}, {}};
-  for (const ViewResult& view : result.views) {
+  for (const pipeline::ViewResult& view : result.views) {
     if (!view.calibrated || !view.rectification || !view.found)
       raise({result.failure ? result.failure->reason : Reason::too_few_fiducials,
              "the views were not calibrated",
@@ -68,10 +69,10 @@ HeldCalibration calibration_of(const Result& result) {
   return held;
 }
 
-void write(const Result& result, const std::filesystem::path& folder) {
+void write(const pipeline::Result& result, const std::filesystem::path& folder) {
   const auto written = without_gil([&] {
-    return write_report(result, folder).and_then([&] {
-      return write_file(folder / "result.json", to_text(to_json(result)) + "\n");
+    return report::write_report(result, folder).and_then([&] {
+      return write_file(folder / "result.json", to_text(pipeline::to_json(result)) + "\n");
     });
   });
   value_or_raise(written);
@@ -94,7 +95,7 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   for (const std::string& word : views) options.views.push_back(value_or_raise(view_angles(word)));
   if (ct) {
     CtOptions body;
-    body.volume = value_or_raise(read_volume(*ct));
+    body.volume = value_or_raise(volume::read_volume(*ct));
     body.name = ct->filename().string();
     options.ct = std::make_shared<const CtOptions>(std::move(body));
   }
@@ -108,36 +109,39 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
 }
 
 void add_points(py::module_& module) {
-  using Point = PointResult;
+  using Point = pipeline::PointResult;
   const auto of_place = [](auto get) {
     return [get](const Point& p) -> py::object { return p.place ? get(*p.place) : py::none(); };
   };
   py::class_<Point>(module, "ResultPoint", "A pick or check target of a case: its place, or why it has none.")
       .def_readonly("name", &Point::name)
-      .def_property_readonly("source",
-                             [](const Point& p) { return p.source == PointSource::pick ? "pick" : "target"; })
       .def_property_readonly(
-          "xyz_mm", of_place([](const PointInFrames& g) -> py::object {
+          "source",
+          [](const Point& p) { return p.source == localization::PointSource::pick ? "pick" : "target"; })
+      .def_property_readonly(
+          "xyz_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
             return rows_array<3>({g.in_calibrator}, true);
           }),
           "(3,) calibrator frame at the first view's moment, mm; None where it was not located.")
-      .def_property_readonly("covariance_mm2", of_place([](const PointInFrames& g) -> py::object {
+      .def_property_readonly("covariance_mm2", of_place([](const guidance::PointInFrames& g) -> py::object {
                                return matrix_array(g.covariance_in_calibrator);
                              }),
                              "(3, 3) mm^2, or None.")
-      .def_property_readonly("error_95_mm", of_place([](const PointInFrames& g) -> py::object {
-                               return py::float_(length_at_95(g.covariance_in_calibrator));
+      .def_property_readonly("error_95_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
+                               return py::float_(localization::length_at_95(g.covariance_in_calibrator));
                              }),
                              "95 % of the errors with this covariance are no longer, mm; or None.")
-      .def_property_readonly("in_femur_mm",
-                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_femur); }),
+      .def_property_readonly("in_femur_mm", of_place([](const guidance::PointInFrames& g) {
+                               return vector_array<3>(g.in_femur);
+                             }),
                              "(3,) or None.")
-      .def_property_readonly("in_tibia_mm",
-                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_tibia); }),
+      .def_property_readonly("in_tibia_mm", of_place([](const guidance::PointInFrames& g) {
+                               return vector_array<3>(g.in_tibia);
+                             }),
                              "(3,) or None.")
-      .def_property_readonly("in_tool_mm",
-                             of_place([](const PointInFrames& g) { return vector_array<3>(g.in_tool); }),
-                             "(3,) or None.")
+      .def_property_readonly(
+          "in_tool_mm", of_place([](const guidance::PointInFrames& g) { return vector_array<3>(g.in_tool); }),
+          "(3,) or None.")
       .def_readonly("ray_gap_mm", &Point::ray_gap_mm)
       .def_property_readonly(
           "reason",
@@ -149,7 +153,8 @@ void add_points(py::module_& module) {
         if (!p.place) return fmt::format("<ResultPoint {}: not located>", p.name);
         const Eigen::Vector3d& at = p.place->in_calibrator;
         return fmt::format("<ResultPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %)>", p.name,
-                           at.x(), at.y(), at.z(), length_at_95(p.place->covariance_in_calibrator));
+                           at.x(), at.y(), at.z(),
+                           localization::length_at_95(p.place->covariance_in_calibrator));
       });
 }
 
@@ -157,22 +162,22 @@ void add_points(py::module_& module) {
 
 void add_cases(py::module_& module) {
   add_points(module);
-  py::class_<Result>(module, "Result", "The answer of run_case; to_dict() is result.json.")
-      .def_property_readonly("status", [](const Result& r) { return r.failure ? "refused" : "ok"; })
-      .def_property_readonly("warnings", [](const Result& r) { return warning_list(r.warnings); })
+  py::class_<pipeline::Result>(module, "Result", "The answer of run_case; to_dict() is result.json.")
+      .def_property_readonly("status", [](const pipeline::Result& r) { return r.failure ? "refused" : "ok"; })
+      .def_property_readonly("warnings", [](const pipeline::Result& r) { return warning_list(r.warnings); })
       .def_property_readonly(
           "names",
-          [](const Result& r) {
+          [](const pipeline::Result& r) {
             std::vector<std::string> names;
-            for (const ViewResult& view : r.views) names.push_back(view.name);
+            for (const pipeline::ViewResult& view : r.views) names.push_back(view.name);
             return names;
           },
           "Of the views.")
-      .def_readonly("points", &Result::points, "List of ResultPoint: picks, then check targets.")
+      .def_readonly("points", &pipeline::Result::points, "List of ResultPoint: picks, then check targets.")
       .def(
           "point",
-          [](const Result& r, const std::string& name) {
-            for (const PointResult& point : r.points)
+          [](const pipeline::Result& r, const std::string& name) {
+            for (const pipeline::PointResult& point : r.points)
               if (point.name == name) return point;
             raise({Reason::bad_value, fmt::format("no point \"{}\"", name), {}, {}});
           },
@@ -181,33 +186,34 @@ void add_cases(py::module_& module) {
                              "Calibration; RefusedError where it was not reached.")
       .def(
           "image",
-          [](const Result& r, const ViewKey& key) {
-            return std::const_pointer_cast<XrayImage>(r.views[index_of(r, key)].xray_image);
+          [](const pipeline::Result& r, const ViewKey& key) {
+            return std::const_pointer_cast<xray::XrayImage>(r.views[index_of(r, key)].xray_image);
           },
           py::arg("view"), "The view's XrayImage, not copied; None where it was not read.")
       .def(
           "rectified_image",
-          [](const Result& r, const ViewKey& key) {
-            const ViewResult& view = r.views[index_of(r, key)];
+          [](const pipeline::Result& r, const ViewKey& key) {
+            const pipeline::ViewResult& view = r.views[index_of(r, key)];
             if (!view.xray_image) raise({Reason::missing_file, "the image was not read", view.name, {}});
-            return moved_to_array(without_gil([&] { return rectified_image(view); }));
+            return moved_to_array(without_gil([&] { return report::rectified_image(view); }));
           },
           py::arg("view"), "(height, width) uint8: rectified and windowed for the eye.")
       .def(
           "overlay_png",
-          [](const Result& r, const ViewKey& key) {
+          [](const pipeline::Result& r, const ViewKey& key) {
             const std::size_t view = index_of(r, key);
-            return py::bytes(without_gil([&] { return overlay_png(r, view); }));
+            return py::bytes(without_gil([&] { return report::overlay_png(r, view); }));
           },
           py::arg("view"), "PNG file content: fiducials, points, planned tunnels on the rectified image.")
       .def(
-          "to_dict", [](const Result& r) { return python_from(to_json(r)); }, "The content of result.json.")
+          "to_dict", [](const pipeline::Result& r) { return python_from(pipeline::to_json(r)); },
+          "The content of result.json.")
       .def("write", &write, py::arg("folder"),
            "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.");
-  const RunOptions usual;
+  const pipeline::RunOptions usual;
   module.def(
       "run_case", &run, py::arg("folder"), py::kw_only(),
-      py::arg("method") = std::string(method_words[std::size_t(usual.method)]),
+      py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
       py::arg("max_error_mm") = usual.max_error_mm, py::arg("threads") = usual.threads,
       py::arg("history") = py::none(), py::arg("progress") = py::none(),
       R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics.

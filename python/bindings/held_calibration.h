@@ -10,9 +10,9 @@
 namespace helicarm::python {
 
 /// helicarm.Calibration: calibrated views, and what is known of them where it is known.
-struct HeldCalibration : Calibration {
-  std::vector<std::optional<DistortionMap>> maps;  ///< per view
-  std::vector<std::vector<Fiducial>> fiducials;    ///< per view; empty: not known
+struct HeldCalibration : calibration::Calibration {
+  std::vector<std::optional<rectification::DistortionMap>> maps;  ///< per view
+  std::vector<std::vector<fiducials::Fiducial>> fiducials;        ///< per view; empty: not known
   std::optional<double> chi2;
   std::optional<int> dof;
   std::optional<double> variance_scale;

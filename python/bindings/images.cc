@@ -41,22 +41,22 @@ std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
   return spacing;
 }
 
-XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
-                     std::optional<double> source_detector_mm,
-                     const std::optional<std::pair<float, float>>& range, const std::string& name) {
-  if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > max_image_side ||
-      pixels.shape(1) > max_image_side)
+xray::XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
+                           std::optional<double> source_detector_mm,
+                           const std::optional<std::pair<float, float>>& range, const std::string& name) {
+  if (pixels.ndim() != 2 || pixels.size() == 0 || pixels.shape(0) > image::max_image_side ||
+      pixels.shape(1) > image::max_image_side)
     raise({Reason::bad_size,
            fmt::format("pixels: shape {} is not (height, width) with sides from 1 to {}", shape_of(pixels),
-                       max_image_side),
+                       image::max_image_side),
            {},
            {}});
-  XrayImage image;
+  xray::XrayImage image;
   std::tie(image.lowest, image.highest) = range_of(pixels, range);
   const Floats values = Floats::ensure(pixels);
   if (!values) raise({Reason::bad_value, "pixels: are not numbers", {}, {}});
   image.name = name;
-  image.pixels = Image<float>(int(values.shape(1)), int(values.shape(0)));
+  image.pixels = image::Image<float>(int(values.shape(1)), int(values.shape(0)));
   for (std::size_t i = 0; i < image.pixels.pixels().size(); ++i) {
     if (!std::isfinite(values.data()[i])) raise({Reason::not_finite, "pixels: hold NaN or infinity", {}, {}});
     image.pixels.pixels()[i] = values.data()[i];
@@ -66,9 +66,9 @@ XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
   return image;
 }
 
-py::dict marks(const XrayImage& image, const std::string& kind) {
-  const MarkKind which = value_or_raise(mark_kind(kind));
-  const std::vector<Dot> dots = without_gil([&] { return find_marks(image, which); });
+py::dict marks(const xray::XrayImage& image, const std::string& kind) {
+  const detection::MarkKind which = value_or_raise(detection::mark_kind(kind));
+  const std::vector<detection::Dot> dots = without_gil([&] { return detection::find_marks(image, which); });
   std::vector<Eigen::Vector2d> uv;
   py::array_t<double> sigma(py::ssize_t(dots.size())), radius(py::ssize_t(dots.size()));
   for (std::size_t i = 0; i < dots.size(); ++i) {
@@ -83,16 +83,18 @@ py::dict marks(const XrayImage& image, const std::string& kind) {
   return found;
 }
 
-std::shared_ptr<XrayImage> image_at(const std::filesystem::path& path, std::optional<int> frame,
-                                    const std::optional<std::string>& name) {
-  auto image = without_gil([&] { return read_xray_image(path, name.value_or(path.stem().string()), frame); });
-  return std::make_shared<XrayImage>(value_or_raise(std::move(image)));
+std::shared_ptr<xray::XrayImage> image_at(const std::filesystem::path& path, std::optional<int> frame,
+                                          const std::optional<std::string>& name) {
+  auto image =
+      without_gil([&] { return xray::read_xray_image(path, name.value_or(path.stem().string()), frame); });
+  return std::make_shared<xray::XrayImage>(value_or_raise(std::move(image)));
 }
 
 }  // namespace
 
 void add_images(py::module_& module) {
-  py::class_<XrayImage, std::shared_ptr<XrayImage>>(module, "XrayImage", R"(An X-ray image as stored.
+  py::class_<xray::XrayImage, std::shared_ptr<xray::XrayImage>>(module, "XrayImage",
+                                                                R"(An X-ray image as stored.
 
 Pixels are neither flipped nor turned. Pixel (0, 0) is the centre of the top-left pixel; u (column) runs right,
 v (row) down. Points are always (u, v); arrays are indexed [v, u].
@@ -107,23 +109,23 @@ Raises InputError: bad_size, bad_value, not_finite.)")
            py::arg("source_detector_mm"), py::arg("range") = py::none(), py::arg("name") = "")
       .def_property_readonly(
           "pixels",
-          [](const py::object& self) { return view_of(self.cast<const XrayImage&>().pixels, self); },
+          [](const py::object& self) { return view_of(self.cast<const xray::XrayImage&>().pixels, self); },
           "(height, width) float32, read only, not copied: it shares the image's memory.")
-      .def_readonly("name", &XrayImage::name)
+      .def_readonly("name", &xray::XrayImage::name)
       .def_property_readonly(
-          "shape", [](const XrayImage& i) { return std::pair(i.pixels.height(), i.pixels.width()); },
+          "shape", [](const xray::XrayImage& i) { return std::pair(i.pixels.height(), i.pixels.width()); },
           "(height, width)")
       .def_property_readonly(
-          "range", [](const XrayImage& i) { return std::pair(i.lowest, i.highest); },
+          "range", [](const xray::XrayImage& i) { return std::pair(i.lowest, i.highest); },
           "Least and greatest grey value that the file could have stored.")
       .def_property_readonly(
-          "pixel_mm", [](const XrayImage& i) { return vector_array<2>(i.acquisition.pixel_mm); },
+          "pixel_mm", [](const xray::XrayImage& i) { return vector_array<2>(i.acquisition.pixel_mm); },
           "(column, row) spacing on the detector, mm; None where the file does not say.")
       .def_property_readonly(
-          "source_detector_mm", [](const XrayImage& i) { return i.acquisition.source_detector_mm; },
+          "source_detector_mm", [](const xray::XrayImage& i) { return i.acquisition.source_detector_mm; },
           "mm, or None.")
-      .def_property_readonly("warnings", [](const XrayImage& i) { return warning_list(i.warnings); })
-      .def("__repr__", [](const XrayImage& i) {
+      .def_property_readonly("warnings", [](const xray::XrayImage& i) { return warning_list(i.warnings); })
+      .def("__repr__", [](const xray::XrayImage& i) {
         return fmt::format("<XrayImage {}: {} x {} pixels>", i.name, i.pixels.width(), i.pixels.height());
       });
   module.def("read_image", &image_at, py::arg("path"), py::kw_only(), py::arg("frame") = py::none(),

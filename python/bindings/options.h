@@ -8,6 +8,6 @@
 namespace helicarm::python {
 
 /// "best" or "paper"; InputError (usage) for another word.
-Method method_of(const std::string& word);
+rectification::Method method_of(const std::string& word);
 
 }  // namespace helicarm::python

@@ -16,7 +16,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// NaN where the map leads off the image.
 template <class Carry>
-py::array carried(const DistortionMap& map, const Doubles& points, Carry carry) {
+py::array carried(const rectification::DistortionMap& map, const Doubles& points, Carry carry) {
   auto rows = rows_of<2>(points, "uv");
   without_gil([&] {
     for (Eigen::Vector2d& row : rows) row = carry(map, row).value_or(Eigen::Vector2d::Constant(nan));
@@ -24,64 +24,66 @@ py::array carried(const DistortionMap& map, const Doubles& points, Carry carry) 
   return rows_array<2>(rows, points.ndim() == 1);
 }
 
-py::array sigmas(const DistortionMap& map, const Doubles& points) {
+py::array sigmas(const rectification::DistortionMap& map, const Doubles& points) {
   const auto rows = rows_of<2>(points, "uv");
   py::array_t<double> sigma(py::ssize_t(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) sigma.mutable_at(i) = map.sigma_px(rows[i]);
   return sigma;
 }
 
-py::array rectified_pixels(const DistortionMap& map, const XrayImage& image) {
+py::array rectified_pixels(const rectification::DistortionMap& map, const xray::XrayImage& image) {
   if (image.pixels.width() != map.width || image.pixels.height() != map.height)
     raise({Reason::bad_size,
            fmt::format("the image has {} x {} pixels, the map is for {} x {}", image.pixels.width(),
                        image.pixels.height(), map.width, map.height),
            {},
            {}});
-  return moved_to_array(without_gil([&] { return resample(image, map); }));
+  return moved_to_array(without_gil([&] { return rectification::resample(image, map); }));
 }
 
-DistortionMap loaded(const std::filesystem::path& path) {
-  return value_or_raise(distortion_map_from_json(value_or_raise(read_json(path)), path.filename().string()));
+rectification::DistortionMap loaded(const std::filesystem::path& path) {
+  return value_or_raise(
+      rectification::distortion_map_from_json(value_or_raise(read_json(path)), path.filename().string()));
 }
 
-Rectification rectified(const XrayImage& image, const std::variant<Plate, std::string>& plate,
-                        const std::string& method) {
-  const RectificationOptions options{method_of(method), {}};
-  const Plate given = std::holds_alternative<Plate>(plate)
-                          ? std::get<Plate>(plate)
-                          : value_or_raise(plate_named(std::get<std::string>(plate), "."));
-  return value_or_raise(without_gil([&] { return rectify(image, given, options); }));
+rectification::Rectification rectified(const xray::XrayImage& image,
+                                       const std::variant<phantom::Plate, std::string>& plate,
+                                       const std::string& method) {
+  const rectification::RectificationOptions options{method_of(method), {}};
+  const phantom::Plate given = std::holds_alternative<phantom::Plate>(plate)
+                                   ? std::get<phantom::Plate>(plate)
+                                   : value_or_raise(phantom::plate_named(std::get<std::string>(plate), "."));
+  return value_or_raise(without_gil([&] { return rectification::rectify(image, given, options); }));
 }
 
-py::array dots(const Rectification& r) {
+py::array dots(const rectification::Rectification& r) {
   std::vector<Eigen::Vector2d> rows;
-  for (const Dot& dot : r.plate_dots) rows.push_back(dot.centre_px);
+  for (const detection::Dot& dot : r.plate_dots) rows.push_back(dot.centre_px);
   return rows_array<2>(rows);
 }
 
 }  // namespace
 
-Method method_of(const std::string& word) {
-  const auto found = std::ranges::find(method_words, word);
-  if (found == method_words.end())
+rectification::Method method_of(const std::string& word) {
+  const auto found = std::ranges::find(pipeline::method_words, word);
+  if (found == pipeline::method_words.end())
     raise({Reason::usage,
-           fmt::format("method: \"{}\" is none of: {}", word, fmt::join(method_words, ", ")),
+           fmt::format("method: \"{}\" is none of: {}", word, fmt::join(pipeline::method_words, ", ")),
            {},
            {}});
-  return Method(found - method_words.begin());
+  return rectification::Method(found - pipeline::method_words.begin());
 }
 
 void add_rectification(py::module_& module) {
-  py::class_<DistortionMap>(module, "DistortionMap",
-                            R"(Raw pixels of an image to rectified ones, and back (Eq. 1).
+  py::class_<rectification::DistortionMap>(module, "DistortionMap",
+                                           R"(Raw pixels of an image to rectified ones, and back (Eq. 1).
 
 Both directions agree: one is the numerical inverse of the other. Rectified pixels have the raw scale and no rotation at
 the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-left pixel.)")
       .def_static(
           "identity",
           [](int width, int height, std::optional<double> pixel_mm) {
-            return identity_map(width, height, pixel_mm);
+            return rectification::identity_map(width, height, pixel_mm);
           },
           py::arg("width"), py::arg("height"), py::arg("pixel_mm") = py::none(),
           "Of a flat panel: no distortion. pixel_mm: detector pixel, mm, or None.")
@@ -89,29 +91,34 @@ the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-l
       .def_static(
           "from_dict",
           [](const py::object& dict) {
-            return value_or_raise(distortion_map_from_json(json_from(dict), "dict"));
+            return value_or_raise(rectification::distortion_map_from_json(json_from(dict), "dict"));
           },
           py::arg("dict"), "From the content of map.json. Raises InputError.")
       .def(
           "save",
-          [](const DistortionMap& map, const std::filesystem::path& path) {
-            value_or_raise(write_file(path, to_text(to_json(map)) + "\n"));
+          [](const rectification::DistortionMap& map, const std::filesystem::path& path) {
+            value_or_raise(write_file(path, to_text(rectification::to_json(map)) + "\n"));
           },
           py::arg("path"),
           "Writes map.json, which load reads back to the last bit. Raises InputError: cannot_write.")
       .def(
-          "to_dict", [](const DistortionMap& map) { return python_from(to_json(map)); },
+          "to_dict",
+          [](const rectification::DistortionMap& map) { return python_from(rectification::to_json(map)); },
           "The content of map.json.")
       .def(
           "rectified_from_raw",
-          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, rectified_in_image); },
+          [](const rectification::DistortionMap& map, const Doubles& uv) {
+            return carried(map, uv, rectification::rectified_in_image);
+          },
           py::arg("uv"), R"((N, 2) or (2,) raw pixels to rectified ones, same shape.
 
 NaN for points off the image and where the map folds: it is not extrapolated. Releases the GIL.
 Raises InputError: bad_value for another shape, not_finite.)")
       .def(
           "raw_from_rectified",
-          [](const DistortionMap& map, const Doubles& uv) { return carried(map, uv, raw_in_image); },
+          [](const rectification::DistortionMap& map, const Doubles& uv) {
+            return carried(map, uv, rectification::raw_in_image);
+          },
           py::arg("uv"), "The inverse: (N, 2) or (2,) rectified pixels to raw ones. As rectified_from_raw.")
       .def("rectify_image", &rectified_pixels, py::arg("image"),
            R"(An XrayImage resampled to rectified pixels (Eq. 3): (height, width) float32, same size.
@@ -120,43 +127,46 @@ Outside the raw image it holds the lowest grey value. The array owns its pixels.
 Raises InputError: bad_size where the map is for another image size.)")
       .def("sigma_px", &sigmas, py::arg("uv"),
            "(N,) standard deviation per axis of the map itself at rectified pixels.")
-      .def_readonly("model", &DistortionMap::model)
-      .def_readonly("order", &DistortionMap::order, "Of the polynomial; 0: the identity.")
-      .def_readonly("residual_rms_px", &DistortionMap::residual_rms_px)
-      .def_readonly("residual_max_px", &DistortionMap::residual_max_px)
-      .def_readonly("held_out_rms_px", &DistortionMap::held_out_rms_px)
-      .def_readonly("rectified_pixel_mm", &DistortionMap::rectified_pixel_mm, "mm, or None.")
+      .def_readonly("model", &rectification::DistortionMap::model)
+      .def_readonly("order", &rectification::DistortionMap::order, "Of the polynomial; 0: the identity.")
+      .def_readonly("residual_rms_px", &rectification::DistortionMap::residual_rms_px)
+      .def_readonly("residual_max_px", &rectification::DistortionMap::residual_max_px)
+      .def_readonly("held_out_rms_px", &rectification::DistortionMap::held_out_rms_px)
+      .def_readonly("rectified_pixel_mm", &rectification::DistortionMap::rectified_pixel_mm, "mm, or None.")
       .def_property_readonly(
           "rectified_plane",
-          [](const DistortionMap& map) -> std::optional<std::string> {
+          [](const rectification::DistortionMap& map) -> std::optional<std::string> {
             if (!map.rectified_plane) return std::nullopt;
-            return map.rectified_plane == RectifiedPlane::detector ? "detector" : "plate";
+            return map.rectified_plane == rectification::RectifiedPlane::detector ? "detector" : "plate";
           },
           "\"detector\", \"plate\" or None: where rectified_pixel_mm holds.")
       .def_property_readonly(
-          "shape", [](const DistortionMap& map) { return std::pair(map.height, map.width); },
+          "shape", [](const rectification::DistortionMap& map) { return std::pair(map.height, map.width); },
           "(height, width) of the image it belongs to.")
-      .def("__repr__", [](const DistortionMap& map) {
+      .def("__repr__", [](const rectification::DistortionMap& map) {
         return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model, map.width, map.height);
       });
-  py::class_<Rectification>(module, "Rectification", "What one image of the plate gives.")
-      .def_readonly("map", &Rectification::map, "DistortionMap")
+  py::class_<rectification::Rectification>(module, "Rectification", "What one image of the plate gives.")
+      .def_readonly("map", &rectification::Rectification::map, "DistortionMap")
       .def_property_readonly("uv_raw", &dots, "(N, 2) plate dots used, raw pixels.")
       .def_property_readonly(
           "residual_px",
-          [](const Rectification& r) {
+          [](const rectification::Rectification& r) {
             return py::array_t<double>(py::ssize_t(r.residual_px.size()), r.residual_px.data());
           },
           "(N,) distance of each from the map.")
-      .def_readonly("dots_found", &Rectification::dots_found)
-      .def_readonly("dots_expected", &Rectification::dots_expected, "None for an unbounded lattice.")
-      .def_readonly("raw_mean_px", &Rectification::raw_mean_px,
+      .def_readonly("dots_found", &rectification::Rectification::dots_found)
+      .def_readonly("dots_expected", &rectification::Rectification::dots_expected,
+                    "None for an unbounded lattice.")
+      .def_readonly("raw_mean_px", &rectification::Rectification::raw_mean_px,
                     "Mean distance from raw to rectified: the distortion.")
-      .def_readonly("raw_max_px", &Rectification::raw_max_px)
-      .def_property_readonly("warnings", [](const Rectification& r) { return warning_list(r.warnings); });
-  module.def("rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
-             py::arg("method") = std::string(method_words[std::size_t(RunOptions{}.method)]),
-             R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
+      .def_readonly("raw_max_px", &rectification::Rectification::raw_max_px)
+      .def_property_readonly("warnings",
+                             [](const rectification::Rectification& r) { return warning_list(r.warnings); });
+  module.def(
+      "rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
+      py::arg("method") = std::string(pipeline::method_words[std::size_t(pipeline::RunOptions{}.method)]),
+      R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
 
 plate: a Plate, a built-in's name ("plate48") or a path of a plate.json below the current folder. method: "best" or
 "paper". Releases the GIL. Raises RefusedError: blank_image, saturated, plate_not_found, plate_mismatch.)");

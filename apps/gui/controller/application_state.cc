@@ -5,14 +5,15 @@
 
 namespace helicarm::gui {
 
-const Pick* pick_of(const ApplicationState& state, const std::string& point, const std::string& view) {
+const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,
+                              const std::string& view) {
   const auto pick = std::ranges::find_if(
-      state.picks, [&](const Pick& other) { return other.name == point && other.view == view; });
+      state.picks, [&](const pipeline::Pick& other) { return other.name == point && other.view == view; });
   return pick == state.picks.end() ? nullptr : &*pick;
 }
 
 std::optional<WantedPick> next_pick(const ApplicationState& state) {
-  for (const PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& point : {tunnel.start, tunnel.end})
       for (const std::string& view : state.views)
         if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, tunnel.bone};

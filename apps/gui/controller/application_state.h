@@ -29,27 +29,27 @@ struct ApplicationState {
   std::filesystem::path folder;    ///< of the session or the case
   std::vector<std::string> views;  ///< required views, in order
   std::string next_view;           ///< view of the next image
-  Calibrator calibrator;
+  phantom::Calibrator calibrator;
   std::shared_ptr<const simulation::BoneMeshes> bones;  ///< at the acquisition; simulation only
 
   /// Images received and, after the measurement, their detections. Never null once a source is open.
-  std::shared_ptr<const Result> result;
+  std::shared_ptr<const pipeline::Result> result;
   bool measured = false;
   int measurements = 0;
 
   std::vector<std::string> check_points;     ///< on the bones, for the pointer
   std::map<std::string, double> touched_mm;  ///< deviation at the last touch
 
-  std::vector<PlannedTunnel> tunnels;
-  std::vector<Pick> picks;
-  std::vector<Pick> offered_picks;  ///< picks of the plan
+  std::vector<operation::PlannedTunnel> tunnels;
+  std::vector<pipeline::Pick> picks;
+  std::vector<pipeline::Pick> offered_picks;  ///< picks of the plan
 
   QString tour;  ///< description of the registration moves
   std::optional<double> hand_eye_rms_mm;
-  std::optional<RobotOrder> order;  ///< previewed, not yet carried out
-  PathPreview path;
+  std::optional<robot::RobotOrder> order;  ///< previewed, not yet carried out
+  operation::PathPreview path;
   bool tool_is_out = false;  ///< moving to a tunnel or in it; can be withdrawn
-  std::map<std::string, TunnelOutcome> outcomes;
+  std::map<std::string, operation::TunnelOutcome> outcomes;
 
   std::optional<Phase> busy;  ///< step in progress
   std::string doing;          ///< description of the work in progress
@@ -57,13 +57,14 @@ struct ApplicationState {
 };
 
 /// Picks of this point in this view, or null.
-const Pick* pick_of(const ApplicationState& state, const std::string& point, const std::string& view);
+const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,
+                              const std::string& view);
 
 /// The next end and view to pick, in order; empty if all are picked.
 struct WantedPick {
   std::string point;
   std::string view;
-  Bone bone;
+  guidance::Bone bone;
 };
 std::optional<WantedPick> next_pick(const ApplicationState& state);
 

@@ -23,14 +23,14 @@ namespace {
 constexpr int look_for_images_ms = 100;
 constexpr double bone_step_mm = 5;
 
-std::shared_ptr<const Result> only(Images images) {
-  auto result = std::make_shared<Result>();
+std::shared_ptr<const pipeline::Result> only(Images images) {
+  auto result = std::make_shared<pipeline::Result>();
   result->views = std::move(images);
   return result;
 }
 
 std::string first_missing(const ApplicationState& state) {
-  for (const ViewResult& view : state.result->views)
+  for (const pipeline::ViewResult& view : state.result->views)
     if (!view.xray_image) return view.name;
   return state.views.empty() ? "" : state.views.front();
 }
@@ -44,15 +44,16 @@ void forget_measurement(ApplicationState& state) {
 }
 
 /// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none.
-std::vector<PlannedTunnel> tunnels_of(const Case& given) {
-  std::vector<PlannedTunnel> tunnels;
-  for (const TunnelPlan& tunnel : given.tunnels) {
-    const auto pick = std::ranges::find(given.picks, tunnel.start, &Pick::name);
-    const Bone bone = pick == given.picks.end() ? Bone::femur : pick->moves_with.value_or(Bone::femur);
+std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
+  std::vector<operation::PlannedTunnel> tunnels;
+  for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
+    const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
+    const guidance::Bone bone =
+        pick == given.picks.end() ? guidance::Bone::femur : pick->moves_with.value_or(guidance::Bone::femur);
     tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
   }
   if (given.picks.empty() && tunnels.empty())
-    tunnels = {{"femur", Bone::femur, "FS", "FE"}, {"tibia", Bone::tibia, "TS", "TE"}};
+    tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}, {"tibia", guidance::Bone::tibia, "TS", "TE"}};
   return tunnels;
 }
 
@@ -134,27 +135,29 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
         });
 }
 
-void Controller::start_operation(Equipment& equipment, OperationPlan plan, const fs::path& folder) {
+void Controller::start_operation(Equipment& equipment, operation::OperationPlan plan,
+                                 const fs::path& folder) {
   equipment.tracker = plan.tracker;
-  equipment.operation =
-      value_or_throw(Operation::begin(std::move(plan), folder, equipment.devices->board(),
-                                      equipment.devices->robot(), [this](Step, const std::string& what) {
-                                        meanwhile([what](ApplicationState& state) { state.doing = what; });
-                                      }));
+  equipment.operation = value_or_throw(operation::Operation::begin(
+      std::move(plan), folder, equipment.devices->board(), equipment.devices->robot(),
+      [this](operation::Step, const std::string& what) {
+        meanwhile([what](ApplicationState& state) { state.doing = what; });
+      }));
   equipment.operation->confirmed_by("the person at the screen");
 }
 
 void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
-                                 const OperationPlan& wished, const fs::path& folder) {
+                                 const operation::OperationPlan& wished, const fs::path& folder) {
   const auto work = [=, this, freshness = freshness_](Equipment& equipment) -> Change {
     equipment.virtual_or = value_or_throw(virtual_devices::VirtualDevices::open(options));
-    OperationPlan plan = plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
-    for (const auto& field : plan_fields)
-      if (field.get(wished) != field.get(OperationPlan())) field.set(plan, field.get(wished));
+    operation::OperationPlan plan =
+        rehearsal::plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
+    for (const auto& field : operation::plan_fields)
+      if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
     const Json offered = std::exchange(plan.picks, Json::array());
-    equipment.devices =
-        std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")), freshness);
-    ReceiverOptions receiver;
+    equipment.devices = std::make_unique<operation::Connections>(
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")), freshness);
+    receiver::ReceiverOptions receiver;
     receiver.port = 0;
     value_or_throw(equipment.devices->listen(receiver));
     start_operation(equipment, plan, folder);
@@ -169,22 +172,25 @@ void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& o
   open(Source::virtual_or, folder, "starting the virtual devices", work);
 }
 
-void Controller::open_devices(const fs::path& file, const ReceiverOptions& receiver, const fs::path& folder) {
+void Controller::open_devices(const fs::path& file, const receiver::ReceiverOptions& receiver,
+                              const fs::path& folder) {
   open(Source::devices, folder, "connecting", [=, this](Equipment& equipment) -> Change {
-    OperationPlan plan = value_or_throw(plan_from(value_or_throw(read_json(file)), file.string()));
+    operation::OperationPlan plan =
+        value_or_throw(operation::plan_from(value_or_throw(read_json(file)), file.string()));
     const Json offered = std::exchange(plan.picks, Json::array());
-    equipment.devices = std::make_unique<Connections>(plan, value_or_throw(Inbox::open(folder / "inbox")));
+    equipment.devices = std::make_unique<operation::Connections>(
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
     value_or_throw(equipment.devices->listen(receiver));
     start_operation(equipment, plan, folder);
     return with_plan(plan, offered);
   });
 }
 
-Controller::Change Controller::with_plan(const OperationPlan& plan, const Json& offered) {
-  std::vector<CaseView> views(plan.views.size());
+Controller::Change Controller::with_plan(const operation::OperationPlan& plan, const Json& offered) {
+  std::vector<pipeline::CaseView> views(plan.views.size());
   for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
-  const Calibrator calibrator = value_or_throw(calibrator_named(plan.calibrator, "."));
-  const std::vector<Pick> picks = value_or_throw(picks_from(offered, "plan", views));
+  const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
+  const std::vector<pipeline::Pick> picks = value_or_throw(pipeline::picks_from(offered, "plan", views));
   return [=](ApplicationState& state) {
     state.views = plan.views;
     state.calibrator = calibrator;
@@ -199,8 +205,9 @@ Controller::Change Controller::with_plan(const OperationPlan& plan, const Json& 
 }
 
 void Controller::open_case(const fs::path& folder) {
-  open(Source::files, folder, "reading " + folder.filename().string(),
-       [=, this](Equipment& equipment) { return with_case(value_or_throw(read_case(folder)), equipment); });
+  open(Source::files, folder, "reading " + folder.filename().string(), [=, this](Equipment& equipment) {
+    return with_case(value_or_throw(pipeline::read_case(folder)), equipment);
+  });
 }
 
 void Controller::open_images(const std::vector<fs::path>& images) {
@@ -210,11 +217,11 @@ void Controller::open_images(const std::vector<fs::path>& images) {
   });
 }
 
-Controller::Change Controller::with_case(Case given, Equipment& equipment) {
+Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment) {
   equipment.given = given;
   const Change found = measured(equipment, given.picks);
   return [given = std::move(given), found](ApplicationState& state) {
-    for (const CaseView& view : given.views) state.views.push_back(view.name);
+    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
     state.calibrator = given.calibrator;
     state.tunnels = tunnels_of(given);
     state.picks = given.picks;
@@ -222,7 +229,7 @@ Controller::Change Controller::with_case(Case given, Equipment& equipment) {
   };
 }
 
-void Controller::set_options(const RunOptions& options) { options_ = options; }
+void Controller::set_options(const pipeline::RunOptions& options) { options_ = options; }
 
 void Controller::expect(const std::string& view) {
   state_.next_view = view;
@@ -252,14 +259,15 @@ Controller::Change Controller::came(Images images) {
     live_tool_.reset();  // its lines belong to the previous images
     state.result = only(images);
     state.next_view = first_missing(state);
-    if (std::ranges::all_of(state.result->views, [](const ViewResult& v) { return v.xray_image != nullptr; }))
+    if (std::ranges::all_of(state.result->views,
+                            [](const pipeline::ViewResult& v) { return v.xray_image != nullptr; }))
       QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
   };
 }
 
-Controller::Change Controller::measured(Equipment& equipment, const std::vector<Pick>& picks) {
-  auto result = std::make_shared<const Result>(value_or_throw(gui::measure(equipment, picks)));
-  std::optional<LiveTool> live;
+Controller::Change Controller::measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
+  auto result = std::make_shared<const pipeline::Result>(value_or_throw(gui::measure(equipment, picks)));
+  std::optional<operation::LiveTool> live;
   if (equipment.operation && !result->failure)
     if (auto follows = equipment.operation->live_tool()) live = *std::move(follows);
   return [this, result, live](ApplicationState& state) {
@@ -296,10 +304,10 @@ bool Controller::is_whole(const std::string& point) const {
 
 bool Controller::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
 
-void Controller::pick(Pick pick) {
+void Controller::pick(pipeline::Pick pick) {
   if (!takes_picks()) return;
   std::erase_if(state_.picks,
-                [&](const Pick& old) { return old.name == pick.name && old.view == pick.view; });
+                [&](const pipeline::Pick& old) { return old.name == pick.name && old.view == pick.view; });
   const std::string point = pick.name;
   state_.picks.push_back(std::move(pick));
   picks_changed(is_whole(point));  // shows its position and ray gap immediately
@@ -328,14 +336,14 @@ void Controller::export_to(const fs::path& folder) {
     emit refused(Phase::verify, tr("Nothing to export: measure first."));
     return;
   }
-  Result result = *state_.result;
+  pipeline::Result result = *state_.result;
   for (const auto& [tunnel, outcome] : state_.outcomes)
     if (outcome.verification) result.verifications.push_back(*outcome.verification);
   begin(Phase::verify, "writing the report", [this, result = std::move(result), folder]() -> Change {
-    value_or_throw(write_report(result, folder));
+    value_or_throw(report::write_report(result, folder));
     value_or_throw(write_pdf_report(result, folder / "report.pdf"));
-    value_or_throw(write_exports(result, folder));
-    value_or_throw(write_file(folder / "result.json", to_text(to_json(result)) + "\n"));
+    value_or_throw(report::write_exports(result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(result)) + "\n"));
     return [this, folder](ApplicationState&) { emit exported(QString::fromStdString(folder.string())); };
   });
 }

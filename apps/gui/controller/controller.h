@@ -20,12 +20,12 @@ struct Equipment;
 struct LiveState {
   double at_s = 0;  ///< monotonic
   std::vector<StatusIndicator> indicators;
-  RobotLinkStatus robot;
-  Bone bone = Bone::femur;                    ///< reference bone of the tool
-  std::optional<Expected<ToolOverlay>> tool;  ///< empty before registration
-  QString tunnel;                             ///< tunnel of `aim`
-  std::optional<Expected<TunnelAim>> aim;     ///< empty without a tunnel
-  std::optional<Failure> stale;               ///< why the displayed path can no longer be confirmed
+  robot::RobotLinkStatus robot;
+  guidance::Bone bone = guidance::Bone::femur;           ///< reference bone of the tool
+  std::optional<Expected<operation::ToolOverlay>> tool;  ///< empty before registration
+  QString tunnel;                                        ///< tunnel of `aim`
+  std::optional<Expected<operation::TunnelAim>> aim;     ///< empty without a tunnel
+  std::optional<Failure> stale;  ///< why the displayed path can no longer be confirmed
 };
 
 /// Operations available to the window. Work runs in a separate thread; its results arrive as `changed`. Lives
@@ -41,25 +41,25 @@ class Controller : public QObject {
 
   /// Virtual devices in this program, over the real protocols through sockets; the plan takes the non-default
   /// `plan_fields` of `wished`.
-  void open_virtual_or(const virtual_devices::VirtualDevicesOptions& options, const OperationPlan& wished,
-                       const std::filesystem::path& folder);
+  void open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
+                       const operation::OperationPlan& wished, const std::filesystem::path& folder);
   /// The devices of a plan.
-  void open_devices(const std::filesystem::path& plan, const ReceiverOptions& receiver,
+  void open_devices(const std::filesystem::path& plan, const receiver::ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
   /// A case folder, or X-ray images without tracker and robot.
   void open_case(const std::filesystem::path& folder);
   void open_images(const std::vector<std::filesystem::path>& images);
 
   /// For virtual devices opened from now on, never for real ones: tests on a busy machine set longer limits.
-  void set_virtual_freshness(const FreshnessLimits& limits) { freshness_ = limits; }
+  void set_virtual_freshness(const operation::FreshnessLimits& limits) { freshness_ = limits; }
 
   /// For the next measurement.
-  void set_options(const RunOptions& options);
+  void set_options(const pipeline::RunOptions& options);
   void expect(const std::string& view);        ///< view of the next image
   void shoot(const std::string& view);         ///< with the virtual C-arm
   void touch(const std::string& check_point);  ///< with the pointer
   /// Also during a measurement with earlier picks, which is then repeated.
-  void pick(Pick pick);
+  void pick(pipeline::Pick pick);
   bool takes_picks() const;
   void take_offered_picks();
   void clear_picks();
@@ -99,25 +99,26 @@ class Controller : public QObject {
   void begin(Phase phase, std::string doing, std::function<Change()> work);
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Equipment&)> work);
-  void start_operation(Equipment& equipment, OperationPlan plan, const std::filesystem::path& folder);
+  void start_operation(Equipment& equipment, operation::OperationPlan plan,
+                       const std::filesystem::path& folder);
   /// From any thread: a state change during the work.
   void meanwhile(Change change);
   void take_waiting_image();
   void picks_changed(bool measurable);
   bool is_whole(const std::string& point) const;
-  Change measured(Equipment& equipment, const std::vector<Pick>& picks);
-  static Change with_plan(const OperationPlan& plan, const Json& offered);
-  Change with_case(Case given, Equipment& equipment);
-  Change came(std::vector<ViewResult> images);
+  Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
+  static Change with_plan(const operation::OperationPlan& plan, const Json& offered);
+  Change with_case(pipeline::Case given, Equipment& equipment);
+  Change came(std::vector<pipeline::ViewResult> images);
 
   ApplicationState state_;
   std::shared_ptr<Equipment> equipment_;
-  std::optional<LiveTool> live_tool_;
-  std::optional<PlanWatch> plan_watch_;  ///< of the displayed path
+  std::optional<operation::LiveTool> live_tool_;
+  std::optional<operation::PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
   bool picks_came_ = false;  ///< during the measurement
-  RunOptions options_;
-  FreshnessLimits freshness_;
+  pipeline::RunOptions options_;
+  operation::FreshnessLimits freshness_;
   QTimer images_;
   QThreadPool background_;  ///< tasks that must not wait for the worker, such as the robot's stop
   Worker worker_;           ///< last: its jobs use all other members

@@ -56,9 +56,9 @@ class ControllerRehearsal : public testing::Test {
   bool unlock() {
     return attempt(
         "the robot is unlocked", [&] { controller_->unlock("tester"); },
-        [&] { return controller_->live().robot.phase == LinkPhase::ready; });
+        [&] { return controller_->live().robot.phase == robot::LinkPhase::ready; });
   }
-  bool moves() const { return controller_->live().robot.phase == LinkPhase::moving; }
+  bool moves() const { return controller_->live().robot.phase == robot::LinkPhase::moving; }
 
   int argc_ = 1;
   char name_[5] = "ctrl";
@@ -101,7 +101,7 @@ TEST_F(ControllerRehearsal, StopAndFaultsReachTheRobotFromOtherThreads) {
   controller_->set_fault("hide:pointer", true);
   controller_->stop();
   ASSERT_TRUE(idle());
-  EXPECT_EQ(controller_->live().robot.phase, LinkPhase::stopped);
+  EXPECT_EQ(controller_->live().robot.phase, robot::LinkPhase::stopped);
   EXPECT_FALSE(controller_->state().hand_eye_rms_mm);
 }
 

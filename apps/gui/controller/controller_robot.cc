@@ -13,17 +13,17 @@ constexpr std::chrono::seconds robot_patience{5};
 /// If the tool is nearer than this to its initial position, no retreat is needed.
 constexpr double at_rest_mm = 1;
 
-bool has_left(const RobotLinkStatus& status, const RobotState& rest) {
+bool has_left(const robot::RobotLinkStatus& status, const robot::RobotState& rest) {
   return !status.state ||
          (status.state->base_from_tcp.translation - rest.base_from_tcp.translation).norm() > at_rest_mm;
 }
 
-QString words_of(const std::vector<RobotOrder>& tour) {
+QString words_of(const std::vector<robot::RobotOrder>& tour) {
   if (tour.empty()) return {};
   double farthest_mm = 0, speed_mm_s = 0;
   const Eigen::Vector3d from = tour.back().waypoints.back().base_from_tcp.translation;
-  for (const RobotOrder& order : tour)
-    for (const Waypoint& waypoint : order.waypoints) {
+  for (const robot::RobotOrder& order : tour)
+    for (const robot::Waypoint& waypoint : order.waypoints) {
       farthest_mm = std::max(farthest_mm, (waypoint.base_from_tcp.translation - from).norm());
       speed_mm_s = std::max(speed_mm_s, waypoint.speed_mm_s);
     }
@@ -58,9 +58,9 @@ void Controller::unlock(const std::string& who) {
 void Controller::register_robot() {
   if (!equipment_ || !equipment_->operation) return;
   begin(Phase::navigate, "registering the robot", [this, equipment = equipment_]() -> Change {
-    RobotLink& robot = equipment->devices->robot();
+    robot::RobotLink& robot = equipment->devices->robot();
     value_or_throw(
-        equipment->operation->register_robot([&](const RobotOrder& order) -> Expected<std::string> {
+        equipment->operation->register_robot([&](const robot::RobotOrder& order) -> Expected<std::string> {
           if (equipment->stopped) return fail(Reason::interrupted, "stopped by a person");
           return robot.confirm(order);
         }));
@@ -77,9 +77,9 @@ void Controller::plan_tunnel(const std::string& tunnel) {
   follow(tunnel);
   begin(Phase::navigate, "planning the path to " + tunnel,
         [this, equipment = equipment_, tunnel]() -> Change {
-          const RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
-          const PathPreview path = value_or_throw(equipment->operation->preview(order));
-          const PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
+          const robot::RobotOrder order = value_or_throw(equipment->operation->plan_tunnel(tunnel));
+          const operation::PathPreview path = value_or_throw(equipment->operation->preview(order));
+          const operation::PlanWatch watch = value_or_throw(equipment->operation->plan_watch(order));
           return [this, order, path, watch](ApplicationState& state) {
             state.order = order;
             state.path = path;
@@ -90,7 +90,7 @@ void Controller::plan_tunnel(const std::string& tunnel) {
 
 void Controller::drop_plan(const Failure& why) {
   if (state_.busy || !state_.order) return;
-  const RobotOrder order = *std::exchange(state_.order, std::nullopt);
+  const robot::RobotOrder order = *std::exchange(state_.order, std::nullopt);
   state_.path = {};
   begin(Phase::navigate, "withdrawing the path", [equipment = equipment_, order, why]() -> Change {
     static_cast<void>(equipment->operation->check_plan(order));
@@ -100,9 +100,9 @@ void Controller::drop_plan(const Failure& why) {
 
 void Controller::go() {
   if (!equipment_ || !equipment_->operation || !state_.order) return;
-  const RobotOrder order = *state_.order;
+  const robot::RobotOrder order = *state_.order;
   begin(Phase::navigate, "moving to " + order.name, [this, equipment = equipment_, order]() -> Change {
-    RobotLink& robot = equipment->devices->robot();
+    robot::RobotLink& robot = equipment->devices->robot();
     const std::string token = robot.confirm(order);
     equipment->rest = value_or_throw(robot.wait_connected(robot_patience));
     equipment->last_order = order;
@@ -124,10 +124,10 @@ void Controller::go() {
 void Controller::withdraw() {
   if (!equipment_ || !equipment_->operation || !equipment_->last_order) return;
   begin(Phase::navigate, "withdrawing", [equipment = equipment_]() -> Change {
-    RobotLink& robot = equipment->devices->robot();
+    robot::RobotLink& robot = equipment->devices->robot();
     value_or_throw(equipment->operation->withdraw(
         *equipment->last_order, equipment->rest,
-        [&](const RobotOrder& order) { return Expected<std::string>(robot.confirm(order)); }));
+        [&](const robot::RobotOrder& order) { return Expected<std::string>(robot.confirm(order)); }));
     return [](ApplicationState& state) { state.tool_is_out = false; };
   });
 }
@@ -140,9 +140,9 @@ void Controller::stop() {
 
 LiveState Controller::live() const {
   LiveState now;
-  now.at_s = monotonic_seconds();
+  now.at_s = tracker::monotonic_seconds();
   if (!equipment_ || !equipment_->operation) return now;
-  const PoseBoard& board = equipment_->devices->board();
+  const tracker::PoseBoard& board = equipment_->devices->board();
   now.indicators = tracker_indicators(equipment_->tracker, board.tools(now.at_s));
   now.robot = equipment_->devices->robot().status();
   now.indicators.push_back(robot_indicator(now.robot));
@@ -152,7 +152,7 @@ LiveState Controller::live() const {
     if (!holds && holds.error().reason == Reason::plan_stale) now.stale = holds.error();
   }
   if (!live_tool_) return now;
-  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &PlannedTunnel::name);
+  const auto tunnel = std::ranges::find(state_.tunnels, followed_, &operation::PlannedTunnel::name);
   if (tunnel != state_.tunnels.end()) now.bone = tunnel->bone;
   now.tool = live_tool_->overlay(board, now.bone);
   if (tunnel == state_.tunnels.end()) return now;

@@ -11,27 +11,27 @@ namespace {
 
 using testing::HasSubstr;
 
-ApplicationState state_with(std::vector<ViewResult> views) {
+ApplicationState state_with(std::vector<pipeline::ViewResult> views) {
   ApplicationState state;
   state.source = Source::files;
   state.views = {"AP", "LAT"};
   state.next_view = "LAT";
-  state.tunnels = {{"femur", Bone::femur, "FS", "FE"}};
-  auto result = std::make_shared<Result>();
+  state.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}};
+  auto result = std::make_shared<pipeline::Result>();
   result->views = std::move(views);
   state.result = std::move(result);
   return state;
 }
 
-ViewResult exposed(const std::string& name) {
-  ViewResult view;
+pipeline::ViewResult exposed(const std::string& name) {
+  pipeline::ViewResult view;
   view.name = name;
-  view.xray_image = std::make_shared<const XrayImage>();
+  view.xray_image = std::make_shared<const xray::XrayImage>();
   return view;
 }
 
-Pick pick(const std::string& name, const std::string& view) {
-  Pick made;
+pipeline::Pick pick(const std::string& name, const std::string& view) {
+  pipeline::Pick made;
   made.name = name;
   made.view = view;
   return made;
@@ -46,7 +46,7 @@ TEST(Steps, WithoutASourceAllWait) {
 }
 
 TEST(Steps, NameTheNextImage) {
-  ViewResult missing;
+  pipeline::ViewResult missing;
   missing.name = "LAT";
   const auto cards = steps_of(state_with({exposed("AP"), missing}));
   EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 of 2 X-ray images");
@@ -77,9 +77,10 @@ TEST(Steps, PlanIsGoodOnlyWithAllEndsLocatedAndShowsTheLargestError) {
   for (const char* end : {"FS", "FE"})
     for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).status, StepStatus::waiting);  // not measured with them yet
-  auto result = std::make_shared<Result>(*state.result);
+  auto result = std::make_shared<pipeline::Result>(*state.result);
   for (const double sigma_mm : {0.1, 0.2}) {
-    PointResult point{"FS", PointSource::pick, {}, {}, PointInFrames{}, 0, {}};
+    pipeline::PointResult point{"FS", localization::PointSource::pick, {}, {}, guidance::PointInFrames{}, 0,
+                                {}};
     point.place->covariance_in_calibrator.diagonal().setConstant(sigma_mm * sigma_mm);
     result->points.push_back(point);
   }
@@ -94,9 +95,14 @@ TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
   state.measured = true;
   for (const char* end : {"FS", "FE"})
     for (const char* view : {"AP", "LAT"}) state.picks.push_back(pick(end, view));
-  auto result = std::make_shared<Result>(*state.result);
-  result->points.push_back(
-      {"FE", PointSource::pick, {}, {}, {}, 0, Failure{Reason::parallel_rays, "rays are parallel"}});
+  auto result = std::make_shared<pipeline::Result>(*state.result);
+  result->points.push_back({"FE",
+                            localization::PointSource::pick,
+                            {},
+                            {},
+                            {},
+                            0,
+                            Failure{Reason::parallel_rays, "rays are parallel"}});
   state.result = result;
   EXPECT_EQ(card_of(steps_of(state), Phase::plan).status, StepStatus::refused);
   EXPECT_THAT(card_of(steps_of(state), Phase::plan).why.toStdString(), HasSubstr("parallel_rays"));
@@ -110,7 +116,7 @@ TEST(Picks, NextOneGoesThroughViewsThenEnds) {
 }
 
 TEST(StatusIndicators, OldPoseIsNotGreen) {
-  TrackerPlan plan;
+  operation::TrackerPlan plan;
   const auto indicators = tracker_indicators(plan, {{.name = "femur", .rejected = {}, .age_s = 0.02},
                                                     {.name = "tibia", .rejected = {}, .age_s = 0.4},
                                                     {.name = "tool", .rejected = {}, .age_s = 7.0}});
@@ -123,7 +129,7 @@ TEST(StatusIndicators, OldPoseIsNotGreen) {
 }
 
 TEST(StatusIndicators, CalibratorIsVisibleByOneFacet) {
-  TrackerPlan plan;
+  operation::TrackerPlan plan;
   plan.facets = {{"calibrator/1", {}}, {"calibrator/2", {}}};
   const auto indicators = tracker_indicators(plan, {{.name = "calibrator/1", .rejected = {}, .age_s = 30.0},
                                                     {.name = "calibrator/2", .rejected = {}, .age_s = 0.03}});
@@ -131,8 +137,8 @@ TEST(StatusIndicators, CalibratorIsVisibleByOneFacet) {
 }
 
 TEST(StatusIndicators, StoppedRobotIsRedWithTheReason) {
-  RobotLinkStatus status;
-  status.phase = LinkPhase::stopped;
+  robot::RobotLinkStatus status;
+  status.phase = robot::LinkPhase::stopped;
   status.why = Failure{Reason::robot_stopped, "emergency stop"};
   const StatusIndicator indicator = robot_indicator(status);
   EXPECT_EQ(indicator.light, Light::red);

@@ -18,17 +18,18 @@ constexpr std::chrono::milliseconds before_exposure{1800};
 
 }  // namespace
 
-Expected<Images> take(Equipment& equipment, const std::string& view, const DatedArrival& view_image) {
+Expected<Images> take(Equipment& equipment, const std::string& view,
+                      const operation::DatedArrival& view_image) {
   return guarded([&] {
     value_or_throw(equipment.operation->take(view, view_image.arrival, view_image.time_s));
     const auto taken = equipment.operation->images();
     Images images;
     for (const std::string& name : equipment.operation->plan().views) {
-      ViewResult shown;
+      pipeline::ViewResult shown;
       shown.name = name;
       if (const auto file = taken.find(name); file != taken.end())
-        shown.xray_image =
-            std::make_shared<const XrayImage>(value_or_throw(read_xray_image(file->second, name, 1)));
+        shown.xray_image = std::make_shared<const xray::XrayImage>(
+            value_or_throw(xray::read_xray_image(file->second, name, 1)));
       images.push_back(std::move(shown));
     }
     return images;
@@ -37,7 +38,7 @@ Expected<Images> take(Equipment& equipment, const std::string& view, const Dated
 
 namespace {
 
-std::optional<DatedArrival> wait_for_image(Equipment& equipment) {
+std::optional<operation::DatedArrival> wait_for_image(Equipment& equipment) {
   for (int glance = 0; glance * image_glance_s < image_patience_s && !equipment.stopped; ++glance)
     if (auto view_image = equipment.devices->next_image(image_glance_s)) return view_image;
   return std::nullopt;
@@ -59,37 +60,38 @@ Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view) {
   return taken;
 }
 
-Expected<Result> measure(Equipment& equipment, const std::vector<Pick>& picks) {
+Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   if (equipment.given) {
     equipment.given->picks = picks;
     if (!equipment.calibration || equipment.calibrated_by != equipment.options.method) {
-      auto calibration = calibrate_case(*equipment.given, equipment.options);
+      auto calibration = pipeline::calibrate_case(*equipment.given, equipment.options);
       if (!calibration)
-        return result_of_refusal(*equipment.given, std::move(calibration).error(), equipment.options);
+        return pipeline::result_of_refusal(*equipment.given, std::move(calibration).error(),
+                                           equipment.options);
       equipment.calibration = *std::move(calibration);
       equipment.calibrated_by = equipment.options.method;
     }
-    return locate_case(*equipment.given, *equipment.calibration, equipment.options);
+    return pipeline::locate_case(*equipment.given, *equipment.calibration, equipment.options);
   }
   Json json = Json::array();
-  for (const Pick& pick : picks) json.push_back(helicarm::to_json(pick));
+  for (const pipeline::Pick& pick : picks) json.push_back(helicarm::pipeline::to_json(pick));
   equipment.operation->pick(std::move(json));
   const auto done = equipment.operation->measure();
   if (const auto& result = equipment.operation->newest_result()) return *result;
   return tl::unexpected<Failure>(done.error());
 }
 
-Expected<Case> case_of_images(const std::vector<std::filesystem::path>& images) {
-  Case given;
-  given.calibrator = udcsc();
-  given.plate = plate48();
+Expected<pipeline::Case> case_of_images(const std::vector<std::filesystem::path>& images) {
+  pipeline::Case given;
+  given.calibrator = phantom::udcsc();
+  given.plate = phantom::plate48();
   for (const std::filesystem::path& view_image : images) {
     if (!std::filesystem::exists(view_image))
       return fail(Reason::missing_file, fmt::format("{}: no such file or folder", view_image.string()));
-    CaseView view;
+    pipeline::CaseView view;
     view.name = view_image.stem().string();
     view.image = std::filesystem::absolute(view_image);
-    for (const CaseView& other : given.views)
+    for (const pipeline::CaseView& other : given.views)
       if (other.name == view.name)
         return fail(Reason::name_clash, fmt::format("{}: two images have this name", view.name));
     given.views.push_back(std::move(view));

@@ -14,31 +14,32 @@ namespace helicarm::gui {
 /// used from any thread.
 struct Equipment {
   std::unique_ptr<virtual_devices::VirtualDevices> virtual_or;
-  std::unique_ptr<Connections> devices;
-  std::unique_ptr<Operation> operation;
-  TrackerPlan tracker;  ///< of the operation; any thread may read it
-  std::optional<Case> given;
-  std::optional<CaseCalibration> calibration;  ///< of `given`
-  Method calibrated_by = Method::best;
-  RunOptions options;
-  std::optional<RobotOrder> last_order;
-  RobotState rest;                    ///< the robot's state before the order
+  std::unique_ptr<operation::Connections> devices;
+  std::unique_ptr<operation::Operation> operation;
+  operation::TrackerPlan tracker;  ///< of the operation; any thread may read it
+  std::optional<pipeline::Case> given;
+  std::optional<pipeline::CaseCalibration> calibration;  ///< of `given`
+  rectification::Method calibrated_by = rectification::Method::best;
+  pipeline::RunOptions options;
+  std::optional<robot::RobotOrder> last_order;
+  robot::RobotState rest;             ///< the robot's state before the order
   std::atomic<bool> stopped = false;  ///< no further move of a tour, no wait for an image
   std::atomic<virtual_devices::CArmFault> c_arm_fault = virtual_devices::CArmFault::none;
 };
 
 /// All views of the operation with the images received so far.
-using Images = std::vector<ViewResult>;
+using Images = std::vector<pipeline::ViewResult>;
 
 /// Acquires an image until the tracker has valid poses at rest. Refuses interrupted once `room.stopped`.
 Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view);
 /// Takes a received image; its file may assign it to another view.
-Expected<Images> take(Equipment& equipment, const std::string& view, const DatedArrival& view_image);
+Expected<Images> take(Equipment& equipment, const std::string& view,
+                      const operation::DatedArrival& view_image);
 
 /// A refused measurement contains the results up to the refusal.
-Expected<Result> measure(Equipment& equipment, const std::vector<Pick>& picks);
+Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
 
 /// X-ray images without tracker and robot, with the default calibrator and plate; named after their files.
-Expected<Case> case_of_images(const std::vector<std::filesystem::path>& images);
+Expected<pipeline::Case> case_of_images(const std::vector<std::filesystem::path>& images);
 
 }  // namespace helicarm::gui

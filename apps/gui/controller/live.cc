@@ -11,9 +11,10 @@ namespace {
 
 QString tr(const char* text) { return QCoreApplication::translate("Live", text); }
 
-std::optional<double> least_age(const std::vector<ToolState>& tools, const std::vector<std::string>& names) {
+std::optional<double> least_age(const std::vector<tracker::ToolState>& tools,
+                                const std::vector<std::string>& names) {
   std::optional<double> least;
-  for (const ToolState& tool : tools)
+  for (const tracker::ToolState& tool : tools)
     if (tool.age_s && std::ranges::find(names, tool.name) != names.end())
       least = std::min(least.value_or(*tool.age_s), *tool.age_s);
   return least;
@@ -35,40 +36,41 @@ QString age_text(const std::optional<double>& age_s) {
   return *age_s < 1 ? tr("%1 ms").arg(*age_s * 1000, 0, 'f', 0) : tr("%1 s").arg(*age_s, 0, 'f', 1);
 }
 
-std::vector<StatusIndicator> tracker_indicators(const TrackerPlan& plan,
-                                                const std::vector<ToolState>& tools) {
+std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& plan,
+                                                const std::vector<tracker::ToolState>& tools) {
   std::vector<std::string> facets;
-  for (const Facet& facet : plan.facets) facets.push_back(facet.name);
+  for (const tracker::Facet& facet : plan.facets) facets.push_back(facet.name);
   return {marker_indicator(tr("calibrator"), least_age(tools, facets)),
           marker_indicator(tr("femur"), least_age(tools, {plan.femur})),
           marker_indicator(tr("tibia"), least_age(tools, {plan.tibia})),
           marker_indicator(tr("tool"), least_age(tools, {plan.tool}))};
 }
 
-StatusIndicator robot_indicator(const RobotLinkStatus& status) {
+StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
   StatusIndicator indicator{tr("robot"), Light::off, {}, status.why ? sentence_of(*status.why) : QString()};
   const QString age = age_text(status.state ? std::optional(status.age_s) : std::nullopt);
   switch (status.phase) {
-    case LinkPhase::disconnected:
-    case LinkPhase::stopped:
+    case robot::LinkPhase::disconnected:
+    case robot::LinkPhase::stopped:
       indicator.light = Light::red;
       break;
-    case LinkPhase::idle:
+    case robot::LinkPhase::idle:
       indicator.light = Light::amber;
       break;
-    case LinkPhase::ready:
-    case LinkPhase::starting:
-    case LinkPhase::moving:
+    case robot::LinkPhase::ready:
+    case robot::LinkPhase::starting:
+    case robot::LinkPhase::moving:
       indicator.light = Light::green;
       break;
   }
-  const QString phase = status.phase == LinkPhase::idle ? tr("locked") : words(name(status.phase));
-  indicator.text = status.phase == LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
-  if (status.phase == LinkPhase::idle) indicator.why = tr("locked until a person unlocks it");
+  const QString phase =
+      status.phase == robot::LinkPhase::idle ? tr("locked") : words(robot::name(status.phase));
+  indicator.text = status.phase == robot::LinkPhase::disconnected ? phase : tr("%1, %2").arg(phase, age);
+  if (status.phase == robot::LinkPhase::idle) indicator.why = tr("locked until a person unlocks it");
   return indicator;
 }
 
-StatusIndicator c_arm_indicator(const CArmStatus& status, double now_s) {
+StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s) {
   StatusIndicator indicator{tr("C-arm"), Light::off, tr("no image yet"),
                             tr("it connects when it has an image")};
   if (status.last_image_s)

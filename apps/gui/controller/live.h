@@ -25,10 +25,11 @@ inline constexpr double fresh_s = 0.1;
 inline constexpr double late_s = 1;
 
 /// The markers of the plan; the calibrator is visible if one of its facets is.
-std::vector<StatusIndicator> tracker_indicators(const TrackerPlan& plan, const std::vector<ToolState>& tools);
-StatusIndicator robot_indicator(const RobotLinkStatus& status);
+std::vector<StatusIndicator> tracker_indicators(const operation::TrackerPlan& plan,
+                                                const std::vector<tracker::ToolState>& tools);
+StatusIndicator robot_indicator(const robot::RobotLinkStatus& status);
 /// At this time, monotonic seconds.
-StatusIndicator c_arm_indicator(const CArmStatus& status, double now_s);
+StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s);
 
 /// "23 ms", "4.1 s", "not visible".
 QString age_text(const std::optional<double>& age_s);

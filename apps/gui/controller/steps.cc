@@ -39,8 +39,8 @@ void settle(StepCard& card, const QString& warning) {
 
 void acquire(StepCard& card, const ApplicationState& state) {
   const auto& views = state.result->views;
-  const auto come =
-      std::ranges::count_if(views, [](const ViewResult& view) { return view.xray_image != nullptr; });
+  const auto come = std::ranges::count_if(
+      views, [](const pipeline::ViewResult& view) { return view.xray_image != nullptr; });
   card.figure = tr("%1 of %2 X-ray images").arg(come).arg(state.views.size());
   if (come == std::ssize(state.views)) return settle(card, {});
   card.why = tr("%1 is next").arg(text(state.next_view));
@@ -50,9 +50,9 @@ void rectify(StepCard& card, const ApplicationState& state) {
   double worst = 0;
   bool bent = false;
   std::vector<Warning> warnings;
-  for (const ViewResult& view : state.result->views) {
+  for (const pipeline::ViewResult& view : state.result->views) {
     if (!view.rectification) return;
-    const Rectification& done = *view.rectification;
+    const rectification::Rectification& done = *view.rectification;
     bent = bent || !done.map.is_identity();
     worst = std::max(worst, done.map.residual_rms_px);
     warnings.insert(warnings.end(), done.warnings.begin(), done.warnings.end());
@@ -64,10 +64,10 @@ void rectify(StepCard& card, const ApplicationState& state) {
 void calibrate(StepCard& card, const ApplicationState& state) {
   int used = 0;
   std::size_t balls = 0;
-  for (const ViewResult& view : state.result->views) {
+  for (const pipeline::ViewResult& view : state.result->views) {
     if (!view.calibrated || !view.found) return;
-    used +=
-        static_cast<int>(std::ranges::count(view.found->fiducials, FiducialStatus::used, &Fiducial::status));
+    used += static_cast<int>(std::ranges::count(view.found->fiducials, fiducials::FiducialStatus::used,
+                                                &fiducials::Fiducial::status));
     balls += view.found->fiducials.size();
   }
   card.figure =
@@ -82,8 +82,8 @@ void plan(StepCard& card, const ApplicationState& state) {
   }
   double worst = 0;
   int located = 0;
-  for (const PointResult& point : state.result->points) {
-    if (point.source != PointSource::pick) continue;
+  for (const pipeline::PointResult& point : state.result->points) {
+    if (point.source != localization::PointSource::pick) continue;
     if (point.reason) {
       card.status = StepStatus::refused;
       card.why = text(point.name + ": ") + sentence_of(*point.reason);
@@ -91,7 +91,7 @@ void plan(StepCard& card, const ApplicationState& state) {
     }
     if (!point.place) continue;
     ++located;
-    worst = std::max(worst, length_at_95(point.place->covariance_in_calibrator));
+    worst = std::max(worst, localization::length_at_95(point.place->covariance_in_calibrator));
   }
   if (located == 0) return;
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
@@ -117,7 +117,7 @@ void verify(StepCard& card, const ApplicationState& state) {
   if (state.outcomes.empty()) return;
   double worst = 0, expected = 0;
   for (const auto& [name, outcome] : state.outcomes)
-    for (const EndMiss& end : {outcome.start, outcome.end})
+    for (const operation::EndMiss& end : {outcome.start, outcome.end})
       if (end.distance_mm() >= worst) worst = end.distance_mm(), expected = end.predicted_mm();
   card.figure = tr("%1 mm (predicted %2)").arg(worst, 0, 'f', 2).arg(expected, 0, 'f', 2);
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});

@@ -35,7 +35,7 @@ QString message_of(const Failure& failure) {
            QString::fromUtf8(reason.data(), qsizetype(reason.size())));
 }
 
-void draw_summary(const Result& result, PdfLayout& layout) {
+void draw_summary(const pipeline::Result& result, PdfLayout& layout) {
   layout.title(Words::tr("helicarm report"));
   layout.paragraph(Words::tr("Research instrument, not a medical device."), PdfLayout::Tone::bad);
   if (result.failure)
@@ -43,7 +43,7 @@ void draw_summary(const Result& result, PdfLayout& layout) {
   else
     layout.paragraph(Words::tr("Measured."), PdfLayout::Tone::good);
   std::vector<LayoutCard> cards;
-  const Accuracy& accuracy = result.accuracy;
+  const localization::Accuracy& accuracy = result.accuracy;
   if (accuracy.fle_px.n)
     cards.push_back({fixed(accuracy.fle_px.rms), "px", Words::tr("fiducial localization error, rms")});
   if (accuracy.fre_mm.n)
@@ -51,8 +51,9 @@ void draw_summary(const Result& result, PdfLayout& layout) {
   if (accuracy.tre_mm.n)
     cards.push_back({fixed(accuracy.tre_mm.mean), "mm", Words::tr("target registration error, mean")});
   double largest = 0;
-  for (const PointResult& point : result.points)
-    if (point.place) largest = std::max(largest, length_at_95(point.place->covariance_in_calibrator));
+  for (const pipeline::PointResult& point : result.points)
+    if (point.place)
+      largest = std::max(largest, localization::length_at_95(point.place->covariance_in_calibrator));
   if (largest > 0)
     cards.push_back({fixed(largest), "mm", Words::tr("largest predicted error of a point at 95 %")});
   layout.cards(cards);
@@ -62,11 +63,11 @@ void draw_summary(const Result& result, PdfLayout& layout) {
   for (const Warning& note : result.notes) layout.paragraph("• " + message_of(note));
 }
 
-void draw_views(const Result& result, PdfLayout& layout) {
+void draw_views(const pipeline::Result& result, PdfLayout& layout) {
   std::vector<LayoutFigure> figures;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
-    const ViewResult& view = result.views[i];
-    const std::string figure = view_figure(result, i);
+    const pipeline::ViewResult& view = result.views[i];
+    const std::string figure = report::view_figure(result, i);
     if (figure.empty()) continue;
     QString caption = text_of(view.name);
     if (view.calibrated)
@@ -83,10 +84,10 @@ void draw_views(const Result& result, PdfLayout& layout) {
       PdfLayout::Tone::soft);
 }
 
-void draw_points(const Result& result, PdfLayout& layout) {
+void draw_points(const pipeline::Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
   QStringList missing;
-  for (const PointResult& point : result.points) {
+  for (const pipeline::PointResult& point : result.points) {
     if (!point.place) {
       missing << QString("%1: %2").arg(text_of(point.name),
                                        point.reason ? message_of(*point.reason) : Words::tr("not located"));
@@ -96,9 +97,10 @@ void draw_points(const Result& result, PdfLayout& layout) {
     const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
     const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
     rows.push_back({text_of(point.name),
-                    point.source == PointSource::pick ? Words::tr("pick") : Words::tr("target"),
+                    point.source == localization::PointSource::pick ? Words::tr("pick") : Words::tr("target"),
                     fixed(at.x(), 2), fixed(at.y(), 2), fixed(at.z(), 2), fixed(sigma.x()), fixed(sigma.y()),
-                    fixed(sigma.z()), fixed(length_at_95(covariance)), fixed(point.ray_gap_mm)});
+                    fixed(sigma.z()), fixed(localization::length_at_95(covariance)),
+                    fixed(point.ray_gap_mm)});
   }
   if (rows.empty() && missing.empty()) return;
   layout.heading(Words::tr("Points in the calibrator frame, mm"));
@@ -109,7 +111,7 @@ void draw_points(const Result& result, PdfLayout& layout) {
   for (const QString& line : missing) layout.paragraph(line, PdfLayout::Tone::bad);
 }
 
-void draw_accuracy(const Accuracy& accuracy, PdfLayout& layout) {
+void draw_accuracy(const localization::Accuracy& accuracy, PdfLayout& layout) {
   std::vector<QStringList> rows;
   for (const auto& [what, s] : {std::pair{Words::tr("FRE of the fiducials (Eq. 11)"), accuracy.fre_mm},
                                 {Words::tr("TRE of the check targets (Eq. 12)"), accuracy.tre_mm}})
@@ -121,7 +123,7 @@ void draw_accuracy(const Accuracy& accuracy, PdfLayout& layout) {
                 "#" + Words::tr("min"), "#n"},
                rows);
   rows.clear();
-  for (const TargetError& target : accuracy.targets)
+  for (const localization::TargetError& target : accuracy.targets)
     rows.push_back({text_of(target.name), fixed(target.error_mm), fixed(target.predicted_mm),
                     fixed(target.predicted_95_mm)});
   if (!rows.empty())
@@ -130,9 +132,9 @@ void draw_accuracy(const Accuracy& accuracy, PdfLayout& layout) {
                  rows);
 }
 
-void draw_guidance(const Result& result, PdfLayout& layout) {
+void draw_guidance(const pipeline::Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
-  for (const Tunnel& tunnel : result.tunnels)
+  for (const guidance::Tunnel& tunnel : result.tunnels)
     rows.push_back({text_of(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
                     coordinates(tunnel.axis_in_tool, 4), fixed(tunnel.axis_sigma_deg()),
                     fixed(tunnel.length_mm, 2)});
@@ -143,7 +145,7 @@ void draw_guidance(const Result& result, PdfLayout& layout) {
                  rows);
   }
   rows.clear();
-  for (const Verification& line : result.verifications)
+  for (const verification::Verification& line : result.verifications)
     for (const auto& [end, error] :
          {std::pair{Words::tr("start"), &line.start}, {Words::tr("end"), &line.end}})
       if (*error)
@@ -156,18 +158,18 @@ void draw_guidance(const Result& result, PdfLayout& layout) {
                rows);
 }
 
-void draw_rectification(const Result& result, PdfLayout& layout) {
+void draw_rectification(const pipeline::Result& result, PdfLayout& layout) {
   std::vector<QStringList> rows;
   std::vector<LayoutFigure> figures;
-  for (const ViewResult& view : result.views) {
+  for (const pipeline::ViewResult& view : result.views) {
     if (!view.rectification || view.rectification->map.is_identity()) continue;
-    const Rectification& of = *view.rectification;
+    const rectification::Rectification& of = *view.rectification;
     const QString found = QString::number(of.dots_found);
     rows.push_back({text_of(view.name),
                     of.dots_expected ? Words::tr("%1 of %2").arg(found).arg(*of.dots_expected) : found,
                     fixed(of.map.residual_rms_px), fixed(of.map.held_out_rms_px), fixed(of.raw_mean_px, 2),
                     fixed(of.raw_max_px, 2)});
-    if (const std::string figure = distortion_figure(view); !figure.empty())
+    if (const std::string figure = report::distortion_figure(view); !figure.empty())
       figures.push_back(
           {print_svg(figure, true),
            Words::tr("Distortion in %1: from the rectified to the raw position").arg(text_of(view.name))});
@@ -183,7 +185,7 @@ void draw_rectification(const Result& result, PdfLayout& layout) {
 
 }  // namespace
 
-Expected<void> write_pdf_report(const Result& result, const std::filesystem::path& path) {
+Expected<void> write_pdf_report(const pipeline::Result& result, const std::filesystem::path& path) {
   QByteArray bytes;
   {
     QBuffer buffer(&bytes);
@@ -194,7 +196,7 @@ Expected<void> write_pdf_report(const Result& result, const std::filesystem::pat
     writer.setResolution(300);
     writer.setTitle(Words::tr("helicarm report"));
     writer.setCreator("helicarm " HELICARM_VERSION);
-    const QString method = result.options.method == Method::paper ? "paper" : "best";
+    const QString method = result.options.method == rectification::Method::paper ? "paper" : "best";
     PdfLayout layout(writer, Words::tr("helicarm %1, method %2 · research instrument, not a medical device")
                                  .arg(HELICARM_VERSION, method));
     draw_summary(result, layout);

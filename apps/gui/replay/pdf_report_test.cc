@@ -18,33 +18,33 @@ namespace helicarm::gui {
 namespace {
 namespace fs = std::filesystem;
 
-Result result_of_two_views(std::size_t points) {
-  Result result;
+pipeline::Result result_of_two_views(std::size_t points) {
+  pipeline::Result result;
   for (const char* name : {"AP", "LAT <&>"}) {
-    ViewResult& view = result.views.emplace_back();
+    pipeline::ViewResult& view = result.views.emplace_back();
     view.name = name;
-    XrayImage exposure{name, Image<float>(640, 480, 3000), 0, 4095, {}, {}};
+    xray::XrayImage exposure{name, image::Image<float>(640, 480, 3000), 0, 4095, {}, {}};
     for (int v = 0; v < 480; ++v)
       for (int u = 0; u < 640; ++u) exposure.pixels(u, v) = float(500 + 4 * u);
-    view.xray_image = std::make_shared<const XrayImage>(std::move(exposure));
-    view.rectification = Rectification{};
-    view.rectification->map = identity_map(640, 480, 0.2);
-    view.found = LabelledFiducials{};
-    Fiducial ball{"P1", Eigen::Vector3d::Zero()};
-    ball.status = FiducialStatus::used;
+    view.xray_image = std::make_shared<const xray::XrayImage>(std::move(exposure));
+    view.rectification = rectification::Rectification{};
+    view.rectification->map = rectification::identity_map(640, 480, 0.2);
+    view.found = fiducials::LabelledFiducials{};
+    fiducials::Fiducial ball{"P1", Eigen::Vector3d::Zero()};
+    ball.status = fiducials::FiducialStatus::used;
     ball.uv = {320, 240};
     view.found->fiducials = {ball};
   }
   for (std::size_t i = 0; i < points; ++i) {
-    PointResult& point = result.points.emplace_back();
+    pipeline::PointResult& point = result.points.emplace_back();
     point.name = "point " + std::to_string(i);
-    point.source = PointSource::pick;
+    point.source = localization::PointSource::pick;
     point.seen.resize(2);
     if (i % 7 == 6) {
       point.reason = Failure{Reason::not_seen, "is in one view only", "", {}};
       continue;
     }
-    point.place = PointInFrames{};
+    point.place = guidance::PointInFrames{};
     point.place->covariance_in_calibrator = 0.01 * Eigen::Matrix3d::Identity();
   }
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
@@ -78,7 +78,7 @@ TEST_F(Pdf, IsCompleteAndGrowsByPages) {
 }
 
 TEST_F(Pdf, RefusedResultHasAReport) {
-  Result refused;
+  pipeline::Result refused;
   refused.failure = Failure{Reason::views_too_close, "AP and LAT are 3 degrees apart, limit 30", "", {}};
   ASSERT_TRUE(write_pdf_report(refused, path_));
   EXPECT_EQ(pages(), 1);
@@ -93,8 +93,8 @@ TEST_F(Pdf, IsWrittenCompletelyOrNotAtAll) {
 }
 
 TEST_F(Pdf, FigureContainsItsImageAndColours) {
-  const Result result = result_of_two_views(1);
-  QSvgRenderer svg(print_svg(view_figure(result, 1)));
+  const pipeline::Result result = result_of_two_views(1);
+  QSvgRenderer svg(print_svg(report::view_figure(result, 1)));
   ASSERT_TRUE(svg.isValid());
   EXPECT_EQ(svg.viewBoxF(), QRectF(-0.5, -0.5, 640, 480));
   QImage page(640, 480, QImage::Format_RGB32);

@@ -213,7 +213,7 @@ void ReplayPanel::verify() {
   progress_->setValue(0);
   progress_->show();
   worker_ = std::jthread([this, session = timeline_->session](const std::stop_token& stop) {
-    const auto report = replay(session, [&](std::size_t done, std::size_t) {
+    const auto report = operation::replay(session, [&](std::size_t done, std::size_t) {
       QMetaObject::invokeMethod(progress_, [this, done] { progress_->setValue(int(done)); });
       return !stop.stop_requested();
     });
@@ -224,7 +224,7 @@ void ReplayPanel::verify() {
   });
 }
 
-void ReplayPanel::show_verdict(const Expected<ReplayReport>& report) {
+void ReplayPanel::show_verdict(const Expected<operation::ReplayReport>& report) {
   progress_->hide();
   verify_->setEnabled(true);
   const bool same = report && report->differences.empty();

@@ -56,7 +56,7 @@ class ReplayPanel : public QWidget {
   void bind_keys();
   void advance();
   void show_moment(int index);
-  void show_verdict(const Expected<ReplayReport>& report);
+  void show_verdict(const Expected<operation::ReplayReport>& report);
 
   std::optional<Timeline> timeline_;
   int moment_ = -1;

@@ -18,20 +18,20 @@ inline constexpr std::array<std::string_view, 15> session_kinds{
     "hand_eye", "order", "confirmed", "navigated", "outcome",  "halted", "end"};
 
 inline Json window_with(double femur_x) {
-  PoseWindow window{10, 0.5, {}};
+  operation::PoseWindow window{10, 0.5, {}};
   window.samples["femur"] = {{9.8, 0, 9.8, {Eigen::Matrix3d::Identity(), {0, 0, 0}}},
                              {10.2, 0, 10.2, {Eigen::Matrix3d::Identity(), {femur_x, 0, 0}}}};
   window.samples["tibia"] = {};
-  return to_json(window);
+  return operation::to_json(window);
 }
 
 inline void write_session(const std::filesystem::path& folder) {
-  const auto session = SessionLog::open(folder / "session.log").value();
+  const auto session = session::SessionLog::open(folder / "session.log").value();
   const auto add = [&](const char* kind, Json content) {
     ASSERT_TRUE(session->append(kind, std::move(content)));
   };
   const Json end = {{"distance_mm", 0.5}, {"predicted_mm", 0.6}};
-  add("plan", to_json(OperationPlan{}));
+  add("plan", operation::to_json(operation::OperationPlan{}));
   add("refused", {{"view", "AP"}, {"picture", "00"}, {"why", "stale_pose"}});
   add("exposure", {{"view", "AP"}, {"picture", "01"}, {"window", window_with(1)}, {"poses", Json::object()}});
   add("exposure", {{"view", "LAT"}, {"picture", "02"}, {"window", window_with(2)}, {"poses", nullptr}});

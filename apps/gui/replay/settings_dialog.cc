@@ -38,9 +38,9 @@ SettingsDialog::SettingsDialog(Settings settings, QWidget* parent)
     : QDialog(parent), given_(std::move(settings)) {
   setWindowTitle(tr("Settings"));
   auto* pages = new QTabWidget(this);
-  add_page(*pages, tr("&Measurement"), &Settings::run, run_fields);
-  add_page(*pages, tr("&Operation"), &Settings::plan, plan_fields);
-  add_page(*pages, tr("&Receiver"), &Settings::receiver, receiver_fields);
+  add_page(*pages, tr("&Measurement"), &Settings::run, pipeline::run_fields);
+  add_page(*pages, tr("&Operation"), &Settings::plan, operation::plan_fields);
+  add_page(*pages, tr("&Receiver"), &Settings::receiver, receiver::receiver_fields);
   add_page(*pages, tr("&Virtual devices"), &Settings::virtual_or, virtual_devices::virtual_devices_fields);
   auto* buttons = new QDialogButtonBox(
       QDialogButtonBox::Ok | QDialogButtonBox::Cancel | QDialogButtonBox::RestoreDefaults, this);

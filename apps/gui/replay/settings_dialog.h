@@ -18,9 +18,9 @@ namespace helicarm::gui {
 
 /// All options that have lists of fields.
 struct Settings {
-  RunOptions run = {};
-  OperationPlan plan = {};
-  ReceiverOptions receiver = {};
+  pipeline::RunOptions run = {};
+  operation::OperationPlan plan = {};
+  receiver::ReceiverOptions receiver = {};
   virtual_devices::VirtualDevicesOptions virtual_or = {};
 };
 

@@ -30,21 +30,22 @@ class Dialog : public testing::Test {
 
 TEST_F(Dialog, ReturnsUneditedValuesUnchanged) {
   Settings given;
-  given.run.method = Method::paper;
+  given.run.method = rectification::Method::paper;
   given.run.max_error_mm = 0.123456789;  // more digits than the box shows
   given.plan.robot.approach.gap_mm = -3;
   given.plan.views = {"one", "two"};
   const Settings back = SettingsDialog(given).settings();
-  EXPECT_EQ(back.run.method, Method::paper);
+  EXPECT_EQ(back.run.method, rectification::Method::paper);
   EXPECT_EQ(back.run.max_error_mm, 0.123456789);
-  EXPECT_EQ(to_json(back.plan), to_json(given.plan));
+  EXPECT_EQ(operation::to_json(back.plan), operation::to_json(given.plan));
   EXPECT_EQ(back.virtual_or.tracker_rate_hz, given.virtual_or.tracker_rate_hz);
 }
 
 TEST_F(Dialog, HasABoxForEveryField) {
   SettingsDialog dialog({});
-  for (const auto& field : run_fields) EXPECT_FALSE(box(dialog, field.name.data()).toolTip().isEmpty());
-  for (const auto& field : plan_fields)
+  for (const auto& field : pipeline::run_fields)
+    EXPECT_FALSE(box(dialog, field.name.data()).toolTip().isEmpty());
+  for (const auto& field : operation::plan_fields)
     EXPECT_FALSE(dialog.findChildren<FieldBox*>(field.name.data()).isEmpty()) << field.name;
 }
 

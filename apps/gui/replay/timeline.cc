@@ -93,7 +93,7 @@ auto of_record(std::size_t number, Read&& read) {
 
 void see(SessionState& state, const Json& window, std::size_t number) {
   const std::string origin = fmt::format("record {}", number);
-  for (const auto& [tool, samples] : value_or_throw(pose_window_from(window, origin)).samples)
+  for (const auto& [tool, samples] : value_or_throw(operation::pose_window_from(window, origin)).samples)
     if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
 }
 
@@ -120,10 +120,10 @@ void take(SessionState& state, const Timeline& timeline, std::size_t number) {
   }
 }
 
-OperationPlan plan_of(const Timeline& timeline) {
+operation::OperationPlan plan_of(const Timeline& timeline) {
   const auto plan = std::ranges::find(timeline.moments, "plan", &Moment::kind);
   if (plan == timeline.moments.end()) throw BadInput(Reason::usage, "the record holds no plan");
-  return value_or_throw(plan_from(plan->content, "the record's plan"));
+  return value_or_throw(operation::plan_from(plan->content, "the record's plan"));
 }
 
 }  // namespace
@@ -137,13 +137,13 @@ std::size_t Timeline::at(double seconds) const {
 
 Expected<Timeline> read_timeline(const std::filesystem::path& session) {
   return guarded([&] {
-    SessionHistory history = value_or_throw(read_session(session / "session.log"));
+    session::SessionHistory history = value_or_throw(session::read_session(session / "session.log"));
     if (history.records.empty())
       throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
     Timeline timeline{session, {}, history.torn};
     double seconds = 0;
     const double begin = history.records.front().time_s;
-    for (SessionRecord& record : history.records) {
+    for (session::SessionRecord& record : history.records) {
       seconds = std::max(seconds, record.time_s - begin);  // the clock may be set back
       QString summary = of_record(record.number, [&] { return summary_of(record.kind, record.content); });
       timeline.finished = timeline.finished || record.kind == "end";
@@ -162,38 +162,42 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index) {
   });
 }
 
-Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result) {
+Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
+                                      const pipeline::Result& result) {
   return guarded([&] {
     if (!state.measured || !state.registered_at)
       throw BadInput(Reason::usage, "no measurement or no registration before this moment");
-    const OperationPlan plan = plan_of(timeline);
-    std::vector<Poses> exposures;
-    for (const ViewResult& view : result.views) {
+    const operation::OperationPlan plan = plan_of(timeline);
+    std::vector<guidance::Poses> exposures;
+    for (const pipeline::ViewResult& view : result.views) {
       const auto at = state.exposed_at.find(view.name);
       if (at == state.exposed_at.end())
         throw BadInput(Reason::usage, fmt::format("{}: no image before this moment", view.name));
       const std::string origin = fmt::format("record {}", at->second);
       const Json& window = timeline.moments[at->second].content.at("window");
-      exposures.push_back(
-          value_or_throw(poses_of_exposure(value_or_throw(pose_window_from(window, origin)), plan.tracker)));
+      exposures.push_back(value_or_throw(operation::poses_of_exposure(
+          value_or_throw(operation::pose_window_from(window, origin)), plan.tracker)));
     }
     const Json& pairs = timeline.moments[*state.registered_at].content.at("pairs");
-    const HandEye hand_eye = value_or_throw(calibrate_hand_eye(
-        value_or_throw(hand_eye_pairs_from(pairs, fmt::format("record {}", *state.registered_at)))));
-    return LiveTool(plan, result, exposures, hand_eye);
+    const tracker::HandEye hand_eye = value_or_throw(tracker::calibrate_hand_eye(value_or_throw(
+        operation::hand_eye_pairs_from(pairs, fmt::format("record {}", *state.registered_at)))));
+    return operation::LiveTool(plan, result, exposures, hand_eye);
   });
 }
 
-Expected<ToolOverlay> overlay_of(const LiveTool& tool, const Timeline& timeline, const SessionState& state) {
+Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, const Timeline& timeline,
+                                            const SessionState& state) {
   return guarded([&] {
-    const OperationPlan plan = plan_of(timeline);
-    const auto pose = [&](const std::string& marker) -> std::optional<RigidTransform> {
+    const operation::OperationPlan plan = plan_of(timeline);
+    const auto pose = [&](const std::string& marker) -> std::optional<geometry::RigidTransform> {
       const auto seen = state.tracker_from.find(marker);
       return seen == state.tracker_from.end() ? std::nullopt : std::optional(seen->second);
     };
-    const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &PlannedTunnel::name);
-    const Poses now{{}, pose(plan.tracker.femur), pose(plan.tracker.tibia), pose(plan.tracker.tool)};
-    return value_or_throw(tool.overlay(now, tunnel == plan.tunnels.end() ? Bone::femur : tunnel->bone));
+    const auto tunnel = std::ranges::find(plan.tunnels, state.tunnel, &operation::PlannedTunnel::name);
+    const guidance::Poses now{
+        {}, pose(plan.tracker.femur), pose(plan.tracker.tibia), pose(plan.tracker.tool)};
+    return value_or_throw(
+        tool.overlay(now, tunnel == plan.tunnels.end() ? guidance::Bone::femur : tunnel->bone));
   });
 }
 

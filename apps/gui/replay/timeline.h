@@ -43,14 +43,14 @@ struct LoopMiss {
 
 /// State of the operation after a moment.
 struct SessionState {
-  std::vector<std::string> exposures;                   ///< views in order of acquisition
-  std::optional<std::filesystem::path> case_folder;     ///< the newest case: images and case.json
-  bool measured = false;                                ///< the newest case has a result
-  std::map<std::string, RigidTransform> tracker_from;   ///< the newest pose of each tool
-  std::map<std::string, std::vector<LoopMiss>> misses;  ///< of the closed loop, by tunnel
-  std::map<std::string, std::size_t> exposed_at;        ///< moment of each view's acquisition
-  std::optional<std::size_t> registered_at;             ///< moment of the latest registration
-  std::string tunnel;                                   ///< target of the newest order
+  std::vector<std::string> exposures;                            ///< views in order of acquisition
+  std::optional<std::filesystem::path> case_folder;              ///< the newest case: images and case.json
+  bool measured = false;                                         ///< the newest case has a result
+  std::map<std::string, geometry::RigidTransform> tracker_from;  ///< the newest pose of each tool
+  std::map<std::string, std::vector<LoopMiss>> misses;           ///< of the closed loop, by tunnel
+  std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's acquisition
+  std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
+  std::string tunnel;                                            ///< target of the newest order
 };
 
 /// Reads session.log in a session's folder. An incomplete end is left out and reported in `torn`; refuses as
@@ -62,9 +62,11 @@ Expected<SessionState> state_at(const Timeline& timeline, std::size_t index);
 
 /// Follows the tool in that state's case, whose measurement is `result`. Refuses (usage) a state before
 /// measurement or registration.
-Expected<LiveTool> tool_of(const Timeline& timeline, const SessionState& state, const Result& result);
+Expected<operation::LiveTool> tool_of(const Timeline& timeline, const SessionState& state,
+                                      const pipeline::Result& result);
 
 /// The tool at the newest poses, relative to the bone of the state's tunnel. Refuses as `LiveTool::overlay`.
-Expected<ToolOverlay> overlay_of(const LiveTool& tool, const Timeline& timeline, const SessionState& state);
+Expected<operation::ToolOverlay> overlay_of(const operation::LiveTool& tool, const Timeline& timeline,
+                                            const SessionState& state);
 
 }  // namespace helicarm::gui

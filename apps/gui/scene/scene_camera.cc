@@ -20,7 +20,7 @@ double half_height(const SceneCamera& camera) { return std::tan(camera.height_de
 
 SceneCamera camera_through(const ViewShape& view, const Vector3d& middle, double aspect) {
   const Eigen::Matrix3d& rotation = view.view.camera_from_world.rotation;
-  const Intrinsics& k = view.view.intrinsics;
+  const geometry::Intrinsics& k = view.view.intrinsics;
   const auto farthest = [](double centre, double size) {
     return std::max(centre + 0.5, size - 0.5 - centre);
   };

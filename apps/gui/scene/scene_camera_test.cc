@@ -24,7 +24,8 @@ TEST(SceneCamera, EachViewsCameraContainsTheCalibratorAndTheWholeImage) {
   for (const ViewShape& view : shown.views)
     for (const double aspect : {0.5, 1.0, 2.5}) {
       const SceneCamera camera = camera_through(view, {0, 0, 40}, aspect);
-      for (const CalibratorBall& ball : shown.balls) expect_inside(camera, aspect, ball.centre_in_calibrator);
+      for (const phantom::CalibratorBall& ball : shown.balls)
+        expect_inside(camera, aspect, ball.centre_in_calibrator);
       for (const Vector3d& corner : view.detector) expect_inside(camera, aspect, corner);
     }
 }
@@ -32,7 +33,7 @@ TEST(SceneCamera, EachViewsCameraContainsTheCalibratorAndTheWholeImage) {
 TEST(SceneCamera, EachViewsCameraAgreesWithItsImage) {
   for (const ViewShape& view : scene().views) {
     const SceneCamera camera = camera_through(view, {0, 0, 40}, 1);
-    const Intrinsics& k = view.view.intrinsics;
+    const geometry::Intrinsics& k = view.view.intrinsics;
     const Vector3d place(20, -15, 60), other(-12, 30, 20);
     const Vector2d way = *seen_at(camera, 1, other) - *seen_at(camera, 1, place);
     const Vector2d in_image = view.view.project(other) - view.view.project(place);

@@ -29,7 +29,7 @@ const ViewShape* SceneView::view_of(Preset preset) const {
 SceneCamera SceneView::camera_of(Preset preset) const {
   if (const ViewShape* view = view_of(preset)) return camera_through(*view, middle_, aspect());
   std::vector<Eigen::Vector3d> places;
-  for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
+  for (const phantom::CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
   for (const ViewShape& view : scene_.views) {
     places.push_back(view.central_ray.from);
     places.insert(places.end(), view.detector.begin(), view.detector.end());
@@ -49,7 +49,7 @@ void SceneView::set_preset(Preset preset) {
 
 SceneCamera SceneView::near_camera() const {
   std::vector<Eigen::Vector3d> places;
-  for (const CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
+  for (const phantom::CalibratorBall& ball : scene_.balls) places.push_back(ball.centre_in_calibrator);
   for (const PointShape& point : scene_.points) places.push_back(point.error.centre);
   if (live_.calibrator_from_tip) places.push_back(live_.calibrator_from_tip->translation);
   constexpr double scene_around = 0.72;

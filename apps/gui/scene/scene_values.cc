@@ -19,10 +19,11 @@ using Eigen::Vector3d;
 /// calibrator.
 constexpr double beyond_calibrator = 1.5;
 
-double detector_depth(const ViewResult& view, const Vector3d& middle) {
-  const View& calibrated = view.calibrated->view;
+double detector_depth(const pipeline::ViewResult& view, const Vector3d& middle) {
+  const geometry::View& calibrated = view.calibrated->view;
   std::optional<double> pixel_mm;
-  if (view.rectification && view.rectification->map.rectified_plane == RectifiedPlane::detector)
+  if (view.rectification &&
+      view.rectification->map.rectified_plane == rectification::RectifiedPlane::detector)
     pixel_mm = view.rectification->map.rectified_pixel_mm;
   if (!pixel_mm && view.xray_image && view.xray_image->acquisition.pixel_mm)
     pixel_mm = view.xray_image->acquisition.pixel_mm->y();
@@ -30,13 +31,13 @@ double detector_depth(const ViewResult& view, const Vector3d& middle) {
 }
 
 Vector3d on_detector(const ViewShape& shape, const Vector2d& pixel) {
-  const Ray ray = ray_through(shape.view, pixel);
+  const geometry::Ray ray = geometry::ray_through(shape.view, pixel);
   const Vector3d along = shape.central_ray.to - shape.central_ray.from;
   return ray.origin + ray.direction * (along.squaredNorm() / ray.direction.dot(along));
 }
 
-ViewShape shape_of(const ViewResult& view, const Vector3d& middle) {
-  const View& calibrated = view.calibrated->view;
+ViewShape shape_of(const pipeline::ViewResult& view, const Vector3d& middle) {
+  const geometry::View& calibrated = view.calibrated->view;
   ViewShape shape{view.name, calibrated, {1024, 1024}, {}, {}};
   if (view.xray_image) shape.size_px = {view.xray_image->pixels.width(), view.xray_image->pixels.height()};
   const Vector3d source = calibrated.source_in_world();
@@ -49,7 +50,8 @@ ViewShape shape_of(const ViewResult& view, const Vector3d& middle) {
   return shape;
 }
 
-PointShape shape_of(const PointResult& point, const Result& result, const std::vector<ViewShape>& views) {
+PointShape shape_of(const pipeline::PointResult& point, const pipeline::Result& result,
+                    const std::vector<ViewShape>& views) {
   PointShape shape{point.name, point.source, point.moves_with, {}, {}};
   shape.error = ellipsoid_95(point.place->in_calibrator, point.place->covariance_in_calibrator);
   std::size_t calibrated = 0;
@@ -71,16 +73,16 @@ Ellipsoid ellipsoid_95(const Vector3d& centre, const Eigen::Matrix3d& covariance
   return {centre, axes, (chi2_95 * solver.eigenvalues().cwiseMax(0)).cwiseSqrt()};
 }
 
-std::optional<TriangleMesh> cone_of(const Calibrator& calibrator) {
+std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrator) {
   constexpr unsigned sides = 48;
   constexpr double off_wall_mm = 5;
   const simulation::ConeWall wall = simulation::cone_wall(calibrator);
   if (!(wall.radius_at(wall.bottom_mm) > 0 && wall.radius_at(wall.top_mm) > 0)) return {};
-  for (const CalibratorBall& ball : calibrator.balls) {
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
     const Vector3d& at = ball.centre_in_calibrator;
     if (std::abs(at.head<2>().norm() - wall.radius_at(at.z())) > off_wall_mm) return {};
   }
-  TriangleMesh mesh;
+  phantom::TriangleMesh mesh;
   for (unsigned i = 0; i < sides; ++i) {
     const double angle = 2 * std::numbers::pi * i / sides;
     for (const double z : {wall.bottom_mm, wall.top_mm})
@@ -92,15 +94,15 @@ std::optional<TriangleMesh> cone_of(const Calibrator& calibrator) {
   return mesh;
 }
 
-ResultScene scene_of(const Result& result, const Calibrator& calibrator) {
+ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& calibrator) {
   ResultScene scene{calibrator.balls, cone_of(calibrator), {}, {}, {}};
-  for (const ViewResult& view : result.views)
-    if (view.calibrated) scene.views.push_back(shape_of(view, middle_of(calibrator)));
-  for (const PointResult& point : result.points)
+  for (const pipeline::ViewResult& view : result.views)
+    if (view.calibrated) scene.views.push_back(shape_of(view, phantom::middle_of(calibrator)));
+  for (const pipeline::PointResult& point : result.points)
     if (point.place) scene.points.push_back(shape_of(point, result, scene.views));
   for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {
-    const PointResult& start = result.points[result.tunnel_ends[i].start];
-    const PointResult& end = result.points[result.tunnel_ends[i].end];
+    const pipeline::PointResult& start = result.points[result.tunnel_ends[i].start];
+    const pipeline::PointResult& end = result.points[result.tunnel_ends[i].end];
     if (start.place && end.place)
       scene.tunnels.push_back({i < result.tunnels.size() ? result.tunnels[i].name : std::string(),
                                start.moves_with,
@@ -110,11 +112,11 @@ ResultScene scene_of(const Result& result, const Calibrator& calibrator) {
 }
 
 std::vector<Segment> robot_links(const LiveScene& live) {
-  const auto model = robot_model(live.robot_model);
+  const auto model = robot::robot_model(live.robot_model);
   if (!live.calibrator_from_base || !live.joints || !model) return {};
   std::vector<Segment> links;
   Vector3d from = live.calibrator_from_base->translation;
-  for (const RigidTransform& base_from_frame : joint_frames(*model, *live.joints)) {
+  for (const geometry::RigidTransform& base_from_frame : robot::joint_frames(*model, *live.joints)) {
     const Vector3d to = *live.calibrator_from_base * base_from_frame.translation;
     links.push_back({from, to});
     from = to;

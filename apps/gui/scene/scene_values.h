@@ -34,7 +34,7 @@ Ellipsoid ellipsoid_95(const Eigen::Vector3d& centre, const Eigen::Matrix3d& cov
 /// A calibrated view: source, edge of the image and central ray.
 struct ViewShape {
   std::string name;
-  View view;
+  geometry::View view;
   Eigen::Vector2d size_px;
   std::array<Eigen::Vector3d, 4> detector;  ///< corners in order around the image
   Segment central_ray;                      ///< from the source to the detector
@@ -42,43 +42,43 @@ struct ViewShape {
 
 struct PointShape {
   std::string name;
-  PointSource source;
-  std::optional<Bone> moves_with;
+  localization::PointSource source;
+  std::optional<guidance::Bone> moves_with;
   Ellipsoid error;            ///< about its position
   std::vector<Segment> rays;  ///< from the sources to the detectors
 };
 
 struct TunnelShape {
   std::string name;
-  std::optional<Bone> moves_with;
+  std::optional<guidance::Bone> moves_with;
   Segment axis;
   double radius_mm = 4;
 };
 
 /// The displayed parts of a result; missing ones are absent.
 struct ResultScene {
-  std::vector<CalibratorBall> balls;
-  std::optional<TriangleMesh> body;  ///< of the calibrator, if its balls lie on a cone
+  std::vector<phantom::CalibratorBall> balls;
+  std::optional<phantom::TriangleMesh> body;  ///< of the calibrator, if its balls lie on a cone
   std::vector<ViewShape> views;
   std::vector<PointShape> points;
   std::vector<TunnelShape> tunnels;
 };
 
-ResultScene scene_of(const Result& result, const Calibrator& calibrator);
+ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& calibrator);
 
 /// The outer wall of the cone that carries the balls; empty if they do not lie on a cone.
-std::optional<TriangleMesh> cone_of(const Calibrator& calibrator);
+std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrator);
 
 /// The moving parts. Absent: unknown at present and not drawn.
 struct LiveScene {
-  std::optional<RigidTransform> calibrator_from_tip;  ///< z along the tool, out of its tip
+  std::optional<geometry::RigidTransform> calibrator_from_tip;  ///< z along the tool, out of its tip
   /// Motion of the bones since the acquisition.
-  std::optional<RigidTransform> calibrator_from_femur_now, calibrator_from_tibia_now;
+  std::optional<geometry::RigidTransform> calibrator_from_femur_now, calibrator_from_tibia_now;
   /// Present poses of the bones' markers.
-  std::optional<RigidTransform> calibrator_from_femur_marker, calibrator_from_tibia_marker;
-  std::optional<RigidTransform> calibrator_from_base;
+  std::optional<geometry::RigidTransform> calibrator_from_femur_marker, calibrator_from_tibia_marker;
+  std::optional<geometry::RigidTransform> calibrator_from_base;
   std::string robot_model = "UR5";
-  std::optional<Joints> joints;
+  std::optional<robot::Joints> joints;
   std::vector<Eigen::Vector3d> path;  ///< of the tool's tip
 };
 

@@ -74,14 +74,14 @@ TEST(SceneValues, TunnelsRunBetweenTheirPoints) {
 }
 
 TEST(SceneValues, RefusedResultShowsOnlyTheCalibrator) {
-  const ResultScene scene = scene_of({}, udcsc());
+  const ResultScene scene = scene_of({}, phantom::udcsc());
   EXPECT_EQ(scene.balls.size(), 12u);
   EXPECT_TRUE(scene.views.empty());
   EXPECT_TRUE(scene.points.empty());
 }
 
 TEST(SceneValues, ConeIsDrawnOnlyForBallsOnACone) {
-  Calibrator calibrator = udcsc();
+  phantom::Calibrator calibrator = phantom::udcsc();
   const auto cone = cone_of(calibrator);
   ASSERT_TRUE(cone);
   for (const auto& [a, b, c] : cone->triangles) {  // outward orientation
@@ -95,12 +95,13 @@ TEST(SceneValues, ConeIsDrawnOnlyForBallsOnACone) {
 TEST(SceneValues, RobotLinksEndAtTheFlange) {
   LiveScene live;
   EXPECT_TRUE(robot_links(live).empty());
-  live.calibrator_from_base = RigidTransform{Matrix3d::Identity(), {60, 520, -160}};
-  live.joints = (Joints() << 0.1, -1.2, 1.4, -0.6, 0.3, 2).finished();
+  live.calibrator_from_base = geometry::RigidTransform{Matrix3d::Identity(), {60, 520, -160}};
+  live.joints = (robot::Joints() << 0.1, -1.2, 1.4, -0.6, 0.3, 2).finished();
   const auto links = robot_links(live);
   ASSERT_EQ(links.size(), 6u);
   EXPECT_EQ(links.front().from, live.calibrator_from_base->translation);
-  EXPECT_LT((links.back().to - *live.calibrator_from_base * base_from_flange(ur5(), *live.joints).translation)
+  EXPECT_LT((links.back().to -
+             *live.calibrator_from_base * robot::base_from_flange(robot::ur5(), *live.joints).translation)
                 .norm(),
             1e-9);
   live.robot_model = "another";

@@ -26,9 +26,10 @@ void SceneView::redraw() {
   update();
 }
 
-void SceneView::show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator) {
+void SceneView::show_result(std::shared_ptr<const pipeline::Result> result,
+                            const phantom::Calibrator& calibrator) {
   scene_ = result ? scene_of(*result, calibrator) : ResultScene{};
-  middle_ = middle_of(calibrator);
+  middle_ = phantom::middle_of(calibrator);
   result_changed_ = live_changed_ = true;
   set_preset(preset_);
 }
@@ -45,7 +46,7 @@ void SceneView::show_live(const LiveScene& live) {
   redraw();
 }
 
-void SceneView::show_tre(std::optional<TreVolume> volume, SliceAxis axis, double place_mm) {
+void SceneView::show_tre(std::optional<localization::TreVolume> volume, SliceAxis axis, double place_mm) {
   tre_ = std::move(volume);
   if (tre_) tre_scale_ = scale_of(*tre_);
   slice_axis_ = axis;
@@ -96,10 +97,10 @@ void SceneView::paintEvent(QPaintEvent*) {
 
 std::vector<SceneLabel> SceneView::labels() const {
   std::vector<SceneLabel> labels;
-  const auto carried = [&](const std::optional<Bone>& bone, const Eigen::Vector3d& place) {
+  const auto carried = [&](const std::optional<guidance::Bone>& bone, const Eigen::Vector3d& place) {
     if (!bone) return place;
     const auto& motion =
-        *bone == Bone::femur ? live_.calibrator_from_femur_now : live_.calibrator_from_tibia_now;
+        *bone == guidance::Bone::femur ? live_.calibrator_from_femur_now : live_.calibrator_from_tibia_now;
     return motion ? *motion * place : place;
   };
   for (const PointShape& point : scene_.points)

@@ -33,12 +33,12 @@ class SceneView : public QWidget {
   const std::optional<QString>& obstacle() const;
 
   /// Null clears the scene. The live part stays.
-  void show_result(std::shared_ptr<const Result> result, const Calibrator& calibrator);
+  void show_result(std::shared_ptr<const pipeline::Result> result, const phantom::Calibrator& calibrator);
   /// In the calibrator's frame, at the acquisition.
   void show_bones(std::optional<BoneMeshes> bones);
   void show_live(const LiveScene& live);
   /// The slice perpendicular to an axis of the calibrator; empty removes it.
-  void show_tre(std::optional<TreVolume> volume, SliceAxis axis, double place_mm);
+  void show_tre(std::optional<localization::TreVolume> volume, SliceAxis axis, double place_mm);
 
   /// `ap` and `lateral` take the view of that name (AP, LAT...), else the first and the second view; without
   /// such a view the overview.
@@ -79,7 +79,7 @@ class SceneView : public QWidget {
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero();  ///< of the calibrator's balls
   std::optional<BoneMeshes> bones_;
   LiveScene live_;
-  std::optional<TreVolume> tre_;
+  std::optional<localization::TreVolume> tre_;
   TreScale tre_scale_{0, 1, 0.5};
   SliceAxis slice_axis_ = SliceAxis::z;
   double slice_mm_ = 0;

@@ -39,16 +39,18 @@ class ShownScene : public testing::Test {
     const Eigen::Vector3d end = points[1].in_calibrator, start = points[0].in_calibrator;
     const Eigen::Matrix3d turn =
         Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), end - start).toRotationMatrix();
-    live.calibrator_from_tip = RigidTransform{turn, start};
-    live.calibrator_from_base =
-        RigidTransform{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(), {60, 520, -160}};
-    const RigidTransform calibrator_from_flange =
-        *live.calibrator_from_tip * RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, -150}};
-    const auto ways = inverse(ur5(), live.calibrator_from_base->inverse() * calibrator_from_flange);
-    live.joints = ways.empty() ? Joints((Joints() << 0, -1.2, 1.5, -1, 0.5, 0).finished()) : ways.front();
-    const Poses& poses = simulated().given.views[0].poses;
-    live.calibrator_from_femur_marker = calibrator_from(Bone::femur, poses);
-    live.calibrator_from_tibia_marker = calibrator_from(Bone::tibia, poses);
+    live.calibrator_from_tip = geometry::RigidTransform{turn, start};
+    live.calibrator_from_base = geometry::RigidTransform{
+        (Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(), {60, 520, -160}};
+    const geometry::RigidTransform calibrator_from_flange =
+        *live.calibrator_from_tip * geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, -150}};
+    const auto ways =
+        robot::inverse(robot::ur5(), live.calibrator_from_base->inverse() * calibrator_from_flange);
+    live.joints =
+        ways.empty() ? robot::Joints((robot::Joints() << 0, -1.2, 1.5, -1, 0.5, 0).finished()) : ways.front();
+    const guidance::Poses& poses = simulated().given.views[0].poses;
+    live.calibrator_from_femur_marker = guidance::calibrator_from(guidance::Bone::femur, poses);
+    live.calibrator_from_tibia_marker = guidance::calibrator_from(guidance::Bone::tibia, poses);
     for (int i = 10; i >= 0; --i) live.path.push_back(start - 12 * i * turn.col(2));
     return live;
   }
@@ -57,11 +59,11 @@ class ShownScene : public testing::Test {
     return simulation::moved(simulation::bone_meshes(6), *simulated().truth.calibrator_from_knee);
   }
 
-  static TreVolume tre() {
-    const Result& result = *simulated().result;
-    Calibration calibration{{}, result.joint_covariance};
-    for (const ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
-    TreVolume volume = predict_tre(calibration, {0, 0, 40}, 100, 10, 0.5, 0);
+  static localization::TreVolume tre() {
+    const pipeline::Result& result = *simulated().result;
+    calibration::Calibration calibration{{}, result.joint_covariance};
+    for (const pipeline::ViewResult& view : result.views) calibration.views.push_back(*view.calibrated);
+    localization::TreVolume volume = localization::predict_tre(calibration, {0, 0, 40}, 100, 10, 0.5, 0);
     volume.rms_mm[std::size_t((10 * 21 + 3) * 21 + 4)] = std::nan("");
     return volume;
   }
@@ -113,7 +115,7 @@ TEST_F(ShownScene, ToolRobotAndBonesMove) {
   view_.show_live(now);
   const QImage turned = acquired_view("robot_turned");
   EXPECT_GT(pixels_apart(still, turned), 100);
-  now.calibrator_from_tibia_now = RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
+  now.calibrator_from_tibia_now = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {25, 0, 0}};
   view_.show_live(now);
   EXPECT_GT(pixels_apart(acquired_view("tibia_moved"), turned), 100);
   view_.show_live({});

@@ -91,7 +91,7 @@ void ShapeBuilder::add_tube(const Segment& axis, double from_radius_mm, double t
   }
 }
 
-void ShapeBuilder::add_mesh(const TriangleMesh& mesh, const Colour& colour) {
+void ShapeBuilder::add_mesh(const phantom::TriangleMesh& mesh, const Colour& colour) {
   std::vector<Vector3d> normals(mesh.corners.size(), Vector3d::Zero());
   const vtkIdType first = data_->GetNumberOfPoints();
   for (const auto& [a, b, c] : mesh.triangles) {

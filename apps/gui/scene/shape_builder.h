@@ -21,7 +21,7 @@ class ShapeBuilder {
   /// A truncated cone along the segment with closed ends.
   void add_tube(const Segment& axis, double from_radius_mm, double to_radius_mm, const Colour& colour);
   /// Smoothly shaded: normals are means over the adjacent triangles.
-  void add_mesh(const TriangleMesh& mesh, const Colour& colour);
+  void add_mesh(const phantom::TriangleMesh& mesh, const Colour& colour);
   void add_line(std::span<const Eigen::Vector3d> places, const Colour& colour, bool closed = false);
   /// Cells with a corner of unknown error are left out.
   void add_slice(const TreSlice& slice, const TreScale& scale);

@@ -15,8 +15,8 @@ namespace helicarm::gui {
 /// A simulated navigation case and its measurement, made once for all tests of a program.
 struct Simulated {
   simulation::SimulatedCase truth;
-  Case given;
-  std::shared_ptr<const Result> result;
+  pipeline::Case given;
+  std::shared_ptr<const pipeline::Result> result;
 };
 
 inline const Simulated& simulated() {
@@ -29,8 +29,8 @@ inline const Simulated& simulated() {
     options.seed = 5;
     Simulated fresh{*simulation::simulate_case(options), {}, nullptr};
     if (!simulation::write_case(folder, fresh.truth)) std::abort();
-    fresh.given = *read_case(folder);
-    fresh.result = std::make_shared<const Result>(*run_case(fresh.given, {}));
+    fresh.given = *pipeline::read_case(folder);
+    fresh.result = std::make_shared<const pipeline::Result>(*pipeline::run_case(fresh.given, {}));
     std::filesystem::remove_all(folder);
     return fresh;
   }();

@@ -38,7 +38,7 @@ void add_triad(ShapeBuilder& shapes, double length_mm) {
 }
 
 /// Maps the unit tube along z onto a link.
-RigidTransform along(const Segment& link) {
+geometry::RigidTransform along(const Segment& link) {
   const Vector3d way = link.to - link.from;
   return {Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix(), link.from};
 }
@@ -106,7 +106,7 @@ vtkActor* Stage::add(bool lit) {
   return actor;
 }
 
-void Stage::move(vtkActor* actor, const std::optional<RigidTransform>& calibrator_from_body) {
+void Stage::move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body) {
   actor->SetVisibility(calibrator_from_body.has_value());
   if (!calibrator_from_body) return;
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = calibrator_from_body->matrix();
@@ -117,7 +117,7 @@ void Stage::move(vtkActor* actor, const std::optional<RigidTransform>& calibrato
 
 void Stage::set_result(const ResultScene& scene, double error_scale) {
   ShapeBuilder solids, lines, cone;
-  for (const CalibratorBall& ball : scene.balls)
+  for (const phantom::CalibratorBall& ball : scene.balls)
     solids.add_ball(ball.centre_in_calibrator, ball.diameter_mm / 2, palette::steel);
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const ViewShape& view = scene.views[i];
@@ -127,8 +127,8 @@ void Stage::set_result(const ResultScene& scene, double error_scale) {
     lines.add_line(ray, palette::dim(palette::of_view(i)));
   }
   std::array<ShapeBuilder, 3> points;
-  const auto group = [&](const std::optional<Bone>& bone) -> ShapeBuilder& {
-    return points[bone ? (*bone == Bone::femur ? 1 : 2) : 0];
+  const auto group = [&](const std::optional<guidance::Bone>& bone) -> ShapeBuilder& {
+    return points[bone ? (*bone == guidance::Bone::femur ? 1 : 2) : 0];
   };
   for (const PointShape& point : scene.points) {
     for (const Segment& ray : point.rays) {
@@ -176,7 +176,7 @@ void Stage::set_live(const LiveScene& live) {
   };
   for (std::size_t i = 0; i < 2; ++i) {
     for (vtkActor* actor : {bones_[i], points_[i + 1]}) {
-      move(actor, motions[i].value_or(RigidTransform()));
+      move(actor, motions[i].value_or(geometry::RigidTransform()));
       actor->SetVisibility(filled(actor));
     }
     move(markers_[i], markers[i]);

@@ -35,7 +35,7 @@ class Stage {
 
  private:
   vtkActor* add(bool lit);
-  void move(vtkActor* actor, const std::optional<RigidTransform>& calibrator_from_body);
+  void move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body);
 
   vtkNew<vtkGenericOpenGLRenderWindow> window_;
   vtkNew<vtkRenderer> renderer_;

@@ -9,7 +9,7 @@
 
 namespace helicarm::gui {
 
-TreSlice slice_of(const TreVolume& volume, SliceAxis axis, double place_mm) {
+TreSlice slice_of(const localization::TreVolume& volume, SliceAxis axis, double place_mm) {
   const int across = int(axis), side = volume.side;
   const double layer = std::clamp((place_mm - volume.first[across]) / volume.step_mm, 0.0, double(side - 1));
   const int below = std::min(int(layer), std::max(0, side - 2));
@@ -34,13 +34,13 @@ TreSlice slice_of(const TreVolume& volume, SliceAxis axis, double place_mm) {
   return slice;
 }
 
-TreScale scale_of(const TreVolume& volume) {
+TreScale scale_of(const localization::TreVolume& volume) {
   constexpr int marks = 5;
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const double value : volume.rms_mm)
     if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
   if (!(high > low)) return high == low ? TreScale{low - 0.5, low + 0.5, 0.5} : TreScale{0, 1, 0.5};
-  const double step = round_step(high - low, marks);
+  const double step = report::round_step(high - low, marks);
   return {std::floor(low / step) * step, std::ceil(high / step) * step, step};
 }
 

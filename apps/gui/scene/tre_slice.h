@@ -19,7 +19,7 @@ struct TreSlice {
 };
 
 /// Interpolated between two layers of the volume; beyond the volume its last layer is used.
-TreSlice slice_of(const TreVolume& volume, SliceAxis axis, double place_mm);
+TreSlice slice_of(const localization::TreVolume& volume, SliceAxis axis, double place_mm);
 
 /// Ends of the colour bar and distance of its ticks, mm.
 struct TreScale {
@@ -30,7 +30,7 @@ struct TreScale {
 };
 
 /// Over the whole volume, so that slices are comparable.
-TreScale scale_of(const TreVolume& volume);
+TreScale scale_of(const localization::TreVolume& volume);
 
 using Colour = std::array<std::uint8_t, 3>;
 

@@ -10,8 +10,8 @@ namespace helicarm::gui {
 namespace {
 
 /// x + 10 y + 100 z, mm.
-TreVolume ramp(int side) {
-  TreVolume volume{{-2, -2, -2}, 1, side, {}};
+localization::TreVolume ramp(int side) {
+  localization::TreVolume volume{{-2, -2, -2}, 1, side, {}};
   for (int k = 0; k < side; ++k)
     for (int j = 0; j < side; ++j)
       for (int i = 0; i < side; ++i)
@@ -20,7 +20,7 @@ TreVolume ramp(int side) {
 }
 
 TEST(TreSlice, InterpolatesBetweenLayersOnEveryAxis) {
-  const TreVolume volume = ramp(5);
+  const localization::TreVolume volume = ramp(5);
   for (const SliceAxis axis : {SliceAxis::x, SliceAxis::y, SliceAxis::z}) {
     const TreSlice slice = slice_of(volume, axis, 0.3);
     ASSERT_EQ(slice.places.size(), 25u);
@@ -32,13 +32,13 @@ TEST(TreSlice, InterpolatesBetweenLayersOnEveryAxis) {
 }
 
 TEST(TreSlice, BeyondTheVolumeItsLastLayerIsUsed) {
-  const TreVolume volume = ramp(5);
+  const localization::TreVolume volume = ramp(5);
   EXPECT_NEAR(slice_of(volume, SliceAxis::y, 77).places[3].y(), 2, 1e-12);
   EXPECT_NEAR(slice_of(volume, SliceAxis::y, -77).places[3].y(), -2, 1e-12);
 }
 
 TEST(TreSlice, UnknownValuesStayUnknownAndOutOfTheScale) {
-  TreVolume volume = ramp(3);
+  localization::TreVolume volume = ramp(3);
   volume.rms_mm[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(std::isnan(slice_of(volume, SliceAxis::z, -2).rms_mm[0]));
   EXPECT_FALSE(std::isnan(slice_of(volume, SliceAxis::z, -1).rms_mm[0]));
@@ -51,8 +51,8 @@ TEST(TreSlice, UnknownValuesStayUnknownAndOutOfTheScale) {
 }
 
 TEST(TreSlice, ScaleOfNoOrOneValueIsUsable) {
-  const TreVolume nothing{{0, 0, 0}, 1, 1, {std::numeric_limits<double>::quiet_NaN()}};
-  const TreVolume one{{0, 0, 0}, 1, 1, {0.2}};
+  const localization::TreVolume nothing{{0, 0, 0}, 1, 1, {std::numeric_limits<double>::quiet_NaN()}};
+  const localization::TreVolume one{{0, 0, 0}, 1, 1, {0.2}};
   EXPECT_GT(scale_of(nothing).high, scale_of(nothing).low);
   EXPECT_NEAR(scale_of(one).share(0.2), 0.5, 1e-12);
   EXPECT_EQ(slice_of(one, SliceAxis::x, 3).rms_mm.front(), 0.2);

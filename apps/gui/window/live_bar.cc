@@ -45,7 +45,7 @@ void paint_indicator(QPainter& painter, const QRectF& box, const StatusIndicator
   painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, indicator.text);
 }
 
-QString aim_words(const QString& tunnel, const TunnelAim& aim) {
+QString aim_words(const QString& tunnel, const operation::TunnelAim& aim) {
   const QString off = LiveBar::tr("%1: %2 mm off axis   %3°")
                           .arg(tunnel)
                           .arg(aim.distance_mm, 0, 'f', 1)
@@ -56,7 +56,7 @@ QString aim_words(const QString& tunnel, const TunnelAim& aim) {
                    .arg(aim.depth_mm < 0 ? LiveBar::tr("before the entry") : LiveBar::tr("deep"));
 }
 
-void paint_depth(QPainter& painter, const QRectF& box, const TunnelAim& aim) {
+void paint_depth(QPainter& painter, const QRectF& box, const operation::TunnelAim& aim) {
   const double span = before_entry_mm + aim.length_mm;
   const auto at = [&](double depth) {
     return box.left() + box.width() * std::clamp((depth + before_entry_mm) / span, 0.0, 1.0);

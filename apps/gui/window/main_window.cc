@@ -227,9 +227,9 @@ void MainWindow::show_picks() {
   const auto wanted = state.measured && phase_ == Phase::plan ? plan_->target() : std::nullopt;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     if (!shown_ || i >= shown_->views.size() || !shown_->views[i].xray_image) continue;
-    const ViewResult& view = shown_->views[i];
+    const pipeline::ViewResult& view = shown_->views[i];
     std::vector<FreshPick> picks;
-    for (const Pick& pick : state.picks)
+    for (const pipeline::Pick& pick : state.picks)
       if (pick.view == view.name && next_pick(state)) picks.push_back({text(pick.name), pick.uv_raw});
     xrays_[i]->set_picks(std::move(picks));
     xrays_[i]->set_picking(wanted.has_value() && controller_.takes_picks());
@@ -238,14 +238,14 @@ void MainWindow::show_picks() {
 
     std::vector<Eigen::Vector2d> epipolar;
     if (wanted)
-      for (const ViewResult& other : shown_->views) {
-        const Pick* pick = pick_of(state, wanted->point, other.name);
+      for (const pipeline::ViewResult& other : shown_->views) {
+        const pipeline::Pick* pick = pick_of(state, wanted->point, other.name);
         if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated) continue;
         const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
-        const double depth = other.calibrated->view.depth(middle_of(state.calibrator));
+        const double depth = other.calibrated->view.depth(phantom::middle_of(state.calibrator));
         if (uv)
-          epipolar = epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
-                                   depth - epipolar_reach_mm, depth + epipolar_reach_mm);
+          epipolar = geometry::epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
+                                             depth - epipolar_reach_mm, depth + epipolar_reach_mm);
       }
     xrays_[i]->set_epipolar(std::move(epipolar));
   }
@@ -261,11 +261,11 @@ void MainWindow::show_phase(Phase phase) {
 void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   const auto wanted = plan_->target();
   if (!wanted || !shown_ || view >= shown_->views.size()) return;
-  Pick pick;
+  pipeline::Pick pick;
   pick.name = wanted->point;
   pick.view = shown_->views[view].name;
   pick.uv_raw = {raw.x(), raw.y()};
-  if (plan_->snaps()) pick.snap = Snap::ball;
+  if (plan_->snaps()) pick.snap = pipeline::Snap::ball;
   if (controller_.state().source != Source::files) pick.moves_with = wanted->bone;
   controller_.pick(std::move(pick));
   plan_->placed(wanted->point);
@@ -276,10 +276,10 @@ void MainWindow::show_live() {
   if (live_.stale) controller_.drop_plan(*live_.stale);
   live_bar_->show_live(live_);
   navigate_->show_live(live_);
-  const ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
+  const operation::ToolOverlay* tool = recorded_ ? &*recorded_ : nullptr;
   if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    std::optional<ImageLine> line;
+    std::optional<verification::ImageLine> line;
     if (tool && shown_ && i < shown_->views.size())
       if (const auto seen = tool->by_view.find(shown_->views[i].name); seen != tool->by_view.end())
         line = seen->second;
@@ -290,8 +290,8 @@ void MainWindow::show_live() {
   scene.path = controller_.state().path.in_calibrator;
   if (tool && tool->calibrator_from_tip) {
     scene.calibrator_from_tip = tool->calibrator_from_tip;
-    (live_.bone == Bone::femur ? scene.calibrator_from_tibia_now : scene.calibrator_from_femur_now) =
-        tool->other_bone_moved;
+    (live_.bone == guidance::Bone::femur ? scene.calibrator_from_tibia_now
+                                         : scene.calibrator_from_femur_now) = tool->other_bone_moved;
     if (live_.robot.state) {
       scene.calibrator_from_base = *scene.calibrator_from_tip * live_.robot.state->base_from_tcp.inverse();
       scene.joints = live_.robot.state->joints;

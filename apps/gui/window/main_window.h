@@ -43,7 +43,7 @@ class MainWindow : public QMainWindow {
   /// The displayed live data.
   const LiveState& live() const { return live_; }
   /// The tool at the replayed moment; empty if no case with a tool is replayed.
-  const std::optional<ToolOverlay>& recorded() const { return recorded_; }
+  const std::optional<operation::ToolOverlay>& recorded() const { return recorded_; }
 
  protected:
   void dragEnterEvent(QDragEnterEvent* event) override;
@@ -104,13 +104,13 @@ class MainWindow : public QMainWindow {
 
   LiveState live_;
   std::optional<TreCut> cut_;
-  std::optional<TreVolume> tre_;
-  std::shared_ptr<const Result> tre_of_;
-  std::optional<LiveTool> recorded_tool_;   ///< of the replayed session's case
-  std::optional<std::size_t> recorded_at_;  ///< its registration
-  std::shared_ptr<const Result> recorded_of_;
-  std::optional<ToolOverlay> recorded_;  ///< at the replayed moment
-  std::shared_ptr<const Result> shown_;
+  std::optional<localization::TreVolume> tre_;
+  std::shared_ptr<const pipeline::Result> tre_of_;
+  std::optional<operation::LiveTool> recorded_tool_;  ///< of the replayed session's case
+  std::optional<std::size_t> recorded_at_;            ///< its registration
+  std::shared_ptr<const pipeline::Result> recorded_of_;
+  std::optional<operation::ToolOverlay> recorded_;  ///< at the replayed moment
+  std::shared_ptr<const pipeline::Result> shown_;
   std::shared_ptr<const simulation::BoneMeshes> shown_bones_;
   Source shown_source_ = Source::none;
   Phase phase_ = Phase::acquire;

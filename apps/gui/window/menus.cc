@@ -256,17 +256,18 @@ void MainWindow::ask_settings() {
 }
 
 void MainWindow::show_tre() {
-  const Eigen::Vector3d middle = middle_of(controller_.state().calibrator);
+  const Eigen::Vector3d middle = phantom::middle_of(controller_.state().calibrator);
   if (!cut_ || !shown_ || !controller_.state().measured) return scene_->show_tre({}, SliceAxis::z, 0);
   if (tre_of_ == shown_)
     return scene_->show_tre(tre_, cut_->axis, middle[int(cut_->axis)] + cut_->from_middle_mm);
   scene_->show_tre({}, SliceAxis::z, 0);
-  Calibration calibration{{}, shown_->joint_covariance};
-  for (const ViewResult& view : shown_->views)
+  calibration::Calibration calibration{{}, shown_->joint_covariance};
+  for (const pipeline::ViewResult& view : shown_->views)
     if (view.calibrated) calibration.views.push_back(*view.calibrated);
   QPointer<MainWindow> self(this);
   QThreadPool::globalInstance()->start([self, calibration, middle, of = shown_] {
-    auto volume = predict_tre(calibration, middle, tre_half_mm, tre_step_mm, click_sigma_px, 1);
+    auto volume = localization::predict_tre(calibration, middle, tre_half_mm, tre_step_mm,
+                                            fiducials::click_sigma_px, 1);
     QMetaObject::invokeMethod(
         qApp,
         [self, volume = std::move(volume), of] {

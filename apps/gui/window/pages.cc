@@ -128,9 +128,9 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
 void RectifyPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   if (state.result)
-    for (const ViewResult& view : state.result->views)
+    for (const pipeline::ViewResult& view : state.result->views)
       if (view.rectification) {
-        const Rectification& done = *view.rectification;
+        const rectification::Rectification& done = *view.rectification;
         rows.push_back({text(view.name), QString::number(done.plate_dots.size()),
                         tr("%1 (max %2)").arg(done.raw_mean_px, 0, 'f', 1).arg(done.raw_max_px, 0, 'f', 1),
                         number(done.map.residual_rms_px, 3), number(done.map.held_out_rms_px, 3)});
@@ -148,16 +148,18 @@ CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {
-  static const std::map<FiducialStatus, QString> words{{FiducialStatus::used, tr("used")},
-                                                       {FiducialStatus::occluded, tr("hidden")},
-                                                       {FiducialStatus::outside, tr("outside")},
-                                                       {FiducialStatus::rejected, tr("rejected")},
-                                                       {FiducialStatus::not_found, tr("not found")}};
+  static const std::map<fiducials::FiducialStatus, QString> words{
+      {fiducials::FiducialStatus::used, tr("used")},
+      {fiducials::FiducialStatus::occluded, tr("hidden")},
+      {fiducials::FiducialStatus::outside, tr("outside")},
+      {fiducials::FiducialStatus::rejected, tr("rejected")},
+      {fiducials::FiducialStatus::not_found, tr("not found")}};
   std::vector<QStringList> views, balls;
   if (state.result)
-    for (const ViewResult& view : state.result->views) {
+    for (const pipeline::ViewResult& view : state.result->views) {
       if (!view.found) continue;
-      const auto used = std::ranges::count(view.found->fiducials, FiducialStatus::used, &Fiducial::status);
+      const auto used = std::ranges::count(view.found->fiducials, fiducials::FiducialStatus::used,
+                                           &fiducials::Fiducial::status);
       if (view.calibrated) {
         const Eigen::Vector3d source = view.calibrated->view.source_in_world();
         views.push_back({text(view.name), QString("%1/%2").arg(used).arg(view.found->fiducials.size()),
@@ -168,8 +170,9 @@ void CalibratePage::show_state(const ApplicationState& state) {
                              .arg(source.y(), 0, 'f', 0)
                              .arg(source.z(), 0, 'f', 0)});
       }
-      for (const Fiducial& ball : view.found->fiducials) {
-        const bool measured = ball.status == FiducialStatus::used || ball.status == FiducialStatus::rejected;
+      for (const fiducials::Fiducial& ball : view.found->fiducials) {
+        const bool measured = ball.status == fiducials::FiducialStatus::used ||
+                              ball.status == fiducials::FiducialStatus::rejected;
         balls.push_back({text(ball.label), text(view.name), words.at(ball.status),
                          measured ? number(ball.sigma_px, 3) : QString(),
                          measured ? number(ball.residual_px, 3) : QString()});

@@ -127,7 +127,7 @@ class NavigatePage : public Page {
   QComboBox* tunnel_;
   HoldButton *unlock_, *register_, *go_, *withdraw_;
   QPushButton* plan_;
-  LinkPhase phase_ = LinkPhase::disconnected;
+  robot::LinkPhase phase_ = robot::LinkPhase::disconnected;
   std::optional<Failure> why_;
 };
 

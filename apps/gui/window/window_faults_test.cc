@@ -38,7 +38,7 @@ TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
   window_->controller().set_virtual_freshness({});
   ASSERT_NO_FATAL_FAILURE(
       stop_in_motion([&] { window_->controller().set_fault("cut_cable", true); }, "no robot state received"));
-  ASSERT_TRUE(wait_for_phase(LinkPhase::disconnected));
+  ASSERT_TRUE(wait_for_phase(robot::LinkPhase::disconnected));
   EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
   EXPECT_EQ(indicator("robot").light, Light::red);
   EXPECT_FALSE(indicator("robot").why.isEmpty());
@@ -46,7 +46,7 @@ TEST_F(Window, DisconnectedRobotCableInMotionStopsTheRobotAndIsShown) {
     EXPECT_FALSE(window_->findChild<QAbstractButton*>(forbidden)->isEnabled()) << forbidden;
   window_->controller().set_fault("cut_cable", false);
   // Reconnected it is still locked: only a person unlocks it.
-  ASSERT_TRUE(wait_for_phase(LinkPhase::idle));
+  ASSERT_TRUE(wait_for_phase(robot::LinkPhase::idle));
   EXPECT_TRUE(unlock());
 }
 

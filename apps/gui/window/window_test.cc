@@ -49,7 +49,7 @@ TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
   screenshot("4-plan");
 
   ASSERT_NO_FATAL_FAILURE(register_robot(true));
-  for (const PlannedTunnel& tunnel : state().tunnels) {
+  for (const operation::PlannedTunnel& tunnel : state().tunnels) {
     find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
     const auto go = [&] {
       click("planWay");
@@ -119,7 +119,7 @@ TEST_F(Window, DisplayedPathIsWithdrawnWhenTheBoneMovesAndCannotBeConfirmed) {
   EXPECT_FALSE(go->isEnabled());
   EXPECT_EQ(card(Phase::navigate).status, StepStatus::refused);
   EXPECT_THAT(card(Phase::navigate).why.toStdString(), HasSubstr("plan_stale"));
-  EXPECT_NE(window_->controller().live().robot.phase, LinkPhase::moving);
+  EXPECT_NE(window_->controller().live().robot.phase, robot::LinkPhase::moving);
 }
 
 TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
@@ -129,7 +129,7 @@ TEST_F(Window, ShortPressOnAYellowButtonDoesNothing) {
   QTest::mouseClick(unlock, Qt::LeftButton);
   QTest::keyClick(unlock, Qt::Key_Return);
   QTest::qWait(HoldButton::hold_ms + 200);
-  EXPECT_EQ(window_->controller().live().robot.phase, LinkPhase::idle);
+  EXPECT_EQ(window_->controller().live().robot.phase, robot::LinkPhase::idle);
 }
 
 }  // namespace

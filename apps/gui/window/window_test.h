@@ -23,7 +23,7 @@ constexpr int patience_ms = 180000;
 /// Number of attempts: a busy machine may delay the tracker or stop the robot.
 constexpr int most_attempts = 10;
 /// The window's steps do not depend on the delay of poses and states on a busy machine.
-constexpr FreshnessLimits patient{.pose_s = 3, .state_s = 3, .heartbeat_s = 3};
+constexpr operation::FreshnessLimits patient{.pose_s = 3, .state_s = 3, .heartbeat_s = 3};
 
 /// The event that blocked the interface longest, and its duration. Nested event loops (a dialog's) count as
 /// theirs.
@@ -82,7 +82,8 @@ class Window : public testing::Test {
     for (const StepCard& step : steps_of(now))
       text += fmt::format("; {} [{}] {} {}", step.name.toStdString(), int(step.status),
                           step.figure.toStdString(), step.why.toStdString());
-    text += fmt::format("; robot {}, state {:.3f} s old", name(devices.robot.phase), devices.robot.age_s);
+    text +=
+        fmt::format("; robot {}, state {:.3f} s old", robot::name(devices.robot.phase), devices.robot.age_s);
     if (devices.robot.why) text += ", " + sentence_of(*devices.robot.why).toStdString();
     for (const StatusIndicator& indicator : devices.indicators)
       text += fmt::format("; {}: {}", indicator.name.toStdString(), indicator.text.toStdString());
@@ -110,8 +111,8 @@ class Window : public testing::Test {
   bool wait_idle() {
     return wait("the controller is idle", [&] { return !state().busy; });
   }
-  bool wait_for_phase(LinkPhase phase) {
-    return wait(fmt::format("the robot is {}", name(phase)).c_str(),
+  bool wait_for_phase(robot::LinkPhase phase) {
+    return wait(fmt::format("the robot is {}", robot::name(phase)).c_str(),
                 [&] { return live().robot.phase == phase; });
   }
   template <class Widget = QPushButton>
@@ -145,14 +146,14 @@ class Window : public testing::Test {
   bool unlock() {
     return attempt(
         "the robot is unlocked", [&] { hold("unlock"); },
-        [&] { return live().robot.phase == LinkPhase::ready; });
+        [&] { return live().robot.phase == robot::LinkPhase::ready; });
   }
   /// Unlocked, with the tool withdrawn from the knee.
   bool make_ready() {
     return attempt(
         "the robot is unlocked and the tool withdrawn",
-        [&] { hold(live().robot.phase == LinkPhase::ready ? "withdraw" : "unlock"); },
-        [&] { return live().robot.phase == LinkPhase::ready && !state().tool_is_out; });
+        [&] { hold(live().robot.phase == robot::LinkPhase::ready ? "withdraw" : "unlock"); },
+        [&] { return live().robot.phase == robot::LinkPhase::ready && !state().tool_is_out; });
   }
   /// The robot's actions from its rest position.
   template <class Act, class Done>
@@ -172,7 +173,7 @@ class Window : public testing::Test {
       ASSERT_NO_FATAL_FAILURE(open_rehearsal());
       ASSERT_TRUE(unlock());
       hold("register");
-      const auto moves = [&] { return live().robot.phase == LinkPhase::moving; };
+      const auto moves = [&] { return live().robot.phase == robot::LinkPhase::moving; };
       ASSERT_TRUE(wait("the robot moves or refuses", [&] { return moves() || !state().busy; }));
       if (!moves()) continue;
       act();
@@ -228,7 +229,7 @@ class Window : public testing::Test {
   void pick_all() {
     while (const auto wanted = next_pick(state())) {
       const std::size_t view = wanted->view == "AP" ? 0 : 1;
-      const auto offered = std::ranges::find_if(state().offered_picks, [&](const Pick& pick) {
+      const auto offered = std::ranges::find_if(state().offered_picks, [&](const pipeline::Pick& pick) {
         return pick.name == wanted->point && pick.view == wanted->view;
       });
       XrayView& xray = window_->xray(view);

@@ -28,8 +28,9 @@ class PoseToPixels : public QObject {
     if (taken_s - newest_s_ < 1e-4) return false;
     newest_s_ = taken_s;
     // After this paint event and its flush.
-    QTimer::singleShot(0, this,
-                       [this, taken_s] { latencies_ms.push_back((monotonic_seconds() - taken_s) * 1000); });
+    QTimer::singleShot(0, this, [this, taken_s] {
+      latencies_ms.push_back((tracker::monotonic_seconds() - taken_s) * 1000);
+    });
     return false;
   }
 
@@ -99,7 +100,7 @@ TEST_F(Window, KeepsItsMemoryOverManyOperations) {
   Controller& controller = window_->controller();
   int outcomes = 0;
   for (int round = 0; since.elapsed() < minutes * 60000; ++round) {
-    if (live().robot.phase != LinkPhase::ready) controller.unlock("soak"), done();
+    if (live().robot.phase != robot::LinkPhase::ready) controller.unlock("soak"), done();
     if (state().tool_is_out) controller.withdraw(), done();
     if (round % 10 == 9) {
       shoot_both();

@@ -78,30 +78,30 @@ void PlanPage::add_map() {
 std::optional<WantedPick> PlanPage::target() const {
   const ApplicationState& state = controller_.state();
   if (!chosen_) return next_pick(state);
-  for (const PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
   return std::nullopt;
 }
 
 void PlanPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
-  for (const PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
       QStringList in;
       for (const std::string& view : state.views)
         if (pick_of(state, end, view) != nullptr) in << text(view);
       QString within, gap;
       if (state.result)
-        for (const PointResult& point : state.result->points)
+        for (const pipeline::PointResult& point : state.result->points)
           if (point.name == end) {
             if (point.place) {
-              within = number(length_at_95(point.place->covariance_in_calibrator), 2);
+              within = number(localization::length_at_95(point.place->covariance_in_calibrator), 2);
               gap = number(point.ray_gap_mm, 2);
             } else if (point.reason) {
               within = sentence_of(*point.reason);
             }
           }
-      const bool enters = (tunnel.enter_at == TunnelEnd::start) == (end == tunnel.start);
+      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
       rows.push_back({text(end), enters ? tr("enters") : tr("ends"), in.join(", "), within, gap});
     }
   fill(ends_, rows);
@@ -118,9 +118,9 @@ void PlanPage::tell_next() {
   const auto wanted = next_pick(state);
   if (!wanted)
     return next_->setText(tr("All ends are placed. To move one, select it in the table and click."));
-  for (const PlannedTunnel& tunnel : state.tunnels)
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
-      const bool enters = (tunnel.enter_at == TunnelEnd::start) == (wanted->point == tunnel.start);
+      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);
       next_->setText((enters ? tr("Click %1 in %2: where the drill enters the %3.")
                              : tr("Click %1 in %2: where the drill ends in the %3."))
                          .arg(text(wanted->point), text(wanted->view), text(tunnel.name)));
@@ -163,7 +163,7 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
 
 void NavigatePage::show_state(const ApplicationState& state) {
   QStringList names;
-  for (const PlannedTunnel& tunnel : state.tunnels) names << text(tunnel.name);
+  for (const operation::PlannedTunnel& tunnel : state.tunnels) names << text(tunnel.name);
   QStringList shown;
   for (int i = 0; i < tunnel_->count(); ++i) shown << tunnel_->itemText(i);
   if (names != shown) {
@@ -189,16 +189,16 @@ QString NavigatePage::next_step() const {
   if (state.busy) return text(state.doing);
   const QString why = why_ ? sentence_of(*why_) + ". " : QString();
   switch (phase_) {
-    case LinkPhase::disconnected:
+    case robot::LinkPhase::disconnected:
       return why + tr("Check the robot's power and cable; the connection is retried.");
-    case LinkPhase::idle:
+    case robot::LinkPhase::idle:
       return tr("The robot is locked. Hold 1 when no person is near it.");
-    case LinkPhase::stopped:
+    case robot::LinkPhase::stopped:
       return why + tr("It stays stopped until you have checked it and hold 1.");
-    case LinkPhase::starting:
-    case LinkPhase::moving:
+    case robot::LinkPhase::starting:
+    case robot::LinkPhase::moving:
       return tr("The robot moves.");
-    case LinkPhase::ready:
+    case robot::LinkPhase::ready:
       break;
   }
   if (state.tool_is_out) return tr("The tool is at a tunnel: withdraw it (5) first.");
@@ -215,10 +215,10 @@ QString NavigatePage::next_step() const {
 void NavigatePage::allow() {
   const ApplicationState& state = controller_.state();
   const bool free = !state.busy && state.source != Source::files && state.source != Source::none;
-  const bool ready = free && phase_ == LinkPhase::ready;
+  const bool ready = free && phase_ == robot::LinkPhase::ready;
   const bool placed = state.measured && !next_pick(state);
   says_->setText(next_step());
-  unlock_->setEnabled(free && (phase_ == LinkPhase::idle || phase_ == LinkPhase::stopped));
+  unlock_->setEnabled(free && (phase_ == robot::LinkPhase::idle || phase_ == robot::LinkPhase::stopped));
   register_->setEnabled(ready && !state.tool_is_out);
   plan_->setEnabled(ready && placed && state.hand_eye_rms_mm && !state.tool_is_out);
   go_->setEnabled(ready && state.order.has_value());
@@ -239,8 +239,9 @@ VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
 void VerifyPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   for (const auto& [name, outcome] : state.outcomes)
-    for (const auto& [end, miss, in_xrays] : {std::tuple(tr("start"), &outcome.start, &Verification::start),
-                                              std::tuple(tr("end"), &outcome.end, &Verification::end)}) {
+    for (const auto& [end, miss, in_xrays] :
+         {std::tuple(tr("start"), &outcome.start, &verification::Verification::start),
+          std::tuple(tr("end"), &outcome.end, &verification::Verification::end)}) {
       QStringList row{QString("%1, %2").arg(text(name), end), number(miss->distance_mm(), 2),
                       number(miss->predicted_mm(), 2)};
       if (outcome.verification)
@@ -249,7 +250,7 @@ void VerifyPage::show_state(const ApplicationState& state) {
       rows.push_back(row);
     }
   if (rows.empty() && state.result)
-    for (const Verification& line : state.result->verifications)
+    for (const verification::Verification& line : state.result->verifications)
       for (const auto& [end, seen] : {std::pair(tr("start"), &line.start), {tr("end"), &line.end}})
         if (*seen)
           rows.push_back({QString("%1, %2").arg(text(line.name), end),

@@ -9,11 +9,11 @@
 namespace helicarm::gui {
 namespace {
 
-std::shared_ptr<const LoadedLayer> computed(const ViewResult& view, Layer layer) try {
+std::shared_ptr<const LoadedLayer> computed(const pipeline::ViewResult& view, Layer layer) try {
   auto loaded = std::make_shared<LoadedLayer>();
   loaded->layer = layer_at_hand(view, layer);
   loaded->pixels = layer_of(view, layer);
-  loaded->usual = usual_window(loaded->pixels, view.xray_image ? view.xray_image->lowest : 0);
+  loaded->usual = image::usual_window(loaded->pixels, view.xray_image ? view.xray_image->lowest : 0);
   return loaded;
 } catch (const std::exception&) {
   return nullptr;
@@ -41,7 +41,7 @@ LayerLoader::~LayerLoader() { cancel(); }
 
 void LayerLoader::cancel() { ++*newest_; }
 
-void LayerLoader::load(std::shared_ptr<const Result> result, std::size_t view, Layer layer) {
+void LayerLoader::load(std::shared_ptr<const pipeline::Result> result, std::size_t view, Layer layer) {
   const unsigned ticket = ++*newest_;
   auto* job = new LayerJob([result = std::move(result), view, layer, ticket, newest = newest_] {
     return ticket == *newest ? computed(result->views[view], layer) : nullptr;

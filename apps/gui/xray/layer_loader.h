@@ -13,8 +13,8 @@ namespace helicarm::gui {
 /// A layer's image and its default grey window.
 struct LoadedLayer {
   Layer layer;
-  Image<float> pixels;
-  GreyWindow usual;
+  image::Image<float> pixels;
+  image::GreyWindow usual;
 };
 
 /// Computes layers in a separate thread. Only the newest request is answered.
@@ -24,7 +24,7 @@ class LayerLoader : public QObject {
   explicit LayerLoader(QObject* parent = nullptr);
   ~LayerLoader() override;
 
-  void load(std::shared_ptr<const Result> result, std::size_t view, Layer layer);
+  void load(std::shared_ptr<const pipeline::Result> result, std::size_t view, Layer layer);
   /// Cancels the pending request.
   void cancel();
 

@@ -12,13 +12,13 @@ namespace helicarm::gui {
 enum class Layer { raw, rectified, inpainted };
 
 /// The available layer: raw if the view is not rectified.
-Layer layer_at_hand(const ViewResult& view, Layer wanted);
+Layer layer_at_hand(const pipeline::ViewResult& view, Layer wanted);
 
 /// The layer's image; empty without an X-ray image. Takes up to 0.1 s.
-Image<float> layer_of(const ViewResult& view, Layer layer);
+image::Image<float> layer_of(const pipeline::ViewResult& view, Layer layer);
 
 /// The image through a grey window. The window itself comes from `usual_window`
 /// (helicarm/image/grey_window.h).
-QImage windowed(const Image<float>& image, GreyWindow window);
+QImage windowed(const image::Image<float>& image, image::GreyWindow window);
 
 }  // namespace helicarm::gui

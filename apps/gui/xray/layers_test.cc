@@ -9,7 +9,7 @@ namespace helicarm::gui {
 namespace {
 
 /// Mean grey value within two pixels of a position.
-double grey_at(const Image<float>& view_image, const Eigen::Vector2d& place) {
+double grey_at(const image::Image<float>& view_image, const Eigen::Vector2d& place) {
   double sum = 0;
   for (int dv = -2; dv <= 2; ++dv)
     for (int du = -2; du <= 2; ++du)
@@ -18,16 +18,16 @@ double grey_at(const Image<float>& view_image, const Eigen::Vector2d& place) {
 }
 
 TEST(LayerOf, RawIsTheImageItself) {
-  const ViewResult& view = simulated_result()->views[0];
-  const Image<float> raw = layer_of(view, Layer::raw);
+  const pipeline::ViewResult& view = simulated_result()->views[0];
+  const image::Image<float> raw = layer_of(view, Layer::raw);
   EXPECT_TRUE(std::ranges::equal(raw.pixels(), view.xray_image->pixels.pixels()));
 }
 
 TEST(LayerOf, RectifiedShowsTheFiducialsAtTheirMeasuredPositions) {
-  const ViewResult& view = simulated_result()->views[0];
-  const Image<float> rectified = layer_of(view, Layer::rectified);
-  for (const Fiducial& ball : view.found->fiducials) {
-    if (ball.status != FiducialStatus::used) continue;
+  const pipeline::ViewResult& view = simulated_result()->views[0];
+  const image::Image<float> rectified = layer_of(view, Layer::rectified);
+  for (const fiducials::Fiducial& ball : view.found->fiducials) {
+    if (ball.status != fiducials::FiducialStatus::used) continue;
     const double around = std::max(grey_at(rectified, ball.uv + Eigen::Vector2d(14, 0)),
                                    grey_at(rectified, ball.uv - Eigen::Vector2d(14, 0)));
     EXPECT_LT(grey_at(rectified, ball.uv), around) << ball.label;
@@ -35,21 +35,22 @@ TEST(LayerOf, RectifiedShowsTheFiducialsAtTheirMeasuredPositions) {
 }
 
 TEST(LayerOf, InpaintedRemovesThePlateAndKeepsTheFiducials) {
-  const ViewResult& view = simulated_result()->views[0];
-  const Image<float> rectified = layer_of(view, Layer::rectified), bare = layer_of(view, Layer::inpainted);
+  const pipeline::ViewResult& view = simulated_result()->views[0];
+  const image::Image<float> rectified = layer_of(view, Layer::rectified),
+                            bare = layer_of(view, Layer::inpainted);
   ASSERT_FALSE(view.rectification->plate_dots.empty());
   double lifted = 0;
-  for (const Dot& dot : view.rectification->plate_dots) {
+  for (const detection::Dot& dot : view.rectification->plate_dots) {
     const auto at = view.rectification->map.rectified_from_raw(dot.centre_px).value();
     lifted += grey_at(bare, at) - grey_at(rectified, at);
   }
   EXPECT_GT(lifted / double(view.rectification->plate_dots.size()), 10);
   int untouched = 0;
-  for (const Fiducial& ball : view.found->fiducials) {
-    const bool beside_a_dot = std::ranges::any_of(view.rectification->plate_dots, [&](const Dot& dot) {
-      return (dot.centre_px - ball.uv_raw).norm() < dot.radius_px + 12;
-    });
-    if (ball.status != FiducialStatus::used || beside_a_dot) continue;
+  for (const fiducials::Fiducial& ball : view.found->fiducials) {
+    const bool beside_a_dot = std::ranges::any_of(
+        view.rectification->plate_dots,
+        [&](const detection::Dot& dot) { return (dot.centre_px - ball.uv_raw).norm() < dot.radius_px + 12; });
+    if (ball.status != fiducials::FiducialStatus::used || beside_a_dot) continue;
     ++untouched;
     EXPECT_NEAR(grey_at(bare, ball.uv), grey_at(rectified, ball.uv), 1e-3) << ball.label;
   }
@@ -57,18 +58,19 @@ TEST(LayerOf, InpaintedRemovesThePlateAndKeepsTheFiducials) {
 }
 
 TEST(LayerOf, ViewThatIsNotRectifiedHasOnlyItsRawLayer) {
-  XrayImage xray_image;
-  xray_image.pixels = Image<float>(4, 3, 7);
-  const ViewResult view{"AP", std::make_shared<const XrayImage>(std::move(xray_image)), {}, {}, {}};
+  xray::XrayImage xray_image;
+  xray_image.pixels = image::Image<float>(4, 3, 7);
+  const pipeline::ViewResult view{
+      "AP", std::make_shared<const xray::XrayImage>(std::move(xray_image)), {}, {}, {}};
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
     EXPECT_EQ(layer_at_hand(view, layer), Layer::raw);
     EXPECT_EQ(layer_of(view, layer).width(), 4);
   }
-  EXPECT_TRUE(layer_of(ViewResult{}, Layer::rectified).empty());
+  EXPECT_TRUE(layer_of(pipeline::ViewResult{}, Layer::rectified).empty());
 }
 
 TEST(Windowed, KeepsThePixelsAtAnyWidth) {
-  Image<float> view_image(5, 2);
+  image::Image<float> view_image(5, 2);
   for (int u = 0; u < 5; ++u) view_image(u, 1) = float(u);
   const QImage image = windowed(view_image, {0, 4});
   ASSERT_EQ(image.size(), QSize(5, 2));

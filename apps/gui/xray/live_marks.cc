@@ -8,8 +8,9 @@
 
 namespace helicarm::gui {
 
-void LiveMarks::set_tool(const std::optional<ImageLine>& rectified, const QString& note) {
-  tool_ = {rectified ? PixelPath{rectified->back, rectified->tip} : PixelPath{}};
+void LiveMarks::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
+  tool_ = {rectified ? rectification::PixelPath{rectified->back, rectified->tip}
+                     : rectification::PixelPath{}};
   note_ = note;
 }
 
@@ -23,7 +24,7 @@ void LiveMarks::forget_layer() {
   for (CarriedPick& pick : picks_) pick.in_layer.reset();
 }
 
-void LiveMarks::carry(const ViewResult& view, Layer layer) {
+void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
   for (Carried* one : {&epipolar_, &path_, &tool_}) {
     if (std::exchange(one->is_carried, true)) continue;
     one->in_layer = in_layer(view, layer, one->given);
@@ -34,13 +35,15 @@ void LiveMarks::carry(const ViewResult& view, Layer layer) {
 }
 
 void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
-  for (const PixelPath& piece : epipolar_.in_layer)
+  for (const rectification::PixelPath& piece : epipolar_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
-  for (const PixelPath& piece : path_.in_layer) paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
+  for (const rectification::PixelPath& piece : path_.in_layer)
+    paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
   painter.setBrush(ink::residual);
   painter.setPen(Qt::NoPen);
   if (path_.end) painter.drawEllipse(frame.to_widget(*path_.end), 4, 4);
-  for (const PixelPath& piece : tool_.in_layer) paint_path(painter, piece, frame, QPen(ink::tool, 3));
+  for (const rectification::PixelPath& piece : tool_.in_layer)
+    paint_path(painter, piece, frame, QPen(ink::tool, 3));
   painter.setBrush(Qt::NoBrush);
   if (tool_.end) {
     const QPointF at = frame.to_widget(*tool_.end);

@@ -18,23 +18,23 @@ struct FreshPick {
 /// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.
 class LiveMarks {
  public:
-  void set_epipolar(PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
-  void set_path(PixelPath rectified) { path_ = {std::move(rectified)}; }
+  void set_epipolar(rectification::PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
+  void set_path(rectification::PixelPath rectified) { path_ = {std::move(rectified)}; }
   bool has_tool() const { return !tool_.given.empty(); }
-  void set_tool(const std::optional<ImageLine>& rectified, const QString& note);
+  void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
   /// Changes the layer; converted positions become invalid.
   void forget_layer();
   /// Converts the remaining positions to the layer; call it after a change.
-  void carry(const ViewResult& view, Layer layer);
+  void carry(const pipeline::ViewResult& view, Layer layer);
   void paint(QPainter& painter, const ImageFrame& frame) const;
 
  private:
   struct Carried {
-    PixelPath given;
+    rectification::PixelPath given;
     bool is_carried = false;
-    std::vector<PixelPath> in_layer = {};
+    std::vector<rectification::PixelPath> in_layer = {};
     std::optional<Eigen::Vector2d> end = {};
   };
   struct CarriedPick {

@@ -57,8 +57,8 @@ double ball_radius(const ImageFrame& frame, int image_width) {
   return std::max(8.0, 15 / 1024.0 * image_width * frame.scale);
 }
 
-void paint_balls(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, double radius) {
-  for (const BallMark& ball : marks.balls) {
+void paint_balls(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, double radius) {
+  for (const report::BallMark& ball : marks.balls) {
     const QPointF at = frame.to_widget(ball.place);
     if (ball.used)
       edged(painter, QPen(ink::ball, 1.6), [&] { painter.drawEllipse(at, radius, radius); });
@@ -71,20 +71,20 @@ void paint_balls(QPainter& painter, const ViewMarks& marks, const ImageFrame& fr
 }
 
 /// Residual arrows of the fiducials and their scale bar.
-void paint_residuals(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, const QRectF& bounds,
-                     LabelPlacer& labels) {
+void paint_residuals(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame,
+                     const QRectF& bounds, LabelPlacer& labels) {
   constexpr double longest_arrow = 45;
-  const double largest = largest_residual(marks);
+  const double largest = report::largest_residual(marks);
   if (!(largest > 0)) return;
-  const double magnification = round_below(std::max(1.0, longest_arrow / (largest * frame.scale)));
+  const double magnification = report::round_below(std::max(1.0, longest_arrow / (largest * frame.scale)));
   const double enlarged = magnification * frame.scale;
-  for (const BallMark& ball : marks.balls)
+  for (const report::BallMark& ball : marks.balls)
     if (ball.used && ball.residual) {
       const QPointF at = frame.to_widget(ball.place), way = enlarged * as_point(*ball.residual);
       arrow(painter, at, way);
       labels.keep_free(QRectF(at, at + way).normalized().adjusted(-2, -2, 2, 2));
     }
-  const double length = round_below(longest_arrow / enlarged);
+  const double length = report::round_below(longest_arrow / enlarged);
   const QPointF left = bounds.bottomLeft() + QPointF(14, -14), right = left + QPointF(length * enlarged, 0);
   edged(painter, QPen(ink::residual, 2), [&] {
     painter.drawLine(left, right);
@@ -94,7 +94,7 @@ void paint_residuals(QPainter& painter, const ViewMarks& marks, const ImageFrame
                 QObject::tr("residuals × %1, %2 px").arg(magnification).arg(length), ink::residual);
 }
 
-void paint_point(QPainter& painter, const PointMark& point, const QPointF& at) {
+void paint_point(QPainter& painter, const report::PointMark& point, const QPointF& at) {
   constexpr double arm = 6;
   const QPen pen(ink::point, 1.8, point.error_95_mm ? Qt::SolidLine : Qt::DotLine);
   edged(painter, pen, [&] {
@@ -105,39 +105,43 @@ void paint_point(QPainter& painter, const PointMark& point, const QPointF& at) {
 
 }  // namespace
 
-void paint_path(QPainter& painter, const PixelPath& path, const ImageFrame& frame, const QPen& pen) {
+void paint_path(QPainter& painter, const rectification::PixelPath& path, const ImageFrame& frame,
+                const QPen& pen) {
   QPolygonF line;
   for (const Eigen::Vector2d& place : path) line << frame.to_widget(place);
   edged(painter, pen, [&] { painter.drawPolyline(line); });
 }
 
-void paint_marks(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, int image_width,
+void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, int image_width,
                  const QRectF& bounds) {
   const double radius = ball_radius(frame, image_width);
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(ink::plate, 1));
-  for (const DotMark& dot : marks.plate_dots) {
+  for (const report::DotMark& dot : marks.plate_dots) {
     const double size = std::max(2.0, dot.radius_px * frame.scale);
     painter.drawEllipse(frame.to_widget(dot.place), size, size);
   }
-  for (const PixelPath& tunnel : marks.tunnels) paint_path(painter, tunnel, frame, QPen(ink::tunnel, 1.8));
-  for (const PixelPath& tool : marks.tool_lines)
+  for (const rectification::PixelPath& tunnel : marks.tunnels)
+    paint_path(painter, tunnel, frame, QPen(ink::tunnel, 1.8));
+  for (const rectification::PixelPath& tool : marks.tool_lines)
     paint_path(painter, tool, frame, QPen(ink::tool, 1.6, Qt::DashDotLine));
-  for (const DotMark& blob : marks.false_blobs)
+  for (const report::DotMark& blob : marks.false_blobs)
     edged(painter, QPen(ink::rejected, 1.6), [&] { cross(painter, frame.to_widget(blob.place), 5); });
   paint_balls(painter, marks, frame, radius);
-  for (const PointMark& point : marks.points) paint_point(painter, point, frame.to_widget(point.place));
+  for (const report::PointMark& point : marks.points)
+    paint_point(painter, point, frame.to_widget(point.place));
 
   LabelPlacer labels(bounds);
   labels.keep_free({bounds.bottomLeft() + QPointF(0, -44), QSizeF(220, 44)});  // the scale bar
-  for (const BallMark& ball : marks.balls)
+  for (const report::BallMark& ball : marks.balls)
     labels.keep_free(square(frame.to_widget(ball.place), 0.8 * radius));
-  for (const PointMark& point : marks.points) labels.keep_free(square(frame.to_widget(point.place), 6));
+  for (const report::PointMark& point : marks.points)
+    labels.keep_free(square(frame.to_widget(point.place), 6));
   paint_residuals(painter, marks, frame, bounds, labels);
-  for (const BallMark& ball : marks.balls)
+  for (const report::BallMark& ball : marks.balls)
     labels.place(painter, frame.to_widget(ball.place), radius, QString::fromStdString(ball.label),
                  ball.used ? ink::ball : ink::rejected);
-  for (const PointMark& point : marks.points)
+  for (const report::PointMark& point : marks.points)
     labels.place(painter, frame.to_widget(point.place), 8, QString::fromStdString(point.name), ink::point);
 }
 

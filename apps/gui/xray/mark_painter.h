@@ -18,10 +18,11 @@ inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197,
 
 /// Draws the detections. Line widths do not depend on zoom; `image_width` sets the radius of the fiducials'
 /// circles.
-void paint_marks(QPainter& painter, const ViewMarks& marks, const ImageFrame& frame, int image_width,
+void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, int image_width,
                  const QRectF& bounds);
 
 /// A line with a dark edge, visible on a bright background.
-void paint_path(QPainter& painter, const PixelPath& path, const ImageFrame& frame, const QPen& pen);
+void paint_path(QPainter& painter, const rectification::PixelPath& path, const ImageFrame& frame,
+                const QPen& pen);
 
 }  // namespace helicarm::gui

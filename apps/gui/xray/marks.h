@@ -10,18 +10,19 @@
 namespace helicarm::gui {
 
 /// All marks of one view, in the pixels of the layer.
-ViewMarks marks_of(const Result& result, std::size_t view, Layer layer);
+report::ViewMarks marks_of(const pipeline::Result& result, std::size_t view, Layer layer);
 
 /// Converts a position or path from rectified pixels to the layer; empty outside the map's range. A path is
 /// clipped at the image border.
-std::optional<Eigen::Vector2d> in_layer(const ViewResult& view, Layer layer,
+std::optional<Eigen::Vector2d> in_layer(const pipeline::ViewResult& view, Layer layer,
                                         const Eigen::Vector2d& rectified);
-std::vector<PixelPath> in_layer(const ViewResult& view, Layer layer, const PixelPath& rectified);
+std::vector<rectification::PixelPath> in_layer(const pipeline::ViewResult& view, Layer layer,
+                                               const rectification::PixelPath& rectified);
 
 /// Conversion to raw pixels and back; empty outside the image or the map's range.
-std::optional<Eigen::Vector2d> raw_from_layer(const ViewResult& view, Layer layer,
+std::optional<Eigen::Vector2d> raw_from_layer(const pipeline::ViewResult& view, Layer layer,
                                               const Eigen::Vector2d& place);
-std::optional<Eigen::Vector2d> layer_from_raw(const ViewResult& view, Layer layer,
+std::optional<Eigen::Vector2d> layer_from_raw(const pipeline::ViewResult& view, Layer layer,
                                               const Eigen::Vector2d& raw);
 
 /// A fiducial or point under the cursor.
@@ -34,10 +35,10 @@ struct MarkUnderCursor {
 };
 
 /// The nearest fiducial or point within `reach_px`.
-std::optional<MarkUnderCursor> mark_near(const ViewMarks& marks, const Eigen::Vector2d& place,
+std::optional<MarkUnderCursor> mark_near(const report::ViewMarks& marks, const Eigen::Vector2d& place,
                                          double reach_px);
 
 /// Content of a view in one sentence, for a screen reader.
-QString described(const ViewMarks& marks);
+QString described(const report::ViewMarks& marks);
 
 }  // namespace helicarm::gui

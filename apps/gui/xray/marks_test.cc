@@ -12,22 +12,22 @@ namespace {
 using Eigen::Vector2d;
 
 TEST(MarksOf, SimulatedCaseHasAllKinds) {
-  const ViewMarks marks = marks_of(*simulated_result(), 0, Layer::rectified);
+  const report::ViewMarks marks = marks_of(*simulated_result(), 0, Layer::rectified);
   EXPECT_EQ(marks.balls.size(), 12u);
   EXPECT_EQ(marks.false_blobs.empty(), false);
   EXPECT_GT(marks.plate_dots.size(), 30u);
   EXPECT_EQ(marks.points.size(), 4u);
   EXPECT_EQ(marks.tunnels.size(), 2u);
   EXPECT_EQ(marks.tool_lines.size(), 2u);
-  for (const BallMark& ball : marks.balls) EXPECT_TRUE(ball.residual) << ball.label;
+  for (const report::BallMark& ball : marks.balls) EXPECT_TRUE(ball.residual) << ball.label;
 }
 
 TEST(MarksOf, RawLayerHasTheRawPositions) {
-  const Result& result = *simulated_result();
-  const ViewMarks raw = marks_of(result, 1, Layer::raw);
-  for (const BallMark& ball : raw.balls) {
+  const pipeline::Result& result = *simulated_result();
+  const report::ViewMarks raw = marks_of(result, 1, Layer::raw);
+  for (const report::BallMark& ball : raw.balls) {
     const auto& all = result.views[1].found->fiducials;
-    const auto same = std::ranges::find(all, ball.label, &Fiducial::label);
+    const auto same = std::ranges::find(all, ball.label, &fiducials::Fiducial::label);
     EXPECT_LT((ball.place - same->uv_raw).norm(), 1e-6) << ball.label;
   }
   const auto& dots = result.views[1].rectification->plate_dots;
@@ -37,7 +37,7 @@ TEST(MarksOf, RawLayerHasTheRawPositions) {
 }
 
 TEST(InLayer, RoundTripReturnsTheSamePixel) {
-  const ViewResult& view = simulated_result()->views[0];
+  const pipeline::ViewResult& view = simulated_result()->views[0];
   const Vector2d place(300, 220);
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
     const auto raw = raw_from_layer(view, layer, place);
@@ -50,9 +50,9 @@ TEST(InLayer, RoundTripReturnsTheSamePixel) {
 }
 
 TEST(InLayer, PathsEndAtTheImageBorder) {
-  const ViewResult& view = simulated_result()->views[0];
+  const pipeline::ViewResult& view = simulated_result()->views[0];
   for (const Layer layer : {Layer::raw, Layer::rectified}) {
-    const auto paths = in_layer(view, layer, PixelPath{{-9000, 256}, {9000, 256}});
+    const auto paths = in_layer(view, layer, rectification::PixelPath{{-9000, 256}, {9000, 256}});
     ASSERT_EQ(paths.size(), 1u);
     EXPECT_GT(paths[0].front().x(), -1);
     EXPECT_LT(paths[0].back().x(), 512);
@@ -60,10 +60,10 @@ TEST(InLayer, PathsEndAtTheImageBorder) {
 }
 
 TEST(MarkNear, NearestWithinReachIsFound) {
-  ViewMarks marks;
+  report::ViewMarks marks;
   marks.balls = {{"P1", {10, 10}, true, 0.02, Vector2d(0.3, 0.4)}, {"P2", {14, 10}, false}};
-  marks.points = {{"T1", {40, 40}, PointSource::target, 0.25},
-                  {"start", {60, 60}, PointSource::pick, {}, "alone"}};
+  marks.points = {{"T1", {40, 40}, localization::PointSource::target, 0.25},
+                  {"start", {60, 60}, localization::PointSource::pick, {}, "alone"}};
   EXPECT_EQ(mark_near(marks, {11, 10}, 8)->name, "P1");
   EXPECT_EQ(mark_near(marks, {13, 10}, 8)->name, "P2");
   EXPECT_FALSE(mark_near(marks, {25, 25}, 8));

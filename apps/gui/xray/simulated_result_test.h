@@ -11,7 +11,7 @@
 namespace helicarm::gui {
 
 /// A case with tunnels, decoy balls and 512 px per side, measured once from its files.
-inline std::shared_ptr<const Result> simulated_result() {
+inline std::shared_ptr<const pipeline::Result> simulated_result() {
   static const auto result = [] {
     simulation::SimulationOptions options;
     options.seed = 7;
@@ -23,7 +23,8 @@ inline std::shared_ptr<const Result> simulated_result() {
     if (const auto written = simulation::write_case(path, simulation::simulate_case(options).value());
         !written)
       throw std::runtime_error(written.error().message);
-    return std::make_shared<const Result>(run_case(read_case(path).value(), {}).value());
+    return std::make_shared<const pipeline::Result>(
+        pipeline::run_case(pipeline::read_case(path).value(), {}).value());
   }();
   return result;
 }

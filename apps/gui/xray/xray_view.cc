@@ -8,7 +8,7 @@ namespace helicarm::gui {
 namespace {
 
 /// Whether two views show the same pixels, so that zoom and window are kept.
-bool same_image(const ViewResult& a, const ViewResult& b) {
+bool same_image(const pipeline::ViewResult& a, const pipeline::ViewResult& b) {
   return a.xray_image && b.xray_image && a.name == b.name &&
          a.xray_image->acquisition.instance_key == b.xray_image->acquisition.instance_key &&
          a.xray_image->pixels.width() == b.xray_image->pixels.width() &&
@@ -27,9 +27,9 @@ XrayView::XrayView(QWidget* parent) : QWidget(parent) {
 
 XrayView::~XrayView() = default;
 
-void XrayView::show_view(std::shared_ptr<const Result> result, std::size_t index) {
+void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::size_t index) {
   if (!result || index >= result->views.size()) return clear(tr("No image yet"));
-  const ViewResult& next = result->views[index];
+  const pipeline::ViewResult& next = result->views[index];
   const QString name = QString::fromStdString(next.name);
   if (!next.xray_image || next.xray_image->pixels.empty())
     return clear(name.isEmpty() ? tr("No image yet") : tr("No image yet: acquire %1").arg(name));
@@ -100,12 +100,12 @@ void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
   Q_EMIT shown();
 }
 
-std::optional<GreyWindow> XrayView::window() const {
+std::optional<image::GreyWindow> XrayView::window() const {
   if (window_) return window_;
   return shown_ ? std::optional(shown_->usual) : std::nullopt;
 }
 
-void XrayView::set_window(GreyWindow window) {
+void XrayView::set_window(image::GreyWindow window) {
   window_ = window;
   if (!shown_) return;
   window_image();
@@ -145,7 +145,7 @@ void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
   carry_live();
 }
 
-void XrayView::set_tool(std::optional<ImageLine> rectified, const QString& note) {
+void XrayView::set_tool(std::optional<verification::ImageLine> rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
   carry_live();

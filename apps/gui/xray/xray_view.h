@@ -24,15 +24,15 @@ class XrayView : public QWidget {
 
   /// Shows a view of a result, also an incomplete one. Removes picks, epipolar line, path and tool of the
   /// previous view.
-  void show_view(std::shared_ptr<const Result> result, std::size_t view);
+  void show_view(std::shared_ptr<const pipeline::Result> result, std::size_t view);
   void clear(const QString& why);
 
   void set_layer(Layer layer);
   Layer layer() const { return wanted_; }
   /// Kept until another image is shown or the default window is requested.
-  void set_window(GreyWindow window);
+  void set_window(image::GreyWindow window);
   void set_usual_window();
-  std::optional<GreyWindow> window() const;
+  std::optional<image::GreyWindow> window() const;
 
   void set_picking(bool picking);
   void set_magnifier(bool on);
@@ -43,7 +43,7 @@ class XrayView : public QWidget {
   /// Marks over the view: rectified pixels, except picks.
   void set_epipolar(std::vector<Eigen::Vector2d> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
-  void set_tool(std::optional<ImageLine> rectified, const QString& note);
+  void set_tool(std::optional<verification::ImageLine> rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
   /// Whether the requested layer is still being computed; until then the previous one is displayed.
@@ -60,7 +60,7 @@ class XrayView : public QWidget {
   void picked(QPointF raw_pixel);
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
   void layer_changed(helicarm::gui::Layer layer);
-  void window_changed(helicarm::GreyWindow window);
+  void window_changed(helicarm::image::GreyWindow window);
   /// The requested layer is displayed.
   void shown();
 
@@ -84,7 +84,7 @@ class XrayView : public QWidget {
     bool may_pick = false;
   };
 
-  const ViewResult& view() const { return result_->views[view_]; }
+  const pipeline::ViewResult& view() const { return result_->views[view_]; }
   QSizeF image_size() const;
   void take(const std::shared_ptr<const LoadedLayer>& layer);
   void window_image();
@@ -101,17 +101,17 @@ class XrayView : public QWidget {
   void paint_magnifier(QPainter& painter) const;
   void paint_words(QPainter& painter) const;
 
-  std::shared_ptr<const Result> result_;
+  std::shared_ptr<const pipeline::Result> result_;
   std::size_t view_ = 0;
   QString why_empty_;
   Layer wanted_ = Layer::rectified;
-  std::optional<GreyWindow> window_;  ///< empty: the default one
+  std::optional<image::GreyWindow> window_;  ///< empty: the default one
   bool picking_ = false, magnifier_ = false, marks_visible_ = true, computing_ = false, fits_ = true;
 
   LayerLoader loader_;
   std::shared_ptr<const LoadedLayer> shown_;
   QImage grey_;
-  ViewMarks marks_;
+  report::ViewMarks marks_;
   LiveMarks live_;
   ImageFrame frame_;
   QPixmap still_;  ///< image and marks; null: to be redrawn

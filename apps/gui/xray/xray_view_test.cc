@@ -25,7 +25,7 @@ class XrayViewTest : public testing::Test {
     for (int i = 0; i < 500 && view.is_computing(); ++i) QTest::qWait(10);
     ASSERT_FALSE(view.is_computing());
   }
-  const ViewResult& shown() { return simulated_result()->views[0]; }
+  const pipeline::ViewResult& shown() { return simulated_result()->views[0]; }
   void key(int which, Qt::KeyboardModifiers with = Qt::NoModifier) {
     QTest::keyClick(&view, static_cast<Qt::Key>(which), with);
   }
@@ -46,7 +46,7 @@ class XrayViewTest : public testing::Test {
 };
 
 TEST_F(XrayViewTest, ClickGivesARawPixelInEveryLayerAtAnyZoom) {
-  const Fiducial& ball = shown().found->fiducials[3];
+  const fiducials::Fiducial& ball = shown().found->fiducials[3];
   const QPointF raw(ball.uv_raw.x(), ball.uv_raw.y());
   view.set_picking(true);
   for (const Layer layer : {Layer::raw, Layer::rectified, Layer::inpainted}) {
@@ -66,12 +66,12 @@ TEST_F(XrayViewTest, ClickGivesARawPixelInEveryLayerAtAnyZoom) {
 }
 
 TEST_F(XrayViewTest, MarksAreDrawnWhereAClickGivesTheirPixel) {
-  Result bare;
-  XrayImage dot;
-  dot.pixels = Image<float>(33, 33, 1);
+  pipeline::Result bare;
+  xray::XrayImage dot;
+  dot.pixels = image::Image<float>(33, 33, 1);
   dot.pixels(20, 9) = 100;
-  bare.views.push_back({"dot", std::make_shared<const XrayImage>(std::move(dot)), {}, {}, {}});
-  view.show_view(std::make_shared<const Result>(std::move(bare)), 0);
+  bare.views.push_back({"dot", std::make_shared<const xray::XrayImage>(std::move(dot)), {}, {}, {}});
+  view.show_view(std::make_shared<const pipeline::Result>(std::move(bare)), 0);
   settle();
   view.set_window({1, 100});
   view.clearFocus();
@@ -124,7 +124,7 @@ TEST_F(XrayViewTest, WheelKeepsThePixelUnderTheCursor) {
 }
 
 TEST_F(XrayViewTest, RightDragChangesTheWindowAndWRestoresIt) {
-  const GreyWindow usual = *view.window();
+  const image::GreyWindow usual = *view.window();
   drag({300, 300}, {400, 340}, Qt::RightButton);
   EXPECT_GT(view.window()->high - view.window()->low, usual.high - usual.low);
   key(Qt::Key_W);
@@ -172,8 +172,8 @@ TEST_F(XrayViewTest, TooltipNamesTheFiducial) {
     QMouseEvent move(QEvent::MouseMove, at, view.mapToGlobal(at), Qt::NoButton, Qt::NoButton, {});
     QApplication::sendEvent(&view, &move);
   };
-  for (const Fiducial& ball : shown().found->fiducials) {
-    if (ball.status != FiducialStatus::used) continue;
+  for (const fiducials::Fiducial& ball : shown().found->fiducials) {
+    if (ball.status != fiducials::FiducialStatus::used) continue;
     hover({2, 2});
     names.clear();
     hover(*view.place_of({ball.uv_raw.x(), ball.uv_raw.y()}));
@@ -191,7 +191,7 @@ TEST_F(XrayViewTest, ClearRemovesEverything) {
   QSignalSpy spy(&view, &XrayView::picked);
   QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
   for (int which : {Qt::Key_H, Qt::Key_L, Qt::Key_0, Qt::Key_W, Qt::Key_Plus, Qt::Key_Return}) key(which);
-  view.set_tool(ImageLine{{1, 2}, {3, 4}}, "note");
+  view.set_tool(verification::ImageLine{{1, 2}, {3, 4}}, "note");
   view.grab();
   EXPECT_EQ(spy.count(), 0);
 }
@@ -217,9 +217,9 @@ TEST_F(XrayViewTest, MayBeDeletedWhileALayerIsComputed) {
 }
 
 TEST_F(XrayViewTest, MissingViewShowsTheNextAction) {
-  Result empty;
+  pipeline::Result empty;
   empty.views.push_back({"AP", {}, {}, {}, {}});
-  const auto result = std::make_shared<const Result>(std::move(empty));
+  const auto result = std::make_shared<const pipeline::Result>(std::move(empty));
   view.show_view(result, 0);
   EXPECT_EQ(view.accessibleDescription(), "No image yet: acquire AP");
   view.show_view(result, 5);
@@ -257,7 +257,7 @@ TEST_F(XrayViewTest, RandomInputDoesNotCrash) {
         view.set_picking(below(2));
         break;
       case 6:
-        view.set_tool(ImageLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
+        view.set_tool(verification::ImageLine{{double(at.x()), 9}, {double(to.x()), 1e5}}, "tip");
         break;
       default:
         key(keys[below(int(std::size(keys)))], with[below(3)]);

@@ -6,7 +6,7 @@
 
 #include <Eigen/Cholesky>
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 constexpr double most_tolerance_mm = 0.5;  // above it the file describes another calibrator
@@ -87,4 +87,4 @@ double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement&
   return std::sqrt(sum);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

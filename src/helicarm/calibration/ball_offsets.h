@@ -6,7 +6,7 @@
 
 #include "helicarm/calibration/outliers.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// A fit with an offset of each fiducial from its coordinates, common to all views.
 struct OffsetFit {
@@ -28,4 +28,4 @@ bool rejects_many(const CleanFit& clean, const std::vector<ViewProblem>& problem
 /// Root mean square over the observed fiducials of the offset's length, mm. `problems` are those of the fit.
 double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement& fit);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

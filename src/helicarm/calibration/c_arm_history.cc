@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 using Eigen::Matrix3d;
@@ -90,7 +90,7 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   const auto alone = calibrate({view}, options);
   if (!alone) return std::nullopt;
   const CalibratedView& calibrated = alone->views[0];
-  const Intrinsics& k = calibrated.view.intrinsics;
+  const geometry::Intrinsics& k = calibrated.view.intrinsics;
   const double hand = k.fx < 0 ? -1 : 1;
   Eigen::Matrix<double, 3, 4> in_mm;
   in_mm << 0.5 * hand, 0.5, 0, 0, 0, 0, hand, 0, 0, 0, 0, 1;
@@ -149,4 +149,4 @@ Json to_json(const CArmHistory& history) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -12,7 +12,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// Intrinsics estimated from one image's fiducials without the prior: focal length, and principal point from
 /// the image's centre (u, v; as if not mirrored), mm on the detector.
@@ -53,4 +53,4 @@ Expected<CArmHistory> read_history(const std::filesystem::path& path);
 Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin);
 Json to_json(const CArmHistory& history);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -6,7 +6,7 @@
 
 #include "helicarm/calibration/views_test.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -17,7 +17,7 @@ const CArmPrior unknown{IntrinsicsVariation{10, 1.4}, IntrinsicsVariation{7, 4.2
 
 /// An acquisition with the given focal length and principal point (mm from the image's centre).
 ViewFiducials acquisition_with(const Vector3d& intrinsics_mm, bool mirrored, RandomStream& random) {
-  View view = paper_view(6 * random.uniform());
+  geometry::View view = paper_view(6 * random.uniform());
   const double hand = mirrored ? -1 : 1;
   view.intrinsics = {hand * px_per_mm * intrinsics_mm.x(), px_per_mm * intrinsics_mm.x(),
                      512 + hand * px_per_mm * intrinsics_mm.y(), 512 + px_per_mm * intrinsics_mm.z(), 0};
@@ -106,4 +106,4 @@ TEST(CArmHistoryJson, IndefiniteInformationIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -13,7 +13,7 @@
 #include "helicarm/calibration/outliers.h"
 #include "helicarm/geometry/ray.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 constexpr std::size_t least_fiducials = 6;
@@ -26,19 +26,20 @@ tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
   return tl::unexpected<Failure>(std::move(failure));
 }
 
-std::vector<PointPair> pairs_of(const std::vector<Fiducial>& fiducials) {
-  std::vector<PointPair> pairs;
-  for (const Fiducial& f : fiducials)
-    if (f.status == FiducialStatus::used) pairs.push_back({f.centre_in_calibrator, f.uv});
+std::vector<geometry::PointPair> pairs_of(const std::vector<fiducials::Fiducial>& fiducials) {
+  std::vector<geometry::PointPair> pairs;
+  for (const fiducials::Fiducial& f : fiducials)
+    if (f.status == fiducials::FiducialStatus::used) pairs.push_back({f.centre_in_calibrator, f.uv});
   return pairs;
 }
 
 /// The given start, or the homogeneous DLT.
-Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<PointPair>& pairs,
+Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<geometry::PointPair>& pairs,
                                const Eigen::Vector3d& centre) {
-  if (view.start) return dlt_condition(pairs).map([&](double) { return centred(*view.start, centre); });
-  return dlt_homogeneous(pairs).map(
-      [&](const DltResult& dlt) { return shrunk_to_prior(centred(dlt.view, centre), view.prior); });
+  if (view.start)
+    return geometry::dlt_condition(pairs).map([&](double) { return centred(*view.start, centre); });
+  return geometry::dlt_homogeneous(pairs).map(
+      [&](const geometry::DltResult& dlt) { return shrunk_to_prior(centred(dlt.view, centre), view.prior); });
 }
 
 /// Splits each sigma into the fiducial's own and the map's, which is correlated: independent errors along the
@@ -70,8 +71,8 @@ Expected<ViewProblem> problem_of(const ViewFiducials& view,
   std::vector<Observation> observations;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   for (std::size_t ball = 0; ball < view.fiducials.size(); ++ball) {
-    const Fiducial& f = view.fiducials[ball];
-    if (f.status != FiducialStatus::used) continue;
+    const fiducials::Fiducial& f = view.fiducials[ball];
+    if (f.status != fiducials::FiducialStatus::used) continue;
     if (!(f.sigma_px > 0) || !std::isfinite(f.sigma_px))
       return fail(Reason::bad_value,
                   fmt::format("fiducial {}: sigma_px is {}, must be positive", f.label, f.sigma_px));
@@ -92,28 +93,30 @@ auto block_of(Eigen::MatrixXd& joint, std::size_t view) {
   return joint.block<view_parameters, view_parameters>(at, at);
 }
 
-void mark_rejected(std::vector<Fiducial>& fiducials, std::size_t used_index) {
-  const auto is_candidate = [](const Fiducial& f) {
-    return f.status == FiducialStatus::used || f.status == FiducialStatus::rejected;
+void mark_rejected(std::vector<fiducials::Fiducial>& fiducials, std::size_t used_index) {
+  const auto is_candidate = [](const fiducials::Fiducial& f) {
+    return f.status == fiducials::FiducialStatus::used || f.status == fiducials::FiducialStatus::rejected;
   };
-  for (Fiducial& f : fiducials)
-    if (is_candidate(f) && used_index-- == 0) f.status = FiducialStatus::rejected;
+  for (fiducials::Fiducial& f : fiducials)
+    if (is_candidate(f) && used_index-- == 0) f.status = fiducials::FiducialStatus::rejected;
 }
 
 /// Residuals and figures of a view, calibrated by either method. Refuses `residual_too_large`.
-Expected<CalibratedView> described(const std::string& name, const View& view,
-                                   std::vector<Fiducial>& fiducials, const CalibrationOptions& options) {
+Expected<CalibratedView> described(const std::string& name, const geometry::View& view,
+                                   std::vector<fiducials::Fiducial>& fiducials,
+                                   const CalibrationOptions& options) {
   const auto pairs = pairs_of(fiducials);
-  const auto condition = dlt_condition(pairs);
+  const auto condition = geometry::dlt_condition(pairs);
   if (!condition) return in_view(condition.error(), name);
-  CalibratedView result{name, view, factors_from_projection(view.projection())};
+  CalibratedView result{name, view, geometry::factors_from_projection(view.projection())};
   result.condition = *condition;
-  result.reprojection_rms_px = reprojection_rms(view, pairs);
+  result.reprojection_rms_px = geometry::reprojection_rms(view, pairs);
   double largest_sigma = 0;
-  for (Fiducial& f : fiducials) {
-    if (f.status != FiducialStatus::used && f.status != FiducialStatus::rejected) continue;
+  for (fiducials::Fiducial& f : fiducials) {
+    if (f.status != fiducials::FiducialStatus::used && f.status != fiducials::FiducialStatus::rejected)
+      continue;
     f.residual_px = (f.uv - view.project(f.centre_in_calibrator)).norm();
-    if (f.status != FiducialStatus::used) continue;
+    if (f.status != fiducials::FiducialStatus::used) continue;
     largest_sigma = std::max(largest_sigma, f.sigma_px);
     if (f.sigma_px > 0) result.chi2 += std::pow(f.residual_px / f.sigma_px, 2);
   }
@@ -161,8 +164,8 @@ void inflate_if_inconsistent(CalibrationResult& result) {
 void add_scale_error(CalibrationResult& result, double scale_sigma) {
   if (scale_sigma == 0) return;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  const std::vector<Fiducial>& balls = result.fiducials.front();
-  for (const Fiducial& ball : balls) mean += ball.centre_in_calibrator / double(balls.size());
+  const std::vector<fiducials::Fiducial>& balls = result.fiducials.front();
+  for (const fiducials::Fiducial& ball : balls) mean += ball.centre_in_calibrator / double(balls.size());
   constexpr Eigen::Index translation = 7;  // index among view_parameters
   Eigen::VectorXd by_scale = Eigen::VectorXd::Zero(result.joint_covariance.rows());
   for (std::size_t i = 0; i < result.views.size(); ++i)
@@ -267,7 +270,7 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
   CalibrationResult result;
   for (const ViewFiducials& view : views) {
     const auto pairs = pairs_of(view.fiducials);
-    const auto dlt = dlt_least_squares(pairs);
+    const auto dlt = geometry::dlt_least_squares(pairs);
     if (!dlt) return in_view(dlt.error(), view.name);
     result.fiducials.push_back(view.fiducials);
     auto calibrated = described(view.name, dlt->view, result.fiducials.back(), options);
@@ -287,9 +290,11 @@ Expected<void> check_views_apart(std::span<const CalibratedView> views,
   double widest_deg = 0;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      const Ray a = ray_through(views[i].view, views[i].view.project(point_in_calibrator));
-      const Ray b = ray_through(views[j].view, views[j].view.project(point_in_calibrator));
-      widest_deg = std::max(widest_deg, angle_between(a, b) * 180 / std::numbers::pi);
+      const geometry::Ray a =
+          geometry::ray_through(views[i].view, views[i].view.project(point_in_calibrator));
+      const geometry::Ray b =
+          geometry::ray_through(views[j].view, views[j].view.project(point_in_calibrator));
+      widest_deg = std::max(widest_deg, geometry::angle_between(a, b) * 180 / std::numbers::pi);
     }
   if (widest_deg >= least_deg) return {};
   return fail(
@@ -298,4 +303,4 @@ Expected<void> check_views_apart(std::span<const CalibratedView> views,
       {{"angle_deg", widest_deg}, {"limit_deg", least_deg}});
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -13,13 +13,13 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/fiducials/fiducial.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 struct ViewFiducials {
   std::string name;
-  std::vector<Fiducial> fiducials;  ///< only those `used` enter
+  std::vector<fiducials::Fiducial> fiducials;  ///< only those `used` enter
   IntrinsicsPrior prior = {};
-  std::optional<View> start = {};  ///< else the homogeneous DLT
+  std::optional<geometry::View> start = {};  ///< else the homogeneous DLT
   /// Covariance of the map among the used fiducials, per axis (n x n, px^2); its diagonal is part of their
   /// sigmas. Empty: independent errors.
   Eigen::MatrixXd map_covariance_px2 = {};
@@ -32,7 +32,8 @@ struct CalibrationOptions {
 };
 
 struct CalibrationResult : Calibration {
-  std::vector<std::vector<Fiducial>> fiducials;  ///< per view, with residuals; outliers are `rejected`
+  std::vector<std::vector<fiducials::Fiducial>>
+      fiducials;  ///< per view, with residuals; outliers are `rejected`
   double chi2 = 0;
   int dof = 0;
   double variance_scale = 1;  ///< covariance inflation where chi2 is inconsistent with the fiducials' sigmas
@@ -63,4 +64,4 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
 Expected<void> check_views_apart(std::span<const CalibratedView> views,
                                  const Eigen::Vector3d& point_in_calibrator, double least_deg = 30);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -12,7 +12,7 @@
 #include "helicarm/calibration/centred_view.h"
 #include "helicarm/calibration/views_test.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 std::vector<ViewFiducials> pair_of_views(double sigma, std::uint64_t trial) {
@@ -33,7 +33,7 @@ TEST(Calibrate, NearlyExactImagesRecoverTheViews) {
 
 TEST(Calibrate, MirroredViewKeepsItsHandedness) {
   RandomStream random(12, 0);
-  View mirrored = paper_view(0.4);
+  geometry::View mirrored = paper_view(0.4);
   mirrored.intrinsics.fx *= -1;
   const auto result = calibrate({observed_fiducials("AP", mirrored, 0.1, random)}, {});
   ASSERT_TRUE(result.has_value());
@@ -71,12 +71,12 @@ TEST_P(ScatterWithTolerance, EqualsTheJointCovariance) {
     ASSERT_TRUE(result.has_value());
     Eigen::VectorXd error(2 * view_parameters);
     for (int i = 0; i < 2; ++i) {
-      const View& view = result->views[std::size_t(i)].view;
-      const View truth = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
-      const Intrinsics& k = view.intrinsics;
+      const geometry::View& view = result->views[std::size_t(i)].view;
+      const geometry::View truth = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
+      const geometry::Intrinsics& k = view.intrinsics;
       error.segment<view_parameters>(view_parameters * i) << k.fx - 6000, k.fy - 6000, k.u0 - 512, k.v0 - 512,
-          vector_from_rotation(view.camera_from_world.rotation *
-                               truth.camera_from_world.rotation.transpose()),
+          geometry::vector_from_rotation(view.camera_from_world.rotation *
+                                         truth.camera_from_world.rotation.transpose()),
           view.camera_from_world.translation - truth.camera_from_world.translation, k.skew;
     }
     distance2 += error.dot(result->joint_covariance.ldlt().solve(error)) / trials;
@@ -97,9 +97,9 @@ TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
   ASSERT_TRUE(exact && uncertain);
   auto larger = views;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Fiducial& f : views[0].fiducials) mean += f.centre_in_calibrator / 12;
+  for (const fiducials::Fiducial& f : views[0].fiducials) mean += f.centre_in_calibrator / 12;
   for (auto& view : larger)
-    for (Fiducial& f : view.fiducials)
+    for (fiducials::Fiducial& f : view.fiducials)
       f.centre_in_calibrator = mean + scale * (f.centre_in_calibrator - mean);
   const auto scaled = calibrate(larger, {});
   ASSERT_TRUE(scaled);
@@ -147,7 +147,7 @@ TEST(Calibrate, CorrelatedErrorsOfTheMapAreInTheCovariance) {
     const auto distance2 = [&] {
       const auto result = calibrate(views, options);
       EXPECT_TRUE(result.has_value());
-      const View& view = result->views[0].view;
+      const geometry::View& view = result->views[0].view;
       Eigen::Vector3d error =
           view.project({0, 0, 40}).homogeneous() - paper_view(0).project({0, 0, 40}).homogeneous();
       const auto by_numbers = pixel_by_parameters(view, {0, 0, 40});
@@ -182,8 +182,9 @@ TEST(Calibrate, OnlyOutliersAreRejected) {
       for (int v = 0; v < 2; ++v)
         for (int k = 0; k < 12; ++k) {
           const bool is_wrong = v == 1 && std::find(wrong.begin(), wrong.end(), k) != wrong.end();
-          EXPECT_EQ(result->fiducials[std::size_t(v)][std::size_t(k)].status == FiducialStatus::rejected,
-                    is_wrong)
+          EXPECT_EQ(
+              result->fiducials[std::size_t(v)][std::size_t(k)].status == fiducials::FiducialStatus::rejected,
+              is_wrong)
               << wrong.size() << " balls off by " << off << ": view " << v << " ball " << k;
         }
       EXPECT_LT(result->views[1].reprojection_rms_px, 0.2);
@@ -195,7 +196,7 @@ TEST(Calibrate, GrossOutlierIsRejected) {
   views[0].fiducials[4].uv += Eigen::Vector2d(90, -40);
   const auto result = calibrate(views, {});
   ASSERT_TRUE(result.has_value()) << result.error().message;
-  EXPECT_EQ(result->fiducials[0][4].status, FiducialStatus::rejected);
+  EXPECT_EQ(result->fiducials[0][4].status, fiducials::FiducialStatus::rejected);
   EXPECT_NEAR(result->fiducials[0][4].residual_px, 98, 3);
 }
 
@@ -209,7 +210,7 @@ TEST(Calibrate, InliersAreKept) {
     const auto result = calibrate(views, {});
     ASSERT_TRUE(result.has_value());
     for (const auto& fiducials : result->fiducials)
-      for (const auto& f : fiducials) rejected += f.status == FiducialStatus::rejected;
+      for (const auto& f : fiducials) rejected += f.status == fiducials::FiducialStatus::rejected;
   }
   EXPECT_LE(rejected, 1);
 }
@@ -232,9 +233,10 @@ std::vector<ViewFiducials> views_of_deviating_calibrator(
   auto views = pair_of_views(sigma, trial);
   RandomStream random(21, 0, trial);
   std::vector<Eigen::Vector3d> places;
-  for (const Fiducial& ball : views[0].fiducials) places.push_back(place(ball.centre_in_calibrator));
+  for (const fiducials::Fiducial& ball : views[0].fiducials)
+    places.push_back(place(ball.centre_in_calibrator));
   for (std::size_t i = 0; i < 2; ++i) {
-    const View view = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
+    const geometry::View view = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
     views[i].prior = {6000, Eigen::Vector2d(512, 512), 1 / 0.15, NormalPrior{1, 1e-3}, NormalPrior{0, 1e-12}};
     for (std::size_t k = 0; k < places.size(); ++k)
       views[i].fiducials[k].uv =
@@ -302,7 +304,8 @@ TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsOffsets) {
   const auto result = calibrate(views_of_deviating_calibrator(off, 3), options);
   ASSERT_TRUE(result.has_value());
   for (const auto& of_view : result->fiducials)
-    for (const Fiducial& ball : of_view) EXPECT_EQ(ball.status, FiducialStatus::used) << ball.label;
+    for (const fiducials::Fiducial& ball : of_view)
+      EXPECT_EQ(ball.status, fiducials::FiducialStatus::used) << ball.label;
   ASSERT_EQ(result->notes.size(), 1u);
   EXPECT_EQ(result->notes[0].reason, Reason::calibrator_deviates);
   EXPECT_NEAR(result->ball_rms_mm, 0.3 * std::sqrt(3), 0.2);
@@ -311,11 +314,11 @@ TEST(Calibrate, DeclaredToleranceIsNotedWithTheBallsOffsets) {
 TEST(Calibrate, SixFiducialsAreRequired) {
   RandomStream random(15, 0);
   auto view = observed_fiducials("AP", paper_view(0.3), 0.1, random, 7);
-  view.fiducials[2].status = FiducialStatus::occluded;
+  view.fiducials[2].status = fiducials::FiducialStatus::occluded;
   const auto six = calibrate({view}, {});
   ASSERT_TRUE(six.has_value()) << six.error().message;
   EXPECT_EQ(six->warnings.at(0).reason, Reason::few_fiducials);
-  view.fiducials[4].status = FiducialStatus::outside;
+  view.fiducials[4].status = fiducials::FiducialStatus::outside;
   const auto five = calibrate({view}, {});
   ASSERT_FALSE(five.has_value());
   EXPECT_EQ(five.error().reason, Reason::too_few_fiducials);
@@ -357,7 +360,7 @@ TEST(CalibratePaper, IsTheDltOfEachView) {
     pixels.segment<2>(row) = uv;
   }
   const Eigen::VectorXd a = (design.transpose() * design).ldlt().solve(design.transpose() * pixels);
-  for (const Fiducial& ball : balls) {
+  for (const fiducials::Fiducial& ball : balls) {
     const Eigen::Vector4d p = (ball.centre_in_calibrator / unit_mm).homogeneous();
     const double w = 1 + a.tail<3>().dot(p.head<3>());
     const Eigen::Vector2d uv(a.head<4>().dot(p) / w, a.segment<4>(4).dot(p) / w);
@@ -383,4 +386,4 @@ TEST(CheckViewsApart, AngleIsThatOfLines) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -10,7 +10,7 @@
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// Parameters of a view: fx, fy, u0, v0, rotation vector in the camera frame (rad), translation (mm), skew.
 inline constexpr int view_parameters = 11;
@@ -19,8 +19,8 @@ using ViewCovariance = Eigen::Matrix<double, view_parameters, view_parameters>;
 /// A calibrated view.
 struct CalibratedView {
   std::string name;
-  View view;                      ///< world = calibrator, pixels = rectified
-  std::optional<DltFactors> dlt;  ///< A1..A11 of Eq. 6; nothing where t_z = 0
+  geometry::View view;                      ///< world = calibrator, pixels = rectified
+  std::optional<geometry::DltFactors> dlt;  ///< A1..A11 of Eq. 6; nothing where t_z = 0
   /// Of the view's parameters; the true pose is (exp(w) R, t + dt). Zero: not computed.
   ViewCovariance covariance = ViewCovariance::Zero();
   double reprojection_rms_px = 0;
@@ -36,4 +36,4 @@ struct Calibration {
   Eigen::MatrixXd joint_covariance;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -10,7 +10,7 @@
 #include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/strain.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 void warn_of_strain(CalibrationResult& result, const CleanFit& clean) {
   constexpr double chi2_at_3_sigma = 18.2;
@@ -48,4 +48,4 @@ void report_offsets(CalibrationResult& result, const CleanFit& clean) {
   (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(deviation));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -4,7 +4,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/calibration/outliers.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// Warns `calibrator_strained` if the calibrator's estimated strain is significant: chi-square of five
 /// degrees of freedom at three sigma. Sets `strain_sigma`.
@@ -14,4 +14,4 @@ void warn_of_strain(CalibrationResult& result, const CleanFit& clean);
 /// tolerance, a warning for one found from the residuals. Sets `ball_rms_mm`.
 void report_offsets(CalibrationResult& result, const CleanFit& clean);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -4,10 +4,10 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/triangulation.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
-CentredView centred(const View& view, const Eigen::Vector3d& centre) {
-  const Intrinsics& k = view.intrinsics;
+CentredView centred(const geometry::View& view, const Eigen::Vector3d& centre) {
+  const geometry::Intrinsics& k = view.intrinsics;
   const Eigen::Vector3d c = view.camera_from_world * centre;
   const double rho = 1 / c.z();
   const double qx = c.x() * rho, qy = c.y() * rho;
@@ -23,7 +23,7 @@ CentredView centred(const View& view, const Eigen::Vector3d& centre) {
           k.skew * rho};
 }
 
-View uncentred(const CentredView& c) {
+geometry::View uncentred(const CentredView& c) {
   const double fx = c.ax / c.rho, fy = c.ay / c.rho, skew = c.skew / c.rho;
   const Eigen::Vector3d centre_in_camera = Eigen::Vector3d(c.qx, c.qy, 1) / c.rho;
   return {{fx, fy, c.uc - fx * c.qx - skew * c.qy, c.vc - fy * c.qy, skew},
@@ -36,7 +36,8 @@ CentredView moved(const CentredView& view, const ViewStep& step) {
   next.ay += step(1);
   next.uc += step(2);
   next.vc += step(3);
-  next.rotation = nearest_rotation(rotation_from_vector(step.segment<3>(4)) * view.rotation);
+  next.rotation =
+      geometry::nearest_rotation(geometry::rotation_from_vector(step.segment<3>(4)) * view.rotation);
   next.rho += step(7);
   next.qx += step(8);
   next.qy += step(9);
@@ -60,7 +61,7 @@ ImageCoordinates image_of(const CentredView& c, const Eigen::Vector3d& point_in_
                          depth};
   image.by_step.diagonal<0>() << gx, gy;
   image.by_step.diagonal<2>() << 1, 1;
-  image.by_step.middleCols<3>(4) = -by_d * cross_matrix(d);
+  image.by_step.middleCols<3>(4) = -by_d * geometry::cross_matrix(d);
   image.by_step.col(7) = -d.z() / depth * Eigen::Vector2d(along_u, c.ay * gy);
   image.by_step.middleCols<2>(8) = -d.z() * by_d.leftCols<2>();
   image.by_step(0, 10) = gy;
@@ -79,8 +80,8 @@ ViewCovariance parameters_by_step(const CentredView& c) {
   m.block<2, 1>(2, 7) = depth * depth * scaled;
   m.block<2, 2>(2, 8) << -depth * c.ax, -depth * c.skew, 0, -depth * c.ay;
   m(2, 10) = -depth * c.qy;
-  m.block<3, 3>(4, 4).setIdentity();                          // rotation
-  m.block<3, 3>(7, 4) = cross_matrix(c.rotation * c.centre);  // translation
+  m.block<3, 3>(4, 4).setIdentity();                                    // rotation
+  m.block<3, 3>(7, 4) = geometry::cross_matrix(c.rotation * c.centre);  // translation
   m.block<3, 1>(7, 7) = -depth * depth * q;
   m.block<2, 2>(7, 8).diagonal().setConstant(depth);
   m(10, 7) = -depth * depth * c.skew;
@@ -88,19 +89,19 @@ ViewCovariance parameters_by_step(const CentredView& c) {
   return m;
 }
 
-Eigen::Matrix<double, 2, view_parameters> pixel_by_parameters(const View& view,
+Eigen::Matrix<double, 2, view_parameters> pixel_by_parameters(const geometry::View& view,
                                                               const Eigen::Vector3d& point_in_world) {
-  const RigidTransform& pose = view.camera_from_world;
+  const geometry::RigidTransform& pose = view.camera_from_world;
   const Eigen::Vector3d p = pose * point_in_world;
   const Eigen::Matrix<double, 2, 3> by_camera =
-      projection_jacobian(view, point_in_world) * pose.rotation.transpose();
+      geometry::projection_jacobian(view, point_in_world) * pose.rotation.transpose();
   Eigen::Matrix<double, 2, view_parameters> m = Eigen::Matrix<double, 2, view_parameters>::Zero();
   m.diagonal<0>() << p.x() / p.z(), p.y() / p.z();
   m.diagonal<2>() << 1, 1;
-  m.middleCols<3>(4) = -by_camera * cross_matrix(pose.rotation * point_in_world);
+  m.middleCols<3>(4) = -by_camera * geometry::cross_matrix(pose.rotation * point_in_world);
   m.middleCols<3>(7) = by_camera;
   m(0, 10) = p.y() / p.z();
   return m;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

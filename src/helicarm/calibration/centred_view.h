@@ -6,7 +6,7 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// A view parametrised about the centre of its fiducials: with d = R (x - centre),
 ///   gx = (dx - qx dz) / (1 + dz rho),   gy = (dy - qy dz) / (1 + dz rho),
@@ -26,8 +26,8 @@ struct CentredView {
 /// Step of (ax, ay, uc, vc, rotation vector in the camera frame, rho, qx, qy, skew).
 using ViewStep = Eigen::Vector<double, view_parameters>;
 
-CentredView centred(const View& view, const Eigen::Vector3d& centre);
-View uncentred(const CentredView& view);
+CentredView centred(const geometry::View& view, const Eigen::Vector3d& centre);
+geometry::View uncentred(const CentredView& view);
 CentredView moved(const CentredView& view, const ViewStep& step);
 
 struct ImageCoordinates {
@@ -42,7 +42,7 @@ ImageCoordinates image_of(const CentredView& view, const Eigen::Vector3d& point_
 ViewCovariance parameters_by_step(const CentredView& view);
 
 /// d pixel / d (the parameters of `CalibratedView::covariance`) of a plain view.
-Eigen::Matrix<double, 2, view_parameters> pixel_by_parameters(const View& view,
+Eigen::Matrix<double, 2, view_parameters> pixel_by_parameters(const geometry::View& view,
                                                               const Eigen::Vector3d& point_in_world);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

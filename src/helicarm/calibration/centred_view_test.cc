@@ -6,27 +6,30 @@
 #include "helicarm/calibration/priors.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 using Parameters = Eigen::Vector<double, view_parameters>;
 
-const View example{{-6000, 6200, 500, 530, 40}, {rotation_from_euler(0.3, -0.8, 2), {30, -20, 820}}};
+const geometry::View example{{-6000, 6200, 500, 530, 40},
+                             {geometry::rotation_from_euler(0.3, -0.8, 2), {30, -20, 820}}};
 const Eigen::Vector3d centre(5, 3, 40);
 
 /// Parameters of a view near `example`, the rotation as a step from it.
-Parameters parameters_of(const View& view) {
-  const Intrinsics& k = view.intrinsics;
+Parameters parameters_of(const geometry::View& view) {
+  const geometry::Intrinsics& k = view.intrinsics;
   Parameters p;
   p << k.fx, k.fy, k.u0, k.v0,
-      vector_from_rotation(view.camera_from_world.rotation * example.camera_from_world.rotation.transpose()),
+      geometry::vector_from_rotation(view.camera_from_world.rotation *
+                                     example.camera_from_world.rotation.transpose()),
       view.camera_from_world.translation, k.skew;
   return p;
 }
 
-View view_of(const Parameters& p) {
+geometry::View view_of(const Parameters& p) {
   return {{p(0), p(1), p(2), p(3), p(10)},
-          {rotation_from_vector(p.segment<3>(4)) * example.camera_from_world.rotation, p.segment<3>(7)}};
+          {geometry::rotation_from_vector(p.segment<3>(4)) * example.camera_from_world.rotation,
+           p.segment<3>(7)}};
 }
 
 const Parameters step_sizes =
@@ -88,7 +91,7 @@ TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
   const CentredView view = centred(example, centre);
   const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, NormalPrior{0.97, 0.01}};
   const CentredView shrunk = shrunk_to_prior(view, prior);
-  const Intrinsics k = uncentred(shrunk).intrinsics;
+  const geometry::Intrinsics k = uncentred(shrunk).intrinsics;
   EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
   EXPECT_NEAR(-k.fx / k.fy, 0.97, 1e-12);
   EXPECT_NEAR(k.u0, 512, 1e-9);
@@ -98,7 +101,7 @@ TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
 }
 
 TEST(PriorRows, JacobianAgreesWithDifferences) {
-  View other = example;
+  geometry::View other = example;
   other.intrinsics = {6100, 6150, 515, 505, 0};
   const std::vector<CentredView> views{centred(example, centre), centred(other, centre)};
   const IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, NormalPrior{1, 0.01}, NormalPrior{0, 0.01}};
@@ -131,7 +134,7 @@ TEST(PriorRows, CommonVariationOfTwoViewsCountsOnce) {
 }
 
 TEST(PriorRows, MirroredViewReversesTheVariation) {
-  View plain = example, mirrored = example;
+  geometry::View plain = example, mirrored = example;
   plain.intrinsics.fx = 6000;
   plain.intrinsics.u0 = 512 + 30;
   mirrored.intrinsics.u0 = 512 - 30;
@@ -144,4 +147,4 @@ TEST(PriorRows, MirroredViewReversesTheVariation) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::calibration

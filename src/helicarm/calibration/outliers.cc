@@ -7,7 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 /// Degrees of freedom of the prior on the scale of the sigmas.
@@ -127,4 +127,4 @@ Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, co
   return clean;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

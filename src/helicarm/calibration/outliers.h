@@ -5,7 +5,7 @@
 
 #include "helicarm/calibration/refine.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// View, and index among its observations.
 struct ObservationIndex {
@@ -26,4 +26,4 @@ struct CleanFit {
 Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, const CommonPrior& common,
                                            double probability, std::size_t least_kept);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

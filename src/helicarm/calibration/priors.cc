@@ -8,7 +8,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 /// Quantities of a view that have priors, and their derivatives by its step.
@@ -19,7 +19,7 @@ struct Quantities {
 };
 
 Quantities quantities_of(const CentredView& view) {
-  const Intrinsics k = uncentred(view).intrinsics;
+  const geometry::Intrinsics k = uncentred(view).intrinsics;
   const ViewCovariance by_step = parameters_by_step(view);
   const double sign = k.fx < 0 ? -1 : 1;
   Quantities quantities{{(sign * k.fx + k.fy) / 2, sign * k.fx / k.fy, k.u0, k.v0, k.skew / k.fy}, {}};
@@ -98,7 +98,7 @@ CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior) {
   if (!prior.principal_px) return view;
   const double qy = (view.vc - prior.principal_px->y()) * view.rho / view.ay;
   const double qx = ((view.uc - prior.principal_px->x()) * view.rho - view.skew * qy) / view.ax;
-  view.rotation = rotation_from_vector({view.qy - qy, qx - view.qx, 0}) * view.rotation;
+  view.rotation = geometry::rotation_from_vector({view.qy - qy, qx - view.qx, 0}) * view.rotation;
   view.qx = qx;
   view.qy = qy;
   return view;
@@ -127,4 +127,4 @@ PriorRows prior_rows(std::span<const CentredView> views, std::span<const Intrins
   return rows.finish();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -9,7 +9,7 @@
 
 #include "helicarm/calibration/centred_view.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// Normal prior of a scalar.
 struct NormalPrior {
@@ -59,4 +59,4 @@ struct PriorRows {
 PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
                      const CArmPrior& c_arm);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

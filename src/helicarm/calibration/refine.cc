@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 constexpr int most_iterations = 1000;
@@ -155,4 +155,4 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -8,7 +8,7 @@
 #include "helicarm/calibration/priors.h"
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// A fiducial's position (mm) and image point (px, standard deviation per axis).
 struct Observation {
@@ -44,4 +44,4 @@ struct Refinement {
 /// views.
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

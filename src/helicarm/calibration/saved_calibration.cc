@@ -4,7 +4,7 @@
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 constexpr Range any_number{-1e15, 1e15};
@@ -18,23 +18,24 @@ Eigen::Matrix<double, Rows, Columns> matrix_from(JsonReader& reader, const char*
 CalibratedView view_from(JsonReader& reader) {
   CalibratedView view;
   view.name = reader.text("name");
-  const auto pose = value_or_throw(rigid_transform_from(matrix_from<4, 4>(reader, "camera_from_calibrator"),
-                                                        reader.where() + ": camera_from_calibrator"));
-  const Projection projection = matrix_from<3, 4>(reader, "projection");
-  const auto decomposed = decompose(projection, pose.inverse() * Eigen::Vector3d::UnitZ());
+  const auto pose = value_or_throw(geometry::rigid_transform_from(
+      matrix_from<4, 4>(reader, "camera_from_calibrator"), reader.where() + ": camera_from_calibrator"));
+  const geometry::Projection projection = matrix_from<3, 4>(reader, "projection");
+  const auto decomposed = geometry::decompose(projection, pose.inverse() * Eigen::Vector3d::UnitZ());
   if (!decomposed) reader.refuse(Reason::bad_value, "projection", decomposed.error().message);
   view.view = *decomposed;
-  view.dlt = factors_from_projection(projection);
+  view.dlt = geometry::factors_from_projection(projection);
   view.reprojection_rms_px = reader.optional_number("reprojection_rms_px", any_number).value_or(0);
   view.dof = int(reader.optional_number("dof", {0, 1e6}).value_or(0));
   return view;
 }
 
-std::optional<DistortionMap> map_from(JsonReader& reader) {
+std::optional<rectification::DistortionMap> map_from(JsonReader& reader) {
   if (!reader.has("rectification")) return std::nullopt;
   JsonReader rectification = reader.object("rectification");
   if (!rectification.has("map")) return std::nullopt;
-  return value_or_throw(distortion_map_from_json(rectification.raw("map"), rectification.where() + ": map"));
+  return value_or_throw(
+      rectification::distortion_map_from_json(rectification.raw("map"), rectification.where() + ": map"));
 }
 
 }  // namespace
@@ -62,4 +63,4 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

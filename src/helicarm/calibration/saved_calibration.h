@@ -9,11 +9,12 @@
 #include "helicarm/core/json.h"
 #include "helicarm/rectification/distortion_map.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// A calibration read from a result file.
 struct SavedCalibration : Calibration {
-  std::vector<std::optional<DistortionMap>> maps;  ///< per view; nothing if the image was not rectified
+  std::vector<std::optional<rectification::DistortionMap>>
+      maps;  ///< per view; nothing if the image was not rectified
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map) and "calibration"
@@ -21,4 +22,4 @@ struct SavedCalibration : Calibration {
 /// that was refused.
 Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-namespace helicarm {
+namespace helicarm::calibration {
 namespace {
 
 constexpr double prior_sigma = 0.05;  // of the strain of a manufactured calibrator
@@ -72,4 +72,4 @@ Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

@@ -7,7 +7,7 @@
 
 #include "helicarm/calibration/refine.h"
 
-namespace helicarm {
+namespace helicarm::calibration {
 
 /// Volume-preserving strain of the calibrator that best explains the views, to first order about the fit with
 /// the file's coordinates.
@@ -24,4 +24,4 @@ struct Strain {
 /// distance.
 Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit);
 
-}  // namespace helicarm
+}  // namespace helicarm::calibration

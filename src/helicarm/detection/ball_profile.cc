@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 /// exp(-x) I0(x), Abramowitz and Stegun 9.8.1 and 9.8.2 (relative error below 2e-7).
@@ -66,4 +66,4 @@ BallProfile::BallProfile(double blur, double absorbance) : blur_(blur), absorban
   values_.push_back(0);  // one extra value for the interpolation at the end
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// Radial profile of a ball's X-ray image: absorption along the chord of a sphere, blurred by a Gaussian and
 /// scaled to 1 at the centre of the sharp image. Tabulated over s = distance / radius.
@@ -47,4 +47,4 @@ class BallProfile {
   std::vector<float> values_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -8,7 +8,7 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -70,4 +70,4 @@ TEST(BallProfile, AgreesWithARenderedBall) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -9,7 +9,7 @@
 
 #include "helicarm/image/opencv.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 constexpr int levels_per_octave = 3;
@@ -101,9 +101,9 @@ void search_octave(const cv::Mat& base, double step, const BlobOptions& options,
 
 }  // namespace
 
-std::vector<Dot> find_blobs(const Image<float>& image, const BlobOptions& options) {
+std::vector<Dot> find_blobs(const image::Image<float>& image, const BlobOptions& options) {
   std::vector<Dot> blobs;
-  cv::Mat base = as_mat(image);
+  cv::Mat base = image::as_mat(image);
   for (double step = 1; base.cols >= 16 && base.rows >= 16; step *= 2) {
     const auto radius_at = [&](double level) {
       return std::numbers::sqrt2 * first_sigma * step * std::pow(ratio, level + 0.5);
@@ -121,4 +121,4 @@ std::vector<Dot> find_blobs(const Image<float>& image, const BlobOptions& option
   return blobs;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

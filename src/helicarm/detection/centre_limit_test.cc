@@ -8,7 +8,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 #include "helicarm/detection/find_dots.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Vector2d;
@@ -34,8 +34,8 @@ double detector_sigma(const Situation& s) { return s.fwhm_px / 2.3548; }
 using Truth = Eigen::VectorXd;
 
 /// Expected quanta in a square with some balls, before the detector blur.
-Image<float> expected(const Truth& truth) {
-  Image<float> image(side, side);
+image::Image<float> expected(const Truth& truth) {
+  image::Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) {
       const double x = (u - 0.5 * side) / side;
@@ -52,14 +52,15 @@ Image<float> expected(const Truth& truth) {
   return image;
 }
 
-Image<float> blurred(Image<float> image, const Situation& s) {
-  cv::Mat mat = as_mat(image);
+image::Image<float> blurred(image::Image<float> image, const Situation& s) {
+  cv::Mat mat = image::as_mat(image);
   if (s.fwhm_px > 0) cv::GaussianBlur(mat, mat, {}, detector_sigma(s), 0, cv::BORDER_REFLECT);
   return image;
 }
 
-Image<float> exposed(const Image<float>& expected_quanta, const Situation& s, RandomStream& random) {
-  Image<float> image = expected_quanta;
+image::Image<float> exposed(const image::Image<float>& expected_quanta, const Situation& s,
+                            RandomStream& random) {
+  image::Image<float> image = expected_quanta;
   for (float& quantum : image.pixels())  // large counts: Poisson is approximated by a Gaussian
     quantum = std::max(0.f, quantum + std::sqrt(quantum) * static_cast<float>(random.normal()));
   image = blurred(std::move(image), s);
@@ -89,15 +90,15 @@ double bound_px(const Truth& truth, const Situation& s, const DotFitOptions& opt
     Truth less = truth;
     more[k] += step;
     less[k] -= step;
-    const Image<float> high = blurred(expected(more), s);
-    const Image<float> low = blurred(expected(less), s);
+    const image::Image<float> high = blurred(expected(more), s);
+    const image::Image<float> low = blurred(expected(less), s);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto [u, v] = pixels[static_cast<std::size_t>(i)];
       slopes(i, k) = double(high(u, v) - low(u, v)) / (2 * step);
     }
   }
   // Neighbouring pixels share quanta through the blur; the quanta's density is nearly constant over it.
-  const Image<float> mean = blurred(expected(truth), s);
+  const image::Image<float> mean = blurred(expected(truth), s);
   const double sigma = detector_sigma(s);
   cv::Mat taps(1, 1, CV_64F, cv::Scalar(1));
   if (s.fwhm_px > 0) taps = cv::getGaussianKernel(2 * int(4 * sigma + 2) + 1, sigma, CV_64F);
@@ -151,12 +152,12 @@ Answer tried(const Situation& s, const std::vector<Vector2d>& further_balls, Fit
       truth.segment<4>(6 + 4 * k) << contrast, place, s.radius;
     }
     bound += 0.25 * bound_px(truth, s, {});
-    const Image<float> one = expected(truth);
-    Image<float> all(tiles * side, tiles * side);
+    const image::Image<float> one = expected(truth);
+    image::Image<float> all(tiles * side, tiles * side);
     for (int v = 0; v < all.height(); ++v)
       for (int u = 0; u < all.width(); ++u) all(u, v) = one(u % side, v % side);
     for (int trial = 0; trial < 4; ++trial) {
-      const XrayImage xray_image = drawn::xray_image(exposed(all, s, random));
+      const xray::XrayImage xray_image = drawn::xray_image(exposed(all, s, random));
       for (int tile = 0; tile < tiles * tiles; ++tile) {
         const Vector2d place = side * Vector2d(tile % tiles, tile / tiles) + centre;
         const std::optional<Dot> dot = fit(xray_image, place);
@@ -191,7 +192,7 @@ TEST_P(CentreLimit, CentresReachTheBoundAndSigmasAreCorrect) {
   const Situation s = GetParam();
   const BallProfile profile = profile_of(s);
   std::optional<NoiseCorrelation> noise;
-  const Answer answer = tried(s, {}, [&](const XrayImage& xray_image, const Vector2d& place) {
+  const Answer answer = tried(s, {}, [&](const xray::XrayImage& xray_image, const Vector2d& place) {
     DotFitOptions options = fit_options_for(xray_image);
     if (!noise) noise = noise_correlation(xray_image, options.floor, options.ceiling);
     options.noise = *noise;
@@ -214,7 +215,7 @@ TEST_P(OverlapLimit, OverlapOfHalfARadiusHasLittleEffect) {
   const Situation s = GetParam();
   const Vector2d beside = 1.5 * s.radius * Vector2d(0.8, 0.6);
   DotAppearance appearance{profile_of(s), {}};
-  const Answer answer = tried(s, {beside}, [&](const XrayImage& xray_image, const Vector2d& place) {
+  const Answer answer = tried(s, {beside}, [&](const xray::XrayImage& xray_image, const Vector2d& place) {
     appearance.options = fit_options_for(xray_image);
     const std::vector<Dot> both{start_at(place, s.radius), start_at(place + beside, s.radius)};
     const auto dots = refit_dots(xray_image, {both[0]}, appearance, both);
@@ -229,4 +230,4 @@ TEST_P(OverlapLimit, OverlapOfHalfARadiusHasLittleEffect) {
 INSTANTIATE_TEST_SUITE_P(Balls, OverlapLimit, testing::Values(Situation{5.5, 0}, Situation{13, 0}));
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

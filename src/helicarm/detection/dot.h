@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// Image of a ball or a hole, raw pixels.
 struct Dot {
@@ -32,4 +32,4 @@ inline double Dot::error_px() const {
   return std::sqrt(prior_variance(sigma_px * sigma_px, jackknife_px * jackknife_px));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::detection {
 
 using Eigen::Index;
 
@@ -133,4 +133,4 @@ DotSums accumulate(const DotModel& model, const DotPatch& patch) {
   return {products.topLeftCorner(n, n), products.col(n).head(n), products(n, n)};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

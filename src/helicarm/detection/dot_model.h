@@ -10,7 +10,7 @@
 #include "helicarm/detection/dot_patch.h"
 #include "helicarm/detection/normal_equations.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// Model of a few dots on a quadratic background. Parameters: background b0 bx by bxx bxy byy (patch
 /// coordinates in units of the window) and the hidden share; contrast, centre, radius of each dot; the
@@ -56,4 +56,4 @@ struct DotSums {
 
 DotSums accumulate(const DotModel& model, const DotPatch& patch);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

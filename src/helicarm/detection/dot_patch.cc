@@ -6,9 +6,9 @@
 #include <cstdlib>
 #include <numeric>
 
-namespace helicarm {
+namespace helicarm::detection {
 
-std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v,
+std::optional<DotPatch> gather_dot_patch(const image::Image<float>& image, int u, int v,
                                          std::span<const Disc> windows, std::span<const Disc> others,
                                          const DotFitOptions& options) {
   DotPatch patch;
@@ -76,4 +76,4 @@ std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v
   return patch;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

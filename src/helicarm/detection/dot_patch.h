@@ -11,7 +11,7 @@
 #include "helicarm/detection/fit_dot.h"
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// Aligned, so that the order of summation does not depend on the address.
 using Floats = std::vector<float, Eigen::aligned_allocator<float>>;
@@ -33,8 +33,8 @@ struct DotPatch {
 
 /// The pixels inside the windows (about the origin u, v) and outside the masked discs. Nothing if too few are
 /// usable.
-std::optional<DotPatch> gather_dot_patch(const Image<float>& image, int u, int v,
+std::optional<DotPatch> gather_dot_patch(const image::Image<float>& image, int u, int v,
                                          std::span<const Disc> windows, std::span<const Disc> others,
                                          const DotFitOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

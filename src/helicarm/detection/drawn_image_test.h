@@ -14,9 +14,9 @@
 #include "helicarm/xray/xray_image.h"
 
 /// For tests: images rendered by brute force, independent of the models under test.
-namespace helicarm::drawn {
+namespace helicarm::detection::drawn {
 
-using Shade = Image<float>;  ///< absorbed fraction of the rays, 0 .. 1
+using Shade = image::Image<float>;  ///< absorbed fraction of the rays, 0 .. 1
 
 /// Adds `absorbed(x, y)` within `reach` of `middle`: sampled on a fine grid, blurred there and averaged over
 /// each pixel.
@@ -28,11 +28,11 @@ void add_shade(Shade& shade, const Eigen::Vector2d& middle, double reach, double
   const int u0 = static_cast<int>(std::floor(middle.x() - rim));
   const int v0 = static_cast<int>(std::floor(middle.y() - rim));
   const int side = static_cast<int>(std::ceil(2 * rim)) + 2;
-  Image<float> sharp(side * fine, side * fine);
+  image::Image<float> sharp(side * fine, side * fine);
   for (int j = 0; j < sharp.height(); ++j)
     for (int i = 0; i < sharp.width(); ++i)
       sharp(i, j) = static_cast<float>(absorbed(u0 + (i + 0.5) / fine - 0.5, v0 + (j + 0.5) / fine - 0.5));
-  cv::Mat mat = as_mat(sharp);
+  cv::Mat mat = image::as_mat(sharp);
   if (blur_px > 0) cv::GaussianBlur(mat, mat, {}, blur_px * fine, 0, cv::BORDER_REPLICATE);
   cv::Mat small;
   cv::resize(mat, small, {side, side}, 0, 0, cv::INTER_AREA);
@@ -75,13 +75,13 @@ inline void add_wires(Shade& shade, const std::vector<Wire>& wires, double radiu
   });
 }
 
-inline void add_noise(Image<float>& image, double sigma, RandomStream& random) {
+inline void add_noise(image::Image<float>& image, double sigma, RandomStream& random) {
   for (float& grey : image.pixels()) grey += static_cast<float>(sigma * random.normal());
 }
 
 /// Grey values on a uniform background of 3000, of which the shade takes `contrast`; negative: brighter.
-inline Image<float> grey(const Shade& shade, double contrast) {
-  Image<float> image(shade.width(), shade.height());
+inline image::Image<float> grey(const Shade& shade, double contrast) {
+  image::Image<float> image(shade.width(), shade.height());
   for (int v = 0; v < shade.height(); ++v)
     for (int u = 0; u < shade.width(); ++u)
       image(u, v) = static_cast<float>((contrast > 0 ? 3000 : 1500) - contrast * double(shade(u, v)));
@@ -89,13 +89,13 @@ inline Image<float> grey(const Shade& shade, double contrast) {
 }
 
 /// A 12-bit image, rounded and clipped as in a file.
-inline XrayImage xray_image(Image<float> image) {
+inline xray::XrayImage xray_image(image::Image<float> image) {
   for (float& value : image.pixels()) value = std::clamp(std::round(value), 0.f, 4095.f);
-  XrayImage xray_image;
+  xray::XrayImage xray_image;
   xray_image.name = "AP";
   xray_image.pixels = std::move(image);
   xray_image.acquisition.logarithmic = true;
   return xray_image;
 }
 
-}  // namespace helicarm::drawn
+}  // namespace helicarm::detection::drawn

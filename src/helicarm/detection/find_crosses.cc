@@ -12,7 +12,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/detection/robust.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Vector2d;
@@ -25,7 +25,7 @@ constexpr int n_parameters = n_background + 7;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
-float bilinear(const Image<float>& image, double u, double v) {
+float bilinear(const image::Image<float>& image, double u, double v) {
   const int i = std::clamp(static_cast<int>(std::floor(u)), 0, image.width() - 2);
   const int j = std::clamp(static_cast<int>(std::floor(v)), 0, image.height() - 2);
   const float s = std::clamp(float(u - i), 0.f, 1.f);
@@ -41,8 +41,8 @@ struct Arms {
 };
 
 /// Directions in which the image is dark on both sides of a position, at two distances.
-std::optional<Arms> arms_at(const Image<float>& image, const Vector2d& place, double radius, double sign,
-                            const CrossOptions& options) {
+std::optional<Arms> arms_at(const image::Image<float>& image, const Vector2d& place, double radius,
+                            double sign, const CrossOptions& options) {
   std::array<double, ring_steps> dark{};
   const double reach = 1.6 * radius;
   if (place.x() < reach || place.y() < reach || place.x() > image.width() - 1 - reach ||
@@ -111,20 +111,20 @@ struct Pixel {
 };
 
 /// Whether a pixel lies outside the field or in its blurred rim.
-bool at_the_rim(const XrayImage& xray_image, int u, int v) {
+bool at_the_rim(const xray::XrayImage& xray_image, int u, int v) {
   constexpr int rim_px = 3;  // screen blur and the ramp at the field's edge
   const float black =
       xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);  // as in usable.cc
-  const Image<float>& image = xray_image.pixels;
+  const image::Image<float>& image = xray_image.pixels;
   for (int y = -rim_px; y <= rim_px; ++y)
     for (int x = -rim_px; x <= rim_px; ++x)
       if (image.contains(u + x, v + y) && image(u + x, v + y) <= black) return true;
   return false;
 }
 
-std::optional<Dot> fit_wires(const XrayImage& xray_image, const Vector2d& start, double half_width,
+std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& start, double half_width,
                              const Arms& arms, std::span<const Disc> discs) {
-  const Image<float>& image = xray_image.pixels;
+  const image::Image<float>& image = xray_image.pixels;
   const int u0 = static_cast<int>(std::lround(start.x()));
   const int v0 = static_cast<int>(std::lround(start.y()));
   const double window = 4 * half_width + 4;
@@ -224,13 +224,13 @@ std::optional<Dot> fit_wires(const XrayImage& xray_image, const Vector2d& start,
 
 }  // namespace
 
-std::optional<Dot> fit_cross(const XrayImage& xray_image, const Dot& start, double first_angle,
+std::optional<Dot> fit_cross(const xray::XrayImage& xray_image, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs) {
   return fit_wires(xray_image, start.centre_px, start.radius_px, {first_angle, second_angle, start.contrast},
                    discs);
 }
 
-std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& options) {
+std::vector<Dot> find_crosses(const xray::XrayImage& xray_image, const CrossOptions& options) {
   BlobOptions blob_options;
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = 0.5 * options.min_width_px;
@@ -259,4 +259,4 @@ std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& o
   return crosses;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

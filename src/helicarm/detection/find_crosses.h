@@ -10,7 +10,7 @@
 #include "helicarm/detection/fit_dot.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 struct CrossOptions {
   Polarity polarity = Polarity::dark;
@@ -23,11 +23,11 @@ struct CrossOptions {
 /// Crossings of two wires with the sub-pixel intersection of their axes. `radius_px` is half the wires'
 /// width. Round dots, single wires and wire ends are not crossings; black pixels (outside the field) and
 /// those next to them are ignored.
-std::vector<Dot> find_crosses(const XrayImage& xray_image, const CrossOptions& options);
+std::vector<Dot> find_crosses(const xray::XrayImage& xray_image, const CrossOptions& options);
 
 /// The crossing near `start` (centre, half width, contrast) of two wires at about the given angles (rad), or
 /// nothing if the pixels show none. Pixels in `discs` are masked.
-std::optional<Dot> fit_cross(const XrayImage& xray_image, const Dot& start, double first_angle,
+std::optional<Dot> fit_cross(const xray::XrayImage& xray_image, const Dot& start, double first_angle,
                              double second_angle, std::span<const Disc> discs);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -8,14 +8,14 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Vector2d;
 
-XrayImage noisy(const drawn::Shade& shade, double contrast = 1200) {
+xray::XrayImage noisy(const drawn::Shade& shade, double contrast = 1200) {
   RandomStream random(4, 2);
-  Image<float> image = drawn::grey(shade, contrast);
+  image::Image<float> image = drawn::grey(shade, contrast);
   drawn::add_noise(image, 12, random);
   return drawn::xray_image(std::move(image));
 }
@@ -107,4 +107,4 @@ TEST(FitCross, NothingWithoutACrossing) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

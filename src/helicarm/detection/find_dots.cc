@@ -6,13 +6,13 @@
 #include <iterator>
 #include <limits>
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 /// The noise of a linear image grows with the root of the signal, so the search runs on the root; a
 /// logarithmic image is used as is.
-Image<float> even_noise(const XrayImage& xray_image) {
-  Image<float> even = xray_image.pixels;
+image::Image<float> even_noise(const xray::XrayImage& xray_image) {
+  image::Image<float> even = xray_image.pixels;
   if (!xray_image.acquisition.logarithmic.value_or(false))
     for (float& grey : even.pixels()) grey = std::sqrt(std::max(0.0f, grey - xray_image.lowest));
   return even;
@@ -43,7 +43,7 @@ std::vector<Disc> discs_beside(const Dot& dot, const std::vector<Dot>& dots) {
 
 /// Fits with the neighbours masked, or jointly with those that overlap, whichever gives the smaller centre
 /// error.
-std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotAppearance& appearance,
+std::optional<Dot> refit(const xray::XrayImage& xray_image, const Dot& dot, const DotAppearance& appearance,
                          const std::vector<Dot>& neighbours) {
   auto best =
       fit_dot(xray_image.pixels, dot, appearance.profile, discs_beside(dot, neighbours), appearance.options);
@@ -70,19 +70,19 @@ std::optional<Dot> refit(const XrayImage& xray_image, const Dot& dot, const DotA
 
 }  // namespace
 
-DotFitOptions fit_options_for(const XrayImage& xray_image) {
+DotFitOptions fit_options_for(const xray::XrayImage& xray_image) {
   DotFitOptions options;
   options.floor = xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);
   options.ceiling = xray_image.highest;
   return options;
 }
 
-NoiseCorrelation noise_correlation(const XrayImage& xray_image) {
+NoiseCorrelation noise_correlation(const xray::XrayImage& xray_image) {
   const DotFitOptions limits = fit_options_for(xray_image);
   return noise_correlation(xray_image, limits.floor, limits.ceiling);
 }
 
-DotAppearance estimate_appearance(const XrayImage& xray_image, const NoiseCorrelation& noise,
+DotAppearance estimate_appearance(const xray::XrayImage& xray_image, const NoiseCorrelation& noise,
                                   std::vector<Dot> dots) {
   constexpr std::size_t sample = 8;
   std::stable_sort(dots.begin(), dots.end(),
@@ -130,7 +130,7 @@ DotAppearance estimate_appearance(const XrayImage& xray_image, const NoiseCorrel
   return {BallProfile(blur / radius, absorbance), options};
 }
 
-std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& options) {
+std::vector<Dot> find_dots(const xray::XrayImage& xray_image, const DotOptions& options) {
   BlobOptions blob_options;
   blob_options.polarity = options.polarity;
   blob_options.min_radius_px = options.min_radius_px;
@@ -161,7 +161,7 @@ std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& option
   return without_doubles(std::move(dots));
 }
 
-std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& options,
+std::vector<Dot> find_clear_dots(const xray::XrayImage& xray_image, const DotOptions& options,
                                  double clear_sigma_px) {
   constexpr double same_size = 1.15;
   std::vector<Dot> found = find_dots(xray_image, options);
@@ -180,7 +180,7 @@ std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& 
   return clear;
 }
 
-std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots,
+std::vector<Dot> refit_dots(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
                             const DotAppearance& appearance, const std::vector<Dot>& neighbours) {
   std::vector<Dot> refitted;
   for (const Dot& dot : dots)
@@ -198,4 +198,4 @@ std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot
   return rest;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

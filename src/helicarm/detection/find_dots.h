@@ -8,7 +8,7 @@
 #include "helicarm/detection/fit_dot.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 struct DotOptions {
   Polarity polarity = Polarity::dark;
@@ -20,7 +20,7 @@ struct DotOptions {
 };
 
 /// Fit options for one image: its clipping limits.
-DotFitOptions fit_options_for(const XrayImage& xray_image);
+DotFitOptions fit_options_for(const xray::XrayImage& xray_image);
 
 /// Appearance of dots of one size and material in one image.
 struct DotAppearance {
@@ -29,23 +29,23 @@ struct DotAppearance {
 };
 
 /// The appearance (blur and absorbance of least total sigma) of the given dots of one size.
-DotAppearance estimate_appearance(const XrayImage& xray_image, const NoiseCorrelation& noise,
+DotAppearance estimate_appearance(const xray::XrayImage& xray_image, const NoiseCorrelation& noise,
                                   std::vector<Dot> dots);
 
 /// All round dots of one polarity, each with sub-pixel centre, standard deviation and radius.
-std::vector<Dot> find_dots(const XrayImage& xray_image, const DotOptions& options);
+std::vector<Dot> find_dots(const xray::XrayImage& xray_image, const DotOptions& options);
 
 /// The dots that are not in `taken`: farther from each than 0.7 of the larger radius.
 std::vector<Dot> dots_except(const std::vector<Dot>& dots, const std::vector<Dot>& taken);
 
 /// Like `find_dots`, without uncertain dots: dots of one size are fitted again with their common appearance,
 /// and those with sigma over `clear_sigma_px` are dropped.
-std::vector<Dot> find_clear_dots(const XrayImage& xray_image, const DotOptions& options,
+std::vector<Dot> find_clear_dots(const xray::XrayImage& xray_image, const DotOptions& options,
                                  double clear_sigma_px = 0.15);
 
 /// Refits every dot with the appearance of its kind and its neighbours masked; dots whose fit fails are
 /// dropped.
-std::vector<Dot> refit_dots(const XrayImage& xray_image, const std::vector<Dot>& dots,
+std::vector<Dot> refit_dots(const xray::XrayImage& xray_image, const std::vector<Dot>& dots,
                             const DotAppearance& appearance, const std::vector<Dot>& neighbours);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -8,7 +8,7 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Vector2d;
@@ -36,7 +36,7 @@ drawn::Shade shade_of(const std::vector<Ball>& balls) {
   return shade;
 }
 
-XrayImage noisy(Image<float> image, double sigma = 15) {
+xray::XrayImage noisy(image::Image<float> image, double sigma = 15) {
   RandomStream random(4, 2);
   drawn::add_noise(image, sigma, random);
   return drawn::xray_image(std::move(image));
@@ -66,18 +66,18 @@ TEST(FindDots, RadiiAgree) {
 }
 
 TEST(FindDots, NoisyEmptyFieldHasNone) {
-  EXPECT_TRUE(find_dots(noisy(Image<float>(256, 256, 2000), 10), {}).empty());
+  EXPECT_TRUE(find_dots(noisy(image::Image<float>(256, 256, 2000), 10), {}).empty());
   DotOptions bright;
   bright.polarity = Polarity::bright;
-  EXPECT_TRUE(find_dots(noisy(Image<float>(256, 256, 2000), 10), bright).empty());
+  EXPECT_TRUE(find_dots(noisy(image::Image<float>(256, 256, 2000), 10), bright).empty());
 }
 
 TEST(FindDots, VeryNoisyEmptyFieldHasAlmostNone) {
-  EXPECT_LE(find_dots(noisy(Image<float>(256, 256, 2000), 60), {}).size(), 5u);
+  EXPECT_LE(find_dots(noisy(image::Image<float>(256, 256, 2000), 60), {}).size(), 5u);
 }
 
 TEST(FindDots, EdgeOfARoundFieldIsNotADot) {
-  Image<float> image(256, 256);
+  image::Image<float> image(256, 256);
   for (int v = 0; v < 256; ++v)
     for (int u = 0; u < 256; ++u)
       image(u, v) = std::hypot(u - 128, v - 128) < 110 ? 2500 - 0.03f * float(u * u + v) : -1e3f;
@@ -86,7 +86,7 @@ TEST(FindDots, EdgeOfARoundFieldIsNotADot) {
 
 TEST(FindDots, BrightHolesAreFoundAsBrightOnly) {
   const std::vector<Ball> holes = some_balls();
-  const XrayImage xray_image = noisy(drawn::grey(shade_of(holes), -1000));
+  const xray::XrayImage xray_image = noisy(drawn::grey(shade_of(holes), -1000));
   DotOptions bright;
   bright.polarity = Polarity::bright;
   const auto dots = find_dots(xray_image, bright);
@@ -103,14 +103,14 @@ TEST(FindDots, SingleWireIsNotADot) {
 }
 
 TEST(FindDots, ImageTooSmallHasNone) {
-  EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(8, 8, 1000)), {}).empty());
-  EXPECT_TRUE(find_dots(drawn::xray_image(Image<float>(1, 1, 1000)), {}).empty());
+  EXPECT_TRUE(find_dots(drawn::xray_image(image::Image<float>(8, 8, 1000)), {}).empty());
+  EXPECT_TRUE(find_dots(drawn::xray_image(image::Image<float>(1, 1, 1000)), {}).empty());
 }
 
 TEST(EstimateLook, RefitWithTheEstimatedLookIsExact) {
   std::vector<Ball> balls = some_balls();
   for (Ball& ball : balls) ball.radius = 6;
-  const XrayImage xray_image = noisy(drawn::grey(shade_of(balls), 1200), 4);
+  const xray::XrayImage xray_image = noisy(drawn::grey(shade_of(balls), 1200), 4);
   const auto rough = find_dots(xray_image, {});
   const DotAppearance appearance = estimate_appearance(xray_image, noise_correlation(xray_image), rough);
   EXPECT_NEAR(appearance.profile.blur() * 6, std::sqrt(0.81 + 1.0 / 12), 0.3);
@@ -120,7 +120,8 @@ TEST(EstimateLook, RefitWithTheEstimatedLookIsExact) {
 }
 
 TEST(EstimateLook, WithoutDotsTheDefaultLookIsReturned) {
-  const DotAppearance appearance = estimate_appearance(drawn::xray_image(Image<float>(64, 64, 1000)), {}, {});
+  const DotAppearance appearance =
+      estimate_appearance(drawn::xray_image(image::Image<float>(64, 64, 1000)), {}, {});
   EXPECT_GT(appearance.profile.blur(), 0);
 }
 
@@ -145,4 +146,4 @@ TEST(FindBlobs, StrongestFirstAndAtMostTheRequestedNumber) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -8,10 +8,10 @@
 #include "helicarm/detection/find_crosses.h"
 #include "helicarm/detection/find_dots.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
-std::vector<Dot> marks_of(const XrayImage& xray_image, bool crosses, Polarity polarity) {
+std::vector<Dot> marks_of(const xray::XrayImage& xray_image, bool crosses, Polarity polarity) {
   if (crosses) {
     CrossOptions options;
     options.polarity = polarity;
@@ -31,11 +31,11 @@ Expected<MarkKind> mark_kind(std::string_view word) {
   return MarkKind(found - mark_words.begin());
 }
 
-std::vector<Dot> find_marks(const XrayImage& xray_image, MarkKind kind) {
+std::vector<Dot> find_marks(const xray::XrayImage& xray_image, MarkKind kind) {
   if (kind == MarkKind::holes) return marks_of(xray_image, false, Polarity::bright);
   auto dark = marks_of(xray_image, kind == MarkKind::crosses, Polarity::dark);
   auto bright = marks_of(xray_image, kind == MarkKind::crosses, Polarity::bright);
   return dark.size() >= bright.size() ? dark : bright;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -9,7 +9,7 @@
 #include "helicarm/detection/dot.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// What to look for in an image without knowledge of plate or calibrator.
 enum class MarkKind {
@@ -24,6 +24,6 @@ Expected<MarkKind> mark_kind(std::string_view word);
 
 /// All marks of a kind (raw pixels). Metal is dark in most images and bright in the others: the polarity that
 /// shows more marks is taken.
-std::vector<Dot> find_marks(const XrayImage& xray_image, MarkKind kind);
+std::vector<Dot> find_marks(const xray::XrayImage& xray_image, MarkKind kind);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

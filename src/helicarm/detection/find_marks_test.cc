@@ -5,18 +5,18 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 const Eigen::Vector2d centre(60.3, 40.7);
 
 /// One ball on an image that is not square: dark, or bright where the grey values are inverted.
-XrayImage ball_image(bool bright) {
+xray::XrayImage ball_image(bool bright) {
   drawn::Shade shade(130, 90);
   drawn::add_ball(shade, centre, 7, 0.9, 3);
   RandomStream random(6, 3);
-  XrayImage image;
-  image.pixels = Image<float>(130, 90);
+  xray::XrayImage image;
+  image.pixels = image::Image<float>(130, 90);
   for (std::size_t i = 0; i < image.pixels.pixels().size(); ++i) {
     const double dark = 3000 - 2000 * double(shade.pixels()[i]) + 10 * random.normal();
     image.pixels.pixels()[i] = float(bright ? 4095 - dark : dark);
@@ -43,4 +43,4 @@ TEST(FindMarks, UnknownKindIsUsage) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

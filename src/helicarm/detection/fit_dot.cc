@@ -11,7 +11,7 @@
 #include "helicarm/detection/dot_patch.h"
 #include "helicarm/detection/robust.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Index;
@@ -135,13 +135,14 @@ std::vector<CentreError> centre_errors(const DotModel& model, const DotPatch& pa
 
 }  // namespace
 
-std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
+std::optional<Dot> fit_dot(const image::Image<float>& image, const Dot& start, const BallProfile& profile,
                            std::span<const Disc> others, const DotFitOptions& options) {
   const auto dots = fit_dots_together(image, {&start, 1}, {&profile, 1}, others, options);
   return dots ? std::optional(dots->front()) : std::nullopt;
 }
 
-std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std::span<const Dot> starts,
+std::optional<std::vector<Dot>> fit_dots_together(const image::Image<float>& image,
+                                                  std::span<const Dot> starts,
                                                   std::span<const BallProfile> profiles,
                                                   std::span<const Disc> others,
                                                   const DotFitOptions& options) {
@@ -252,4 +253,4 @@ std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std
   return dots;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -12,7 +12,7 @@
 #include "helicarm/detection/noise.h"
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// A disc of pixels that a fit ignores, raw pixels.
 struct Disc {
@@ -38,15 +38,16 @@ struct DotFitOptions {
 /// over centre, radius, contrast and background: grey = B - (A + hidden G) profile, with B quadratic and G
 /// its linear part. The hidden share (a ball hides neither scatter nor glare) has a prior and is estimated.
 /// Nothing if the patch is not usable (outside the image, clipped, no contrast) or the fit does not converge.
-std::optional<Dot> fit_dot(const Image<float>& image, const Dot& start, const BallProfile& profile,
+std::optional<Dot> fit_dot(const image::Image<float>& image, const Dot& start, const BallProfile& profile,
                            std::span<const Disc> others, const DotFitOptions& options);
 
 constexpr std::size_t max_dots_together = 4;
 
 /// Like `fit_dot` for several overlapping dots. The overlap term of each pair is estimated: 0 in a
 /// logarithmic image, the product of both absorptions in a linear one.
-std::optional<std::vector<Dot>> fit_dots_together(const Image<float>& image, std::span<const Dot> starts,
+std::optional<std::vector<Dot>> fit_dots_together(const image::Image<float>& image,
+                                                  std::span<const Dot> starts,
                                                   std::span<const BallProfile> profiles,
                                                   std::span<const Disc> others, const DotFitOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -8,7 +8,7 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Vector2d;
@@ -32,16 +32,16 @@ drawn::Shade ball(const Vector2d& centre, double radius) {
 }
 
 /// The ball takes a share of the background.
-Image<float> multiplied(const drawn::Shade& shade, const Background& background, double share) {
-  Image<float> image(side, side);
+image::Image<float> multiplied(const drawn::Shade& shade, const Background& background, double share) {
+  image::Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) image(u, v) = float(background(u, v) * (1 - share * double(shade(u, v))));
   return image;
 }
 
 /// Logarithmic image: the ball takes a constant.
-Image<float> subtracted(const drawn::Shade& shade, const Background& background, double contrast) {
-  Image<float> image(side, side);
+image::Image<float> subtracted(const drawn::Shade& shade, const Background& background, double contrast) {
+  image::Image<float> image(side, side);
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) image(u, v) = float(background(u, v) - contrast * double(shade(u, v)));
   return image;
@@ -52,7 +52,7 @@ BallProfile profile_for(double radius) {
 }
 
 /// From an approximate start, as the search gives it.
-std::optional<Dot> fit(const Image<float>& image, const Vector2d& centre, double radius,
+std::optional<Dot> fit(const image::Image<float>& image, const Vector2d& centre, double radius,
                        std::vector<Disc> others = {}, DotFitOptions options = {}) {
   Dot start;
   start.centre_px = centre + Vector2d(0.3, -0.25);
@@ -65,13 +65,14 @@ double error(const std::optional<Dot>& dot, const Vector2d& centre) {
 }
 
 /// Largest error over sub-pixel positions.
-double worst(double radius, double noise, const std::function<Image<float>(const drawn::Shade&)>& image_of) {
+double worst(double radius, double noise,
+             const std::function<image::Image<float>(const drawn::Shade&)>& image_of) {
   RandomStream random(5, 1);
   double most = 0;
   for (const double x : {0.0, 0.25, 0.5, 0.8})
     for (const double y : {0.0, 0.35, 0.6}) {
       const Vector2d centre = middle + Vector2d(x, y);
-      Image<float> image = image_of(ball(centre, radius));
+      image::Image<float> image = image_of(ball(centre, radius));
       drawn::add_noise(image, noise, random);
       most = std::max(most, error(fit(image, centre, radius), centre));
     }
@@ -107,14 +108,14 @@ TEST_P(FitDotOfRadius, MaskedNeighbourHasNoEffect) {
   const Vector2d other = centre + 2.1 * radius * Vector2d(0.8, 0.6);
   drawn::Shade shade = ball(centre, radius);
   drawn::add_ball(shade, other, radius, blur_px, absorbance);
-  const Image<float> image = subtracted(shade, even, 800);
+  const image::Image<float> image = subtracted(shade, even, 800);
   EXPECT_LT(error(fit(image, centre, radius, {{other, radius + 2}}), centre), 0.02);
 }
 
 TEST_P(FitDotOfRadius, SaturatedOnOneSide) {
   const double radius = GetParam();
   const Vector2d centre = middle + Vector2d(0.2, 0.4);
-  Image<float> image = subtracted(ball(centre, radius), sloping, 800);
+  image::Image<float> image = subtracted(ball(centre, radius), sloping, 800);
   DotFitOptions options;
   options.ceiling = 2030;
   for (float& grey : image.pixels()) grey = std::min(grey, options.ceiling);
@@ -136,9 +137,9 @@ TEST_P(FitDotOfRadius, SigmaAgreesWithTheScatter) {
   int trials = 0;
   for (int phase = 0; phase < 10; ++phase) {
     const Vector2d centre = middle + Vector2d(random.uniform(), random.uniform());
-    const Image<float> clean = subtracted(ball(centre, radius), sloping, 800);
+    const image::Image<float> clean = subtracted(ball(centre, radius), sloping, 800);
     for (int k = 0; k < 20; ++k) {
-      Image<float> image = clean;
+      image::Image<float> image = clean;
       drawn::add_noise(image, 40, random);
       const auto dot = fit(image, centre, radius);
       ASSERT_TRUE(dot);
@@ -163,14 +164,14 @@ TEST(FitDot, KeepsTheRadiusIfRequested) {
 }
 
 TEST(FitDot, PositionOutsideTheImageIsRefused) {
-  const Image<float> image = subtracted(ball(middle, 5.5), even, 800);
+  const image::Image<float> image = subtracted(ball(middle, 5.5), even, 800);
   EXPECT_FALSE(fit(image, {-3, 20}, 5.5));
   EXPECT_FALSE(fit(image, {20, 200}, 5.5));
 }
 
 TEST(FitDot, BlankPatchIsRefused) {
   EXPECT_FALSE(fit(subtracted(drawn::Shade(side, side), even, 0), middle, 5.5));
-  EXPECT_FALSE(fit(Image<float>(side, side, 0), middle, 5.5));
+  EXPECT_FALSE(fit(image::Image<float>(side, side, 0), middle, 5.5));
 }
 
 TEST(FitDot, PatchOutsideTheFieldIsRefused) {
@@ -192,14 +193,14 @@ TEST(FitDot, StartWithoutRadiusIsRefused) {
 }
 
 /// Dark band over part of one side of the ball, like a shutter's soft edge or a faint wire.
-Image<float> with_band(Image<float> image, double from_u, double depth) {
+image::Image<float> with_band(image::Image<float> image, double from_u, double depth) {
   for (int v = 0; v < side; ++v)
     for (int u = 0; u < side; ++u) image(u, v) -= float(depth / (1 + std::exp(from_u - u)));
   return image;
 }
 
 TEST(FitDot, OneSidedDisturbanceRaisesTheError) {
-  const Image<float> clean = multiplied(ball(middle, 9), even, 0.5);
+  const image::Image<float> clean = multiplied(ball(middle, 9), even, 0.5);
   const auto undisturbed = fit(clean, middle, 9);
   const auto pulled = fit(with_band(clean, 38, 120), middle, 9);
   ASSERT_TRUE(undisturbed && pulled);
@@ -209,4 +210,4 @@ TEST(FitDot, OneSidedDisturbanceRaisesTheError) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -10,7 +10,7 @@
 
 #include "helicarm/detection/robust.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 constexpr int side = 32;
@@ -77,7 +77,8 @@ const Lags& lags_of_quadratics() {
   return sum;
 }
 
-std::optional<Lags> lags_of_block(const XrayImage& xray_image, int u, int v, float floor, float ceiling) {
+std::optional<Lags> lags_of_block(const xray::XrayImage& xray_image, int u, int v, float floor,
+                                  float ceiling) {
   Block block;
   for (int j = 0; j < side; ++j) {
     const float* row = xray_image.pixels.row(v + j) + u;
@@ -110,7 +111,7 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-NoiseCorrelation noise_correlation(const XrayImage& xray_image, float floor, float ceiling) {
+NoiseCorrelation noise_correlation(const xray::XrayImage& xray_image, float floor, float ceiling) {
   constexpr int blocks = 8;  // along each side of the image
   constexpr std::size_t enough = 8;
   const int step_u = std::max(side, xray_image.pixels.width() / blocks);
@@ -189,4 +190,4 @@ Eigen::MatrixXd correlated_normal(const NoiseCorrelation& noise, const PixelRows
   return normal;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

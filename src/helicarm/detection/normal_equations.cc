@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 using Eigen::Index;
@@ -72,4 +72,4 @@ Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> 
   return products.selfadjointView<Eigen::Lower>();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

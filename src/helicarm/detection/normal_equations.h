@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// One row per parameter, one column per pixel.
 using PixelRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -14,4 +14,4 @@ using PixelRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 /// only on the numbers of rows and pixels.
 Eigen::MatrixXd weighted_products(const PixelRows& rows, std::span<const float> weights);
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

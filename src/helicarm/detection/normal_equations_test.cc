@@ -7,7 +7,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::detection {
 namespace {
 
 class WeightedProducts : public testing::TestWithParam<std::pair<int, int>> {};
@@ -38,4 +38,4 @@ TEST(WeightedProducts, PixelsOfZeroWeightAreIgnored) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::detection

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::detection {
 
 /// Residual at which Tukey's weight becomes 0: 4.7 robust standard deviations (95 % efficient for normal
 /// noise), each at least `least`. Estimated from a few hundred evenly spaced residuals.
@@ -29,4 +29,4 @@ Real tukey_weight(Real residual, Real cut) {
   return inside * inside;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::detection

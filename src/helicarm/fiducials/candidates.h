@@ -6,14 +6,15 @@
 #include "helicarm/detection/dot.h"
 #include "helicarm/rectification/rectify.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// The metal dots of one image that are not the plate's: each may be a fiducial.
 struct Candidates {
-  std::vector<Dot> dots;  ///< raw pixels, with their standard deviations and radii
+  std::vector<detection::Dot> dots;  ///< raw pixels, with their standard deviations and radii
 };
 
 /// Stage 2 (2.1). Uses the dots that the rectification has found already.
-Candidates detect_candidates(const XrayImage& xray_image, const Rectification& rectification);
+Candidates detect_candidates(const xray::XrayImage& xray_image,
+                             const rectification::Rectification& rectification);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 using Eigen::Vector2d;
 
-Vector2d blob_offset(const DistortionMap& map, const View& view, const Vector2d& centre, double depth_mm,
-                     double diameter_mm) {
+Vector2d blob_offset(const rectification::DistortionMap& map, const geometry::View& view,
+                     const Vector2d& centre, double depth_mm, double diameter_mm) {
   const double radius_mm = 0.5 * diameter_mm;
   const Vector2d principal(view.intrinsics.u0, view.intrinsics.v0);
   const double push = 0.8 * radius_mm * radius_mm / (depth_mm * depth_mm - radius_mm * radius_mm);
@@ -23,4 +23,4 @@ Vector2d blob_offset(const DistortionMap& map, const View& view, const Vector2d&
   return perspective + 0.5 * (around - here);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

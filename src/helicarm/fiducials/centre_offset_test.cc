@@ -7,16 +7,17 @@
 
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-View straight_view() { return {{1500, 1500, 250, 240}, {Eigen::Matrix3d::Identity(), {0, 0, 0}}}; }
+geometry::View straight_view() { return {{1500, 1500, 250, 240}, {Eigen::Matrix3d::Identity(), {0, 0, 0}}}; }
 
 /// Centroid of a ball's image less the image of its centre, raw px, by tracing one ray per subpixel.
-Vector2d traced_offset(const DistortionMap& map, const View& view, const Vector3d& centre, double diameter) {
+Vector2d traced_offset(const rectification::DistortionMap& map, const geometry::View& view,
+                       const Vector3d& centre, double diameter) {
   const Vector2d image = map.raw_from_rectified(view.project(centre));
   const Eigen::Matrix3d inverse = view.intrinsics.matrix().inverse();
   const double reach = 0.6 * diameter * view.intrinsics.fy / centre.z() + 3;
@@ -36,23 +37,25 @@ Vector2d traced_offset(const DistortionMap& map, const View& view, const Vector3
 }
 
 /// Pincushion distortion of an image intensifier: 6.5 px at the edge of a 512 px image.
-DistortionMap pincushion() {
-  DistortionMap map = identity_map(512, 512, {});
+rectification::DistortionMap pincushion() {
+  rectification::DistortionMap map = rectification::identity_map(512, 512, {});
   map.order = 3;
   map.centre = {255.5, 255.5};
   map.scale = 252;
-  map.coefficients = Eigen::MatrixX2d::Zero(term_count(3), 2);
+  map.coefficients = Eigen::MatrixX2d::Zero(rectification::term_count(3), 2);
   map.coefficients.topRows(3) << 255.5, 255.5, 252, 0, 0, 252;
   map.coefficients.bottomRows(4) << 6.5, 0, 0, 6.5, 6.5, 0, 0, 6.5;
   return map;
 }
 
 TEST(BlobOffset, IsZeroOnTheCentralRay) {
-  EXPECT_LT(blob_offset(identity_map(512, 512, {}), straight_view(), {250, 240}, 640, 4).norm(), 1e-12);
+  EXPECT_LT(
+      blob_offset(rectification::identity_map(512, 512, {}), straight_view(), {250, 240}, 640, 4).norm(),
+      1e-12);
 }
 
 TEST(BlobOffset, PerspectiveOffsetEqualsTheTracedCentroid) {
-  const DistortionMap map = identity_map(512, 512, {});
+  const rectification::DistortionMap map = rectification::identity_map(512, 512, {});
   for (const double diameter : {4.0, 30.0}) {
     const Vector3d centre(90, -70, 600);
     const Vector2d traced = traced_offset(map, straight_view(), centre, diameter);
@@ -62,7 +65,8 @@ TEST(BlobOffset, PerspectiveOffsetEqualsTheTracedCentroid) {
 }
 
 TEST(BlobOffset, PointsAwayFromThePrincipalPoint) {
-  const Vector2d offset = blob_offset(identity_map(512, 512, {}), straight_view(), {400, 240}, 640, 20);
+  const Vector2d offset =
+      blob_offset(rectification::identity_map(512, 512, {}), straight_view(), {400, 240}, 640, 20);
   EXPECT_GT(offset.x(), 0);
   EXPECT_EQ(offset.y(), 0);
 }
@@ -77,4 +81,4 @@ TEST(BlobOffset, WithDistortionIsWithinAFiftiethOfAPixelOfTheTracedCentroid) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

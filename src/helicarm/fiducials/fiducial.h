@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 enum class FiducialStatus { used, occluded, outside, rejected, not_found };
 
@@ -23,4 +23,4 @@ struct Fiducial {
   double radius_px = 0;                          ///< measured, rectified
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -18,7 +18,7 @@
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/solid_template.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
@@ -35,7 +35,8 @@ using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 /// raw -> rectified in a small patch: biquadratic interpolation of 3 x 3 exact points.
 class LocalInverse {
  public:
-  static std::optional<LocalInverse> make(const DistortionMap& map, const Vector2d& raw, double half) {
+  static std::optional<LocalInverse> make(const rectification::DistortionMap& map, const Vector2d& raw,
+                                          double half) {
     LocalInverse inverse(raw, half);
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i) {
@@ -76,12 +77,12 @@ struct Patch {
   std::vector<Vector2d> offsets;  ///< rectified, from the predicted image of the target's point
   std::vector<float> grey;        ///< over `scale`
   std::vector<float> weights;
-  std::vector<int> cells;  ///< index in the patch's grid of raw pixels
-  PixelRows rows;          ///< the model's derivatives, then the residuals
+  std::vector<int> cells;     ///< index in the patch's grid of raw pixels
+  detection::PixelRows rows;  ///< the model's derivatives, then the residuals
   double scale;
   double window;
   int side;
-  NoiseCorrelation noise;
+  detection::NoiseCorrelation noise;
 };
 
 struct Sums {
@@ -112,7 +113,7 @@ void evaluate(Patch& patch, const SolidTemplate& absorbed, const Vector& p) {
 }
 
 Sums accumulate(const Patch& patch, std::span<const float> weights) {
-  const Eigen::MatrixXd products = weighted_products(patch.rows, weights);
+  const Eigen::MatrixXd products = detection::weighted_products(patch.rows, weights);
   return {products.topLeftCorner<n_parameters, n_parameters>(),
           products.col(n_parameters).head<n_parameters>(), products(n_parameters, n_parameters),
           products(0, 0)};
@@ -157,9 +158,10 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
   Vector2d before = Vector2d::Zero();
   for (int i = 0; i < 20; ++i) {
     evaluate(patch, absorbed, p);
-    const float cut = tukey_cut<float>(
+    const float cut = detection::tukey_cut<float>(
         residuals, float(std::max(0.03, 0.3 * std::pow(0.5, i)) * std::abs(p[n_background])));
-    for (std::size_t k = 0; k < residuals.size(); ++k) patch.weights[k] = tukey_weight(residuals[k], cut);
+    for (std::size_t k = 0; k < residuals.size(); ++k)
+      patch.weights[k] = detection::tukey_weight(residuals[k], cut);
     sums = accumulate(patch, patch.weights);
     Vector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
@@ -177,17 +179,17 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
   sums = accumulate(patch, patch.weights);
   const double variance = sums.squares / std::max(1.0, sums.weight - n_parameters);
   const Normal inverse = sums.normal.ldlt().solve(Normal::Identity());
-  PixelRows weighted = patch.rows.topRows<n_parameters>();
+  detection::PixelRows weighted = patch.rows.topRows<n_parameters>();
   weighted.array().rowwise() *=
       Eigen::Map<const Eigen::ArrayXf>(patch.weights.data(), Eigen::Index(patch.weights.size())).transpose();
   const Normal covariance =
-      inverse * correlated_normal(patch.noise, weighted, patch.cells, patch.side) * inverse;
+      inverse * detection::correlated_normal(patch.noise, weighted, patch.cells, patch.side) * inverse;
   Fit fit;
   fit.shift = p.tail<2>();
   fit.contrast = p[n_background] * patch.scale;
-  fit.sigma_px = std::sqrt(
-      prior_variance(0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
-                     jackknife_variance(patch, p)));
+  fit.sigma_px = std::sqrt(detection::prior_variance(
+      0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
+      jackknife_variance(patch, p)));
   fit.noise = std::sqrt(variance) * patch.scale;
   fit.misfit = double(patch.rows.row(n_parameters).norm()) / std::sqrt(double(residuals.size())) /
                std::max(1e-9, std::abs(p[n_background]));
@@ -195,9 +197,10 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
 }
 
 /// The pixels within a few pixels of the metal; the background model holds no farther.
-Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, const Vector2d& centre,
-                       double half_width, const PathImage& view_image, std::span<const Disc> others,
-                       const NoiseCorrelation& noise, const std::string& name) {
+Expected<Patch> gather(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
+                       const Vector2d& centre, double half_width, const PathImage& view_image,
+                       std::span<const detection::Disc> others, const detection::NoiseCorrelation& noise,
+                       const std::string& name) {
   const SolidTemplate near_metal(view_image, 1, 2.5);
   const auto not_seen = [&] {
     return fail(Reason::not_seen, fmt::format("check target \"{}\" lies outside the image", name));
@@ -207,7 +210,7 @@ Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, co
     return not_seen();
   const auto inverse = LocalInverse::make(map, raw, half_width);
   if (!inverse) return not_seen();
-  const DotFitOptions limits = fit_options_for(xray_image);
+  const detection::DotFitOptions limits = detection::fit_options_for(xray_image);
   const int half = static_cast<int>(std::ceil(half_width));
   Patch patch{{}, {}, {}, {}, {}, 1, half_width, 2 * half + 1, noise};
   const int u0 = static_cast<int>(std::lround(raw.x()));
@@ -222,7 +225,7 @@ Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, co
       if (!xray_image.pixels.contains(u, v)) continue;
       const float grey = xray_image.pixels(u, v);
       if (grey <= limits.floor || grey >= limits.ceiling) continue;
-      const bool hidden = std::any_of(others.begin(), others.end(), [&](const Disc& disc) {
+      const bool hidden = std::any_of(others.begin(), others.end(), [&](const detection::Disc& disc) {
         return (disc.centre - Vector2d(u, v)).squaredNorm() < disc.radius * disc.radius;
       });
       const int cell = (v - v0 + half) * patch.side + u - u0 + half;
@@ -249,9 +252,10 @@ Expected<Patch> gather(const XrayImage& xray_image, const DistortionMap& map, co
 
 }  // namespace
 
-Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMap& map, const View& view,
-                                 const CalibratorTarget& target, std::span<const Disc> others,
-                                 const NoiseCorrelation& noise) {
+Expected<ImagePoint> find_target(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
+                                 const geometry::View& view, const phantom::CalibratorTarget& target,
+                                 std::span<const detection::Disc> others,
+                                 const detection::NoiseCorrelation& noise) {
   const double depth = view.depth(target.point_in_calibrator);
   if (!(depth > 0))
     return fail(Reason::behind_source,
@@ -260,8 +264,8 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
   const Vector2d centre = view.project(target.point_in_calibrator);
   // Long enough for the wire's direction, short of its far end (a wire of unknown length has at least
   // 10 mm).
-  const double reach_mm = target.kind == TargetKind::ball ? 0.55 * target.diameter_mm
-                          : target.kind == TargetKind::cross
+  const double reach_mm = target.kind == phantom::TargetKind::ball ? 0.55 * target.diameter_mm
+                          : target.kind == phantom::TargetKind::cross
                               ? 0.45 * (target.length_mm > 0 ? target.length_mm : 10)
                               : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
@@ -291,7 +295,7 @@ Expected<ImagePoint> find_target(const XrayImage& xray_image, const DistortionMa
       std::sqrt(best->sigma_px * best->sigma_px + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px)};
 }
 
-Expected<ImagePoint> point_of_click(const DistortionMap& map, const Vector2d& click_raw,
+Expected<ImagePoint> point_of_click(const rectification::DistortionMap& map, const Vector2d& click_raw,
                                     std::optional<double> sigma_px) {
   const auto uv = map.rectified_from_raw(click_raw);
   if (!uv)
@@ -301,29 +305,29 @@ Expected<ImagePoint> point_of_click(const DistortionMap& map, const Vector2d& cl
   return ImagePoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
 }
 
-Expected<ImagePoint> snap_to_ball(const XrayImage& xray_image, const DistortionMap& map, const View& view,
-                                  double depth_mm, const Vector2d& click_raw, double diameter_mm,
-                                  const NoiseCorrelation& noise) {
-  Dot start;
+Expected<ImagePoint> snap_to_ball(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
+                                  const geometry::View& view, double depth_mm, const Vector2d& click_raw,
+                                  double diameter_mm, const detection::NoiseCorrelation& noise) {
+  detection::Dot start;
   start.radius_px = 0.5 * diameter_mm * std::abs(view.intrinsics.fy) / depth_mm;
   const double reach = std::max(5.0, start.radius_px);
-  const BallProfile profile(0.9 / start.radius_px, 3);
-  DotFitOptions options = fit_options_for(xray_image);
+  const detection::BallProfile profile(0.9 / start.radius_px, 3);
+  detection::DotFitOptions options = detection::fit_options_for(xray_image);
   options.noise = noise;
-  DotFitOptions wide = options;
+  detection::DotFitOptions wide = options;
   wide.tolerance = 0.1;
   wide.margin_share = 0.35;
   wide.margin_px = 3.5;
-  std::optional<Dot> best;
+  std::optional<detection::Dot> best;
   for (const double r : {0.0, 0.5})
     for (int k = 0; k < (r > 0 ? 6 : 1); ++k) {
       start.centre_px =
           click_raw + r * start.radius_px * Vector2d(std::cos(1.0472 * k), std::sin(1.0472 * k));
-      const auto rough = fit_dot(xray_image.pixels, start, profile, {}, wide);
+      const auto rough = detection::fit_dot(xray_image.pixels, start, profile, {}, wide);
       if (!rough || (rough->centre_px - click_raw).norm() > reach) continue;
       if (std::abs(rough->radius_px / start.radius_px - 1) > 0.3 || rough->misfit > 0.35) continue;
-      const auto fine = fit_dot(xray_image.pixels, *rough, profile, {}, options);
-      const Dot& dot = fine ? *fine : *rough;
+      const auto fine = detection::fit_dot(xray_image.pixels, *rough, profile, {}, options);
+      const detection::Dot& dot = fine ? *fine : *rough;
       if (!best || dot.misfit < best->misfit) best = dot;
     }
   if (!best)
@@ -340,4 +344,4 @@ Expected<ImagePoint> snap_to_ball(const XrayImage& xray_image, const DistortionM
                               sigma_floor_px * sigma_floor_px)};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

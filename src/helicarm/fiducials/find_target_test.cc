@@ -10,7 +10,7 @@
 #include "helicarm/simulation/detector_response.h"
 #include "helicarm/simulation/render_view.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
@@ -22,20 +22,25 @@ using simulation::Visibility;
 /// A flat panel (rectified, ideal and raw pixels are equal); the lateral view is mirrored.
 const SimulatedCase& simulated_case() {
   static const SimulatedCase simulated =
-      small_case(9, simulation::CaseKind::flat, {simulation::Fault::mirrored});
+      rectification::small_case(9, simulation::CaseKind::flat, {simulation::Fault::mirrored});
   return simulated;
 }
 
-DistortionMap no_distortion() { return identity_map(512, 512, {}); }
+rectification::DistortionMap no_distortion() { return rectification::identity_map(512, 512, {}); }
 
 /// One target of each kind in soft tissue of varying thickness, in an image of 256 x 256 pixels.
 struct TargetImage {
-  View view{{3300, 3300, 127, 126}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  std::vector<CalibratorTarget> targets = {
-      {"ball", {-12.3, -10.1, 3}, TargetKind::ball, 3, {}, 0},
-      {"cross", {9.7, -8.2, -4}, TargetKind::cross, 2, {Vector3d(0.8, 0.6, 0), Vector3d(-0.6, 0.8, 0)}, 16},
-      {"end", {-9.2, 11.4, 5}, TargetKind::line_end, 2, {Vector3d(0.96, 0.28, 0)}, 20}};
-  XrayImage xray_image;
+  geometry::View view{{3300, 3300, 127, 126}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  std::vector<phantom::CalibratorTarget> targets = {
+      {"ball", {-12.3, -10.1, 3}, phantom::TargetKind::ball, 3, {}, 0},
+      {"cross",
+       {9.7, -8.2, -4},
+       phantom::TargetKind::cross,
+       2,
+       {Vector3d(0.8, 0.6, 0), Vector3d(-0.6, 0.8, 0)},
+       16},
+      {"end", {-9.2, 11.4, 5}, phantom::TargetKind::line_end, 2, {Vector3d(0.96, 0.28, 0)}, 20}};
+  xray::XrayImage xray_image;
 
   explicit TargetImage(bool mirrored) {
     const simulation::Body tissue{
@@ -57,7 +62,7 @@ struct TargetImage {
       view.intrinsics.fx = -view.intrinsics.fx;
       view.intrinsics.u0 = 255 - view.intrinsics.u0;
     }
-    xray_image.pixels = Image<float>(256, 256);
+    xray_image.pixels = image::Image<float>(256, 256);
     std::copy(pixels.pixels().begin(), pixels.pixels().end(), xray_image.pixels.pixels().begin());
   }
 };
@@ -66,11 +71,12 @@ struct TargetImage {
 void expect_found(std::size_t k) {
   for (const bool mirrored : {false, true}) {
     const TargetImage target_image(mirrored);
-    View off = target_image.view;
+    geometry::View off = target_image.view;
     off.intrinsics.u0 += 1.3;
     off.intrinsics.v0 -= 0.8;
-    const auto found = find_target(target_image.xray_image, identity_map(256, 256, {}), off,
-                                   target_image.targets[k], {}, noise_correlation(target_image.xray_image));
+    const auto found =
+        find_target(target_image.xray_image, rectification::identity_map(256, 256, {}), off,
+                    target_image.targets[k], {}, detection::noise_correlation(target_image.xray_image));
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_LT((found->uv - target_image.view.project(target_image.targets[k].point_in_calibrator)).norm(),
               0.1)
@@ -88,9 +94,9 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
   for (const SimulatedView& view : simulated_case().views)
     for (const std::size_t k : {1u, 2u}) {
       if (view.targets[k].visibility != Visibility::clear) continue;
-      const auto found =
-          find_target(exposure_of(view), no_distortion(), view.true_view.stored_view(),
-                      simulated_case().calibrator.targets[k], {}, noise_correlation(exposure_of(view)));
+      const auto found = find_target(exposure_of(view), no_distortion(), view.true_view.stored_view(),
+                                     simulated_case().calibrator.targets[k], {},
+                                     detection::noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << found.error().message;
       EXPECT_LT((found->uv - view.targets[k].ideal).norm(), 0.1)
           << view.true_view.name << " " << view.targets[k].name;
@@ -98,7 +104,7 @@ TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
 }
 
 TEST(FindTarget, AbsentTargetIsNotFound) {
-  CalibratorTarget absent = simulated_case().calibrator.targets[0];
+  phantom::CalibratorTarget absent = simulated_case().calibrator.targets[0];
   absent.point_in_calibrator += Vector3d(14, 5, -20);
   const auto found = find_target(exposure_of(simulated_case().views[0]), no_distortion(),
                                  simulated_case().views[0].true_view.stored_view(), absent, {}, {});
@@ -107,7 +113,7 @@ TEST(FindTarget, AbsentTargetIsNotFound) {
 }
 
 TEST(FindTarget, TargetOutsideTheImageIsNotSeen) {
-  CalibratorTarget outside = simulated_case().calibrator.targets[0];
+  phantom::CalibratorTarget outside = simulated_case().calibrator.targets[0];
   outside.point_in_calibrator += Vector3d(0, 400, 0);
   const auto found = find_target(exposure_of(simulated_case().views[0]), no_distortion(),
                                  simulated_case().views[0].true_view.stored_view(), outside, {}, {});
@@ -116,8 +122,8 @@ TEST(FindTarget, TargetOutsideTheImageIsNotSeen) {
 }
 
 TEST(FindTarget, TargetBehindTheSourceIsRefused) {
-  const View view = simulated_case().views[0].true_view.stored_view();
-  CalibratorTarget behind = simulated_case().calibrator.targets[0];
+  const geometry::View view = simulated_case().views[0].true_view.stored_view();
+  phantom::CalibratorTarget behind = simulated_case().calibrator.targets[0];
   behind.point_in_calibrator = view.camera_from_world.inverse() * Vector3d(0, 0, -50);
   const auto found =
       find_target(exposure_of(simulated_case().views[0]), no_distortion(), view, behind, {}, {});
@@ -127,12 +133,12 @@ TEST(FindTarget, TargetBehindTheSourceIsRefused) {
 
 TEST(SnapToBall, ClickBesideABallGivesItsCentresImage) {
   for (const SimulatedView& view : simulated_case().views) {
-    const View stored = view.true_view.stored_view();
+    const geometry::View stored = view.true_view.stored_view();
     for (const auto& ball : view.balls) {
       if (ball.visibility != Visibility::clear) continue;
       const auto found =
           snap_to_ball(exposure_of(view), no_distortion(), stored, stored.depth(ball.in_calibrator),
-                       ball.raw + Vector2d(2.1, -1.6), 4, noise_correlation(exposure_of(view)));
+                       ball.raw + Vector2d(2.1, -1.6), 4, detection::noise_correlation(exposure_of(view)));
       ASSERT_TRUE(found) << view.true_view.name << " " << ball.name;
       EXPECT_LT((found->uv - ball.ideal).norm(), 0.15) << view.true_view.name << " " << ball.name;
     }
@@ -147,19 +153,19 @@ TEST(SnapToBall, NoBallNearTheClickIsNotFound) {
   EXPECT_EQ(found.error().reason, Reason::target_not_found);
 }
 
-CalibratorTarget target_of(TargetKind kind) {
+phantom::CalibratorTarget target_of(phantom::TargetKind kind) {
   return {"T", {1, 2, 3}, kind, 2, {Vector3d::UnitX(), Vector3d::UnitY()}, 16};
 }
 
 TEST(PathInTarget, BallsDiameterAndChord) {
-  const CalibratorTarget ball = target_of(TargetKind::ball);
+  const phantom::CalibratorTarget ball = target_of(phantom::TargetKind::ball);
   EXPECT_NEAR(path_in_target(ball, {1, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
   EXPECT_NEAR(path_in_target(ball, {1.6, 2, -90}, Vector3d::UnitZ()), 1.6, 1e-12);
   EXPECT_EQ(path_in_target(ball, {2.1, 2, -90}, Vector3d::UnitZ()), 0);
 }
 
 TEST(PathInTarget, CrossCountsTheSharedMetalOnce) {
-  const CalibratorTarget cross = target_of(TargetKind::cross);
+  const phantom::CalibratorTarget cross = target_of(phantom::TargetKind::cross);
   EXPECT_NEAR(path_in_target(cross, {1, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
   EXPECT_NEAR(path_in_target(cross, {6, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
   EXPECT_EQ(path_in_target(cross, {9.1, 2, -90}, Vector3d::UnitZ()), 0);
@@ -167,15 +173,15 @@ TEST(PathInTarget, CrossCountsTheSharedMetalOnce) {
 }
 
 TEST(PathInTarget, LineEndsFlatAtItsPoint) {
-  const CalibratorTarget end = target_of(TargetKind::line_end);
+  const phantom::CalibratorTarget end = target_of(phantom::TargetKind::line_end);
   EXPECT_NEAR(path_in_target(end, {1.01, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
   EXPECT_EQ(path_in_target(end, {0.99, 2, -90}, Vector3d::UnitZ()), 0);
   EXPECT_EQ(path_in_target(end, {17.01, 2, -90}, Vector3d::UnitZ()), 0);
 }
 
 TEST(SolidTemplate, SlopeMatchesFiniteDifferences) {
-  const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  const SolidTemplate absorbed(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1);
+  const geometry::View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  const SolidTemplate absorbed(image_of_target(target_of(phantom::TargetKind::cross), view, 20), 0.5, 1);
   const double h = 0.01;
   for (double x = -9.13; x < 9; x += 1.7)
     for (double y = -9.13; y < 9; y += 1.7)
@@ -188,10 +194,12 @@ TEST(SolidTemplate, SlopeMatchesFiniteDifferences) {
 }
 
 TEST(SolidTemplate, IsZeroOutsideItsImage) {
-  const View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
-  EXPECT_EQ(SolidTemplate(image_of_target(target_of(TargetKind::cross), view, 20), 0.5, 1).at({90, 0}).value,
+  const geometry::View view{{1500, 1500, 100, 100}, {Eigen::Matrix3d::Identity(), {0, 0, 640}}};
+  EXPECT_EQ(SolidTemplate(image_of_target(target_of(phantom::TargetKind::cross), view, 20), 0.5, 1)
+                .at({90, 0})
+                .value,
             0);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

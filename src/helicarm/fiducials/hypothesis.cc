@@ -9,7 +9,7 @@
 
 #include <math.h>  // lgamma_r is of POSIX
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -21,7 +21,7 @@ constexpr double depth_span = 1.4;           // ln of the ratio of the greatest 
 
 /// Cauchy weights limit the influence of false matches. Within a third of the gate all count alike, so that
 /// the three that gave the pose do not dominate.
-void downweight_outliers(std::vector<WeightedCorrespondence>& correspondences, const View& view,
+void downweight_outliers(std::vector<WeightedCorrespondence>& correspondences, const geometry::View& view,
                          double gate_px) {
   for (auto& s : correspondences)
     s.sigma_px = std::hypot(s.sigma_px, gate_px / 3, (view.project(s.point) - s.uv).norm());
@@ -86,7 +86,7 @@ double log_odds(const Scene& scene, const std::vector<WeightedCorrespondence>& c
 /// Pairs balls and candidates one to one by increasing cost; pairs of infinite cost or outside the gate are
 /// excluded.
 template <class Cost>
-std::vector<int> assign(const Scene& scene, const View& view, double gate_px, const Cost& cost_of) {
+std::vector<int> assign(const Scene& scene, const geometry::View& view, double gate_px, const Cost& cost_of) {
   struct Pair {
     double cost;
     int ball;
@@ -161,7 +161,8 @@ std::vector<int> beyond(const Scene& scene, const Hypothesis& h, double sigmas) 
 
 }  // namespace
 
-double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, std::size_t candidate) {
+double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_t ball,
+                      std::size_t candidate) {
   const double own = scene.candidates[candidate].sigma_px;
   const double of_ball = scene.balls[ball].sigma_mm;
   if (of_ball == 0) return own;
@@ -170,7 +171,7 @@ double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, st
 
 std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
                                                        const std::vector<int>& candidate_of_ball,
-                                                       const View& view) {
+                                                       const geometry::View& view) {
   std::vector<WeightedCorrespondence> correspondences;
   for (std::size_t k = 0; k < scene.balls.size(); ++k) {
     if (candidate_of_ball[k] < 0) continue;
@@ -189,14 +190,14 @@ Scale scale_by_radius(const Scene& scene, const BallCandidate& candidate, const 
           radius > spread ? ball.radius_mm / (radius - spread) : infinity};
 }
 
-std::vector<int> match(const Scene& scene, const View& view, double gate_px) {
+std::vector<int> match(const Scene& scene, const geometry::View& view, double gate_px) {
   return assign(scene, view, gate_px, [&](std::size_t k, std::size_t i, const Eigen::Vector2d& off) {
     const double sigma = match_sigma_px(scene, view, k, i);
     return off.squaredNorm() / (sigma * sigma);
   });
 }
 
-Hypothesis match_and_fit(const Scene& scene, const View& rough, int least) {
+Hypothesis match_and_fit(const Scene& scene, const geometry::View& rough, int least) {
   Hypothesis h;
   h.fit.view = rough;
   h.log_odds = -infinity;
@@ -265,4 +266,4 @@ std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int b
   return rivals;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -8,7 +8,7 @@
 
 #include "helicarm/fiducials/pose_fit.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// A dot that may be a fiducial.
 struct BallCandidate {
@@ -64,24 +64,25 @@ struct Hypothesis {
 
 /// Pairs balls and candidates one to one, nearest first, within `gate_px` and at a distance from the source
 /// that agrees with the candidate's radius.
-std::vector<int> match(const Scene& scene, const View& view, double gate_px);
+std::vector<int> match(const Scene& scene, const geometry::View& view, double gate_px);
 
 constexpr int fit_steps = 10;  ///< at most
 
 /// Per axis, px: the candidate's error and that of the ball's coordinates, projected.
-double match_sigma_px(const Scene& scene, const View& view, std::size_t ball, std::size_t candidate);
+double match_sigma_px(const Scene& scene, const geometry::View& view, std::size_t ball,
+                      std::size_t candidate);
 
 /// The matched balls as input of `fit_pose` near `view`.
 std::vector<WeightedCorrespondence> correspondences_of(const Scene& scene,
                                                        const std::vector<int>& candidate_of_ball,
-                                                       const View& view);
+                                                       const geometry::View& view);
 
 /// Largest error of a pose from three points at the other balls.
 inline double rough_gate_px(const Scene& scene) { return 0.025 * scene.field_radius_px; }
 
 /// Alternates matching, with narrowing gates, and fitting from a rough pose until the matches are stable.
 /// With fewer than `least` matches, log_odds = -infinity.
-Hypothesis match_and_fit(const Scene& scene, const View& rough, int least = 4);
+Hypothesis match_and_fit(const Scene& scene, const geometry::View& rough, int least = 4);
 
 /// Sets the number of matches, residuals and log odds from the matches and the fit.
 void evaluate_odds(const Scene& scene, Hypothesis& h);
@@ -97,4 +98,4 @@ Hypothesis without(const Scene& scene, Hypothesis h, int ball);
 /// still are after its removal.
 std::vector<Hypothesis> with_pair(const Scene& scene, const Hypothesis& h, int ball, int candidate);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -7,7 +7,7 @@
 
 #include "helicarm/fiducials/three_point.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 constexpr double radius_sigmas = 3;  // a true triple lost here is replaced by another
@@ -238,4 +238,4 @@ const std::vector<PoseHypothesis>& HypothesisFilter::filter(const std::array<int
   return passed_;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

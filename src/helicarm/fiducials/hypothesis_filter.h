@@ -9,7 +9,7 @@
 
 #include "helicarm/fiducials/hypothesis.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// Grid that marks the rough gate around each candidate, with cells of a third of the gate: one lookup per
 /// projected ball.
@@ -93,4 +93,4 @@ class HypothesisFilter {
   std::vector<PoseHypothesis> passed_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -8,12 +8,12 @@
 #include "helicarm/fiducials/label_scene_test.h"
 #include "helicarm/fiducials/three_point.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using namespace label_scene;
 
-Scene scene_of(const Calibrator& calibrator, const SyntheticImage& view_image) {
+Scene scene_of(const phantom::Calibrator& calibrator, const SyntheticImage& view_image) {
   Scene scene;
   for (const auto& ball : calibrator.balls)
     scene.balls.push_back({ball.centre_in_calibrator, ball.diameter_mm / 2});
@@ -53,8 +53,9 @@ int support(const Scene& scene, const std::array<int, 3>& candidates, const Pose
   const auto depths = three_point_depths(*triangle, image, start);
   if (!depths) return -1;
   const double fx = pose.mirrored ? -scene.camera.focal_px : scene.camera.focal_px;
-  const View view{{fx, scene.camera.focal_px, scene.camera.principal_px.x(), scene.camera.principal_px.y()},
-                  three_point_pose(*triangle, image, *depths)};
+  const geometry::View view{
+      {fx, scene.camera.focal_px, scene.camera.principal_px.x(), scene.camera.principal_px.y()},
+      three_point_pose(*triangle, image, *depths)};
   int near = 0;
   for (const auto& ball : scene.balls) {
     const Eigen::Vector2d uv = view.project(ball.centre);
@@ -70,7 +71,7 @@ TEST(HypothesisFilter, PassesTheSamePosesAsTheScalarReference) {
   int passed = 0;
   for (int trial = 0; trial < 6; ++trial) {
     RandomStream random(6, 1, trial);
-    const Calibrator calibrator = trial % 2 == 0 ? helix() : scattered(9, 3);
+    const phantom::Calibrator calibrator = trial % 2 == 0 ? helix() : scattered(9, 3);
     const auto view_image = image_of(calibrator, {.outliers = 6, .noise_px = 0.3}, random);
     const Scene scene = scene_of(calibrator, view_image);
     const std::array<int, 3> candidates{0, 3, 5};
@@ -102,4 +103,4 @@ TEST(HypothesisFilter, NoPosePassesWithoutSupport) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -9,7 +9,7 @@
 
 #include "helicarm/fiducials/label_scene_test.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using namespace label_scene;
@@ -17,7 +17,7 @@ using namespace label_scene;
 /// A noise-free lateral image in which candidate k is ball k.
 struct SyntheticScene {
   Scene scene;
-  View view;
+  geometry::View view;
 };
 
 SyntheticScene synthetic_scene() {
@@ -85,4 +85,4 @@ TEST(Hypothesis, OutlierNearAHiddenBallIsReplacedInARival) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

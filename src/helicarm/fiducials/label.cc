@@ -11,25 +11,25 @@
 #include "helicarm/fiducials/rivals.h"
 #include "helicarm/fiducials/search.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 constexpr double chi2_sigmas = 3.3;     // of chi2, in sigmas: exceeded by one correct view in 2000
 constexpr std::size_t most_loose = 24;  // poses; for a similar calibrator one of the first is right
 
-Eigen::Vector3d centroid(const Calibrator& calibrator) {
+Eigen::Vector3d centroid(const phantom::Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const auto& ball : calibrator.balls) sum += ball.centre_in_calibrator;
   return sum / static_cast<double>(calibrator.balls.size());
 }
 
-Scene scene_of(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
+Scene scene_of(const phantom::Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
                const LabellingPrior& prior, const LabellingOptions& options) {
   Scene scene;
   const Eigen::Vector3d centre = centroid(calibrator);
-  const auto covariances = ball_covariances(calibrator);
+  const auto covariances = phantom::ball_covariances(calibrator);
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-    const CalibratorBall& ball = calibrator.balls[k];
+    const phantom::CalibratorBall& ball = calibrator.balls[k];
     const double stated = covariances.empty() ? 0 : std::sqrt(covariances[k].trace() / 3);
     scene.balls.push_back(
         {ball.centre_in_calibrator - centre, ball.diameter_mm / 2, std::hypot(stated, options.tolerance_mm)});
@@ -124,7 +124,7 @@ Hypothesis loose_best(const LabelSearch& search, const LabellingOptions& options
   Hypothesis found = match_and_fit(loose, best.fit.view);
   const auto could_match = static_cast<double>(std::min(loose.candidates.size(), loose.balls.size()));
   if (best.matched >= 0.75 * could_match) return found;
-  for (const View& rough : search.supported(best.matched, most_loose)) {
+  for (const geometry::View& rough : search.supported(best.matched, most_loose)) {
     if (found.log_odds > best.log_odds && is_certain(found, options)) break;
     Hypothesis other = match_and_fit(loose, rough, best.matched);
     if (other.log_odds > found.log_odds) found = std::move(other);
@@ -265,8 +265,9 @@ Expected<Hypothesis> unambiguous(LabelSearch& search, const LabellingOptions& op
 
 }  // namespace
 
-Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
-                                const LabellingPrior& prior, const LabellingOptions& options) {
+Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
+                                const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
+                                const LabellingOptions& options) {
   const int n = static_cast<int>(candidates.size());
   if (n < least_balls) return too_few(n, n);
   const Scene scene = scene_of(calibrator, candidates, prior, options);
@@ -305,4 +306,4 @@ Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<
   return labelling;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -11,7 +11,7 @@
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// The camera prior from the image file, in rectified pixels.
 struct LabellingPrior {
@@ -35,7 +35,7 @@ struct LabellingOptions {
 
 struct Labelling {
   std::vector<int> candidate_of_ball;  ///< -1: none
-  View view;                           ///< estimate, world = calibrator; a mirrored image has fx < 0
+  geometry::View view;                 ///< estimate, world = calibrator; a mirrored image has fx < 0
   bool mirrored = false;
   int matched = 0;
   int false_blobs = 0;     ///< candidates without a label
@@ -50,7 +50,8 @@ struct Labelling {
 /// Labels the fiducials among the candidates, in any orientation, without a starting pose, mirrored or not.
 /// Refuses too_few_fiducials (fewer than six are labelled), ambiguous_labels (another labelling, or the
 /// mirror image, explains the image almost as well) or calibrator_mismatch (no pose explains the candidates).
-Expected<Labelling> label_balls(const Calibrator& calibrator, const std::vector<BallCandidate>& candidates,
-                                const LabellingPrior& prior, const LabellingOptions& options = {});
+Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
+                                const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
+                                const LabellingOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -12,7 +12,7 @@
 #include "helicarm/fiducials/label.h"
 #include "helicarm/rectification/paper_dots.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
@@ -26,26 +26,30 @@ constexpr double tolerance_sigmas = 3.3;      // as for a labelled fiducial
 constexpr double printed_tolerance_mm = 0.3;  // of a printed phantom that has not been measured
 
 /// Dots that may be fiducials, by decreasing ratio of contrast to misfit.
-std::vector<Dot> plausible_balls(const std::vector<Dot>& dots, const DistortionMap& map,
-                                 const Calibrator& calibrator) {
+std::vector<detection::Dot> plausible_balls(const std::vector<detection::Dot>& dots,
+                                            const rectification::DistortionMap& map,
+                                            const phantom::Calibrator& calibrator) {
   const auto& pixel_mm = map.rectified_pixel_mm;
   const Range radii = pixel_mm ? ball_radii_px(calibrator, *pixel_mm) : Range{2, 1e9};
-  std::vector<Dot> balls;
-  for (const Dot& dot : dots)
+  std::vector<detection::Dot> balls;
+  for (const detection::Dot& dot : dots)
     if (radii.low <= dot.radius_px && dot.radius_px <= radii.high && dot.sigma_px < 0.5 &&
         map.rectified_from_raw(dot.centre_px))
       balls.push_back(dot);
-  const auto contrast_to_misfit = [](const Dot& dot) { return std::abs(dot.contrast) / (0.03 + dot.misfit); };
-  std::stable_sort(balls.begin(), balls.end(),
-                   [&](const Dot& a, const Dot& b) { return contrast_to_misfit(a) > contrast_to_misfit(b); });
+  const auto contrast_to_misfit = [](const detection::Dot& dot) {
+    return std::abs(dot.contrast) / (0.03 + dot.misfit);
+  };
+  std::stable_sort(balls.begin(), balls.end(), [&](const detection::Dot& a, const detection::Dot& b) {
+    return contrast_to_misfit(a) > contrast_to_misfit(b);
+  });
   if (balls.size() > max_candidates) balls.resize(max_candidates);
   return balls;
 }
 
-LabellingPrior prior_of(const XrayImage& xray_image, const DistortionMap& map) {
+LabellingPrior prior_of(const xray::XrayImage& xray_image, const rectification::DistortionMap& map) {
   LabellingPrior prior;
   const auto& distance = xray_image.acquisition.source_detector_mm;
-  if (distance && map.rectified_pixel_mm && map.rectified_plane == RectifiedPlane::detector)
+  if (distance && map.rectified_pixel_mm && map.rectified_plane == rectification::RectifiedPlane::detector)
     prior.focal_px = *distance / *map.rectified_pixel_mm;
   prior.principal_px = {0.5 * (xray_image.pixels.width() - 1), 0.5 * (xray_image.pixels.height() - 1)};
   prior.principal_sigma_px = 0.03 * xray_image.pixels.width();
@@ -54,38 +58,38 @@ LabellingPrior prior_of(const XrayImage& xray_image, const DistortionMap& map) {
 }
 
 /// Standard deviation of a fiducial's image point, rectified, per axis.
-double sigma_of(const Dot& dot, const DistortionMap& map, const Vector2d& uv) {
+double sigma_of(const detection::Dot& dot, const rectification::DistortionMap& map, const Vector2d& uv) {
   const double map_sigma = map.sigma_px(uv);
   return std::sqrt(dot.error_px() * dot.error_px() + map_sigma * map_sigma + sigma_floor_px * sigma_floor_px);
 }
 
-double predicted_radius(const View& view, const CalibratorBall& ball) {
+double predicted_radius(const geometry::View& view, const phantom::CalibratorBall& ball) {
   return 0.5 * ball.diameter_mm * std::abs(view.intrinsics.fy) / view.depth(ball.centre_in_calibrator);
 }
 
 /// Fits fiducials with the profile common to the labelled ones.
 class BallFitter {
  public:
-  BallFitter(const XrayImage& xray_image, const Rectification& rectification, const Candidates& candidates,
-             const std::vector<Dot>& labelled_dots)
+  BallFitter(const xray::XrayImage& xray_image, const rectification::Rectification& rectification,
+             const Candidates& candidates, const std::vector<detection::Dot>& labelled_dots)
       : image_(xray_image),
-        appearance_(estimate_appearance(xray_image, rectification.noise, labelled_dots)),
+        appearance_(detection::estimate_appearance(xray_image, rectification.noise, labelled_dots)),
         neighbours_(candidates.dots) {
     neighbours_.insert(neighbours_.end(), rectification.plate_dots.begin(), rectification.plate_dots.end());
     std::vector<double> contrasts;
-    for (const Dot& dot : labelled_dots) contrasts.push_back(dot.contrast);
+    for (const detection::Dot& dot : labelled_dots) contrasts.push_back(dot.contrast);
     std::sort(contrasts.begin(), contrasts.end());
     typical_contrast_ = contrasts[contrasts.size() / 2];
   }
 
-  std::optional<Dot> fit(const Dot& start) const {
-    const auto fitted = refit_dots(image_, {start}, appearance_, neighbours_);
+  std::optional<detection::Dot> fit(const detection::Dot& start) const {
+    const auto fitted = detection::refit_dots(image_, {start}, appearance_, neighbours_);
     return fitted.empty() ? std::nullopt : std::optional(fitted.front());
   }
 
   /// A fiducial at its predicted position; nothing if none is visible there.
-  std::optional<Dot> fit_at_prediction(const Vector2d& raw, double radius, double reach_px) const {
-    Dot start;
+  std::optional<detection::Dot> fit_at_prediction(const Vector2d& raw, double radius, double reach_px) const {
+    detection::Dot start;
     start.centre_px = raw;
     start.radius_px = radius;
     const auto dot = fit(start);
@@ -98,29 +102,30 @@ class BallFitter {
   }
 
  private:
-  const XrayImage& image_;
-  DotAppearance appearance_;
-  std::vector<Dot> neighbours_;
+  const xray::XrayImage& image_;
+  detection::DotAppearance appearance_;
+  std::vector<detection::Dot> neighbours_;
   double typical_contrast_ = 0;
 };
 
-bool inside(const XrayImage& xray_image, const Vector2d& raw, double margin) {
+bool inside(const xray::XrayImage& xray_image, const Vector2d& raw, double margin) {
   return raw.x() >= margin && raw.y() >= margin && raw.x() <= xray_image.pixels.width() - 1 - margin &&
          raw.y() <= xray_image.pixels.height() - 1 - margin;
 }
 
 /// Why a fiducial predicted at `raw` was not measured.
-FiducialStatus status_if_absent(const XrayImage& xray_image, const BallFitter& fitter, const Vector2d& raw,
-                                double radius, const std::vector<Dot>& labelled_dots) {
+FiducialStatus status_if_absent(const xray::XrayImage& xray_image, const BallFitter& fitter,
+                                const Vector2d& raw, double radius,
+                                const std::vector<detection::Dot>& labelled_dots) {
   if (!inside(xray_image, raw, 0.5 * radius) || fitter.is_black(raw)) return FiducialStatus::outside;
-  const bool behind = std::any_of(labelled_dots.begin(), labelled_dots.end(), [&](const Dot& other) {
-    return (other.centre_px - raw).norm() < 1.2 * other.radius_px;
-  });
+  const bool behind = std::any_of(
+      labelled_dots.begin(), labelled_dots.end(),
+      [&](const detection::Dot& other) { return (other.centre_px - raw).norm() < 1.2 * other.radius_px; });
   return behind ? FiducialStatus::occluded : FiducialStatus::not_found;
 }
 
-void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, const View& view,
-                double diameter_mm) {
+void set_pixels(Fiducial& fiducial, const detection::Dot& dot, const rectification::DistortionMap& map,
+                const geometry::View& view, double diameter_mm) {
   const Eigen::Vector3d& centre = fiducial.centre_in_calibrator;
   const Vector2d raw =
       dot.centre_px - blob_offset(map, view, view.project(centre), view.depth(centre), diameter_mm);
@@ -134,7 +139,7 @@ void set_pixels(Fiducial& fiducial, const Dot& dot, const DistortionMap& map, co
 }
 
 /// Whether displaced fiducials may be the reason that labelling failed.
-bool may_be_displaced(const Expected<Labelling>& labelling, const Calibrator& calibrator) {
+bool may_be_displaced(const Expected<Labelling>& labelling, const phantom::Calibrator& calibrator) {
   return !labelling && calibrator.tolerance_mm < printed_tolerance_mm &&
          (labelling.error().reason == Reason::calibrator_mismatch ||
           labelling.error().reason == Reason::ambiguous_labels);
@@ -148,51 +153,57 @@ bool explains_more(const Labelling& loose, const Failure& without) {
 }
 
 /// `--method paper` takes the Hough transform's circle centres.
-std::vector<Dot> hough_circles(const XrayImage& xray_image, const std::vector<Dot>& labelled_dots) {
+std::vector<detection::Dot> hough_circles(const xray::XrayImage& xray_image,
+                                          const std::vector<detection::Dot>& labelled_dots) {
   double least = 1e9;
   double most = 0;
-  for (const Dot& dot : labelled_dots) {
+  for (const detection::Dot& dot : labelled_dots) {
     least = std::min(least, dot.radius_px);
     most = std::max(most, dot.radius_px);
   }
-  return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.8 * least, 1.2 * most);
+  return rectification::find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.8 * least,
+                                        1.2 * most);
 }
 
-std::optional<Dot> circle_near(const std::vector<Dot>& circles, const Dot& dot) {
-  for (const Dot& circle : circles)
+std::optional<detection::Dot> circle_near(const std::vector<detection::Dot>& circles,
+                                          const detection::Dot& dot) {
+  for (const detection::Dot& circle : circles)
     if ((circle.centre_px - dot.centre_px).norm() < 0.3 * dot.radius_px) return circle;
   return std::nullopt;
 }
 
 }  // namespace
 
-Range ball_radii_px(const Calibrator& calibrator, double pixel_mm) {
+Range ball_radii_px(const phantom::Calibrator& calibrator, double pixel_mm) {
   const auto [least, most] =
-      std::ranges::minmax(calibrator.balls | std::views::transform(&CalibratorBall::diameter_mm));
+      std::ranges::minmax(calibrator.balls | std::views::transform(&phantom::CalibratorBall::diameter_mm));
   return {1.03 * 0.5 * least / pixel_mm, 2.7 * 0.5 * most / pixel_mm};
 }
 
-bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast, double reach_px) {
+bool is_plausible(const detection::Dot& fitted, const detection::Dot& predicted, double typical_contrast,
+                  double reach_px) {
   return (fitted.centre_px - predicted.centre_px).norm() <= reach_px && fitted.sigma_px <= 0.4 &&
          std::abs(fitted.radius_px / predicted.radius_px - 1) <= 0.12 && fitted.misfit <= 0.35 &&
          fitted.contrast * typical_contrast >= 0 &&
          std::abs(fitted.contrast) >= 0.25 * std::abs(typical_contrast);
 }
 
-Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const Rectification& rectification,
-                                            const Candidates& candidates, const Calibrator& calibrator,
+Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
+                                            const rectification::Rectification& rectification,
+                                            const Candidates& candidates,
+                                            const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options) {
-  const DistortionMap& map = rectification.map;
-  const Method method = options.method;
-  const std::vector<Dot> balls = plausible_balls(candidates.dots, map, calibrator);
+  const rectification::DistortionMap& map = rectification.map;
+  const rectification::Method method = options.method;
+  const std::vector<detection::Dot> balls = plausible_balls(candidates.dots, map, calibrator);
   std::vector<BallCandidate> rectified;
-  for (const Dot& ball : balls) {
+  for (const detection::Dot& ball : balls) {
     const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
     rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1,
                          sigma_of(ball, map, uv)});
   }
   LabellingOptions labelling_options;
-  if (method == Method::paper) labelling_options.systematic_sigma = paper_systematic;
+  if (method == rectification::Method::paper) labelling_options.systematic_sigma = paper_systematic;
   LabellingPrior prior = prior_of(xray_image, map);
   prior.mirrored = options.mirrored;
   if (options.radius_bias) {
@@ -218,29 +229,30 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
   found.runner_up_rms_px = labelling->runner_up_rms_px;
   found.radius_bias = labelling->radius_bias;
   found.assumed_tolerance_mm = labelling_options.tolerance_mm;
-  std::vector<Dot> labelled_dots;
+  std::vector<detection::Dot> labelled_dots;
   for (const int candidate : labelling->candidate_of_ball)
     if (candidate >= 0) labelled_dots.push_back(balls[static_cast<std::size_t>(candidate)]);
   const BallFitter fitter(xray_image, rectification, candidates, labelled_dots);
   const double tolerance_mm = std::hypot(calibrator.tolerance_mm, labelling_options.tolerance_mm);
-  const std::vector<Dot> circles =
-      method == Method::paper ? hough_circles(xray_image, labelled_dots) : std::vector<Dot>{};
+  const std::vector<detection::Dot> circles = method == rectification::Method::paper
+                                                  ? hough_circles(xray_image, labelled_dots)
+                                                  : std::vector<detection::Dot>{};
 
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-    const CalibratorBall& ball = calibrator.balls[k];
+    const phantom::CalibratorBall& ball = calibrator.balls[k];
     Fiducial fiducial;
     fiducial.label = ball.label;
     fiducial.centre_in_calibrator = ball.centre_in_calibrator;
     const double radius = predicted_radius(found.view, ball);
     const Vector2d raw = map.raw_from_rectified(found.view.project(ball.centre_in_calibrator));
     const int candidate = labelling->candidate_of_ball[k];
-    std::optional<Dot> dot;
+    std::optional<detection::Dot> dot;
     if (candidate >= 0)
       dot = fitter.fit(balls[static_cast<std::size_t>(candidate)]);
     else if (inside(xray_image, raw, 2))
       dot = fitter.fit_at_prediction(
           raw, radius, prediction_reach_px + tolerance_sigmas * tolerance_mm * 2 * radius / ball.diameter_mm);
-    if (dot && method == Method::paper) dot = circle_near(circles, *dot);
+    if (dot && method == rectification::Method::paper) dot = circle_near(circles, *dot);
     if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
     if (fiducial.status != FiducialStatus::used)
       fiducial.status = status_if_absent(xray_image, fitter, raw, radius, labelled_dots);
@@ -254,4 +266,4 @@ Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const R
   return found;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -12,13 +12,13 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// The calibrator's fiducials in one image.
 struct LabelledFiducials {
-  std::vector<Fiducial> fiducials;  ///< one per ball of the calibrator, in its order
-  std::vector<Dot> false_blobs;     ///< candidates of a fiducial's size without a label
-  View view;                        ///< from the labelling: the calibration's start
+  std::vector<Fiducial> fiducials;          ///< one per ball of the calibrator, in its order
+  std::vector<detection::Dot> false_blobs;  ///< candidates of a fiducial's size without a label
+  geometry::View view;                      ///< from the labelling: the calibration's start
   bool mirrored = false;
   double margin = 0;          ///< log odds over the best other labelling
   int runner_up_matched = 0;  ///< fiducials of the best other labelling; 0: none
@@ -32,14 +32,15 @@ struct LabelledFiducials {
 
 /// Possible radii of a fiducial's image for a pixel size on the detector: the fiducial is between the
 /// detector and about half way to the source.
-Range ball_radii_px(const Calibrator& calibrator, double pixel_mm);
+Range ball_radii_px(const phantom::Calibrator& calibrator, double pixel_mm);
 
 /// Whether a dot fitted at a predicted position is that fiducial: within `reach_px`, radius within 12 %, and
 /// the other fiducials' polarity with at least a quarter of their contrast.
-bool is_plausible(const Dot& fitted, const Dot& predicted, double typical_contrast, double reach_px = 4);
+bool is_plausible(const detection::Dot& fitted, const detection::Dot& predicted, double typical_contrast,
+                  double reach_px = 4);
 
 struct FiducialOptions {
-  Method method = Method::best;
+  rectification::Method method = rectification::Method::best;
   /// Relative bias of all radii in the image, from another view of the calibrator. Along a helix's axis only
   /// the radii distinguish some labellings.
   std::optional<double> radius_bias = {};
@@ -49,8 +50,10 @@ struct FiducialOptions {
 /// Stage 3 (2.3.4): labels the fiducials among the candidates, refits them, fits those without a candidate at
 /// their predicted positions, and gives each of the others the status that says why it is not used. Refuses
 /// as `label_balls`.
-Expected<LabelledFiducials> label_fiducials(const XrayImage& xray_image, const Rectification& rectification,
-                                            const Candidates& candidates, const Calibrator& calibrator,
+Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
+                                            const rectification::Rectification& rectification,
+                                            const Candidates& candidates,
+                                            const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -7,7 +7,7 @@
 
 #include "helicarm/rectification/simulated_image_test.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
@@ -18,29 +18,32 @@ using simulation::SimulatedView;
 using simulation::Visibility;
 
 const SimulatedCase& sound_case() {
-  static const SimulatedCase simulated_case = small_case(6, CaseKind::accuracy);
+  static const SimulatedCase simulated_case = rectification::small_case(6, CaseKind::accuracy);
   return simulated_case;
 }
 
 /// Lateral view mirrored, two decoy balls, two fiducials missing.
 const SimulatedCase& faulty_case() {
   static const SimulatedCase simulated_case =
-      small_case(8, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
+      rectification::small_case(8, CaseKind::accuracy, {Fault::mirrored, Fault::decoys}, {"P4", "P9"});
   return simulated_case;
 }
 
-Expected<LabelledFiducials> label(const XrayImage& xray_image, const Rectification& rectification,
-                                  const Calibrator& calibrator, const FiducialOptions& options = {}) {
+Expected<LabelledFiducials> label(const xray::XrayImage& xray_image,
+                                  const rectification::Rectification& rectification,
+                                  const phantom::Calibrator& calibrator,
+                                  const FiducialOptions& options = {}) {
   return label_fiducials(xray_image, rectification, detect_candidates(xray_image, rectification), calibrator,
                          options);
 }
 
 LabelledFiducials found_in(const SimulatedCase& simulated_case, const SimulatedView& view,
-                           Method method = Method::best) {
-  const XrayImage xray_image = exposure_of(view);
-  RectificationOptions options;
+                           rectification::Method method = rectification::Method::best) {
+  const xray::XrayImage xray_image = exposure_of(view);
+  rectification::RectificationOptions options;
   options.method = method;
-  const Rectification rectification = rectify(xray_image, *simulated_case.plate, options).value();
+  const rectification::Rectification rectification =
+      rectification::rectify(xray_image, *simulated_case.plate, options).value();
   return label(xray_image, rectification, simulated_case.calibrator, {method}).value();
 }
 
@@ -70,8 +73,9 @@ TEST(LabelFiducials, ApAndLateralViewLabelEveryFiducial) {
 }
 
 TEST(LabelFiducials, RectifiedPixelsMapToTheRawOnes) {
-  const XrayImage xray_image = exposure_of(sound_case().views[0]);
-  const Rectification rectification = rectify(xray_image, plate48(), {}).value();
+  const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
+  const rectification::Rectification rectification =
+      rectification::rectify(xray_image, phantom::plate48(), {}).value();
   const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   for (const Fiducial& fiducial : found->fiducials)
@@ -96,7 +100,7 @@ TEST(LabelFiducials, MissingBallsAreNotFoundAndDecoysAreUnlabelled) {
         EXPECT_NE(fiducial.status, FiducialStatus::used) << view.true_view.name << " " << fiducial.label;
       }
     EXPECT_GE(found.false_blobs.size(), 1u) << view.true_view.name;
-    for (const Dot& blob : found.false_blobs)
+    for (const detection::Dot& blob : found.false_blobs)
       for (const Fiducial& fiducial : found.fiducials)
         if (fiducial.status == FiducialStatus::used) {
           EXPECT_GT((blob.centre_px - fiducial.uv_raw).norm(), 2);
@@ -105,14 +109,15 @@ TEST(LabelFiducials, MissingBallsAreNotFoundAndDecoysAreUnlabelled) {
 }
 
 TEST(LabelFiducials, BallOutsideTheFieldIsOutside) {
-  XrayImage xray_image = exposure_of(sound_case().views[0]);
+  xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& lost = sound_case().views[0].balls[5];
-  Rectification rectification = rectify(xray_image, plate48(), {}).value();
+  rectification::Rectification rectification =
+      rectification::rectify(xray_image, phantom::plate48(), {}).value();
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u)
       if ((Vector2d(u, v) - lost.raw).norm() < 10) xray_image.pixels(u, v) = xray_image.lowest;
   std::erase_if(*rectification.other_dots,
-                [&](const Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
+                [&](const detection::Dot& dot) { return (dot.centre_px - lost.raw).norm() < 20; });
   const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found) << found.error().message;
   for (const Fiducial& fiducial : found->fiducials)
@@ -120,12 +125,13 @@ TEST(LabelFiducials, BallOutsideTheFieldIsOutside) {
 }
 
 TEST(LabelFiducials, BallWithoutACandidateIsFittedAtItsPrediction) {
-  const XrayImage xray_image = exposure_of(sound_case().views[0]);
+  const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
   const auto& ball = sound_case().views[0].balls[6];
   ASSERT_EQ(ball.visibility, Visibility::clear);
-  Rectification rectification = rectify(xray_image, plate48(), {}).value();
+  rectification::Rectification rectification =
+      rectification::rectify(xray_image, phantom::plate48(), {}).value();
   std::erase_if(*rectification.other_dots,
-                [&](const Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
+                [&](const detection::Dot& dot) { return (dot.centre_px - ball.raw).norm() < 4; });
   const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->fiducials[6].status, FiducialStatus::used);
@@ -133,8 +139,9 @@ TEST(LabelFiducials, BallWithoutACandidateIsFittedAtItsPrediction) {
 }
 
 TEST(LabelFiducials, NoCandidatesAreRefused) {
-  const XrayImage xray_image = exposure_of(sound_case().views[0]);
-  Rectification rectification = rectify(xray_image, plate48(), {}).value();
+  const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
+  rectification::Rectification rectification =
+      rectification::rectify(xray_image, phantom::plate48(), {}).value();
   rectification.other_dots->clear();
   const auto found = label(xray_image, rectification, sound_case().calibrator);
   ASSERT_FALSE(found);
@@ -142,7 +149,7 @@ TEST(LabelFiducials, NoCandidatesAreRefused) {
 }
 
 TEST(LabelFiducials, PaperMethodMeasuresWithinAPixelAndAHalf) {
-  const LabelledFiducials found = found_in(sound_case(), sound_case().views[0], Method::paper);
+  const LabelledFiducials found = found_in(sound_case(), sound_case().views[0], rectification::Method::paper);
   int used = 0;
   for (std::size_t k = 0; k < found.fiducials.size(); ++k) {
     if (found.fiducials[k].status != FiducialStatus::used) continue;
@@ -153,4 +160,4 @@ TEST(LabelFiducials, PaperMethodMeasuresWithinAPixelAndAHalf) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

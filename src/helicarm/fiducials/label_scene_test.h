@@ -12,13 +12,13 @@
 #include "helicarm/fiducials/label.h"
 #include "helicarm/simulation/synthetic_detections.h"
 
-namespace helicarm::label_scene {
+namespace helicarm::fiducials::label_scene {
 
 inline constexpr double pi = std::numbers::pi;
 
 /// Twelve balls on the conical helix of Eq. 9, from t0 in steps of a quarter turn.
-inline Calibrator helix(double t0 = pi / 6, double height_mm = 87.5, double radius_mm = 60) {
-  Calibrator calibrator{"helix", {}, {}};
+inline phantom::Calibrator helix(double t0 = pi / 6, double height_mm = 87.5, double radius_mm = 60) {
+  phantom::Calibrator calibrator{"helix", {}, {}};
   for (int k = 0; k < 12; ++k) {
     const double t = t0 + k * pi / 2;
     const double r = radius_mm * std::exp(-t / 31.529);
@@ -28,9 +28,9 @@ inline Calibrator helix(double t0 = pi / 6, double height_mm = 87.5, double radi
   return calibrator;
 }
 
-inline Calibrator scattered(int balls, std::uint64_t seed) {
+inline phantom::Calibrator scattered(int balls, std::uint64_t seed) {
   RandomStream random(seed, 7);
-  Calibrator calibrator{"scattered", {}, {}};
+  phantom::Calibrator calibrator{"scattered", {}, {}};
   for (int k = 0; k < balls; ++k) {
     const Eigen::Vector3d centre(random.uniform(-45, 45), random.uniform(-45, 45), random.uniform(-35, 35));
     calibrator.balls.push_back({fmt::format("B{}", k), centre, k % 2 == 0 ? 4.0 : 3.0});
@@ -48,7 +48,7 @@ struct SyntheticImage : simulation::SyntheticView {
   }
 };
 
-inline SyntheticImage image_of(const Calibrator& calibrator,
+inline SyntheticImage image_of(const phantom::Calibrator& calibrator,
                                const simulation::SyntheticDetectionOptions& options, RandomStream& random) {
   SyntheticImage view_image{simulation::synthetic_detections(calibrator, options, random), {}};
   for (const auto& detection : view_image.detections)
@@ -59,7 +59,7 @@ inline SyntheticImage image_of(const Calibrator& calibrator,
 
 /// Whether the mirroring is right and each labelled ball's candidate is its detection, or lies at its image.
 inline bool right(const Labelling& labelling, const SyntheticImage& view_image,
-                  const Calibrator& calibrator) {
+                  const phantom::Calibrator& calibrator) {
   bool all = labelling.mirrored == view_image.mirrored();
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const int i = labelling.candidate_of_ball[k];
@@ -71,4 +71,4 @@ inline bool right(const Labelling& labelling, const SyntheticImage& view_image,
   return all;
 }
 
-}  // namespace helicarm::label_scene
+}  // namespace helicarm::fiducials::label_scene

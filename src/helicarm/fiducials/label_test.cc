@@ -9,7 +9,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/label_scene_test.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using namespace label_scene;
@@ -23,14 +23,14 @@ struct Tally {
 };
 
 /// Random views with 0 to 6 hidden balls and 0 to 10 outliers.
-SyntheticImage any_image(const Calibrator& calibrator, std::uint64_t trial, double noise_px) {
+SyntheticImage any_image(const phantom::Calibrator& calibrator, std::uint64_t trial, double noise_px) {
   RandomStream random(1, 1, trial);
   const int hidden = static_cast<int>(random.index(7));
   const int outliers = static_cast<int>(random.index(11));
   return image_of(calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = noise_px}, random);
 }
 
-Tally monte_carlo(const Calibrator& calibrator, int trials, double noise_px,
+Tally monte_carlo(const phantom::Calibrator& calibrator, int trials, double noise_px,
                   const LabellingPrior& prior = nominal) {
   Tally tally;
   for (int trial = 0; trial < trials; ++trial) {
@@ -43,7 +43,7 @@ Tally monte_carlo(const Calibrator& calibrator, int trials, double noise_px,
   return tally;
 }
 
-Expected<Labelling> label_one(const Calibrator& seen, const Calibrator& file,
+Expected<Labelling> label_one(const phantom::Calibrator& seen, const phantom::Calibrator& file,
                               const SyntheticDetectionOptions& options, std::uint64_t trial,
                               SyntheticImage* out = nullptr) {
   RandomStream random(2, 1, trial);
@@ -67,9 +67,9 @@ TEST(LabelBalls, NoisyCentresAreNeverLabelledWrong) {
 TEST(LabelBalls, PartialLabellingsAreCompleted) {
   // Regression: in these the first fit missed true balls within its own error, or mislabelled a few.
   for (const int trial : {241, 1639, 3544, 3976, 4259, 4680}) {
-    const auto view_image = any_image(udcsc(), trial, 0.5);
-    const auto labelling = label_balls(udcsc(), view_image.candidates, nominal);
-    EXPECT_TRUE(labelling && right(*labelling, view_image, udcsc())) << trial;
+    const auto view_image = any_image(phantom::udcsc(), trial, 0.5);
+    const auto labelling = label_balls(phantom::udcsc(), view_image.candidates, nominal);
+    EXPECT_TRUE(labelling && right(*labelling, view_image, phantom::udcsc())) << trial;
   }
 }
 
@@ -84,10 +84,11 @@ TEST(LabelBalls, ImitatingOutliersNeverGiveWrongLabels) {
     const int hidden = static_cast<int>(random.index(7));
     const int outliers = static_cast<int>(random.index(11));
     const auto view_image = image_of(
-        udcsc(), {.hidden = hidden, .outliers = outliers, .kind = simulation::OutlierKind::imitating},
-        random);
-    const auto labelling = label_balls(udcsc(), view_image.candidates, nominal);
-    EXPECT_TRUE(!labelling || right(*labelling, view_image, udcsc())) << hard.seed << " " << hard.number;
+        phantom::udcsc(),
+        {.hidden = hidden, .outliers = outliers, .kind = simulation::OutlierKind::imitating}, random);
+    const auto labelling = label_balls(phantom::udcsc(), view_image.candidates, nominal);
+    EXPECT_TRUE(!labelling || right(*labelling, view_image, phantom::udcsc()))
+        << hard.seed << " " << hard.number;
   }
 }
 
@@ -177,7 +178,7 @@ TEST(LabelBalls, OutliersAloneAreRefused) {
 
 TEST(LabelBalls, CoplanarBallsLeaveTheMirroringAmbiguous) {
   // The mirror image of a plane is another view of that plane.
-  Calibrator calibrator = scattered(9, 5);
+  phantom::Calibrator calibrator = scattered(9, 5);
   for (std::size_t k = 0; k < 7; ++k) {
     calibrator.balls[k].centre_in_calibrator.z() = 0.2 * calibrator.balls[k].centre_in_calibrator.x();
   }
@@ -198,10 +199,10 @@ TEST(LabelBalls, CoplanarBallsLeaveTheMirroringAmbiguous) {
 }
 
 /// A flat, nearly mirror-symmetric phantom, like many commercial ones.
-Calibrator flat_and_symmetric(int balls, std::uint64_t seed, double half_height_mm = 4,
-                              double jitter_mm = 0.4) {
+phantom::Calibrator flat_and_symmetric(int balls, std::uint64_t seed, double half_height_mm = 4,
+                                       double jitter_mm = 0.4) {
   RandomStream random(seed, 8);
-  Calibrator calibrator{"flat", {}, {}};
+  phantom::Calibrator calibrator{"flat", {}, {}};
   for (int k = 0; k < balls; ++k) {
     Eigen::Vector3d centre(random.uniform(5, 53), random.uniform(-34, 34),
                            random.uniform(-half_height_mm, half_height_mm));
@@ -220,9 +221,9 @@ TEST(LabelBalls, FlatSymmetricPhantomAmongEqualBallsIsLabelled) {
   int solved = 0;
   for (int trial = 0; trial < 40; ++trial) {
     RandomStream random(31, 1, trial);
-    const Calibrator phantom = flat_and_symmetric(18, std::uint64_t(trial));
+    const phantom::Calibrator phantom = flat_and_symmetric(18, std::uint64_t(trial));
     const auto seen = image_of(phantom, {.noise_px = 0.05}, random);
-    Calibrator file = phantom;
+    phantom::Calibrator file = phantom;
     file.balls.erase(file.balls.begin() + 10, file.balls.end());
     const auto labelling = label_balls(file, seen.candidates, prior);
     if (!labelling) continue;
@@ -239,7 +240,7 @@ TEST(LabelBalls, CandidatesOwnErrorsResolveTheMirrorAmbiguity) {
   int before = 0, after = 0;
   for (int trial = 0; trial < 40; ++trial) {
     RandomStream random(32, 1, trial);
-    const Calibrator file = flat_and_symmetric(10, std::uint64_t(trial), 1, 0.1);
+    const phantom::Calibrator file = flat_and_symmetric(10, std::uint64_t(trial), 1, 0.1);
     auto seen = image_of(file, {.noise_px = 0.03}, random);
     before += label_balls(file, seen.candidates, prior).has_value();
     for (BallCandidate& candidate : seen.candidates) candidate.own_sigma_px = 0.04;
@@ -254,9 +255,9 @@ TEST(LabelBalls, PrintedPhantomWithDeclaredToleranceIsLabelled) {
   for (const double tolerance_mm : {0.1, 0.3}) {
     for (int trial = 0; trial < 20; ++trial) {
       RandomStream random(33, 1, trial);
-      Calibrator file = helix();
+      phantom::Calibrator file = helix();
       file.tolerance_mm = tolerance_mm;
-      for (CalibratorBall& ball : file.balls)
+      for (phantom::CalibratorBall& ball : file.balls)
         ball.centre_in_calibrator +=
             tolerance_mm * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
       SyntheticImage seen;
@@ -275,9 +276,9 @@ TEST(LabelBalls, PrintedPhantomWithDeclaredToleranceIsLabelled) {
 /// Balls at random in a slab, in mirror-symmetric pairs, or on the conical helix.
 enum class Shape { flat, symmetric, helical };
 
-Calibrator shaped(Shape shape, int balls, std::uint64_t seed) {
+phantom::Calibrator shaped(Shape shape, int balls, std::uint64_t seed) {
   RandomStream random(seed, 90, std::uint64_t(balls));
-  Calibrator calibrator{"shaped", {}, {}};
+  phantom::Calibrator calibrator{"shaped", {}, {}};
   for (int k = 0; k < balls; ++k) {
     Eigen::Vector3d centre(random.uniform(-53, 53), random.uniform(-35, 35), random.uniform(-4, 4));
     if (shape == Shape::symmetric) {
@@ -303,7 +304,7 @@ void label_shaped_views(Shape shape, int views, const char* name) {
     const int balls = 6 + int(random.index(13));
     const int hidden = int(random.index(std::uint32_t(std::min(4, balls - 5))));
     const int outliers = int(random.index(9));
-    const Calibrator calibrator = shaped(shape, balls, std::uint64_t(trial));
+    const phantom::Calibrator calibrator = shaped(shape, balls, std::uint64_t(trial));
     const auto seen = image_of(calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = 0.1}, random);
     if (seen.visible < 6) continue;
     ++tried;
@@ -355,4 +356,4 @@ TEST(LabelBalls, RadiusBiasOfAnotherViewResolvesMoreViews) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -8,7 +8,7 @@
 
 #include <Eigen/Geometry>
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Vector9 = Eigen::Matrix<double, 9, 1>;
@@ -37,8 +37,8 @@ std::vector<FourCorrespondences> in_fours(const std::vector<WeightedCorresponden
 }
 
 /// d pixel / d (rotation applied from the left, translation, ln f, u0, v0).
-Eigen::Matrix<double, 2, 9> jacobian(const View& view, const Eigen::Vector3d& point) {
-  const Intrinsics& k = view.intrinsics;
+Eigen::Matrix<double, 2, 9> jacobian(const geometry::View& view, const Eigen::Vector3d& point) {
+  const geometry::Intrinsics& k = view.intrinsics;
   const Eigen::Vector3d turned = view.camera_from_world.rotation * point;
   const Eigen::Vector3d p = turned + view.camera_from_world.translation;
   const double x = p.x() / p.z();
@@ -68,7 +68,7 @@ void add(RowSums& sums, const Row& row) {
 /// whole SIMD vectors.
 using Normal = Eigen::Matrix<double, 12, 10>;
 
-Normal normal_equations(const View& view, const std::vector<FourCorrespondences>& fours,
+Normal normal_equations(const geometry::View& view, const std::vector<FourCorrespondences>& fours,
                         const CameraPrior& prior) {
   constexpr std::array<int, 8> of_u{0, 1, 2, 3, 5, 6, 7, 9};
   constexpr std::array<int, 8> of_v{0, 1, 2, 4, 5, 6, 8, 9};
@@ -77,7 +77,7 @@ Normal normal_equations(const View& view, const std::vector<FourCorrespondences>
   RowSums v_sums = u_sums;
   const Eigen::Matrix3d& r = view.camera_from_world.rotation;
   const Eigen::Vector3d& t = view.camera_from_world.translation;
-  const Intrinsics& k = view.intrinsics;
+  const geometry::Intrinsics& k = view.intrinsics;
   bool before_source = true;
   for (const FourCorrespondences& s : fours) {
     const Four x = r(0, 0) * s.x + r(0, 1) * s.y + r(0, 2) * s.z;
@@ -130,8 +130,8 @@ Vector9 descent(Normal a, double damping) {
   return step;
 }
 
-View moved(const View& view, const Vector9& step) {
-  View next = view;
+geometry::View moved(const geometry::View& view, const Vector9& step) {
+  geometry::View next = view;
   const double angle = step.head<3>().norm();
   if (angle > 0) {
     next.camera_from_world.rotation =
@@ -147,14 +147,14 @@ View moved(const View& view, const Vector9& step) {
 
 }  // namespace
 
-PoseFit fit_pose(const View& start, const std::vector<WeightedCorrespondence>& correspondences,
+PoseFit fit_pose(const geometry::View& start, const std::vector<WeightedCorrespondence>& correspondences,
                  const CameraPrior& prior, int most_steps) {
   const auto fours = in_fours(correspondences);
   PoseFit fit{start};
   Normal normal = normal_equations(fit.view, fours, prior);
   double damping = 1e-6;
   for (int step = 0; step < most_steps && damping < 1e3; ++step) {
-    const View next = moved(fit.view, descent(normal, damping));
+    const geometry::View next = moved(fit.view, descent(normal, damping));
     const Normal there = normal_equations(next, fours, prior);
     const double gain = normal(9, 9) - there(9, 9);
     if (!(there(9, 9) <= normal(9, 9))) {
@@ -178,4 +178,4 @@ Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d&
   return j.transpose() * j;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

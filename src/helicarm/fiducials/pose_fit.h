@@ -8,7 +8,7 @@
 
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// Gaussian prior of the camera about the file's nominal values.
 struct CameraPrior {
@@ -26,7 +26,7 @@ struct WeightedCorrespondence {
 };
 
 struct PoseFit {
-  View view;
+  geometry::View view;
   double chi2 = 0;        ///< of the residuals and of the camera prior
   double log_volume = 0;  ///< 0.5 ln det of the covariance of (rotation rad, translation mm, ln f, u0, v0)
   Eigen::LLT<Eigen::Matrix<double, 9, 9>> information = {};  ///< inverse of that covariance
@@ -37,7 +37,7 @@ Eigen::Matrix2d prediction_covariance(const PoseFit& fit, const Eigen::Vector3d&
 
 /// Maximum a posteriori pose, focal length and principal point by Levenberg-Marquardt from `start`. Pixels
 /// are square; the mirroring of `start` is kept. The covariance is finite from three correspondences on.
-PoseFit fit_pose(const View& start, const std::vector<WeightedCorrespondence>& correspondences,
+PoseFit fit_pose(const geometry::View& start, const std::vector<WeightedCorrespondence>& correspondences,
                  const CameraPrior& prior, int most_steps);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

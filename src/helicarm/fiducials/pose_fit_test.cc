@@ -8,13 +8,13 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 const CameraPrior prior{4345, 0.01, {511.5, 511.5}, 30};
 
-View truth() {
-  View view{{4360, 4360, 530, 500}, {}};
+geometry::View truth() {
+  geometry::View view{{4360, 4360, 530, 500}, {}};
   view.camera_from_world.rotation = Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 2, -1).normalized()).matrix();
   view.camera_from_world.translation = {5, -8, 640};
   return view;
@@ -31,7 +31,7 @@ std::vector<WeightedCorrespondence> correspondences(int n, double sigma_px) {
   return all;
 }
 
-View nudged(View view) {
+geometry::View nudged(geometry::View view) {
   view.camera_from_world.rotation =
       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()).matrix() * view.camera_from_world.rotation;
   view.camera_from_world.translation += Eigen::Vector3d(3, 3, -20);
@@ -49,7 +49,7 @@ TEST(FitPose, ResidualsFallToTheNoise) {
 TEST(FitPose, KeepsTheMirroring) {
   auto seen = correspondences(12, 0.1);
   for (auto& s : seen) s.uv.x() = 2 * truth().intrinsics.u0 - s.uv.x();
-  View start = nudged(truth());
+  geometry::View start = nudged(truth());
   start.intrinsics.fx = -start.intrinsics.fx;
   const auto fit = fit_pose(start, seen, prior, 30);
   EXPECT_LT(fit.chi2, 40);
@@ -63,12 +63,12 @@ TEST(FitPose, GradientVanishesAtTheFit) {
   const auto fit = fit_pose(nudged(truth()), seen, prior, 50);
   for (int axis = 0; axis < 3; ++axis) {
     for (const double direction : {-1.0, 1.0}) {
-      View turned = fit.view;
+      geometry::View turned = fit.view;
       turned.camera_from_world.rotation =
           Eigen::AngleAxisd(direction * 1e-3, Eigen::Vector3d::Unit(axis)).matrix() *
           turned.camera_from_world.rotation;
       EXPECT_GT(fit_pose(turned, seen, prior, 0).chi2, fit.chi2);
-      View shifted = fit.view;
+      geometry::View shifted = fit.view;
       shifted.camera_from_world.translation += direction * 0.2 * Eigen::Vector3d::Unit(axis);
       EXPECT_GT(fit_pose(shifted, seen, prior, 0).chi2, fit.chi2);
     }
@@ -108,4 +108,4 @@ TEST(FitPose, TwiceTheNoiseMakesTheVolumeLarger) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 Hypothesis fitted_in(const Scene& scene, Hypothesis h) {
@@ -29,4 +29,4 @@ std::optional<double> fine_margin(const Scene& scene, const Hypothesis& h, const
   return fitted_in(fine, h).log_odds - fitted_in(fine, rival).log_odds;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

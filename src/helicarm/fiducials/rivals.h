@@ -5,10 +5,10 @@
 
 #include "helicarm/fiducials/hypothesis.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// Log odds of `h` over `rival` with each candidate's `own_sigma_px`, inflated by the smaller reduced
 /// chi-square of the two fits if that exceeds 1. Empty if a candidate has no own sigma.
 std::optional<double> fine_margin(const Scene& scene, const Hypothesis& h, const Hypothesis& rival);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

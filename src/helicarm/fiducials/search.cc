@@ -11,7 +11,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/three_point.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 constexpr std::size_t most_kept = 24;        // hypotheses
@@ -95,7 +95,7 @@ int LabelSearch::required() const {
   return std::max(least_balls - 1, (ranking_.empty() ? 0 : ranking_.front().matched) - 3);
 }
 
-void LabelSearch::try_pose(const View& rough, double depth_sign) {
+void LabelSearch::try_pose(const geometry::View& rough, double depth_sign) {
   auto key = match(scene_, rough, rough_gate_px(scene_));
   const auto matched = static_cast<int>(std::count_if(key.begin(), key.end(), [](int i) { return i >= 0; }));
   if (matched < required()) return;
@@ -106,13 +106,13 @@ void LabelSearch::try_pose(const View& rough, double depth_sign) {
   keep(match_and_fit(scene_, rough, required()));
 }
 
-std::vector<View> LabelSearch::supported(int required, std::size_t most) const {
+std::vector<geometry::View> LabelSearch::supported(int required, std::size_t most) const {
   std::vector<Rough> enough;
   std::copy_if(supported_.begin(), supported_.end(), std::back_inserter(enough),
                [&](const Rough& rough) { return rough.matched >= required; });
   std::stable_sort(enough.begin(), enough.end(),
                    [](const Rough& p, const Rough& q) { return p.matched > q.matched; });
-  std::vector<View> views;
+  std::vector<geometry::View> views;
   for (std::size_t i = 0; i < std::min(most, enough.size()); ++i) views.push_back(enough[i].view);
   return views;
 }
@@ -134,8 +134,8 @@ void LabelSearch::try_symmetric_poses(const Hypothesis& h) {
   for (int which = 1; which < 16; ++which) {
     const auto sign = [&](int bit) { return which >> bit & 1 ? -1.0 : 1.0; };
     const Eigen::Vector3d along_axes(sign(0), sign(1), sign(2)), in_depth(1, 1, sign(3));
-    View symmetric = h.fit.view;
-    RigidTransform& pose = symmetric.camera_from_world;
+    geometry::View symmetric = h.fit.view;
+    geometry::RigidTransform& pose = symmetric.camera_from_world;
     pose.rotation = in_depth.asDiagonal() * pose.rotation * principal_axes_ * along_axes.asDiagonal() *
                     principal_axes_.transpose();
     const bool flips = along_axes.prod() * in_depth.z() < 0;
@@ -207,4 +207,4 @@ void search_rivals(LabelSearch& search) {
   } while (search.ranking().front().candidate_of_ball != best);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

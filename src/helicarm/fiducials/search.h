@@ -9,7 +9,7 @@
 #include "helicarm/fiducials/hypothesis.h"
 #include "helicarm/fiducials/hypothesis_filter.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 constexpr int least_balls = 6;  ///< least of a labelling
 
@@ -37,18 +37,18 @@ class LabelSearch {
   const Ranking& ranking() const { return ranking_; }
 
   /// Up to `most` poses with candidates near at least `required` balls, by decreasing number.
-  std::vector<View> supported(int required, std::size_t most) const;
+  std::vector<geometry::View> supported(int required, std::size_t most) const;
   const Scene& scene() const { return scene_; }
 
  private:
   struct Rough {
     int matched;
-    View view;
+    geometry::View view;
   };
 
   void try_scale(const std::array<int, 3>& candidates, double focal_px);
   int required() const;  ///< balls near candidates
-  void try_pose(const View& rough, double depth_sign);
+  void try_pose(const geometry::View& rough, double depth_sign);
   void keep(Hypothesis hypothesis);
 
   const Scene& scene_;
@@ -74,4 +74,4 @@ void try_random_triples(LabelSearch& search, std::size_t triples,
 /// changes. A rival almost as good shares all but one or two candidates, hence several triples.
 void search_rivals(LabelSearch& search);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -10,7 +10,7 @@
 
 #include "helicarm/image/opencv.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 using Eigen::Vector2d;
@@ -59,17 +59,17 @@ Span in_cylinder(const Vector3d& start, const Vector3d& along, const Vector3d& a
 
 }  // namespace
 
-double path_in_target(const CalibratorTarget& target, const Vector3d& point, const Vector3d& along) {
+double path_in_target(const phantom::CalibratorTarget& target, const Vector3d& point, const Vector3d& along) {
   const Vector3d start = point - target.point_in_calibrator;
   const double radius = 0.5 * target.diameter_mm;
   const double unlimited_mm = 1e6;
   const double length = target.length_mm > 0 ? target.length_mm : unlimited_mm;
   switch (target.kind) {
-    case TargetKind::ball:
+    case phantom::TargetKind::ball:
       return in_sphere(start, along, radius).length();
-    case TargetKind::line_end:
+    case phantom::TargetKind::line_end:
       return in_cylinder(start, along, target.directions[0], radius, 0, length).length();
-    case TargetKind::cross: {
+    case phantom::TargetKind::cross: {
       const Span first = in_cylinder(start, along, target.directions[0], radius, -0.5 * length, 0.5 * length);
       const Span second =
           in_cylinder(start, along, target.directions[1], radius, -0.5 * length, 0.5 * length);
@@ -81,10 +81,11 @@ double path_in_target(const CalibratorTarget& target, const Vector3d& point, con
   return 0;
 }
 
-PathImage image_of_target(const CalibratorTarget& target, const View& view, double half_width_px) {
+PathImage image_of_target(const phantom::CalibratorTarget& target, const geometry::View& view,
+                          double half_width_px) {
   const int middle = static_cast<int>(std::ceil(half_width_px * PathImage::per_pixel));
   const int side = 2 * middle + 1;
-  PathImage view_image{Image<float>(side, side), middle};
+  PathImage view_image{image::Image<float>(side, side), middle};
   const Vector2d centre = view.project(target.point_in_calibrator);
   const Vector3d source = view.source_in_world();
   const Eigen::Matrix3d direction_from_pixel =
@@ -102,7 +103,7 @@ SolidTemplate::SolidTemplate(const PathImage& view_image, double attenuation_per
     : absorbed_(view_image.path_mm), middle_(view_image.middle) {
   for (float& path : absorbed_.pixels())
     if (path > 0) path = -std::expm1(-static_cast<float>(attenuation_per_mm) * path);
-  cv::Mat mat = as_mat(absorbed_);
+  cv::Mat mat = image::as_mat(absorbed_);
   cv::GaussianBlur(mat, mat, {}, blur_px * PathImage::per_pixel, 0, cv::BORDER_REPLICATE);
 }
 
@@ -123,4 +124,4 @@ SolidTemplate::Sample SolidTemplate::at(const Vector2d& offset) const {
           PathImage::per_pixel * Vector2d((1 - t) * (b - a) + t * (d - c), (1 - s) * (c - a) + s * (d - b))};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

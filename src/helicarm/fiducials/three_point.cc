@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 Eigen::Matrix3d frame_of(const Eigen::Vector3d& e1, const Eigen::Vector3d& e2) {
@@ -57,16 +57,17 @@ std::optional<Orthography> three_point_depths(const ModelTriangle& model,
   return std::nullopt;
 }
 
-RigidTransform three_point_pose(const ModelTriangle& model, const std::array<Eigen::Vector2d, 3>& image,
-                                const Orthography& depths) {
+geometry::RigidTransform three_point_pose(const ModelTriangle& model,
+                                          const std::array<Eigen::Vector2d, 3>& image,
+                                          const Orthography& depths) {
   const Eigen::Vector2d e1 = (1 + depths.behind1) * image[1] - image[0];
   const Eigen::Vector2d e2 = (1 + depths.behind2) * image[2] - image[0];
   const Eigen::Matrix3d axes = frame_of({e1.x(), e1.y(), depths.behind1}, {e2.x(), e2.y(), depths.behind2});
-  RigidTransform pose;
+  geometry::RigidTransform pose;
   pose.rotation.noalias() = axes.lazyProduct(model.axes.transpose());
   pose.translation =
       image[0].homogeneous() / std::sqrt(depths.inverse_distance2) - pose.rotation * model.corner;
   return pose;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -10,7 +10,7 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 
 /// Three balls in a fixed order, and their geometry.
 struct ModelTriangle {
@@ -68,7 +68,8 @@ std::optional<Orthography> three_point_depths(const ModelTriangle& model,
                                               const Orthography& start);
 
 /// The pose with the triangle at these depths.
-RigidTransform three_point_pose(const ModelTriangle& model, const std::array<Eigen::Vector2d, 3>& image,
-                                const Orthography& depths);
+geometry::RigidTransform three_point_pose(const ModelTriangle& model,
+                                          const std::array<Eigen::Vector2d, 3>& image,
+                                          const Orthography& depths);
 
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

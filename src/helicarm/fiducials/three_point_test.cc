@@ -7,7 +7,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::fiducials {
 namespace {
 
 Eigen::Vector3d random_point(RandomStream& random, double half) {
@@ -24,7 +24,7 @@ TEST(ThreePointPose, FindsTheTruePoseFromExactPoints) {
     const auto model = model_triangle({0, 1, 2}, points);
     if (!model) continue;
     ++posed;
-    RigidTransform truth;
+    geometry::RigidTransform truth;
     truth.rotation = Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal())
                          .normalized()
                          .toRotationMatrix();
@@ -61,4 +61,4 @@ TEST(ModelTriangle, CollinearBallsAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::fiducials

@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr double least_sine = 1e-9;  // of the angle between a row and the span of the rows below it
@@ -64,4 +64,4 @@ Expected<View> decompose(const Projection& projection, const Eigen::Vector3d& po
   return decompose_signed(projection, projection.row(2).dot(point_in_front.homogeneous()) < 0 ? -1 : 1);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

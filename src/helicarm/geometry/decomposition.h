@@ -4,7 +4,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// The view whose projection equals a 3x4 matrix up to scale and sign: fy > 0, a proper rotation, fx < 0 for
 /// a mirrored image. The sign of the matrix is chosen so that the given point lies in front of the source;
@@ -13,4 +13,4 @@ namespace helicarm {
 Expected<View> decompose(const Projection& projection);
 Expected<View> decompose(const Projection& projection, const Eigen::Vector3d& point_in_front);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

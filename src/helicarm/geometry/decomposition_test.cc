@@ -8,7 +8,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 View random_view(RandomStream& random, bool mirrored) {
@@ -84,4 +84,4 @@ TEST(Decompose, ParallelProjectionAndRankDeficientMatricesAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -10,7 +10,7 @@
 
 #include "helicarm/geometry/decomposition.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr double largest_condition = 1e3;  // thickness 0.4 % of the width; the udcsc has 5
@@ -186,4 +186,4 @@ double reprojection_rms(const View& view, std::span<const PointPair> points) {
   return std::sqrt(sum / double(points.size()));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -9,7 +9,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// World point (mm) and its image (px).
 struct PointPair {
@@ -49,4 +49,4 @@ Expected<DltResult> dlt_homogeneous(std::span<const PointPair> points);
 /// Root mean square reprojection error, px.
 double reprojection_rms(const View& view, std::span<const PointPair> points);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

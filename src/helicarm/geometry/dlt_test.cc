@@ -12,7 +12,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 std::vector<Eigen::Vector3d> helix(int n) {
@@ -148,4 +148,4 @@ TEST(Dlt, ImagesAllInOnePixelAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

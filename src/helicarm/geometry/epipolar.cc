@@ -3,7 +3,7 @@
 
 #include "helicarm/geometry/ray.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 std::vector<Eigen::Vector2d> epipolar_line(const View& from, const Eigen::Vector2d& uv, const View& onto,
                                            double near_mm, double far_mm) {
@@ -21,4 +21,4 @@ std::vector<Eigen::Vector2d> epipolar_line(const View& from, const Eigen::Vector
   return line;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

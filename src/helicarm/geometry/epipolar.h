@@ -7,7 +7,7 @@
 
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// The ray through pixel `uv` of one view, projected into another: points at depths (from the first source
 /// along its central ray) evenly spaced from `near_mm` to `far_mm`. They lie on the epipolar line. Points
@@ -15,4 +15,4 @@ namespace helicarm {
 std::vector<Eigen::Vector2d> epipolar_line(const View& from, const Eigen::Vector2d& uv, const View& onto,
                                            double near_mm, double far_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

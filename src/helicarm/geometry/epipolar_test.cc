@@ -6,7 +6,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 using Eigen::Matrix3d;
@@ -62,4 +62,4 @@ TEST(EpipolarLine, IntoTheSameViewIsThePixel) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -6,7 +6,7 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// A pose read from a file or a device, with the names of its frames: to_from_from.
 struct FramedTransform {
@@ -25,4 +25,4 @@ inline FramedTransform operator*(const FramedTransform& left, const FramedTransf
   return {left.to, right.from, left.transform * right.transform};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -16,7 +16,7 @@
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr std::uintmax_t max_bytes = 256u << 20;  // an NRRD file includes its pixels
@@ -184,4 +184,4 @@ Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

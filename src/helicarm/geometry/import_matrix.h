@@ -9,7 +9,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// A calibration from other software. K, R and t are the file's, or else the decomposition of its matrix with
 /// the world's origin in front of the source; camera = R world + t with z towards the detector.
@@ -23,4 +23,4 @@ struct ImportedMatrix {
 /// with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`, `bad_size` or `unsupported`.
 Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double mm_per_unit = 1);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -7,7 +7,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/decomposition.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 namespace fs = std::filesystem;
 
@@ -113,4 +113,4 @@ TEST(ImportMatrix, BadFilesAreNamed) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

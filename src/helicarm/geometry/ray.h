@@ -8,7 +8,7 @@
 
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// X-ray of a pixel: from the source, in a unit direction towards the detector (world frame, mm).
 struct Ray {
@@ -37,4 +37,4 @@ inline double gap_between(const Ray& a, const Ray& b) {
   return sine < 1e-12 ? apart.cross(a.direction).norm() : std::abs(apart.dot(across)) / sine;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 TEST(RayThrough, PassesThroughTheProjectedPoint) {
@@ -27,4 +27,4 @@ TEST(GapBetween, SkewAndParallelLines) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

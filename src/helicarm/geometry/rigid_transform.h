@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// A proper rigid motion. `a_from_b` maps points of frame b to frame a: p_a = a_from_b * p_b (mm).
 struct RigidTransform {
@@ -24,4 +24,4 @@ struct RigidTransform {
   }
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

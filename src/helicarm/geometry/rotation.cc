@@ -7,7 +7,7 @@
 #include <Eigen/SVD>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr double rigid_tolerance = 1e-3;
@@ -83,4 +83,4 @@ Expected<RigidTransform> rigid_transform_from(const Eigen::Matrix4d& matrix, con
   return RigidTransform{nearest_rotation(rotation), matrix.topRightCorner<3, 1>()};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

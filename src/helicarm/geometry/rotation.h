@@ -8,7 +8,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// Angles of Eq. 5, rad. At beta = +-90 degrees only the sum or difference of alpha and gamma is determined:
 /// gamma is set to 0 and the angles are marked as locked.
@@ -40,4 +40,4 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);
 /// message.
 Expected<RigidTransform> rigid_transform_from(const Eigen::Matrix4d& matrix, const std::string& what);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

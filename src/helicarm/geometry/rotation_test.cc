@@ -9,7 +9,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/framed_transform.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -109,4 +109,4 @@ TEST(FramedTransform, ProductChecksTheInnerFrames) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -11,7 +11,7 @@
 
 #include "helicarm/geometry/ray.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 constexpr double least_angle_deg = 1;
@@ -133,4 +133,4 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

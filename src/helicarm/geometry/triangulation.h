@@ -8,7 +8,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// Image of a point in one view (rectified px).
 struct RayObservation {
@@ -42,4 +42,4 @@ Eigen::Matrix<double, 2, 3> projection_jacobian(const View& view, const Eigen::V
 /// Largest angle between two of the rays taken as lines, rad.
 double widest_angle(std::span<const RayObservation> ray_observations);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

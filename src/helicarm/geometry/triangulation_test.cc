@@ -12,7 +12,7 @@
 #include "helicarm/geometry/dlt.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 View view_at(double alpha) {
@@ -110,4 +110,4 @@ TEST(Intersect, DegenerateConfigurationsAreRefusedWithFigures) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// 3x4, maps world (mm) to homogeneous pixels.
 using Projection = Eigen::Matrix<double, 3, 4>;
@@ -54,4 +54,4 @@ struct View {
   }
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

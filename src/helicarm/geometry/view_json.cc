@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 Json json_list(const Eigen::VectorXd& vector) {
   Json list = Json::array();
@@ -35,4 +35,4 @@ Json intrinsics_json(const Intrinsics& k, std::optional<double> pixel_mm) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

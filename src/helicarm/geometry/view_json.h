@@ -9,7 +9,7 @@
 #include "helicarm/geometry/rigid_transform.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 
 /// Matrix as a list of rows; vector as a list.
 Json json_rows(const Eigen::MatrixXd& matrix);
@@ -25,4 +25,4 @@ RigidTransform exact_pose_from(JsonReader& reader, const char* key, Range range)
 /// is unknown.
 Json intrinsics_json(const Intrinsics& intrinsics, std::optional<double> pixel_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::geometry

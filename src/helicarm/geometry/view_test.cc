@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::geometry {
 namespace {
 
 /// Points (mm), pose and intrinsics, and the pixels computed by OpenCV 4.6.0: cv2.projectPoints(points, (0.4,
@@ -51,4 +51,4 @@ TEST(RotationFromVector, AgreesWithOpenCv) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::geometry

@@ -6,7 +6,7 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/guidance/propagated_point.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 namespace {
 
 Marker marker_of(Bone bone) { return bone == Bone::femur ? Marker::femur : Marker::tibia; }
@@ -25,8 +25,8 @@ constexpr int present = -1;
 
 /// Information of one ray about the point: the inverse covariance across the ray, in the bone's frame.
 Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eigen::Vector3d& point_in_bone) {
-  const View view = seen_from_bone(dated.view, *calibrator_from(bone, dated.poses));
-  const Eigen::Matrix<double, 2, 3> slope = projection_jacobian(view, point_in_bone);
+  const geometry::View view = seen_from_bone(dated.view, *calibrator_from(bone, dated.poses));
+  const Eigen::Matrix<double, 2, 3> slope = geometry::projection_jacobian(view, point_in_bone);
   return slope.transpose() * slope / (dated.sigma_px * dated.sigma_px);
 }
 
@@ -58,7 +58,8 @@ PropagatedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& r
 
 }  // namespace
 
-View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone) {
+geometry::View seen_from_bone(const geometry::View& view,
+                              const geometry::RigidTransform& calibrator_from_bone) {
   return {view.intrinsics, view.camera_from_world * calibrator_from_bone};
 }
 
@@ -113,4 +114,4 @@ PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise
   return guided;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

@@ -10,11 +10,11 @@
 #include "helicarm/guidance/poses.h"
 #include "helicarm/guidance/propagated_point.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 
 /// A view that shows a point, with the tracked poses at its acquisition.
 struct DatedView {
-  View view;            ///< world = calibrator
+  geometry::View view;  ///< world = calibrator
   Poses poses;          ///< at the acquisition
   double sigma_px = 1;  ///< standard deviation of the pixel per axis: weight of this ray
 };
@@ -45,7 +45,8 @@ struct PointInFrames {
 
 /// The same view in a bone's frame: world = bone. Intersection of such views accounts for bone motion between
 /// acquisitions.
-View seen_from_bone(const View& view, const RigidTransform& calibrator_from_bone);
+geometry::View seen_from_bone(const geometry::View& view,
+                              const geometry::RigidTransform& calibrator_from_bone);
 
 /// Covariance (mm^2) of a bone point's position in the calibrator due to the tracker's noise at one
 /// acquisition. The poses must contain calibrator and bone.
@@ -55,4 +56,4 @@ Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, 
 /// Eq. 16. A point without a bone is taken as fixed in the tracker's frame since the first view.
 PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise);
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

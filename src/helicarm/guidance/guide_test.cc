@@ -7,28 +7,28 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 namespace {
 
-RigidTransform motion(double x, double y, double z, double degrees, const Eigen::Vector3d& axis) {
+geometry::RigidTransform motion(double x, double y, double z, double degrees, const Eigen::Vector3d& axis) {
   return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix(),
           {x, y, z}};
 }
 
-const RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
-const RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
-const RigidTransform tracker_from_tibia = motion(-120, -20, 740, 75, {0, 1, 1});
-const RigidTransform tracker_from_tool = motion(110, -190, 1100, 200, {1, 1, 0});
+const geometry::RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
+const geometry::RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
+const geometry::RigidTransform tracker_from_tibia = motion(-120, -20, 740, 75, {0, 1, 1});
+const geometry::RigidTransform tracker_from_tool = motion(110, -190, 1100, 200, {1, 1, 0});
 
 Poses all_poses() {
   return {tracker_from_calibrator, tracker_from_femur, tracker_from_tibia, tracker_from_tool};
 }
 
-View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
-View lateral() { return {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})}; }
+geometry::View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
+geometry::View lateral() { return {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})}; }
 
 XrayPoint femoral_point(const Poses& first, const Poses& second) {
-  const RigidTransform calibrator_from_femur = *calibrator_from(Bone::femur, first);
+  const geometry::RigidTransform calibrator_from_femur = *calibrator_from(Bone::femur, first);
   return {calibrator_from_femur.inverse() * Eigen::Vector3d(10, -5, 20),
           0.01 * Eigen::Matrix3d::Identity(),
           Bone::femur,
@@ -36,7 +36,7 @@ XrayPoint femoral_point(const Poses& first, const Poses& second) {
 }
 
 TEST(Guide, PointFollowsAMovedFemurToTheTool) {
-  const RigidTransform bend = motion(3, -2, 5, 12, {1, 0, 0});
+  const geometry::RigidTransform bend = motion(3, -2, 5, 12, {1, 0, 0});
   Poses now = all_poses();
   now.tracker_from_femur = *now.tracker_from_femur * bend;
   const XrayPoint point = femoral_point(all_poses(), all_poses());
@@ -90,12 +90,13 @@ TEST(Guide, SharedReadingOfABoneCancelsInTheTool) {
 }
 
 /// Draws one noisy reading from the covariance's noise model.
-RigidTransform noisy(const RigidTransform& pose, const TrackerNoise& noise, RandomStream& stream) {
+geometry::RigidTransform noisy(const geometry::RigidTransform& pose, const TrackerNoise& noise,
+                               RandomStream& stream) {
   const double rad = noise.sigma_deg * std::numbers::pi / 180;
   const Eigen::Vector3d shift{stream.normal(), stream.normal(), stream.normal()};
   const Eigen::Vector3d turn = rad * Eigen::Vector3d{stream.normal(), stream.normal(), stream.normal()};
-  return pose * RigidTransform{Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix(),
-                               noise.sigma_mm * shift};
+  return pose * geometry::RigidTransform{Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix(),
+                                         noise.sigma_mm * shift};
 }
 
 /// Point nearest to two rays, in a bone's frame.
@@ -104,7 +105,8 @@ Eigen::Vector3d meet(const std::vector<DatedView>& views,
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const RigidTransform femur_from_calibrator = calibrator_from(Bone::femur, views[i].poses)->inverse();
+    const geometry::RigidTransform femur_from_calibrator =
+        calibrator_from(Bone::femur, views[i].poses)->inverse();
     const Eigen::Vector3d source = femur_from_calibrator * views[i].view.source_in_world();
     const Eigen::Vector3d through = femur_from_calibrator * true_in_calibrator[i];
     const Eigen::Vector3d ray = (through - source).normalized();
@@ -145,4 +147,4 @@ TEST(Guide, CovarianceAgreesWithMonteCarloReadings) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::guidance

@@ -5,22 +5,22 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 
 enum class Bone { femur, tibia };
 constexpr Bone other_bone(Bone bone) { return bone == Bone::femur ? Bone::tibia : Bone::femur; }
 
 /// Tracker readings at one moment (Fig. 15b): the pose of each marker, absent if it was not visible.
 struct Poses {
-  std::optional<RigidTransform> tracker_from_calibrator;
-  std::optional<RigidTransform> tracker_from_femur;
-  std::optional<RigidTransform> tracker_from_tibia;
-  std::optional<RigidTransform> tracker_from_tool;
+  std::optional<geometry::RigidTransform> tracker_from_calibrator;
+  std::optional<geometry::RigidTransform> tracker_from_femur;
+  std::optional<geometry::RigidTransform> tracker_from_tibia;
+  std::optional<geometry::RigidTransform> tracker_from_tool;
 
-  const std::optional<RigidTransform>& tracker_from(Bone bone) const {
+  const std::optional<geometry::RigidTransform>& tracker_from(Bone bone) const {
     return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
   }
-  std::optional<RigidTransform>& tracker_from(Bone bone) {
+  std::optional<geometry::RigidTransform>& tracker_from(Bone bone) {
     return bone == Bone::femur ? tracker_from_femur : tracker_from_tibia;
   }
 };
@@ -36,6 +36,6 @@ struct TrackerNoise {
 };
 
 /// Pose of a bone in the calibrator at the moment of `poses`; nothing if a marker was not visible.
-std::optional<RigidTransform> calibrator_from(Bone bone, const Poses& poses);
+std::optional<geometry::RigidTransform> calibrator_from(Bone bone, const Poses& poses);
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

@@ -3,7 +3,7 @@
 
 #include <numbers>
 
-namespace helicarm {
+namespace helicarm::guidance {
 namespace {
 
 using Effect = Eigen::Matrix<double, 3, 6>;
@@ -65,14 +65,14 @@ Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const Propagated
   return covariance;
 }
 
-PropagatedPoint enter_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+PropagatedPoint enter_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading) {
   effect_at(point, reading) += effect_of_motion(point.point);
   point.point = tracker_from_marker * point.point;
   return turned(std::move(point), tracker_from_marker.rotation);
 }
 
-PropagatedPoint leave_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+PropagatedPoint leave_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading) {
   point.point = tracker_from_marker.inverse() * point.point;
   point = turned(std::move(point), tracker_from_marker.rotation.transpose());
@@ -80,4 +80,4 @@ PropagatedPoint leave_tracker(PropagatedPoint point, const RigidTransform& track
   return point;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

@@ -8,7 +8,7 @@
 
 #include "helicarm/guidance/poses.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 
 enum class Marker { calibrator, femur, tibia, tool };
 
@@ -32,11 +32,11 @@ Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const Propagated
                                    const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 
 /// From a marker's frame to the tracker's.
-PropagatedPoint enter_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+PropagatedPoint enter_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading);
 
 /// From the tracker's frame to a marker's.
-PropagatedPoint leave_tracker(PropagatedPoint point, const RigidTransform& tracker_from_marker,
+PropagatedPoint leave_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading);
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

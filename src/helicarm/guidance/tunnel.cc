@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::guidance {
 
 std::optional<double> Tunnel::axis_sigma_deg() const {
   if (!axis_covariance) return std::nullopt;
@@ -41,4 +41,4 @@ Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start
   return tunnel;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

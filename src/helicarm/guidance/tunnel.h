@@ -9,7 +9,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/guidance/guide.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 
 /// A planned tunnel from `start` to `end` for the tool.
 struct Tunnel {
@@ -33,4 +33,4 @@ inline constexpr double longest_tunnel_mm = 200;
 Expected<Tunnel> plan_tunnel(const std::string& name, const PointInFrames& start, const PointInFrames& end,
                              const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 
-}  // namespace helicarm
+}  // namespace helicarm::guidance

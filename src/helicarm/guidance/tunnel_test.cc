@@ -8,7 +8,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::guidance {
 namespace {
 
 PointInFrames point_at(double x, bool in_tool) {
@@ -97,4 +97,4 @@ TEST(PlanTunnel, MotionCommonToBothEndsDoesNotTurnTheAxis) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::guidance

@@ -6,7 +6,7 @@
 
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::image {
 
 /// Limits for every image file.
 inline constexpr std::uint32_t max_image_side = 16384;
@@ -18,4 +18,4 @@ struct GreyImage {
   int bits = 8;  ///< 8 or 16
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::image

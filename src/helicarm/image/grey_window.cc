@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::image {
 
 GreyWindow usual_window(const Image<float>& grey_image, float lowest) {
   std::vector<float> values;
@@ -29,4 +29,4 @@ Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window)
   return grey;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::image

@@ -5,7 +5,7 @@
 
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::image {
 
 /// Grey values displayed as black and white.
 struct GreyWindow {
@@ -20,4 +20,4 @@ GreyWindow usual_window(const Image<float>& grey_image, float lowest);
 /// 8-bit image for display: black at the window's low end, white at its high end.
 Image<std::uint8_t> eight_bit(const Image<float>& grey_image, GreyWindow window);
 
-}  // namespace helicarm
+}  // namespace helicarm::image

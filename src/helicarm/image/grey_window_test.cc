@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::image {
 namespace {
 
 TEST(UsualWindow, ClipsHalfAPercentOfTheFieldAndIgnoresItsRim) {
@@ -40,4 +40,4 @@ TEST(EightBit, WindowOfZeroWidthIsAThreshold) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::image

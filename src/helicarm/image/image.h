@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::image {
 
 /// Pixel matrix, row major, without padding. Pixel (0, 0) is the centre of the top-left pixel; u (column) to
 /// the right, v (row) down. A value type: deep copy, cheap move.
@@ -41,4 +41,4 @@ class Image {
   std::vector<T> pixels_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::image

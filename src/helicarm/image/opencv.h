@@ -5,7 +5,7 @@
 
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::image {
 
 /// OpenCV header on the same pixels, without a copy; the image must outlive it.
 template <class T>
@@ -19,4 +19,4 @@ cv::Mat as_mat(const Image<T>& image) {
   return {image.height(), image.width(), cv::DataType<T>::type, const_cast<T*>(image.pixels().data())};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::image

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
-namespace helicarm {
+namespace helicarm::image {
 namespace {
 
 std::string encode(std::uint32_t format, int width, int height, const void* pixels, int stride) {
@@ -150,4 +150,4 @@ Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::image

@@ -9,7 +9,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/image/grey_image.h"
 
-namespace helicarm {
+namespace helicarm::image {
 
 std::string encode_png(const Image<std::uint8_t>& grey);
 std::string encode_png(const Image<std::uint16_t>& grey);
@@ -22,4 +22,4 @@ bool is_png(std::string_view bytes);
 /// (damaged), unsupported (palette, alpha, fewer than 8 bits, true colour). `origin` begins each message.
 Expected<GreyImage> decode_png(std::string_view bytes, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::image

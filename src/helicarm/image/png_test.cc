@@ -6,7 +6,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::image {
 namespace {
 
 template <class T>
@@ -91,4 +91,4 @@ TEST(Png, HugeHeaderIsRefusedBeforeItIsAccepted) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::image

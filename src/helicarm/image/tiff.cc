@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <tiffio.h>
 
-namespace helicarm {
+namespace helicarm::image {
 namespace {
 
 /// The file in memory, as libtiff's I/O callbacks read it.
@@ -157,4 +157,4 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::image

@@ -7,7 +7,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/image/grey_image.h"
 
-namespace helicarm {
+namespace helicarm::image {
 
 bool is_tiff(std::string_view bytes);
 
@@ -19,4 +19,4 @@ Expected<int> count_tiff_pages(std::string_view bytes, const std::string& origin
 /// truncated), unsupported (palette, alpha, tiles, other sample types and compressions, colour).
 Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::image

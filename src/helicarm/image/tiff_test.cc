@@ -10,7 +10,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::image {
 namespace {
 namespace fs = std::filesystem;
 
@@ -111,4 +111,4 @@ TEST(Tiff, FileTruncatedInItsDirectoryHasNoPages) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::image

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::localization {
 
 Statistics statistics_of(std::span<const double> errors) {
   if (errors.empty()) return {};
@@ -19,12 +19,12 @@ Statistics statistics_of(std::span<const double> errors) {
   return s;
 }
 
-Statistics fiducial_localization_error(const CalibrationResult& calibration) {
+Statistics fiducial_localization_error(const calibration::CalibrationResult& calibration) {
   std::vector<double> residuals;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const auto first = residuals.size();
-    for (const Fiducial& f : calibration.fiducials[i])
-      if (f.status == FiducialStatus::used) residuals.push_back(f.residual_px);
+    for (const fiducials::Fiducial& f : calibration.fiducials[i])
+      if (f.status == fiducials::FiducialStatus::used) residuals.push_back(f.residual_px);
     const double rows = 2 * double(residuals.size() - first);
     if (calibration.views[i].dof < 1) {
       residuals.resize(first);
@@ -36,15 +36,15 @@ Statistics fiducial_localization_error(const CalibrationResult& calibration) {
   return statistics_of(residuals);
 }
 
-Statistics fiducial_registration_error(const CalibrationResult& calibration) {
+Statistics fiducial_registration_error(const calibration::CalibrationResult& calibration) {
   std::vector<double> errors;
-  Calibration exact{calibration.views, {}};
-  for (CalibratedView& view : exact.views) view.reprojection_rms_px = 0;
-  for (const Fiducial& ball : calibration.fiducials.front()) {
+  calibration::Calibration exact{calibration.views, {}};
+  for (calibration::CalibratedView& view : exact.views) view.reprojection_rms_px = 0;
+  for (const fiducials::Fiducial& ball : calibration.fiducials.front()) {
     std::vector<PointObservation> observations;
     for (std::size_t i = 0; i < calibration.views.size(); ++i)
-      for (const Fiducial& f : calibration.fiducials[i])
-        if (f.label == ball.label && f.status == FiducialStatus::used)
+      for (const fiducials::Fiducial& f : calibration.fiducials[i])
+        if (f.label == ball.label && f.status == fiducials::FiducialStatus::used)
           observations.push_back({i, f.uv, f.sigma_px * f.sigma_px * Eigen::Matrix2d::Identity()});
     if (const auto located = locate(ball.label, PointSource::target, observations, exact))
       errors.push_back(target_error(*located, ball.centre_in_calibrator));
@@ -56,4 +56,4 @@ double target_error(const LocatedPoint& located, const Eigen::Vector3d& true_poi
   return (located.point_in_anchor - true_point).norm();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

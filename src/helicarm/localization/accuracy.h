@@ -8,7 +8,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/localization/locate.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 struct Statistics {
   double mean = 0;
@@ -22,12 +22,12 @@ Statistics statistics_of(std::span<const double> errors);
 
 /// Eq. 10 without the true pixels: the residuals (px), scaled by the square root of observations over degrees
 /// of freedom.
-Statistics fiducial_localization_error(const CalibrationResult& calibration);
+Statistics fiducial_localization_error(const calibration::CalibrationResult& calibration);
 
 /// Eq. 11: distances (mm) of the fiducials used in two or more views, triangulated, from their coordinates.
-Statistics fiducial_registration_error(const CalibrationResult& calibration);
+Statistics fiducial_registration_error(const calibration::CalibrationResult& calibration);
 
 /// Distance of a located target from its known position, mm: a term of Eq. 12.
 double target_error(const LocatedPoint& located, const Eigen::Vector3d& true_point);
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

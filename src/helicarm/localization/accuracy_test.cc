@@ -9,7 +9,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 namespace {
 
 TEST(StatisticsOf, TwoValues) {
@@ -23,17 +23,17 @@ TEST(StatisticsOf, TwoValues) {
   EXPECT_EQ(statistics_of({}).n, 0);
 }
 
-std::vector<ViewFiducials> observed_balls(double sigma, std::uint64_t trial) {
-  std::vector<ViewFiducials> views;
+std::vector<calibration::ViewFiducials> observed_balls(double sigma, std::uint64_t trial) {
+  std::vector<calibration::ViewFiducials> views;
   RandomStream random(31, 0, trial);
   for (double alpha : {0.0, 1.5}) {
-    const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
-    const View view{{6000, 6000, 512, 512, 0}, {rotation, {0, 0, 800}}};
-    ViewFiducials seen{fmt::format("{}", alpha), {}};
+    const Eigen::Matrix3d rotation = geometry::rotation_from_euler(alpha, 0, 0);
+    const geometry::View view{{6000, 6000, 512, 512, 0}, {rotation, {0, 0, 800}}};
+    calibration::ViewFiducials seen{fmt::format("{}", alpha), {}};
     for (int k = 0; k < 12; ++k) {
       const double t = 0.5 + k * 1.57;
-      Fiducial f{fmt::format("P{}", k), {50 * std::cos(t), 50 * std::sin(t), 4 * t - 40}};
-      f.status = FiducialStatus::used;
+      fiducials::Fiducial f{fmt::format("P{}", k), {50 * std::cos(t), 50 * std::sin(t), 4 * t - 40}};
+      f.status = fiducials::FiducialStatus::used;
       f.sigma_px = sigma;
       f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
       seen.fiducials.push_back(f);
@@ -45,7 +45,7 @@ std::vector<ViewFiducials> observed_balls(double sigma, std::uint64_t trial) {
 
 TEST(FiducialLocalizationError, EqualsTheNoiseForBothMethods) {
   const double sigma = 0.4;
-  for (auto method : {calibrate, calibrate_paper}) {
+  for (auto method : {calibration::calibrate, calibration::calibrate_paper}) {
     double mean = 0, rms2 = 0;
     const int trials = 200;
     for (int trial = 0; trial < trials; ++trial) {
@@ -62,8 +62,8 @@ TEST(FiducialLocalizationError, EqualsTheNoiseForBothMethods) {
 
 TEST(FiducialRegistrationError, BallsUsedInOneViewAreExcluded) {
   auto views = observed_balls(0.4, 0);
-  views[0].fiducials[3].status = FiducialStatus::occluded;
-  const auto result = calibrate(views, {});
+  views[0].fiducials[3].status = fiducials::FiducialStatus::occluded;
+  const auto result = calibration::calibrate(views, {});
   ASSERT_TRUE(result.has_value());
   const Statistics fre = fiducial_registration_error(*result);
   EXPECT_EQ(fre.n, 11);
@@ -72,4 +72,4 @@ TEST(FiducialRegistrationError, BallsUsedInOneViewAreExcluded) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::localization

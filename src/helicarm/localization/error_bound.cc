@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::localization {
 
 double length_at_95(const Eigen::Matrix3d& covariance) {
   constexpr double normal_at_95 = 1.6448536269514722;
@@ -14,4 +14,4 @@ double length_at_95(const Eigen::Matrix3d& covariance) {
   return std::sqrt(mean * std::pow(1 - w + normal_at_95 * std::sqrt(w), 3));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -8,7 +8,7 @@
 
 #include "helicarm/localization/accuracy.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 /// Measured and predicted error of a check target.
 struct TargetError {
@@ -30,4 +30,4 @@ struct Accuracy {
 /// the same mean and variance, Wilson and Hilferty's quantile).
 double length_at_95(const Eigen::Matrix3d& covariance);
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -5,7 +5,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 namespace {
 
 TEST(LengthAt95, OneTwoAndThreeEqualAxes) {
@@ -31,4 +31,4 @@ TEST(LengthAt95, UnequalAxesHoldNinetyFivePercent) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -9,21 +9,22 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/localization/error_bound.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 namespace {
 
 /// d pixels (2n) / d the views' parameters.
 Eigen::MatrixXd images_by_calibration(const Eigen::Vector3d& point_in_anchor,
                                       std::span<const PointObservation> observations,
-                                      const Calibration& calibration) {
+                                      const calibration::Calibration& calibration) {
   const auto n = 2 * Eigen::Index(observations.size());
   const Eigen::Index columns = calibration.joint_covariance.cols();
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(n, columns);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
     const PointObservation& observation = observations[std::size_t(i)];
-    jacobian.block<2, view_parameters>(2 * i, view_parameters * Eigen::Index(observation.view)) =
-        pixel_by_parameters(calibration.views[observation.view].view,
-                            observation.calibrator_from_anchor * point_in_anchor);
+    jacobian.block<2, calibration::view_parameters>(
+        2 * i, calibration::view_parameters * Eigen::Index(observation.view)) =
+        calibration::pixel_by_parameters(calibration.views[observation.view].view,
+                                         observation.calibrator_from_anchor * point_in_anchor);
   }
   return jacobian;
 }
@@ -31,13 +32,13 @@ Eigen::MatrixXd images_by_calibration(const Eigen::Vector3d& point_in_anchor,
 /// Noise of the observations due to the anchors' poses, px^2 (2n x 2n).
 Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
                                  std::span<const PointObservation> observations,
-                                 const Calibration& calibration) {
+                                 const calibration::Calibration& calibration) {
   const auto n = 2 * Eigen::Index(observations.size());
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
     const PointObservation& observation = observations[std::size_t(i)];
-    const auto slope = projection_jacobian(calibration.views[observation.view].view,
-                                           observation.calibrator_from_anchor * point_in_anchor);
+    const auto slope = geometry::projection_jacobian(calibration.views[observation.view].view,
+                                                     observation.calibrator_from_anchor * point_in_anchor);
     noise.block<2, 2>(2 * i, 2 * i) = slope * observation.anchor_covariance * slope.transpose();
   }
   return noise;
@@ -46,13 +47,13 @@ Eigen::MatrixXd noise_of_anchors(const Eigen::Vector3d& point_in_anchor,
 /// Noise of the observations due to motion between the first acquisition and each other one, px^2.
 Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
                                 std::span<const PointObservation> observations,
-                                const Calibration& calibration, double motion_sigma_mm) {
+                                const calibration::Calibration& calibration, double motion_sigma_mm) {
   const auto n = 2 * Eigen::Index(observations.size());
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
   for (Eigen::Index i = 1; 2 * i < n; ++i) {
     const PointObservation& observation = observations[std::size_t(i)];
-    const auto slope = projection_jacobian(calibration.views[observation.view].view,
-                                           observation.calibrator_from_anchor * point_in_anchor);
+    const auto slope = geometry::projection_jacobian(calibration.views[observation.view].view,
+                                                     observation.calibrator_from_anchor * point_in_anchor);
     noise.block<2, 2>(2 * i, 2 * i) = motion_sigma_mm * motion_sigma_mm * slope * slope.transpose();
   }
   return noise;
@@ -61,13 +62,13 @@ Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
 /// Approximation for a calibration without covariance: the residuals at the fiducials, corrected for degrees
 /// of freedom. Imported views have no residuals.
 Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
-                               const Calibration& calibration) {
+                               const calibration::Calibration& calibration) {
   constexpr double least_px = 0.05;  // rounding of a matrix or a pixel in a text file
   const auto n = 2 * Eigen::Index(observations.size());
   Eigen::MatrixXd noise = least_px * least_px * Eigen::MatrixXd::Identity(n, n);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
-    const CalibratedView& view = calibration.views[observations[std::size_t(i)].view];
-    const double share = view.dof > 0 ? (view.dof + view_parameters) / double(view.dof) : 1;
+    const calibration::CalibratedView& view = calibration.views[observations[std::size_t(i)].view];
+    const double share = view.dof > 0 ? (view.dof + calibration::view_parameters) / double(view.dof) : 1;
     const double variance = share * view.reprojection_rms_px * view.reprojection_rms_px / 2;
     noise.block<2, 2>(2 * i, 2 * i) += variance * Eigen::Matrix2d::Identity();
   }
@@ -103,14 +104,14 @@ void bound_by_ray_gap(LocatedPoint& located) {
 double LocatedPoint::predicted_rms_mm() const { return std::sqrt(covariance_in_anchor.trace()); }
 
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
-                              std::span<const PointObservation> observations, const Calibration& calibration,
-                              double motion_sigma_mm) {
-  std::vector<RayObservation> ray_observations;
+                              std::span<const PointObservation> observations,
+                              const calibration::Calibration& calibration, double motion_sigma_mm) {
+  std::vector<geometry::RayObservation> ray_observations;
   LocatedPoint located{.name = name, .source = source, .point_in_anchor = {}, .covariance_in_anchor = {}};
   const auto n = 2 * Eigen::Index(observations.size());
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(n, n);
   for (const PointObservation& observation : observations) {
-    const CalibratedView& seen = calibration.views[observation.view];
+    const calibration::CalibratedView& seen = calibration.views[observation.view];
     const auto at = 2 * Eigen::Index(ray_observations.size());
     noise.block<2, 2>(at, at) = observation.covariance_px2;
     ray_observations.push_back(
@@ -118,18 +119,18 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
          observation.uv});
     located.views.push_back(seen.name);
   }
-  auto found = intersect(ray_observations, noise);
+  auto found = geometry::intersect(ray_observations, noise);
   if (found && motion_sigma_mm > 0)
     noise += noise_of_motion(found->point, observations, calibration, motion_sigma_mm);
   if (found && calibration.joint_covariance.size() > 0) {
     const Eigen::MatrixXd slopes = images_by_calibration(found->point, observations, calibration);
     noise += slopes * calibration.joint_covariance * slopes.transpose();
-    found = intersect(ray_observations, noise);
+    found = geometry::intersect(ray_observations, noise);
     if (found) located.by_calibration = -found->by_pixels * slopes;
   } else if (found) {
     const Eigen::Vector3d point = found->point;  // of Eq. 8: the views' residuals do not weight the rays
     noise += noise_of_views(observations, calibration);
-    found = intersect(ray_observations, noise);
+    found = geometry::intersect(ray_observations, noise);
     if (found && motion_sigma_mm == 0) found->point = point;
   }
   if (!found) return tl::unexpected<Failure>(found.error());
@@ -139,14 +140,14 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   located.chi2 = found->chi2;
   const Eigen::MatrixXd by_anchors = noise_of_anchors(found->point, observations, calibration);
   if (!by_anchors.isZero(0))
-    if (const auto met = intersect(ray_observations, noise + by_anchors)) located.chi2 = met->chi2;
+    if (const auto met = geometry::intersect(ray_observations, noise + by_anchors)) located.chi2 = met->chi2;
   inflate_if_rays_miss(located);
   bound_by_ray_gap(located);
   return located;
 }
 
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
-                            const CalibratedView& first, double motion_sigma_mm) {
+                            const calibration::CalibratedView& first, double motion_sigma_mm) {
   const Eigen::Vector3d direction = (point_in_calibrator - first.view.source_in_world()).normalized();
   return {
       Reason::unobservable_motion,
@@ -165,10 +166,11 @@ Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& poin
 }
 
 Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
-                                             const Calibration& calibration, double motion_sigma_mm) {
+                                             const calibration::Calibration& calibration,
+                                             double motion_sigma_mm) {
   std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
-    const View& view = calibration.views[i].view;
+    const geometry::View& view = calibration.views[i].view;
     if (!(view.depth(point_in_calibrator) > 0))
       return fail(Reason::behind_source,
                   fmt::format("the point lies behind the source of {}", calibration.views[i].name));
@@ -179,4 +181,4 @@ Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_cal
       .map([](const LocatedPoint& point) { return point.covariance_in_anchor; });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -12,14 +12,14 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 /// The observation of a point in one of the calibrated views.
 struct PointObservation {
-  std::size_t view;                            ///< index into the calibration
-  Eigen::Vector2d uv;                          ///< rectified px
-  Eigen::Matrix2d covariance_px2;              ///< zero: exact
-  RigidTransform calibrator_from_anchor = {};  ///< at the acquisition; see LocatedPoint
+  std::size_t view;                                      ///< index into the calibration
+  Eigen::Vector2d uv;                                    ///< rectified px
+  Eigen::Matrix2d covariance_px2;                        ///< zero: exact
+  geometry::RigidTransform calibrator_from_anchor = {};  ///< at the acquisition; see LocatedPoint
   /// Covariance of the point in the calibrator due to `calibrator_from_anchor`, mm^2. Enters chi2 only;
   /// `guide` adds it to the point's covariance.
   Eigen::Matrix3d anchor_covariance = Eigen::Matrix3d::Zero();
@@ -49,17 +49,18 @@ struct LocatedPoint {
 /// If chi2 per degree of freedom exceeds 9 (three standard deviations), the covariance is inflated by it and
 /// `missing_rays` is set. The 95 % length is at least half the ray gap. Refuses as `intersect`.
 Expected<LocatedPoint> locate(const std::string& name, PointSource source,
-                              std::span<const PointObservation> observations, const Calibration& calibration,
-                              double motion_sigma_mm = 0);
+                              std::span<const PointObservation> observations,
+                              const calibration::Calibration& calibration, double motion_sigma_mm = 0);
 
 /// A note: motion between the acquisitions along the first view's ray displaces the located point by the same
 /// amount without a ray gap. The direction is a unit vector in the calibrator's frame.
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
-                            const CalibratedView& first, double motion_sigma_mm);
+                            const calibration::CalibratedView& first, double motion_sigma_mm);
 
 /// Covariance (mm^2) of a point observed in all views with the given noise per axis; the predicted TRE is the
 /// square root of its trace. Refuses as `locate`, and `behind_source`.
 Expected<Eigen::Matrix3d> predict_covariance(const Eigen::Vector3d& point_in_calibrator, double sigma_px,
-                                             const Calibration& calibration, double motion_sigma_mm = 0);
+                                             const calibration::Calibration& calibration,
+                                             double motion_sigma_mm = 0);
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -13,38 +13,38 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/error_bound.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 namespace {
 
-View paper_view(double alpha) {
-  const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
+geometry::View paper_view(double alpha) {
+  const Eigen::Matrix3d rotation = geometry::rotation_from_euler(alpha, 0, 0);
   return {{6000, 6000, 512, 512, 0},
           {rotation, Eigen::Vector3d(0, 0, 800) - rotation * Eigen::Vector3d(0, 0, 40)}};
 }
 
-const std::vector<View> truth{paper_view(0), paper_view(std::numbers::pi / 2)};
+const std::vector<geometry::View> truth{paper_view(0), paper_view(std::numbers::pi / 2)};
 const Eigen::Vector3d target(12, -20, 55);
 
 /// Twelve balls in each view, as in 2.3.3, with the nominal intrinsics as prior.
-Expected<CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
-  std::vector<ViewFiducials> views;
-  for (const View& view : truth) {
-    ViewFiducials seen{fmt::format("V{}", views.size()), {}};
-    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, NormalPrior{1, 0.001}};
+Expected<calibration::CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
+  std::vector<calibration::ViewFiducials> views;
+  for (const geometry::View& view : truth) {
+    calibration::ViewFiducials seen{fmt::format("V{}", views.size()), {}};
+    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, calibration::NormalPrior{1, 0.001}};
     for (int k = 0; k < 12; ++k) {
       const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);
-      Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
-      f.status = FiducialStatus::used;
+      fiducials::Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};
+      f.status = fiducials::FiducialStatus::used;
       f.sigma_px = sigma;
       f.uv = view.project(f.centre_in_calibrator) + sigma * Eigen::Vector2d(random.normal(), random.normal());
       seen.fiducials.push_back(f);
     }
     views.push_back(seen);
   }
-  CalibrationOptions options;
+  calibration::CalibrationOptions options;
   options.rejection_probability = 0;
-  options.common.c_arm.principal = IntrinsicsVariation{1000, 0.7};
-  return calibrate(views, options);
+  options.common.c_arm.principal = calibration::IntrinsicsVariation{1000, 0.7};
+  return calibration::calibrate(views, options);
 }
 
 std::vector<PointObservation> images_of(const Eigen::Vector3d& point, double sigma, RandomStream& random) {
@@ -79,7 +79,7 @@ TEST(Locate, EllipsoidsCoverAtTheirNominalRate) {
   }
 }
 
-Calibration exact_calibration() { return {{{"AP", truth[0], {}}, {"LAT", truth[1], {}}}, {}}; }
+calibration::Calibration exact_calibration() { return {{{"AP", truth[0], {}}, {"LAT", truth[1], {}}}, {}}; }
 
 TEST(Locate, ExactPicksInAnExactCalibration) {
   RandomStream random(22, 0);
@@ -93,7 +93,8 @@ TEST(Locate, PointThatMovesWithABoneIsFoundInTheBone) {
   const Eigen::Vector3d in_bone(3, 4, 5);
   std::vector<PointObservation> observations;
   for (std::size_t i = 0; i < 2; ++i) {
-    const RigidTransform pose{rotation_from_euler(0.1 + 0.2 * double(i), 0.3, 0), {5, 10.0 * double(i), 40}};
+    const geometry::RigidTransform pose{geometry::rotation_from_euler(0.1 + 0.2 * double(i), 0.3, 0),
+                                        {5, 10.0 * double(i), 40}};
     observations.push_back({i, truth[i].project(pose * in_bone), Eigen::Matrix2d::Identity(), pose});
   }
   const auto point = locate("T", PointSource::pick, observations, exact_calibration());
@@ -115,9 +116,10 @@ TEST(Locate, LengthAt95IsNeverBelowHalfTheRayGap) {
   RandomStream random(25, 0);
   const auto calibrated = noisy_calibration(0.05, random);
   ASSERT_TRUE(calibrated.has_value());
-  Calibration paper = exact_calibration();
-  for (CalibratedView& view : paper.views) view.reprojection_rms_px = 0.5;
-  for (const Calibration& calibration : {Calibration(*calibrated), exact_calibration(), paper})
+  calibration::Calibration paper = exact_calibration();
+  for (calibration::CalibratedView& view : paper.views) view.reprojection_rms_px = 0.5;
+  for (const calibration::Calibration& calibration :
+       {calibration::Calibration(*calibrated), exact_calibration(), paper})
     for (const double sigma : {0.0, 0.5, 5.0})
       for (const double off : {0.0, 0.3, 5.0, 150.0}) {
         const auto point = locate("T", PointSource::pick, wrong_images({off, off}, sigma), calibration);
@@ -131,7 +133,8 @@ TEST(Locate, RaysThatMissAreWarnedOfWithAndWithoutCovariance) {
   RandomStream random(25, 0);
   const auto calibrated = noisy_calibration(0.05, random);
   ASSERT_TRUE(calibrated.has_value());
-  for (const Calibration& calibration : {Calibration(*calibrated), exact_calibration()}) {
+  for (const calibration::Calibration& calibration :
+       {calibration::Calibration(*calibrated), exact_calibration()}) {
     const auto wrong = locate("T", PointSource::pick, wrong_images({60, 60}, 0.5), calibration);
     ASSERT_TRUE(wrong && wrong->missing_rays);
     EXPECT_EQ(wrong->missing_rays->reason, Reason::residual_too_large);
@@ -142,7 +145,7 @@ TEST(Locate, RaysThatMissAreWarnedOfWithAndWithoutCovariance) {
 }
 
 TEST(Locate, ResidualsOfAPaperCalibrationChangeOnlyTheCovariance) {
-  Calibration paper = exact_calibration();
+  calibration::Calibration paper = exact_calibration();
   const auto before = locate("T", PointSource::pick, wrong_images({0.4, 0.2}, 0.1), paper);
   paper.views[0].reprojection_rms_px = 0.7;
   paper.views[1].reprojection_rms_px = 0.2;
@@ -153,7 +156,7 @@ TEST(Locate, ResidualsOfAPaperCalibrationChangeOnlyTheCovariance) {
 }
 
 TEST(Locate, MotionAlongTheFirstRayLeavesNoGapAndIsInTheCovariance) {
-  const Calibration calibration = exact_calibration();
+  const calibration::Calibration calibration = exact_calibration();
   const Warning note = unobservable_motion("T", target, calibration.views[0], 0);
   const Eigen::Vector3d along(note.figures.at("direction_x"), note.figures.at("direction_y"),
                               note.figures.at("direction_z"));
@@ -192,4 +195,4 @@ TEST(PredictCovariance, GrowsWithTheDistanceFromTheBalls) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::localization

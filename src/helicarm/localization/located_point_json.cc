@@ -4,7 +4,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/localization/error_bound.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 Json point_json(const std::string& name, PointSource source, Reason reason) {
   Json json;
@@ -21,8 +21,8 @@ Json point_json(const std::string& name, PointSource source, Reason reason) {
 
 Json point_json(const LocatedPoint& point) {
   Json json = point_json(point.name, point.source, Reason::not_seen);
-  json["xyz_mm"] = json_list(point.point_in_anchor);
-  json["covariance_mm2"] = json_rows(point.covariance_in_anchor);
+  json["xyz_mm"] = geometry::json_list(point.point_in_anchor);
+  json["covariance_mm2"] = geometry::json_rows(point.covariance_in_anchor);
   json["ray_gap_mm"] = point.ray_gap_mm;
   json["predicted_mm"] = point.predicted_rms_mm();
   json["error_95_mm"] = length_at_95(point.covariance_in_anchor);
@@ -31,4 +31,4 @@ Json point_json(const LocatedPoint& point) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

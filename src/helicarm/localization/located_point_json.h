@@ -6,7 +6,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/localization/locate.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 /// An element of a result's "points", in the calibrator's frame. Positions in bones and tool are null;
 /// guidance sets them.
@@ -15,4 +15,4 @@ Json point_json(const LocatedPoint& located_in_calibrator);
 /// A point that was not located, with the reason.
 Json point_json(const std::string& name, PointSource source, Reason reason);
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

@@ -9,10 +9,11 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/localization/locate.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
-TreVolume predict_tre(const Calibration& calibration, const Eigen::Vector3d& centre, double half_mm,
-                      double step_mm, double sigma_px, unsigned threads, double motion_sigma_mm) {
+TreVolume predict_tre(const calibration::Calibration& calibration, const Eigen::Vector3d& centre,
+                      double half_mm, double step_mm, double sigma_px, unsigned threads,
+                      double motion_sigma_mm) {
   const int arm = int(std::floor(half_mm / step_mm + 1e-9));
   TreVolume volume{centre - Eigen::Vector3d::Constant(arm * step_mm), step_mm, 2 * arm + 1, {}};
   const auto side = std::size_t(volume.side);
@@ -54,4 +55,4 @@ std::string to_vtk(const TreVolume& volume) {
   return text;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

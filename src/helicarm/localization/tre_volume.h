@@ -10,7 +10,7 @@
 
 #include "helicarm/calibration/calibrated_view.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 
 /// Predicted TRE (rms, mm) on a cubic lattice of points in the calibrator's frame; x is the fastest index.
 /// NaN where no point can be located.
@@ -25,8 +25,9 @@ struct TreVolume {
 };
 
 /// Within `half_mm` of a centre, for points picked with the given noise in every view.
-TreVolume predict_tre(const Calibration& calibration, const Eigen::Vector3d& centre, double half_mm,
-                      double step_mm, double sigma_px, unsigned threads, double motion_sigma_mm = 0);
+TreVolume predict_tre(const calibration::Calibration& calibration, const Eigen::Vector3d& centre,
+                      double half_mm, double step_mm, double sigma_px, unsigned threads,
+                      double motion_sigma_mm = 0);
 
 /// x_mm,y_mm,z_mm,tre_mm: a line for each point; tre_mm is empty where no point can be located.
 std::string to_csv(const TreVolume& volume);
@@ -34,4 +35,4 @@ std::string to_csv(const TreVolume& volume);
 /// Legacy VTK structured points, as text.
 std::string to_vtk(const TreVolume& volume);
 
-}  // namespace helicarm
+}  // namespace helicarm::localization

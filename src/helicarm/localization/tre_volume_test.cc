@@ -9,15 +9,15 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/localization/locate.h"
 
-namespace helicarm {
+namespace helicarm::localization {
 namespace {
 
 /// Two exact views of f / pixel = 6000 px at 800 mm, across each other.
-Calibration exact_pair() {
-  Calibration calibration;
+calibration::Calibration exact_pair() {
+  calibration::Calibration calibration;
   for (const double angle : {0.0, std::numbers::pi / 2}) {
-    CalibratedView view;
-    view.view = {{6000, 6000, 512, 512, 0}, {rotation_from_euler(angle, 0, 0), {0, 0, 800}}};
+    calibration::CalibratedView view;
+    view.view = {{6000, 6000, 512, 512, 0}, {geometry::rotation_from_euler(angle, 0, 0), {0, 0, 800}}};
     calibration.views.push_back(view);
   }
   return calibration;
@@ -53,4 +53,4 @@ TEST(TreVolumeVtk, ContainsEveryPoint) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::localization

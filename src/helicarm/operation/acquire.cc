@@ -9,7 +9,7 @@
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/view_of.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 /// The limit that check_views_apart applies to calibrated views.
@@ -24,12 +24,12 @@ void Operation::notify_once(const std::string& warning) {
   if (reported_.insert(warning).second) notify_(Step::acquire, "warning: " + warning);
 }
 
-double Operation::held_s(const Acquisition& header, double arrival_s) const {
+double Operation::held_s(const xray::Acquisition& header, double arrival_s) const {
   return header.acquired ? delays_.held_s(*header.acquired, arrival_s) : 0;
 }
 
 /// The new image may show that earlier ones were delayed; these must be acquired again.
-void Operation::weigh_delay(const std::string& view, const Acquisition& header, double arrival_s) {
+void Operation::weigh_delay(const std::string& view, const xray::Acquisition& header, double arrival_s) {
   if (!header.acquired)
     return notify_once("the images carry no acquisition time: an image delayed in the C-arm is not detected");
   delays_.learn(*header.acquired, arrival_s);
@@ -55,7 +55,7 @@ void Operation::weigh_delay(const std::string& view, const Acquisition& header, 
     throw BadInput(held_back(view, held));
 }
 
-void Operation::refuse_other_views(const std::string& view, const Acquisition& header) const {
+void Operation::refuse_other_views(const std::string& view, const xray::Acquisition& header) const {
   for (const View& other : views_) {
     if (other.name == view) continue;
     if (header.instance_key == other.acquisition.instance_key)
@@ -65,7 +65,7 @@ void Operation::refuse_other_views(const std::string& view, const Acquisition& h
         differ(header.study_key, other.acquisition.study_key))
       throw BadInput(Reason::patient_mismatch,
                      fmt::format("{} and {} belong to different patients or studies", view, other.name));
-    const auto apart = degrees_apart(header, other.acquisition);
+    const auto apart = xray::degrees_apart(header, other.acquisition);
     if (plan_.views.size() == 2 && apart && *apart < least_apart_deg)
       throw BadInput(
           {Reason::views_too_close,
@@ -78,15 +78,16 @@ void Operation::refuse_other_views(const std::string& view, const Acquisition& h
 }
 
 /// Sets `view` to the view that the image shows.
-Acquisition Operation::acquisition_of(std::string& view, const Arrival& arrival, double arrival_s) {
+xray::Acquisition Operation::acquisition_of(std::string& view, const receiver::Arrival& arrival,
+                                            double arrival_s) {
   if (arrival.repeated)
     throw BadInput(Reason::stale_pose,
                    fmt::format("{}: this image was received before; acquire a new one", view));
-  const Acquisition header = value_or_throw(read_xray_image(arrival.path, view, 1)).acquisition;
+  const xray::Acquisition header = value_or_throw(xray::read_xray_image(arrival.path, view, 1)).acquisition;
   refuse_other_views(view, header);
-  if (const std::string acquired_view = view_of(header, view, views_to_come());
+  if (const std::string acquired_view = xray::view_of(header, view, views_to_come());
       acquired_view != view && std::ranges::none_of(views_, [&](const View& other) {
-        return !degrees_apart(header, other.acquisition);
+        return !xray::degrees_apart(header, other.acquisition);
       })) {
     notify_(Step::acquire, fmt::format("{}: assigned instead of {} by the positioner angle of {:g} degrees",
                                        acquired_view, view, *header.primary_angle_deg));
@@ -96,7 +97,8 @@ Acquisition Operation::acquisition_of(std::string& view, const Arrival& arrival,
   return header;
 }
 
-Expected<void> Operation::take(const std::string& wanted, const Arrival& arrival, double arrival_s) {
+Expected<void> Operation::take(const std::string& wanted, const receiver::Arrival& arrival,
+                               double arrival_s) {
   return guarded([&] {
     if (std::ranges::find(plan_.views, wanted) == plan_.views.end())
       throw BadInput(Reason::bad_value, fmt::format("{}: is not a view of the plan", wanted));
@@ -118,7 +120,7 @@ Expected<void> Operation::take(const std::string& wanted, const Arrival& arrival
                         {"held_s", held_s(*acquisition, arrival_s)},
                         {"window", to_json(window)},
                         {"poses", seen ? to_json(*seen) : Json()}});
-    const Poses poses = value_or_throw(seen);
+    const guidance::Poses poses = value_or_throw(seen);
     for (const PlannedTunnel& tunnel : plan_.tunnels)
       if (!poses.tracker_from(tunnel.bone))
         throw BadInput(Reason::no_pose,
@@ -131,4 +133,4 @@ Expected<void> Operation::take(const std::string& wanted, const Arrival& arrival
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -9,7 +9,7 @@
 #include "helicarm/report/report.h"
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace fs = std::filesystem;
 
 namespace {
@@ -27,11 +27,11 @@ Json image_json(const CaseImage& image) {
           {"poses", without(to_json(image.poses), "tracker_from_tool")}};
 }
 
-Json tool_line_json(const ToolLine& line) {
+Json tool_line_json(const verification::ToolLine& line) {
   return {{"name", line.name},
           {"tunnel", line.tunnel},
-          {"p1_in_calibrator", json_list(line.p1_in_calibrator)},
-          {"p2_in_calibrator", json_list(line.p2_in_calibrator)}};
+          {"p1_in_calibrator", geometry::json_list(line.p1_in_calibrator)},
+          {"p2_in_calibrator", geometry::json_list(line.p2_in_calibrator)}};
 }
 
 bool is_picked(const Json& picks, const std::string& name) {
@@ -50,8 +50,8 @@ std::string brought_along(const std::string& name_or_file, const fs::path& folde
 }  // namespace
 
 Expected<void> write_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                    const std::vector<CaseImage>& images, const Poses& now,
-                                    const std::vector<ToolLine>& tool_lines) {
+                                    const std::vector<CaseImage>& images, const guidance::Poses& now,
+                                    const std::vector<verification::ToolLine>& tool_lines) {
   return guarded([&] {
     Json json = {{"format", "helicarm-case/1"},
                  {"calibrator", brought_along(plan.calibrator, folder)},
@@ -73,30 +73,31 @@ Expected<void> write_operation_case(const fs::path& folder, const OperationPlan&
     for (const PlannedTunnel& tunnel : plan.tunnels)
       if (is_picked(plan.picks, tunnel.start) && is_picked(plan.picks, tunnel.end))
         json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
-    for (const ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
+    for (const verification::ToolLine& line : tool_lines) json["tool_lines"].push_back(tool_line_json(line));
     value_or_throw(write_file(folder / "case.json", to_text(json)));
   });
 }
 
-Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan, CalibrationCache& cache) {
+Expected<CaseRun> recompute_case(const fs::path& folder, const OperationPlan& plan,
+                                 pipeline::CalibrationCache& cache) {
   return guarded([&] {
-    const Case given = value_or_throw(read_case(folder));
-    RunOptions options;
+    const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+    pipeline::RunOptions options;
     options.max_error_mm = plan.max_error_mm;
     CaseRun run{value_or_throw(cache.run(given, options)), {}};
-    run.digest = digest(to_text(without(to_json(run.result), "timing_ms")));
+    run.digest = xray::digest(to_text(without(pipeline::to_json(run.result), "timing_ms")));
     return run;
   });
 }
 
 Expected<CaseRun> run_operation_case(const fs::path& folder, const OperationPlan& plan,
-                                     CalibrationCache& cache) {
+                                     pipeline::CalibrationCache& cache) {
   return guarded([&] {
     CaseRun run = value_or_throw(recompute_case(folder, plan, cache));
-    value_or_throw(write_file(folder / "result.json", to_text(to_json(run.result))));
-    value_or_throw(write_report(run.result, folder));
+    value_or_throw(write_file(folder / "result.json", to_text(pipeline::to_json(run.result))));
+    value_or_throw(report::write_report(run.result, folder));
     return run;
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -7,9 +7,9 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/operation.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
-std::vector<std::string> Operation::checks_to_come(Bone bone) const {
+std::vector<std::string> Operation::checks_to_come(guidance::Bone bone) const {
   std::vector<std::string> names;
   for (const PlannedCheck& check : plan_.check_points)
     if (check.bone == bone && !in_place_.contains(check.name)) names.push_back(check.name);
@@ -26,14 +26,15 @@ Expected<double> Operation::touch(const std::string& name) {
       throw BadInput(Reason::usage, fmt::format("{}: must be touched before the first image", name));
     const PoseWindow window = window_now(board_, plan_.tracker, end_.get_token());
     const Eigen::Vector3d tip = value_or_throw(touched_in_bone(window, plan_.tracker, check->bone));
-    record("touched", {{"check_point", name}, {"window", to_json(window)}, {"in_bone", json_list(tip)}});
+    record("touched",
+           {{"check_point", name}, {"window", to_json(window)}, {"in_bone", geometry::json_list(tip)}});
     if (first == touched_in_bone_.end()) {
       touched_in_bone_[name] = tip;
       return 0;
     }
     in_place_.erase(name);
-    const auto off =
-        check_point_off_mm({first->second, check->limit_mm}, {Eigen::Matrix3d::Identity(), {0, 0, 0}}, tip);
+    const auto off = tracker::check_point_off_mm({first->second, check->limit_mm},
+                                                 {Eigen::Matrix3d::Identity(), {0, 0, 0}}, tip);
     if (!off) {
       Failure moved = off.error();
       moved.message = fmt::format(
@@ -47,4 +48,4 @@ Expected<double> Operation::touch(const std::string& name) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -3,12 +3,12 @@
 
 #include <chrono>
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
-RobotConfig config_of(const RobotPlan& plan, const FreshnessLimits& limits) {
-  RobotConfig config;
-  config.model = value_or_throw(robot_model(plan.model));
+robot::RobotConfig config_of(const RobotPlan& plan, const FreshnessLimits& limits) {
+  robot::RobotConfig config;
+  config.model = value_or_throw(robot::robot_model(plan.model));
   config.address = plan.address;
   config.rtde_port = plan.rtde_port;
   config.dashboard_port = plan.dashboard_port;
@@ -19,31 +19,32 @@ RobotConfig config_of(const RobotPlan& plan, const FreshnessLimits& limits) {
   return config;
 }
 
-PoseBoardOptions board_options(const FreshnessLimits& limits) {
-  PoseBoardOptions options;
+tracker::PoseBoardOptions board_options(const FreshnessLimits& limits) {
+  tracker::PoseBoardOptions options;
   options.max_age_s = options.gate.frozen_s = limits.pose_s;
   return options;
 }
 
 }  // namespace
 
-Connections::Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox,
+Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
                          const FreshnessLimits& limits)
     : inbox_(std::move(inbox)), board_(board_options(limits)), robot_(config_of(plan.robot, limits)) {
-  IgtlClientOptions options;
+  tracker::IgtlClientOptions options;
   options.address = plan.tracker.address;
   options.port = plan.tracker.port;
   options.ask_for_tracking = true;
-  tracker_ = value_or_throw(IgtlClient::start(
-      options, [this](const IgtlMessage& message, double arrival_s) { board_.take(message, arrival_s); },
+  tracker_ = value_or_throw(tracker::IgtlClient::start(
+      options,
+      [this](const tracker::IgtlMessage& message, double arrival_s) { board_.take(message, arrival_s); },
       [this] { board_.forget_time(); }));
 }
 
-Expected<void> Connections::listen(const ReceiverOptions& options) {
-  ReceiverHooks hooks;
-  hooks.arrived = [this](const Arrival& arrival) {
+Expected<void> Connections::listen(const receiver::ReceiverOptions& options) {
+  receiver::ReceiverHooks hooks;
+  hooks.arrived = [this](const receiver::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
-    arrivals_.push_back({arrival, monotonic_seconds()});
+    arrivals_.push_back({arrival, tracker::monotonic_seconds()});
     c_arm_ = {arrivals_.back().time_s, {}};
     broken_before_ = broken();
     news_.notify_all();
@@ -52,8 +53,8 @@ Expected<void> Connections::listen(const ReceiverOptions& options) {
     const std::lock_guard lock(mutex_);
     c_arm_.refused = why;
   };
-  return DicomReceiver::open(options, *inbox_, std::move(hooks))
-      .map([this](std::unique_ptr<DicomReceiver> receiver) {
+  return receiver::DicomReceiver::open(options, *inbox_, std::move(hooks))
+      .map([this](std::unique_ptr<receiver::DicomReceiver> receiver) {
         const std::lock_guard lock(mutex_);
         receiver_ = std::move(receiver);
       });
@@ -61,7 +62,7 @@ Expected<void> Connections::listen(const ReceiverOptions& options) {
 
 std::uint64_t Connections::broken() const {
   if (!receiver_) return 0;
-  const ReceiverCounters& counters = receiver_->counters();
+  const receiver::ReceiverCounters& counters = receiver_->counters();
   return counters.rejected + counters.aborted + counters.timed_out;
 }
 
@@ -81,4 +82,4 @@ std::optional<DatedArrival> Connections::next_image(double patience_s) {
   return arrival;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

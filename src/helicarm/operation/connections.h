@@ -13,11 +13,11 @@
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// An image and its arrival time (monotonic seconds).
 struct DatedArrival {
-  Arrival arrival;
+  receiver::Arrival arrival;
   double time_s;
 };
 
@@ -39,33 +39,34 @@ struct FreshnessLimits {
 class Connections {
  public:
   /// Throws BadInput for invalid addresses.
-  Connections(const OperationPlan& plan, std::unique_ptr<Inbox> inbox, const FreshnessLimits& limits = {});
+  Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
+              const FreshnessLimits& limits = {});
 
   /// Starts receiving images. Refuses as DicomReceiver.
-  Expected<void> listen(const ReceiverOptions& options);
+  Expected<void> listen(const receiver::ReceiverOptions& options);
   std::uint16_t receiver_port() const { return receiver_->port(); }
 
   /// The oldest image not yet taken; empty if none arrives within this time.
   std::optional<DatedArrival> next_image(double patience_s);
 
-  const PoseBoard& board() const { return board_; }
-  RobotLink& robot() { return robot_; }
+  const tracker::PoseBoard& board() const { return board_; }
+  robot::RobotLink& robot() { return robot_; }
   /// State before `listen`: no image received.
   CArmStatus c_arm() const;
 
  private:
   std::uint64_t broken() const;
 
-  std::unique_ptr<Inbox> inbox_;
+  std::unique_ptr<receiver::Inbox> inbox_;
   mutable std::mutex mutex_;
   std::condition_variable news_;
   std::deque<DatedArrival> arrivals_;
   CArmStatus c_arm_;
   std::uint64_t broken_before_ = 0;  ///< connections lost before the last image
-  PoseBoard board_;
-  RobotLink robot_;
-  std::unique_ptr<IgtlClient> tracker_;
-  std::unique_ptr<DicomReceiver> receiver_;
+  tracker::PoseBoard board_;
+  robot::RobotLink robot_;
+  std::unique_ptr<tracker::IgtlClient> tracker_;
+  std::unique_ptr<receiver::DicomReceiver> receiver_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -4,12 +4,13 @@
 
 #include "helicarm/operation/operation.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 /// Retreat along the tool's axis to the stand-off distance; empty if the tool is already there.
-std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTransform& base_from_tcp) {
-  Waypoint back = order.waypoints.front();
+std::optional<robot::Waypoint> back_to_stand_off(const robot::RobotOrder& order,
+                                                 const geometry::RigidTransform& base_from_tcp) {
+  robot::Waypoint back = order.waypoints.front();
   const Eigen::Vector3d axis = base_from_tcp.rotation.col(2);
   const double along_mm = axis.dot(base_from_tcp.translation - back.base_from_tcp.translation);
   constexpr double near_mm = 1;
@@ -22,26 +23,27 @@ std::optional<Waypoint> back_to_stand_off(const RobotOrder& order, const RigidTr
 }  // namespace
 
 /// Before registration the tool's expected pose is unknown.
-Watch Operation::sees_tool() const {
+robot::Watch Operation::sees_tool() const {
   return [this]() -> Expected<void> {
-    return board_.latest(plan_.tracker.tool, monotonic_seconds()).map([](const PoseSample&) {});
+    return board_.latest(plan_.tracker.tool, tracker::monotonic_seconds())
+        .map([](const tracker::PoseSample&) {});
   };
 }
 
-Watch Operation::in_place(PlanWatch watch) const {
+robot::Watch Operation::in_place(PlanWatch watch) const {
   return [this, watch = std::move(watch)] {
-    return watch.in_place(board_, robot_.track(), monotonic_seconds());
+    return watch.in_place(board_, robot_.track(), tracker::monotonic_seconds());
   };
 }
 
 PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& window,
-                              const RobotState& present) const {
+                              const robot::RobotState& present) const {
   const auto see = [&](const std::string& marker) {
     return value_or_throw(see_tool(window, plan_.tracker, marker)).tracker_from_marker;
   };
   const TunnelInBone ends = value_or_throw(tunnel_in_bone(*result_, tunnel));
   const std::string& bone = plan_.tracker.marker_of(tunnel.bone);
-  const RigidTransform from_tcp = marker_from_tcp(*hand_eye_, plan_.robot.tool);
+  const geometry::RigidTransform from_tcp = marker_from_tcp(*hand_eye_, plan_.robot.tool);
   return {window.middle_s,
           bone,
           see(bone),
@@ -51,26 +53,26 @@ PlanBasis Operation::basis_of(const PlannedTunnel& tunnel, const PoseWindow& win
           present.base_from_tcp};
 }
 
-const Operation::Planned& Operation::planned(const RobotOrder& order) const {
+const Operation::Planned& Operation::planned(const robot::RobotOrder& order) const {
   const auto found = planned_.find(order.name);
   if (found == planned_.end())
     throw BadInput(Reason::usage, order.name + ": was not planned in this operation; plan it first");
   return found->second;
 }
 
-Expected<PlanWatch> Operation::plan_watch(const RobotOrder& order) const {
+Expected<PlanWatch> Operation::plan_watch(const robot::RobotOrder& order) const {
   return guarded([&] { return planned(order).watch; });
 }
 
-Expected<void> Operation::check_plan(const RobotOrder& order) {
+Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
   return guarded([&] {
     const Planned& plan = planned(order);
-    if (plan.order != to_text(to_json(order)))
+    if (plan.order != to_text(robot::to_json(order)))
       throw BadInput(
           Reason::plan_stale,
           order.name + ": is not the last plan to this tunnel: confirm the last one or plan again");
     if (plan.stale) throw BadInput(*plan.stale);
-    const auto holds = plan.watch.holds(board_, robot_.track(), monotonic_seconds());
+    const auto holds = plan.watch.holds(board_, robot_.track(), tracker::monotonic_seconds());
     if (!holds && holds.error().reason == Reason::plan_stale) {
       planned_.at(order.name).stale = holds.error();
       in_place_.clear();  // what moved may be a marker on its bone
@@ -80,28 +82,29 @@ Expected<void> Operation::check_plan(const RobotOrder& order) {
   });
 }
 
-Expected<void> Operation::withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm) {
+Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::RobotState& rest,
+                                   const Confirm& confirm) {
   return guarded([&] {
     notify_(Step::navigate, order.name + ": withdraw");
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
     const PoseWindow window = look("withdraw");
-    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
     const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
-    RobotOrder back = order;
+    robot::RobotOrder back = order;
     back.start = present.joints;
-    Waypoint home = order.waypoints.front();
+    robot::Waypoint home = order.waypoints.front();
     home.base_from_tcp = rest.base_from_tcp;
     back.waypoints = {home};
     if (const auto stand_off = back_to_stand_off(order, present.base_from_tcp))
       back.waypoints.insert(back.waypoints.begin(), *stand_off);
     back.corrections.most = 0;
-    back = slowed_for_joints(std::move(back), plan_.robot.approach.limits);
-    record("order", to_json(back));
+    back = robot::slowed_for_joints(std::move(back), plan_.robot.approach.limits);
+    record("order", robot::to_json(back));
     const std::string token = value_or_throw(confirm(back));
-    value_or_throw(watch.holds(board_, robot_.track(), monotonic_seconds()));
+    value_or_throw(watch.holds(board_, robot_.track(), tracker::monotonic_seconds()));
     carry_out(back, token, {}, in_place(watch));
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -8,7 +8,7 @@
 
 #include "helicarm/devices/robot/check_order.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 constexpr double turn_rad = 20 * std::numbers::pi / 180;
@@ -17,7 +17,7 @@ constexpr double tour_acceleration_mm_s2 = 250;
 
 }  // namespace
 
-std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp) {
+std::vector<geometry::RigidTransform> hand_eye_tour(const geometry::RigidTransform& base_from_tcp) {
   constexpr std::array<std::array<double, 3>, 8> corners{{{1, 0, 0.4},
                                                           {-1, 0, -0.4},
                                                           {0, 1, 0.4},
@@ -26,10 +26,10 @@ std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp) {
                                                           {-0.7, 0.7, 0.8},
                                                           {-0.7, -0.7, -0.8},
                                                           {0.7, -0.7, 0.8}}};
-  std::vector<RigidTransform> tour;
+  std::vector<geometry::RigidTransform> tour;
   for (const auto& [x, y, z] : corners) {
     const Eigen::Vector3d turn(x, y, z);
-    const RigidTransform moved{
+    const geometry::RigidTransform moved{
         Eigen::AngleAxisd(turn_rad * turn.norm(), turn.normalized()).toRotationMatrix(),
         shift_mm * Eigen::Vector3d(y, z, x)};
     tour.push_back(base_from_tcp * moved);
@@ -38,8 +38,9 @@ std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp) {
   return tour;
 }
 
-RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const RigidTransform& base_from_tcp) {
-  RobotOrder order;
+robot::RobotOrder tour_order(const RobotPlan& plan, const robot::RobotState& present,
+                             const geometry::RigidTransform& base_from_tcp) {
+  robot::RobotOrder order;
   order.name = "hand-eye";
   order.model = plan.model;
   order.tool = plan.tool;
@@ -48,7 +49,7 @@ RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const Ri
   order.keep_outs = plan.approach.keep_outs;
   order.corrections.tolerance_mm = 0.5;
   order.corrections.tolerance_deg = 0.5;
-  return slowed_for_joints(std::move(order), plan.approach.limits);
+  return robot::slowed_for_joints(std::move(order), plan.approach.limits);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -5,13 +5,14 @@
 
 #include "helicarm/operation/plan.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// Tool poses (base_from_tcp) for hand-eye calibration: rotations in several directions about the present
 /// pose, with small shifts of the tip; the last one is the initial pose.
-std::vector<RigidTransform> hand_eye_tour(const RigidTransform& base_from_tcp);
+std::vector<geometry::RigidTransform> hand_eye_tour(const geometry::RigidTransform& base_from_tcp);
 
 /// The move to one of these poses.
-RobotOrder tour_order(const RobotPlan& plan, const RobotState& present, const RigidTransform& base_from_tcp);
+robot::RobotOrder tour_order(const RobotPlan& plan, const robot::RobotState& present,
+                             const geometry::RigidTransform& base_from_tcp);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

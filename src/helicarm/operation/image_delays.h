@@ -6,7 +6,7 @@
 
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// An image with a longer delay is not dated by its arrival. The acquisition window leaves 0.5 s for the
 /// transfer of the fastest image.
@@ -18,10 +18,10 @@ inline constexpr double longest_held_s = 1;
 class ImageDelays {
  public:
   /// Adds an image that arrived at this time (monotonic seconds).
-  void learn(const AcquisitionTime& acquired, double arrival_s);
+  void learn(const xray::AcquisitionTime& acquired, double arrival_s);
 
   /// Delay relative to the fastest image dated by the same DICOM elements, s. Zero below the clocks' drift.
-  double held_s(const AcquisitionTime& acquired, double arrival_s) const;
+  double held_s(const xray::AcquisitionTime& acquired, double arrival_s) const;
 
  private:
   struct Least {
@@ -31,4 +31,4 @@ class ImageDelays {
   std::map<std::string, Least> least_;  ///< by source of the acquisition time
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

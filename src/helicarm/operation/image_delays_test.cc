@@ -3,13 +3,13 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 /// Reading of the C-arm's clock at our time 0: an offset of years, as between clocks of different epochs.
 constexpr double c_arm_s = 1.7e9;
 
-AcquisitionTime acquired_at(double our_s, const char* source = "Acquisition DateTime") {
+xray::AcquisitionTime acquired_at(double our_s, const char* source = "Acquisition DateTime") {
   return {c_arm_s + our_s, 0.001, source};
 }
 
@@ -46,4 +46,4 @@ TEST(ImageDelays, TimesOfOtherElementsAreNotCompared) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

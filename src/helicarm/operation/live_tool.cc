@@ -8,10 +8,10 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::operation {
 
-LiveTool::LiveTool(const OperationPlan& plan, const Result& result, const std::vector<Poses>& exposures,
-                   const HandEye& hand_eye)
+LiveTool::LiveTool(const OperationPlan& plan, const pipeline::Result& result,
+                   const std::vector<guidance::Poses>& exposures, const tracker::HandEye& hand_eye)
     : tracker_(plan.tracker), marker_from_tip_(marker_from_tcp(hand_eye, plan.robot.tool)) {
   for (std::size_t i = 0; i < exposures.size(); ++i) {
     const auto& calibrated = result.views[i].calibrated;
@@ -22,19 +22,19 @@ LiveTool::LiveTool(const OperationPlan& plan, const Result& result, const std::v
     if (const auto in_bone = tunnel_in_bone(result, tunnel)) tunnels_.emplace(tunnel.name, *in_bone);
 }
 
-LiveTool::Now LiveTool::newest(const PoseBoard& board, Bone bone) const {
-  const double now_s = monotonic_seconds();
-  const PoseSample tool = value_or_throw(board.latest(tracker_.tool, now_s));
-  const PoseSample marker = value_or_throw(board.latest(tracker_.marker_of(bone), now_s));
+LiveTool::Now LiveTool::newest(const tracker::PoseBoard& board, guidance::Bone bone) const {
+  const double now_s = tracker::monotonic_seconds();
+  const tracker::PoseSample tool = value_or_throw(board.latest(tracker_.tool, now_s));
+  const tracker::PoseSample marker = value_or_throw(board.latest(tracker_.marker_of(bone), now_s));
   Now now{{}, now_s - std::min(tool.time_s, marker.time_s)};
   now.poses.tracker_from_tool = tool.tracker_from_tool;
   now.poses.tracker_from(bone) = marker.tracker_from_tool;
-  const auto other = board.latest(tracker_.marker_of(other_bone(bone)), now_s);
-  if (other) now.poses.tracker_from(other_bone(bone)) = other->tracker_from_tool;
+  const auto other = board.latest(tracker_.marker_of(guidance::other_bone(bone)), now_s);
+  if (other) now.poses.tracker_from(guidance::other_bone(bone)) = other->tracker_from_tool;
   return now;
 }
 
-Expected<ToolOverlay> LiveTool::overlay(const PoseBoard& board, Bone bone) const {
+Expected<ToolOverlay> LiveTool::overlay(const tracker::PoseBoard& board, guidance::Bone bone) const {
   return guarded([&] {
     const Now now = newest(board, bone);
     ToolOverlay overlay = value_or_throw(this->overlay(now.poses, bone));
@@ -43,15 +43,16 @@ Expected<ToolOverlay> LiveTool::overlay(const PoseBoard& board, Bone bone) const
   });
 }
 
-Expected<ToolOverlay> LiveTool::overlay(const Poses& now, Bone bone) const {
+Expected<ToolOverlay> LiveTool::overlay(const guidance::Poses& now, guidance::Bone bone) const {
   if (!now.tracker_from_tool || !now.tracker_from(bone))
     return fail(Reason::no_pose, "the marker of the tool or the bone is not visible");
-  const RigidTransform bone_from_tracker = now.tracker_from(bone)->inverse();
+  const geometry::RigidTransform bone_from_tracker = now.tracker_from(bone)->inverse();
   ToolOverlay overlay;
   if (!views_.empty()) {
-    const Poses& then = views_.front().poses;
-    const Bone other = other_bone(bone);
-    const auto placed = calibrator_from(bone, then), other_placed = calibrator_from(other, then);
+    const guidance::Poses& then = views_.front().poses;
+    const guidance::Bone other = guidance::other_bone(bone);
+    const auto placed = guidance::calibrator_from(bone, then),
+               other_placed = guidance::calibrator_from(other, then);
     if (placed)
       overlay.calibrator_from_tip = *placed * bone_from_tracker * *now.tracker_from_tool * marker_from_tip_;
     if (placed && other_placed && now.tracker_from(other))
@@ -61,19 +62,19 @@ Expected<ToolOverlay> LiveTool::overlay(const Poses& now, Bone bone) const {
   for (const Shown& shown : views_) {
     const auto line = tool_line("", bone, shown.poses, now, marker_from_tip_);
     if (!line || !shown.view) continue;
-    if (const auto seen = line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
+    if (const auto seen = verification::line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
   }
   return overlay;
 }
 
-Expected<TunnelAim> LiveTool::aim(const PoseBoard& board, const std::string& name) const {
+Expected<TunnelAim> LiveTool::aim(const tracker::PoseBoard& board, const std::string& name) const {
   return guarded([&] {
     const auto tunnel = tunnels_.find(name);
     if (tunnel == tunnels_.end())
       throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located; check its picks", name));
     const auto& [bone, enter, leave] = tunnel->second;
     const Now now = newest(board, bone);
-    const RigidTransform bone_from_tip =
+    const geometry::RigidTransform bone_from_tip =
         now.poses.tracker_from(bone)->inverse() * *now.poses.tracker_from_tool * marker_from_tip_;
     const Eigen::Vector3d axis = (leave - enter).normalized();
     const Eigen::Vector3d from_entry = bone_from_tip.translation - enter;
@@ -84,4 +85,4 @@ Expected<TunnelAim> LiveTool::aim(const PoseBoard& board, const std::string& nam
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -9,7 +9,7 @@
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/tool_line.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// Position of the tool relative to a tunnel at the bone's present pose.
 struct TunnelAim {
@@ -21,48 +21,48 @@ struct TunnelAim {
 
 /// The tool at the newest poses.
 struct ToolOverlay {
-  std::map<std::string, ImageLine> by_view;  ///< rectified px (Eq. 6)
-  double age_s = 0;                          ///< of the older of the tool's and the bone's pose
+  std::map<std::string, verification::ImageLine> by_view;  ///< rectified px (Eq. 6)
+  double age_s = 0;                                        ///< of the older of the tool's and the bone's pose
   /// At the first view's acquisition, as if the tool had moved with the bone; empty if the bone was not
   /// visible.
-  std::optional<RigidTransform> calibrator_from_tip = {};
+  std::optional<geometry::RigidTransform> calibrator_from_tip = {};
   /// Motion of the other bone relative to this one since then, in the calibrator's frame; empty if it was not
   /// visible then or is not now.
-  std::optional<RigidTransform> other_bone_moved = {};
+  std::optional<geometry::RigidTransform> other_bone_moved = {};
 };
 
 /// Projects the tool into measured X-ray images. A value: any thread may use a copy during the operation.
 class LiveTool {
  public:
   /// `acquisitions`: of each view of the result, in its order.
-  LiveTool(const OperationPlan& plan, const Result& result, const std::vector<Poses>& exposures,
-           const HandEye& hand_eye);
+  LiveTool(const OperationPlan& plan, const pipeline::Result& result,
+           const std::vector<guidance::Poses>& exposures, const tracker::HandEye& hand_eye);
 
   /// The tool's line in each X-ray image, relative to this bone. Refuses no_pose, and stale_pose for a pose
   /// older than 0.1 s.
-  Expected<ToolOverlay> overlay(const PoseBoard& board, Bone bone) const;
+  Expected<ToolOverlay> overlay(const tracker::PoseBoard& board, guidance::Bone bone) const;
   /// As above for recorded poses; the age is 0.
-  Expected<ToolOverlay> overlay(const Poses& now, Bone bone) const;
+  Expected<ToolOverlay> overlay(const guidance::Poses& now, guidance::Bone bone) const;
 
   /// Refuses as `overlay`, and not_seen for a tunnel that is not located.
-  Expected<TunnelAim> aim(const PoseBoard& board, const std::string& tunnel) const;
+  Expected<TunnelAim> aim(const tracker::PoseBoard& board, const std::string& tunnel) const;
 
  private:
   struct Shown {
     std::string name;
-    std::optional<View> view;
-    Poses poses;
+    std::optional<geometry::View> view;
+    guidance::Poses poses;
   };
   struct Now {
-    Poses poses;
+    guidance::Poses poses;
     double age_s;
   };
-  Now newest(const PoseBoard& board, Bone bone) const;
+  Now newest(const tracker::PoseBoard& board, guidance::Bone bone) const;
 
   TrackerPlan tracker_;
-  RigidTransform marker_from_tip_;
+  geometry::RigidTransform marker_from_tip_;
   std::vector<Shown> views_;
   std::map<std::string, TunnelInBone> tunnels_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

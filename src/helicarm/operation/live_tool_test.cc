@@ -6,61 +6,65 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/operation/hand_eye_test.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
 
-const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
-const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
-const RigidTransform tibia_then{rotation_from_euler(0.4, 0.2, 1), {60, -90, 870}};
+const geometry::RigidTransform femur_then{geometry::rotation_from_euler(1, 0, 0), {-50, 0, 880}};
+const geometry::RigidTransform femur_now{geometry::rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
+const geometry::RigidTransform tibia_then{geometry::rotation_from_euler(0.4, 0.2, 1), {60, -90, 870}};
 /// In the femur marker's frame: the tunnel begins at `entry` and extends along z.
 const Vector3d entry(30, 5, -20);
 
 OperationPlan plan() {
   OperationPlan plan;
-  plan.robot.tool = {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2};
-  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::start},
-                  {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
+  plan.robot.tool = {{geometry::rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2};
+  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::start},
+                  {"tibia", guidance::Bone::tibia, "TS", "TE", TunnelEnd::start}};
   return plan;
 }
 
-Result measured() {
-  Result result;
+pipeline::Result measured() {
+  pipeline::Result result;
   for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
-    PointResult point{name, PointSource::pick, Bone::femur, {}, PointInFrames{}, 0, {}};
+    pipeline::PointResult point{
+        name, localization::PointSource::pick, guidance::Bone::femur, {}, guidance::PointInFrames{}, 0, {}};
     point.place->in_femur = at;
     result.points.push_back(point);
   }
-  ViewResult view;
+  pipeline::ViewResult view;
   view.name = "AP";
-  view.calibrated = CalibratedView{.name = "AP", .view = {{4000, 4000, 500, 500}, {}}, .dlt = {}};
+  view.calibrated =
+      calibration::CalibratedView{.name = "AP", .view = {{4000, 4000, 500, 500}, {}}, .dlt = {}};
   view.calibrated->view.camera_from_world.translation = {0, 0, 900};
   result.views.push_back(view);
   return result;
 }
 
-Poses exposure() {
-  Poses poses;
-  poses.tracker_from_calibrator = {rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
+guidance::Poses exposure() {
+  guidance::Poses poses;
+  poses.tracker_from_calibrator = {geometry::rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
   poses.tracker_from_femur = femur_then;
   poses.tracker_from_tibia = tibia_then;
   return poses;
 }
 
-IgtlMessage message(const RigidTransform& femur, const RigidTransform& tool, double now_s) {
-  return {"tracker", stamp_from_seconds(1.7e9 + now_s),
-          IgtlTracking{{{"femur", 1, femur.matrix()}, {"tool", 1, tool.matrix()}}}};
+tracker::IgtlMessage message(const geometry::RigidTransform& femur, const geometry::RigidTransform& tool,
+                             double now_s) {
+  return {"tracker", tracker::stamp_from_seconds(1.7e9 + now_s),
+          tracker::IgtlTracking{{{"femur", 1, femur.matrix()}, {"tool", 1, tool.matrix()}}}};
 }
 
 TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
   const OperationPlan planned = plan();
   const LiveTool live(planned, measured(), {exposure()}, exact_hand_eye());
   // The tip 3 mm beside the axis and 12 mm deep, tilted by 0.2 rad, on a femur that has moved.
-  const RigidTransform femur_from_tip{rotation_from_vector(Vector3d(0.2, 0, 0)), entry + Vector3d(3, 0, 12)};
-  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), planned.robot.tool);
-  PoseBoard board;
-  const double now_s = monotonic_seconds();
+  const geometry::RigidTransform femur_from_tip{geometry::rotation_from_vector(Vector3d(0.2, 0, 0)),
+                                                entry + Vector3d(3, 0, 12)};
+  const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), planned.robot.tool);
+  tracker::PoseBoard board;
+  const double now_s = tracker::monotonic_seconds();
   board.take(message(femur_now, femur_now * femur_from_tip * marker_from_tip.inverse(), now_s), now_s);
   const TunnelAim aim = live.aim(board, "femur").value();
   EXPECT_NEAR(aim.distance_mm, 3, 1e-6);
@@ -68,7 +72,7 @@ TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
   EXPECT_NEAR(aim.angle_deg, 0.2 * 180 / EIGEN_PI, 1e-6);
   EXPECT_NEAR(aim.length_mm, 40, 1e-9);
 
-  const ToolOverlay overlay = live.overlay(board, Bone::femur).value();
+  const ToolOverlay overlay = live.overlay(board, guidance::Bone::femur).value();
   const Vector3d tip =
       exposure().tracker_from_calibrator->inverse() * (femur_then * femur_from_tip.translation);
   EXPECT_LT((overlay.calibrator_from_tip.value().translation - tip).norm(), 1e-6);
@@ -78,30 +82,31 @@ TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
 TEST(LiveTool, ReportsMotionOfTheOtherBoneRelativeToThisOne) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
   // Both bones move together; the tibia also bends relative to the femur.
-  const RigidTransform calibrator_then = *exposure().tracker_from_calibrator;
-  const RigidTransform bent{rotation_from_vector(Vector3d(0, 0.1, 0)), Vector3d(2, -1, 4)};
-  const RigidTransform leg_moved = femur_now * femur_then.inverse();
-  Poses now;
+  const geometry::RigidTransform calibrator_then = *exposure().tracker_from_calibrator;
+  const geometry::RigidTransform bent{geometry::rotation_from_vector(Vector3d(0, 0.1, 0)),
+                                      Vector3d(2, -1, 4)};
+  const geometry::RigidTransform leg_moved = femur_now * femur_then.inverse();
+  guidance::Poses now;
   now.tracker_from_tool = femur_now;
   now.tracker_from_femur = femur_now;
   now.tracker_from_tibia = leg_moved * calibrator_then * bent * calibrator_then.inverse() * tibia_then;
-  const auto moved = live.overlay(now, Bone::femur).value().other_bone_moved;
+  const auto moved = live.overlay(now, guidance::Bone::femur).value().other_bone_moved;
   EXPECT_TRUE(moved.value().matrix().isApprox(bent.matrix(), 1e-9));
   now.tracker_from_tibia.reset();
-  EXPECT_FALSE(live.overlay(now, Bone::femur).value().other_bone_moved);
-  EXPECT_EQ(live.overlay(now, Bone::tibia).error().reason, Reason::no_pose);
+  EXPECT_FALSE(live.overlay(now, guidance::Bone::femur).value().other_bone_moved);
+  EXPECT_EQ(live.overlay(now, guidance::Bone::tibia).error().reason, Reason::no_pose);
 }
 
 TEST(LiveTool, TunnelThatIsNotLocatedIsRefused) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
-  EXPECT_EQ(live.aim(PoseBoard(), "tibia").error().reason, Reason::not_seen);
+  EXPECT_EQ(live.aim(tracker::PoseBoard(), "tibia").error().reason, Reason::not_seen);
 }
 
 TEST(LiveTool, WithoutAPoseIsRefused) {
   const LiveTool live(plan(), measured(), {exposure()}, exact_hand_eye());
-  EXPECT_EQ(live.aim(PoseBoard(), "femur").error().reason, Reason::no_pose);
-  EXPECT_EQ(live.overlay(PoseBoard(), Bone::femur).error().reason, Reason::no_pose);
+  EXPECT_EQ(live.aim(tracker::PoseBoard(), "femur").error().reason, Reason::no_pose);
+  EXPECT_EQ(live.overlay(tracker::PoseBoard(), guidance::Bone::femur).error().reason, Reason::no_pose);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

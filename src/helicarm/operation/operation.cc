@@ -13,7 +13,7 @@
 #include "helicarm/report/overlay.h"
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace fs = std::filesystem;
 
 namespace {
@@ -22,8 +22,8 @@ namespace {
 constexpr double preview_step_mm = 5;
 
 /// A path is planned with the robot base found at registration.
-Expected<void> refuse_moved_base(const HandEye& registered, const PlanBasis& basis, const RobotState& present,
-                                 const PlanLimits& limits) {
+Expected<void> refuse_moved_base(const tracker::HandEye& registered, const PlanBasis& basis,
+                                 const robot::RobotState& present, const PlanLimits& limits) {
   return check_motion(
       "robot base or tool",
       motion_of(present.base_from_tcp.translation, registered.tracker_from_base, basis.tracker_from_base),
@@ -38,14 +38,14 @@ std::string_view name_of(Step step) {
 }
 
 Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const fs::path& folder,
-                                                      const PoseBoard& board, RobotLink& robot,
-                                                      Notify notify) {
+                                                      const tracker::PoseBoard& board,
+                                                      robot::RobotLink& robot, Notify notify) {
   return guarded([&] {
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(notify)));
     std::error_code ec;
     if (fs::create_directories(folder, ec)) fs::permissions(folder, fs::perms::owner_all, ec);
-    operation->log_ = value_or_throw(SessionLog::open(folder / "session.log"));
+    operation->log_ = value_or_throw(session::SessionLog::open(folder / "session.log"));
     if (operation->log_->history().records.size() > 1)
       throw BadInput(Reason::cannot_write,
                      fmt::format("{}: already holds the record of another operation; choose an empty folder",
@@ -73,15 +73,16 @@ PoseWindow Operation::look(const char* why) {
   return window;
 }
 
-void Operation::record_halt(const RobotOrder& order, const Failure& why) {
+void Operation::record_halt(const robot::RobotOrder& order, const Failure& why) {
   record(
       "halted",
       {{"order", order.name}, {"why", code(why.reason)}, {"message", why.message}, {"figures", why.figures}});
 }
 
-std::vector<Miss> Operation::carry_out(const RobotOrder& order, const std::string& token,
-                                       const Measure& measure, const Watch& watch) {
-  record("confirmed", {{"order", order.name}, {"digest", digest(to_text(to_json(order)))}, {"by", who_}});
+std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, const std::string& token,
+                                              const robot::Measure& measure, const robot::Watch& watch) {
+  record("confirmed",
+         {{"order", order.name}, {"digest", xray::digest(to_text(robot::to_json(order)))}, {"by", who_}});
   auto misses = robot_.execute(order, token, measure, watch);
   if (!misses) record_halt(order, misses.error());
   return value_or_throw(std::move(misses));
@@ -91,7 +92,8 @@ Expected<void> Operation::finish() {
   return guarded([&] { record("end", Json::object()); });
 }
 
-Result Operation::run(const Poses& now, const std::vector<ToolLine>& tool_lines) {
+pipeline::Result Operation::run(const guidance::Poses& now,
+                                const std::vector<verification::ToolLine>& tool_lines) {
   newest_.reset();
   const std::string name = fmt::format("case-{}", ++measurements_);
   std::vector<CaseImage> images;
@@ -114,11 +116,11 @@ Expected<void> Operation::measure() {
   });
 }
 
-Expected<std::vector<RobotOrder>> Operation::preview_tour() const {
+Expected<std::vector<robot::RobotOrder>> Operation::preview_tour() const {
   return guarded([&] {
-    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
-    std::vector<RobotOrder> orders;
-    for (const RigidTransform& pose : hand_eye_tour(present.base_from_tcp))
+    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    std::vector<robot::RobotOrder> orders;
+    for (const geometry::RigidTransform& pose : hand_eye_tour(present.base_from_tcp))
       orders.push_back(tour_order(plan_.robot, present, pose));
     return orders;
   });
@@ -127,24 +129,24 @@ Expected<std::vector<RobotOrder>> Operation::preview_tour() const {
 Expected<void> Operation::register_robot(const Confirm& confirm) {
   return guarded([&] {
     notify_(Step::register_robot, "hand-eye calibration");
-    std::vector<HandEyePair> pairs;
-    const RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
-    const std::vector<RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
-    for (const RigidTransform& pose : tour) {
-      const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
-      const RobotOrder order = tour_order(plan_.robot, present, pose);
-      const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = monotonic_seconds()});
-      record("order", to_json(order));
+    std::vector<tracker::HandEyePair> pairs;
+    const robot::RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
+    const std::vector<geometry::RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
+    for (const geometry::RigidTransform& pose : tour) {
+      const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+      const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
+      const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
+      record("order", robot::to_json(order));
       const std::string token = value_or_throw(confirm(order));
-      value_or_throw(age.young(monotonic_seconds()));
+      value_or_throw(age.young(tracker::monotonic_seconds()));
       carry_out(order, token, {}, sees_tool());
       const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
-      const RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
+      const robot::RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
       pairs.push_back(
           {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
       notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
     }
-    hand_eye_ = value_or_throw(calibrate_hand_eye(pairs));
+    hand_eye_ = value_or_throw(tracker::calibrate_hand_eye(pairs));
     record("hand_eye", {{"pairs", to_json(pairs)}, {"found", to_json(*hand_eye_)}});
   });
 }
@@ -156,7 +158,7 @@ const PlannedTunnel& Operation::tunnel_named(const std::string& name) const {
   return *tunnel;
 }
 
-Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
+Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(name);
     if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
@@ -165,31 +167,32 @@ Expected<RobotOrder> Operation::plan_tunnel(const std::string& name) {
     if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
     notify_(Step::plan, name);
     const PoseWindow window = look("plan");
-    const Poses now = value_or_throw(poses_now(window, plan_.tracker));
-    const TunnelAxis axis = axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
-    const RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
+    const robot::TunnelAxis axis =
+        axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
+    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
     const PlanBasis basis = basis_of(tunnel, window, present);
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
-    RobotOrder order =
-        value_or_throw(plan_approach(name, value_or_throw(robot_model(plan_.robot.model)), plan_.robot.tool,
-                                     present.joints, axis, plan_.robot.approach));
+    robot::RobotOrder order =
+        value_or_throw(robot::plan_approach(name, value_or_throw(robot::robot_model(plan_.robot.model)),
+                                            plan_.robot.tool, present.joints, axis, plan_.robot.approach));
     planned_.insert_or_assign(
-        name, Planned{to_text(to_json(order)),
+        name, Planned{to_text(robot::to_json(order)),
                       now.tracker_from(tunnel.bone)->inverse() * hand_eye_->tracker_from_base *
                           order.waypoints.back().base_from_tcp,
                       {plan_.limits, plan_.tracker, basis}});
-    record("order", to_json(order));
+    record("order", robot::to_json(order));
     draw_preview(order);
     return order;
   });
 }
 
-void Operation::draw_preview(const RobotOrder& order) const {
+void Operation::draw_preview(const robot::RobotOrder& order) const {
   const PathPreview path = value_or_throw(preview(order));
   for (std::size_t i = 0; i < views_.size(); ++i)
     if (const auto shown = path.by_view.find(views_[i].name); shown != path.by_view.end())
       value_or_throw(write_file(folder_ / fmt::format("preview-{}-{}.png", order.name, views_[i].name),
-                                overlay_png(*result_, i, shown->second)));
+                                report::overlay_png(*result_, i, shown->second)));
 }
 
 std::map<std::string, fs::path> Operation::images() const {
@@ -198,8 +201,8 @@ std::map<std::string, fs::path> Operation::images() const {
   return images;
 }
 
-std::vector<Poses> Operation::exposures() const {
-  std::vector<Poses> poses;
+std::vector<guidance::Poses> Operation::exposures() const {
+  std::vector<guidance::Poses> poses;
   for (const View& view : views_) poses.push_back(view.poses);
   return poses;
 }
@@ -209,11 +212,11 @@ Expected<LiveTool> Operation::live_tool() const {
   return LiveTool(plan_, *result_, exposures(), *hand_eye_);
 }
 
-Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
+Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
   return guarded([&] {
     PathPreview preview;
     const PlannedTunnel& tunnel = tunnel_named(order.name);
-    const RigidTransform bone_from_base =
+    const geometry::RigidTransform bone_from_base =
         planned_.at(order.name).bone_from_target * order.waypoints.back().base_from_tcp.inverse();
     std::vector<Eigen::Vector3d> tips_in_bone;
     for (std::size_t i = 1; i < order.waypoints.size(); ++i) {
@@ -224,8 +227,8 @@ Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
         tips_in_bone.push_back(bone_from_base * (from + way * step / steps));
     }
     for (const View& view : views_) {
-      const auto shown = std::ranges::find(result_->views, view.name, &ViewResult::name);
-      const auto calibrator_from_bone = calibrator_from(tunnel.bone, view.poses);
+      const auto shown = std::ranges::find(result_->views, view.name, &pipeline::ViewResult::name);
+      const auto calibrator_from_bone = guidance::calibrator_from(tunnel.bone, view.poses);
       if (shown == result_->views.end() || !shown->calibrated || !calibrator_from_bone) continue;
       std::vector<Eigen::Vector2d>& path = preview.by_view[view.name];
       for (const Eigen::Vector3d& tip_in_bone : tips_in_bone) {
@@ -238,14 +241,14 @@ Expected<PathPreview> Operation::preview(const RobotOrder& order) const {
   });
 }
 
-Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string& token) {
+Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std::string& token) {
   return guarded([&] {
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     value_or_throw(check_plan(order));
     Planned& plan = planned_.at(order.name);
     in_place_.clear();
     notify_(Step::navigate, order.name);
-    const Measure measure = [&] {
+    const robot::Measure measure = [&] {
       return guarded([&] {
         return value_or_throw(
             measure_tool(look("correct"), plan_, *hand_eye_, tunnel.bone, plan.bone_from_target));
@@ -263,12 +266,12 @@ Expected<TunnelOutcome> Operation::go(const RobotOrder& order, const std::string
 }
 
 TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
-  const Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
-  const ToolLine line = value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now,
-                                                 marker_from_tcp(*hand_eye_, plan_.robot.tool)));
-  const Result checked = run(now, {line});
+  const guidance::Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
+  const verification::ToolLine line = value_or_throw(tool_line(
+      tunnel.name, tunnel.bone, views_.front().poses, now, marker_from_tcp(*hand_eye_, plan_.robot.tool)));
+  const pipeline::Result checked = run(now, {line});
   const auto end = [&](const std::string& name) {
-    const auto point = std::ranges::find(checked.points, name, &PointResult::name);
+    const auto point = std::ranges::find(checked.points, name, &pipeline::PointResult::name);
     if (point == checked.points.end() || !point->place || !point->place->in_tool)
       throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
     return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, *hand_eye_, plan_.robot.tool);
@@ -280,4 +283,4 @@ TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
   return outcome;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -19,7 +19,7 @@
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// The steps in their order, which the application shows.
 enum class Step { acquire, measure, register_robot, plan, navigate, verify };
@@ -28,10 +28,10 @@ std::string_view name_of(Step step);
 /// Position of a tool relative to its tunnel after the robot's approach.
 struct TunnelOutcome {
   std::string tunnel;
-  std::vector<Miss> loop;  ///< measurements of the closed loop; the last one is within the tolerance
-  EndMiss start;           ///< across the tool's axis, from tracker and X-ray images
+  std::vector<robot::Miss> loop;  ///< measurements of the closed loop; the last one is within the tolerance
+  EndMiss start;                  ///< across the tool's axis, from tracker and X-ray images
   EndMiss end;
-  std::optional<Verification> verification;  ///< Eq. 17 in the X-ray images
+  std::optional<verification::Verification> verification;  ///< Eq. 17 in the X-ray images
 };
 
 /// Path of the tip to a tunnel, for a bone at rest.
@@ -50,8 +50,8 @@ class Operation {
 
   /// Writes session.log and one folder per measurement into `folder`.
   static Expected<std::unique_ptr<Operation>> begin(
-      OperationPlan plan, const std::filesystem::path& folder, const PoseBoard& board, RobotLink& robot,
-      Notify notify = [](Step, const std::string&) {});
+      OperationPlan plan, const std::filesystem::path& folder, const tracker::PoseBoard& board,
+      robot::RobotLink& robot, Notify notify = [](Step, const std::string&) {});
 
   const OperationPlan& plan() const { return plan_; }
   /// Name of the person who confirms orders from now on; goes into the session log.
@@ -69,14 +69,14 @@ class Operation {
   /// required. Refuses as `touched_in_bone`, and a first touch after an image (usage).
   Expected<double> touch(const std::string& check_point);
   /// Check points to touch before this tunnel is planned.
-  std::vector<std::string> checks_to_come(Bone bone) const;
+  std::vector<std::string> checks_to_come(guidance::Bone bone) const;
 
   /// Accepts an image: dates it by its arrival (monotonic seconds) and averages the poses of all markers over
   /// the acquisition window. The positioner angle decides the view, else `view`. Refuses as
   /// `poses_of_exposure`; a tunnel's bone that was not visible (no_pose); an image received before or delayed
   /// in the C-arm, whose poses are unknown (stale_pose); an image of another view (views_too_close) or
   /// another patient (patient_mismatch). An earlier image found to be delayed must be acquired again.
-  Expected<void> take(const std::string& view, const Arrival& arrival, double arrival_s);
+  Expected<void> take(const std::string& view, const receiver::Arrival& arrival, double arrival_s);
 
   /// The accepted images by view.
   std::map<std::string, std::filesystem::path> images() const;
@@ -87,34 +87,34 @@ class Operation {
   /// Rectifies, calibrates, locates; fails with the refusal of the case. The calibration is kept until the
   /// next image.
   Expected<void> measure();
-  const Result& result() const { return *result_; }
+  const pipeline::Result& result() const { return *result_; }
   /// The last measurement, also a refused one.
-  const std::optional<Result>& newest_result() const { return newest_; }
+  const std::optional<pipeline::Result>& newest_result() const { return newest_; }
   /// Number of calibrations.
   int calibrations() const { return cache_.calibrations(); }
   /// Poses at each view's acquisition, in the plan's order.
-  std::vector<Poses> exposures() const;
+  std::vector<guidance::Poses> exposures() const;
 
   /// The moves that `register_robot` would make from the present pose, in order. Nothing moves.
-  Expected<std::vector<RobotOrder>> preview_tour() const;
+  Expected<std::vector<robot::RobotOrder>> preview_tour() const;
   /// Moves the tool through small rotations and estimates the transforms between marker, robot and tracker.
   /// Calls `confirm` for the token of each move.
-  using Confirm = std::function<Expected<std::string>(const RobotOrder&)>;
+  using Confirm = std::function<Expected<std::string>(const robot::RobotOrder&)>;
   Expected<void> register_robot(const Confirm& confirm);
-  const HandEye& hand_eye() const { return *hand_eye_; }
+  const tracker::HandEye& hand_eye() const { return *hand_eye_; }
 
   /// The order that moves the tool to the tunnel, with its preview, also written as preview-TUNNEL-VIEW.png
   /// into the session's folder. Nothing moves. Refuses (usage) a bone whose check points were not touched
   /// since the last order, and (plan_stale) a robot whose base or tool moved since registration.
-  Expected<RobotOrder> plan_tunnel(const std::string& tunnel);
+  Expected<robot::RobotOrder> plan_tunnel(const std::string& tunnel);
   /// Whether this order may be carried out at the newest poses; poll it while the confirmation is open.
   /// Refuses as `PlanWatch::holds`, and (plan_stale) an order that is not the last plan to its tunnel. A plan
   /// once found stale stays stale, and its check points must be touched again.
-  Expected<void> check_plan(const RobotOrder& order);
+  Expected<void> check_plan(const robot::RobotOrder& order);
   /// Performs the same check from any thread, without a record. Refuses (usage) an order that was not
   /// planned.
-  Expected<PlanWatch> plan_watch(const RobotOrder& order) const;
-  Expected<PathPreview> preview(const RobotOrder& order) const;
+  Expected<PlanWatch> plan_watch(const robot::RobotOrder& order) const;
+  Expected<PathPreview> preview(const robot::RobotOrder& order) const;
 
   /// Follows the tool from any thread. Refuses (usage) before measurement and registration.
   Expected<LiveTool> live_tool() const;
@@ -122,11 +122,12 @@ class Operation {
   /// Carries out the confirmed order with corrections by the tracker, and verifies the result in the X-ray
   /// images. Refuses as `check_plan`, which also stops the robot during the move, and (uncertain) an end
   /// point whose predicted error exceeds the plan's limit.
-  Expected<TunnelOutcome> go(const RobotOrder& order, const std::string& token);
+  Expected<TunnelOutcome> go(const robot::RobotOrder& order, const std::string& token);
 
   /// Retreats along the tool's axis to the stand-off distance, then moves to the tool's initial pose
   /// (`rest`). Planned at the present poses, so also after a stop, once a person has unlocked the robot.
-  Expected<void> withdraw(const RobotOrder& order, const RobotState& rest, const Confirm& confirm);
+  Expected<void> withdraw(const robot::RobotOrder& order, const robot::RobotState& rest,
+                          const Confirm& confirm);
 
  private:
   static constexpr std::chrono::seconds robot_patience{5};
@@ -134,20 +135,20 @@ class Operation {
   struct View {
     std::string name;
     std::filesystem::path image;
-    Acquisition acquisition;
+    xray::Acquisition acquisition;
     double arrival_s;
-    Poses poses;
+    guidance::Poses poses;
   };
 
   struct Planned {
     std::string order;  ///< its text, which the confirmation must match
-    RigidTransform bone_from_target;
+    geometry::RigidTransform bone_from_target;
     PlanWatch watch;
     std::optional<Failure> stale = {};  ///< set when first found stale
   };
 
-  Operation(OperationPlan plan, std::filesystem::path folder, const PoseBoard& board, RobotLink& robot,
-            Notify notify)
+  Operation(OperationPlan plan, std::filesystem::path folder, const tracker::PoseBoard& board,
+            robot::RobotLink& robot, Notify notify)
       : plan_(std::move(plan)),
         folder_(std::move(folder)),
         board_(board),
@@ -157,29 +158,30 @@ class Operation {
   const PlannedTunnel& tunnel_named(const std::string& name) const;
   void record(const std::string& kind, Json content);
   PoseWindow look(const char* why);
-  Acquisition acquisition_of(std::string& view, const Arrival& arrival, double arrival_s);
-  void refuse_other_views(const std::string& view, const Acquisition& shown) const;
-  void weigh_delay(const std::string& view, const Acquisition& shown, double arrival_s);
-  double held_s(const Acquisition& shown, double arrival_s) const;
+  xray::Acquisition acquisition_of(std::string& view, const receiver::Arrival& arrival, double arrival_s);
+  void refuse_other_views(const std::string& view, const xray::Acquisition& shown) const;
+  void weigh_delay(const std::string& view, const xray::Acquisition& shown, double arrival_s);
+  double held_s(const xray::Acquisition& shown, double arrival_s) const;
   void notify_once(const std::string& warning);
-  Watch sees_tool() const;
-  Watch in_place(PlanWatch watch) const;
-  PlanBasis basis_of(const PlannedTunnel& tunnel, const PoseWindow& window, const RobotState& present) const;
-  const Planned& planned(const RobotOrder& order) const;
-  void record_halt(const RobotOrder& order, const Failure& why);
-  Result run(const Poses& now, const std::vector<ToolLine>& tool_lines);
-  std::vector<Miss> carry_out(const RobotOrder& order, const std::string& token, const Measure& measure,
-                              const Watch& watch);
+  robot::Watch sees_tool() const;
+  robot::Watch in_place(PlanWatch watch) const;
+  PlanBasis basis_of(const PlannedTunnel& tunnel, const PoseWindow& window,
+                     const robot::RobotState& present) const;
+  const Planned& planned(const robot::RobotOrder& order) const;
+  void record_halt(const robot::RobotOrder& order, const Failure& why);
+  pipeline::Result run(const guidance::Poses& now, const std::vector<verification::ToolLine>& tool_lines);
+  std::vector<robot::Miss> carry_out(const robot::RobotOrder& order, const std::string& token,
+                                     const robot::Measure& measure, const robot::Watch& watch);
   TunnelOutcome check(const PlannedTunnel& tunnel);
-  void draw_preview(const RobotOrder& order) const;
+  void draw_preview(const robot::RobotOrder& order) const;
 
   OperationPlan plan_;
   std::filesystem::path folder_;
-  const PoseBoard& board_;
-  RobotLink& robot_;
+  const tracker::PoseBoard& board_;
+  robot::RobotLink& robot_;
   Notify notify_;
   std::stop_source end_;
-  std::unique_ptr<SessionLog> log_;
+  std::unique_ptr<session::SessionLog> log_;
   std::string who_ = "unknown";
   std::vector<View> views_;
   ImageDelays delays_;
@@ -187,10 +189,10 @@ class Operation {
   std::map<std::string, Eigen::Vector3d> touched_in_bone_;  ///< first touch of each check point
   std::set<std::string> in_place_;                          ///< check points touched since the last order
   int measurements_ = 0;
-  CalibrationCache cache_;
-  std::optional<Result> result_, newest_;
-  std::optional<HandEye> hand_eye_;
+  pipeline::CalibrationCache cache_;
+  std::optional<pipeline::Result> result_, newest_;
+  std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

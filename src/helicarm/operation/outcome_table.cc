@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace helicarm {
+namespace helicarm::operation {
 
 ErrorFigures figures_of(std::span<const double> errors) {
   if (errors.empty()) throw std::invalid_argument("figures_of: no errors");
@@ -31,4 +31,4 @@ Json to_json(const ErrorFigures& figures) {
           {"sd", figures.sd},   {"rms", figures.rms}, {"n", figures.n}};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

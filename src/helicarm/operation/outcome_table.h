@@ -6,7 +6,7 @@
 
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// Statistics of one column of Table 2, mm.
 struct ErrorFigures {
@@ -22,4 +22,4 @@ struct ErrorFigures {
 ErrorFigures figures_of(std::span<const double> errors_mm);
 Json to_json(const ErrorFigures& figures);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

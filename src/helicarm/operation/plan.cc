@@ -9,18 +9,20 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 constexpr const char* plan_format = "helicarm-plan/1";
 constexpr Range millimetres{-100000, 100000};
 
 /// Orthonormalised if written with few digits; otherwise unchanged to the last bit, for replay.
-RigidTransform pose_from(JsonReader& reader, const char* key) {
-  const Eigen::Matrix4d given = matrix_from(reader, key, millimetres);
-  const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
+geometry::RigidTransform pose_from(JsonReader& reader, const char* key) {
+  const Eigen::Matrix4d given = geometry::matrix_from(reader, key, millimetres);
+  const geometry::RigidTransform corrected =
+      value_or_throw(geometry::rigid_transform_from(given, reader.where() + ": " + key));
   constexpr double rounding = 1e-9;
-  return (corrected.matrix() - given).cwiseAbs().maxCoeff() > rounding ? corrected : exact_pose(given);
+  return (corrected.matrix() - given).cwiseAbs().maxCoeff() > rounding ? corrected
+                                                                       : geometry::exact_pose(given);
 }
 
 /// Within the limits that plan_fields.h sets for the key.
@@ -28,7 +30,7 @@ double planned_number(JsonReader& reader, const char* key) {
   return reader.number(key, field_named<OperationPlan>(plan_fields, key).range);
 }
 
-const char* word(Bone bone) { return bone == Bone::femur ? "femur" : "tibia"; }
+const char* word(guidance::Bone bone) { return bone == guidance::Bone::femur ? "femur" : "tibia"; }
 
 std::uint16_t port_from(JsonReader& reader, const char* key) {
   return static_cast<std::uint16_t>(reader.integer(key, 1, 65535));
@@ -54,8 +56,9 @@ Pointer pointer_from(JsonReader reader) {
 }
 
 PlannedCheck check_from(JsonReader& reader) {
-  PlannedCheck check{reader.text("name"), static_cast<Bone>(reader.choice("bone", {"femur", "tibia"})),
-                     reader.optional_number("limit_mm", {0.1, 10}).value_or(CheckPoint{}.limit_mm)};
+  PlannedCheck check{reader.text("name"),
+                     static_cast<guidance::Bone>(reader.choice("bone", {"femur", "tibia"})),
+                     reader.optional_number("limit_mm", {0.1, 10}).value_or(tracker::CheckPoint{}.limit_mm)};
   reader.finish();
   return check;
 }
@@ -69,7 +72,7 @@ TrackerPlan tracker_from(JsonReader reader) {
   tracker.tool = reader.text("tool");
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("facets", true, 16)) {
-    Facet facet{entry.text("name"), pose_from(entry, "calibrator_from_facet")};
+    tracker::Facet facet{entry.text("name"), pose_from(entry, "calibrator_from_facet")};
     take_once(entry, names, facet.name);
     entry.finish();
     tracker.facets.push_back(std::move(facet));
@@ -81,8 +84,8 @@ TrackerPlan tracker_from(JsonReader reader) {
   return tracker;
 }
 
-ApproachOptions approach_from(JsonReader reader) {
-  ApproachOptions approach;
+robot::ApproachOptions approach_from(JsonReader reader) {
+  robot::ApproachOptions approach;
   approach.stand_off_mm = planned_number(reader, "stand_off_mm");
   approach.gap_mm = planned_number(reader, "gap_mm");
   approach.travel_mm_s = planned_number(reader, "travel_mm_s");
@@ -91,7 +94,7 @@ ApproachOptions approach_from(JsonReader reader) {
   approach.corrections.tolerance_mm = planned_number(reader, "tolerance_mm");
   approach.corrections.tolerance_deg = planned_number(reader, "tolerance_deg");
   for (JsonReader& entry : reader.objects("keep_outs", false, 100))
-    approach.keep_outs.push_back(keep_out_from(entry, millimetres));
+    approach.keep_outs.push_back(robot::keep_out_from(entry, millimetres));
   reader.finish();
   return approach;
 }
@@ -99,7 +102,7 @@ ApproachOptions approach_from(JsonReader reader) {
 RobotPlan robot_from(JsonReader reader) {
   RobotPlan robot;
   robot.model = reader.text("model");
-  value_or_throw(robot_model(robot.model));
+  value_or_throw(robot::robot_model(robot.model));
   robot.address = reader.text("address");
   robot.rtde_port = port_from(reader, "rtde_port");
   robot.dashboard_port = port_from(reader, "dashboard_port");
@@ -111,7 +114,8 @@ RobotPlan robot_from(JsonReader reader) {
 }
 
 PlannedTunnel tunnel_from(JsonReader& reader) {
-  PlannedTunnel tunnel{reader.text("name"), static_cast<Bone>(reader.choice("bone", {"femur", "tibia"})),
+  PlannedTunnel tunnel{reader.text("name"),
+                       static_cast<guidance::Bone>(reader.choice("bone", {"femur", "tibia"})),
                        reader.text("start"), reader.text("end"),
                        static_cast<TunnelEnd>(reader.choice("enter_at", {"start", "end"}))};
   check_file_name(reader, "name", tunnel.name);
@@ -134,11 +138,11 @@ std::vector<std::string> views_from(JsonReader& reader) {
   return views;
 }
 
-Json to_json(const TrackerPlan& tracker) {
+Json json_of(const TrackerPlan& tracker) {
   Json facets = Json::array();
-  for (const Facet& facet : tracker.facets)
-    facets.push_back(
-        {{"name", facet.name}, {"calibrator_from_facet", json_rows(facet.calibrator_from_facet.matrix())}});
+  for (const tracker::Facet& facet : tracker.facets)
+    facets.push_back({{"name", facet.name},
+                      {"calibrator_from_facet", geometry::json_rows(facet.calibrator_from_facet.matrix())}});
   return {{"address", tracker.address},
           {"port", tracker.port},
           {"femur", tracker.femur},
@@ -147,21 +151,22 @@ Json to_json(const TrackerPlan& tracker) {
           {"facets", std::move(facets)},
           {"sigma_mm", tracker.sigma_mm},
           {"sigma_deg", tracker.sigma_deg},
-          {"pointer", tracker.pointer ? Json{{"name", tracker.pointer->name},
-                                             {"tip_in_pointer", json_list(tracker.pointer->tip_in_pointer)}}
-                                      : Json()}};
+          {"pointer", tracker.pointer
+                          ? Json{{"name", tracker.pointer->name},
+                                 {"tip_in_pointer", geometry::json_list(tracker.pointer->tip_in_pointer)}}
+                          : Json()}};
 }
 
-Json to_json(const RobotPlan& robot) {
-  const ApproachOptions& approach = robot.approach;
+Json json_of(const RobotPlan& robot) {
+  const robot::ApproachOptions& approach = robot.approach;
   Json keep_outs = Json::array();
-  for (const KeepOut& keep_out : approach.keep_outs) keep_outs.push_back(to_json(keep_out));
+  for (const robot::KeepOut& keep_out : approach.keep_outs) keep_outs.push_back(robot::to_json(keep_out));
   return {{"model", robot.model},
           {"address", robot.address},
           {"rtde_port", robot.rtde_port},
           {"dashboard_port", robot.dashboard_port},
           {"script_port", robot.script_port},
-          {"flange_from_tcp", json_rows(robot.tool.flange_from_tcp.matrix())},
+          {"flange_from_tcp", geometry::json_rows(robot.tool.flange_from_tcp.matrix())},
           {"payload_kg", robot.tool.payload_kg},
           {"approach",
            {{"stand_off_mm", approach.stand_off_mm},
@@ -226,8 +231,8 @@ Json to_json(const OperationPlan& plan) {
           {"calibrator", plan.calibrator},
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
           {"views", plan.views},
-          {"tracker", to_json(plan.tracker)},
-          {"robot", to_json(plan.robot)},
+          {"tracker", json_of(plan.tracker)},
+          {"robot", json_of(plan.robot)},
           {"tunnels", std::move(tunnels)},
           {"check_points", std::move(check_points)},
           {"picks", plan.picks},
@@ -237,4 +242,4 @@ Json to_json(const OperationPlan& plan) {
           {"plan_stale_s", plan.limits.age_s}};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

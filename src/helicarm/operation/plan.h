@@ -12,7 +12,7 @@
 #include "helicarm/devices/tracker/facets.h"
 #include "helicarm/guidance/poses.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// A calibrated pointer (`tracker pivot`).
 struct Pointer {
@@ -24,7 +24,7 @@ struct Pointer {
 /// displaced marker and exchanged markers.
 struct PlannedCheck {
   std::string name;
-  Bone bone;
+  guidance::Bone bone;
   double limit_mm;
 };
 
@@ -35,12 +35,14 @@ struct TrackerPlan {
   std::string femur = "femur";
   std::string tibia = "tibia";
   std::string tool = "tool";
-  std::vector<Facet> facets;  ///< of the calibrator; a single marker is one facet
+  std::vector<tracker::Facet> facets;  ///< of the calibrator; a single marker is one facet
   std::optional<Pointer> pointer;
   double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
   double sigma_deg = 0.05;
 
-  const std::string& marker_of(Bone bone) const { return bone == Bone::femur ? femur : tibia; }
+  const std::string& marker_of(guidance::Bone bone) const {
+    return bone == guidance::Bone::femur ? femur : tibia;
+  }
 };
 
 struct RobotPlan {
@@ -49,15 +51,15 @@ struct RobotPlan {
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
-  RobotTool tool;
-  ApproachOptions approach;
+  robot::RobotTool tool;
+  robot::ApproachOptions approach;
 };
 
 enum class TunnelEnd { start, end };
 
 struct PlannedTunnel {
   std::string name;
-  Bone bone;
+  guidance::Bone bone;
   std::string start;  ///< names of picks
   std::string end;
   TunnelEnd enter_at = TunnelEnd::start;  ///< where the drill enters
@@ -89,4 +91,4 @@ struct OperationPlan {
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin);
 Json to_json(const OperationPlan& plan);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -6,7 +6,7 @@
 #include "helicarm/core/field.h"
 #include "helicarm/operation/plan.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// The plan's numbers that a user may set; the limits of plan.json.
 inline constexpr std::array<Field<OperationPlan>, 13> plan_fields{
@@ -44,47 +44,47 @@ inline constexpr std::array<Field<OperationPlan>, 13> plan_fields{
          .unit = "deg",
          .range = {0, 10},
          .help = "Error of a tracker rotation averaged over 1 s, per axis"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::stand_off_mm>(
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::stand_off_mm>(
         {.name = "stand_off_mm",
          .label = "Stand-off",
          .unit = "mm",
          .range = {1, 500},
          .help = "Distance before the tunnel's start at which the tip reaches its axis"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::gap_mm>(
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::gap_mm>(
         {.name = "gap_mm",
          .label = "Gap before the tunnel",
          .unit = "mm",
          .range = {-200, 500},
          .help = "Distance before the tunnel's start at which the tip stops; negative: inside the tunnel"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::travel_mm_s>(
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::travel_mm_s>(
         {.name = "travel_mm_s",
          .label = "Travel speed",
          .unit = "mm/s",
          .range = {0.1, 250},
          .help = "Speed to the stand-off point"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::approach_mm_s>(
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::approach_mm_s>(
         {.name = "approach_mm_s",
          .label = "Approach speed",
          .unit = "mm/s",
          .range = {0.1, 250},
          .help = "Speed along the tunnel's axis"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::corrections, &Corrections::most>(
-        {.name = "corrections",
-         .label = "Corrections",
-         .range = {0, 20},
-         .step = 1,
-         .help = "Maximum number of corrections by the tracker"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::corrections,
-          &Corrections::tolerance_mm>({.name = "tolerance_mm",
-                                       .label = "Position tolerance",
-                                       .unit = "mm",
-                                       .range = {0.01, 10},
-                                       .help = "Greatest position error of the tool at its target"}),
-    bound<&OperationPlan::robot, &RobotPlan::approach, &ApproachOptions::corrections,
-          &Corrections::tolerance_deg>({.name = "tolerance_deg",
-                                        .label = "Rotation tolerance",
-                                        .unit = "deg",
-                                        .range = {0.01, 10},
-                                        .help = "Greatest rotation error of the tool at its target"})};
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::corrections,
+          &robot::Corrections::most>({.name = "corrections",
+                                      .label = "Corrections",
+                                      .range = {0, 20},
+                                      .step = 1,
+                                      .help = "Maximum number of corrections by the tracker"}),
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::corrections,
+          &robot::Corrections::tolerance_mm>({.name = "tolerance_mm",
+                                              .label = "Position tolerance",
+                                              .unit = "mm",
+                                              .range = {0.01, 10},
+                                              .help = "Greatest position error of the tool at its target"}),
+    bound<&OperationPlan::robot, &RobotPlan::approach, &robot::ApproachOptions::corrections,
+          &robot::Corrections::tolerance_deg>({.name = "tolerance_deg",
+                                               .label = "Rotation tolerance",
+                                               .unit = "deg",
+                                               .range = {0.01, 10},
+                                               .help = "Greatest rotation error of the tool at its target"})};
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -6,7 +6,7 @@
 #include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/pipeline/run_fields.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 template <class Options, std::size_t count>
@@ -28,9 +28,9 @@ void expect_sound(const std::array<Field<Options>, count>& fields) {
 
 TEST(Fields, DefaultsLieWithinTheLimits) {
   expect_sound(plan_fields);
-  expect_sound(run_fields);
-  expect_sound(receiver_fields);
+  expect_sound(pipeline::run_fields);
+  expect_sound(receiver::receiver_fields);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

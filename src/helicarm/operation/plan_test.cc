@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 OperationPlan plan() {
@@ -11,7 +11,7 @@ OperationPlan plan() {
   plan.tracker.facets = {{"calibrator/1", {Eigen::Matrix3d::Identity(), {85, 0, 10}}}};
   plan.robot.tool = {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2};
   plan.robot.approach.keep_outs = {{{0, 0, -200}, Eigen::Vector3d::UnitZ()}};
-  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end}};
+  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::end}};
   plan.max_error_mm = 2;
   return plan;
 }
@@ -76,4 +76,4 @@ TEST(Plan, FacetThatIsNotARigidMotionIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

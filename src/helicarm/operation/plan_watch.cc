@@ -9,7 +9,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
@@ -23,10 +23,11 @@ constexpr double lever_mm = 200;
 constexpr double deg_per_rad = 180 / std::numbers::pi;
 
 /// Displacement of the point (mm), then rotation vector (rad), both in the common frame.
-Vector6d step_of(const Vector3d& point, const RigidTransform& from, const RigidTransform& to) {
+Vector6d step_of(const Vector3d& point, const geometry::RigidTransform& from,
+                 const geometry::RigidTransform& to) {
   Vector6d step;
   step.head<3>() = to * point - from * point;
-  step.tail<3>() = vector_from_rotation(to.rotation * from.rotation.transpose());
+  step.tail<3>() = geometry::vector_from_rotation(to.rotation * from.rotation.transpose());
   return step;
 }
 
@@ -43,11 +44,12 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
   return median;
 }
 
-std::vector<PoseSample> recent(const PoseBoard& board, const std::string& name, double now_s) {
+std::vector<tracker::PoseSample> recent(const tracker::PoseBoard& board, const std::string& name,
+                                        double now_s) {
   if (const auto elsewhere = board.elsewhere(name, now_s, recent_s)) return {*elsewhere};
   value_or_throw(board.latest(name, now_s, recent_s));
   // A sample may arrive after `now`.
-  std::vector<PoseSample> samples =
+  std::vector<tracker::PoseSample> samples =
       board.between(name, now_s - recent_s, std::numeric_limits<double>::infinity());
   if (samples.size() > most_samples) samples.erase(samples.begin(), samples.end() - most_samples);
   return samples;
@@ -72,7 +74,8 @@ Vector6d least_of(const std::vector<Vector6d>& steps) {
 
 }  // namespace
 
-Motion motion_of(const Vector3d& point, const RigidTransform& from, const RigidTransform& to) {
+Motion motion_of(const Vector3d& point, const geometry::RigidTransform& from,
+                 const geometry::RigidTransform& to) {
   return size_of(step_of(point, from, to));
 }
 
@@ -98,13 +101,13 @@ Expected<void> PlanWatch::young(double now_s) const {
               {{"age_s", age_s}, {"limit_s", limits_.age_s}});
 }
 
-Expected<Motion> PlanWatch::bone_motion(const PoseBoard& board, double now_s) const {
+Expected<Motion> PlanWatch::bone_motion(const tracker::PoseBoard& board, double now_s) const {
   return guarded([&] {
-    const std::vector<PoseSample> samples = recent(board, basis_.bone, now_s);
+    const std::vector<tracker::PoseSample> samples = recent(board, basis_.bone, now_s);
     Motion most;
     for (const Vector3d& point : basis_.points_in_bone) {
       std::vector<Vector6d> steps;
-      for (const PoseSample& sample : samples)
+      for (const tracker::PoseSample& sample : samples)
         steps.push_back(step_of(point, basis_.tracker_from_bone, sample.tracker_from_tool));
       const Motion motion = size_of(median_of(steps));
       most = {std::max(most.distance_mm, motion.distance_mm), motion.turn_deg};
@@ -113,14 +116,16 @@ Expected<Motion> PlanWatch::bone_motion(const PoseBoard& board, double now_s) co
   });
 }
 
-Expected<Motion> PlanWatch::base_motion(const PoseBoard& board, const ToolTrack& track, double now_s) const {
+Expected<Motion> PlanWatch::base_motion(const tracker::PoseBoard& board, const robot::ToolTrack& track,
+                                        double now_s) const {
   return guarded([&] {
-    const std::vector<PoseSample> samples = recent(board, tool_, now_s);
+    const std::vector<tracker::PoseSample> samples = recent(board, tool_, now_s);
     std::vector<Vector6d> steps;
-    for (const PoseSample& sample : samples) {
-      const RigidTransform seen = sample.tracker_from_tool * basis_.marker_from_tcp;
+    for (const tracker::PoseSample& sample : samples) {
+      const geometry::RigidTransform seen = sample.tracker_from_tool * basis_.marker_from_tcp;
       std::vector<Vector6d> to_path;
-      for (const TimedToolPose& pose : track.between(sample.time_s - recent_s, sample.time_s + recent_s))
+      for (const robot::TimedToolPose& pose :
+           track.between(sample.time_s - recent_s, sample.time_s + recent_s))
         to_path.push_back(step_of(Vector3d::Zero(), basis_.tracker_from_base * pose.base_from_tcp, seen));
       if (!to_path.empty()) steps.push_back(least_of(to_path));
     }
@@ -130,13 +135,14 @@ Expected<Motion> PlanWatch::base_motion(const PoseBoard& board, const ToolTrack&
   });
 }
 
-Expected<Motion> PlanWatch::travelled(const ToolTrack& track, double now_s) const {
+Expected<Motion> PlanWatch::travelled(const robot::ToolTrack& track, double now_s) const {
   const auto poses = track.between(now_s - recent_s, std::numeric_limits<double>::infinity());
   if (poses.empty()) return fail(Reason::stale_state, "no recent robot poses");
   return motion_of(Vector3d::Zero(), basis_.base_from_tcp, poses.back().base_from_tcp);
 }
 
-Expected<void> PlanWatch::in_place(const PoseBoard& board, const ToolTrack& track, double now_s) const {
+Expected<void> PlanWatch::in_place(const tracker::PoseBoard& board, const robot::ToolTrack& track,
+                                   double now_s) const {
   return guarded([&] {
     value_or_throw(check_motion(basis_.bone, value_or_throw(bone_motion(board, now_s)), limits_));
     value_or_throw(check_motion("robot base or tool", value_or_throw(base_motion(board, track, now_s)),
@@ -144,11 +150,12 @@ Expected<void> PlanWatch::in_place(const PoseBoard& board, const ToolTrack& trac
   });
 }
 
-Expected<void> PlanWatch::holds(const PoseBoard& board, const ToolTrack& track, double now_s) const {
+Expected<void> PlanWatch::holds(const tracker::PoseBoard& board, const robot::ToolTrack& track,
+                                double now_s) const {
   return guarded([&] {
     value_or_throw(young(now_s));
     value_or_throw(in_place(board, track, now_s));
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -8,7 +8,7 @@
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// Size of a motion.
 struct Motion {
@@ -20,11 +20,11 @@ struct Motion {
 struct PlanBasis {
   double time_s = 0;      ///< monotonic; middle of the averaging window
   std::string bone = {};  ///< its marker
-  RigidTransform tracker_from_bone = {};
+  geometry::RigidTransform tracker_from_bone = {};
   std::vector<Eigen::Vector3d> points_in_bone = {};  ///< mm; its motion is evaluated here: the tunnel's ends
-  RigidTransform marker_from_tcp = {};               ///< of the tool, by hand-eye calibration
-  RigidTransform tracker_from_base = {};             ///< from the tool's poses by tracker and robot
-  RigidTransform base_from_tcp = {};                 ///< by the robot, at planning
+  geometry::RigidTransform marker_from_tcp = {};     ///< of the tool, by hand-eye calibration
+  geometry::RigidTransform tracker_from_base = {};   ///< from the tool's poses by tracker and robot
+  geometry::RigidTransform base_from_tcp = {};       ///< by the robot, at planning
 };
 
 /// Limits of robot base and tool after the tool's motion since planning. Deviations of the real arm from its
@@ -37,14 +37,15 @@ inline PlanLimits widened(PlanLimits limits, const Motion& travelled) {
 }
 
 /// Pose of the robot's base in the tracker frame, from one tool pose.
-inline RigidTransform base_by_tool(const RigidTransform& tracker_from_marker,
-                                   const RigidTransform& marker_from_tcp,
-                                   const RigidTransform& base_from_tcp) {
+inline geometry::RigidTransform base_by_tool(const geometry::RigidTransform& tracker_from_marker,
+                                             const geometry::RigidTransform& marker_from_tcp,
+                                             const geometry::RigidTransform& base_from_tcp) {
   return tracker_from_marker * marker_from_tcp * base_from_tcp.inverse();
 }
 
 /// Motion of this point of a body between two poses.
-Motion motion_of(const Eigen::Vector3d& point, const RigidTransform& from, const RigidTransform& to);
+Motion motion_of(const Eigen::Vector3d& point, const geometry::RigidTransform& from,
+                 const geometry::RigidTransform& to);
 
 /// Above the limits: plan_stale with the values and the name of what moved. `since` and `then` are parts of
 /// the message.
@@ -65,20 +66,21 @@ class PlanWatch {
   /// plan_stale if the bone moved at one of its points, or if the tool's tracked pose deviates from the
   /// robot's: motion of the robot base, the tool in its mount or the tracker. Also fails as `bone_motion` and
   /// `base_motion`.
-  Expected<void> in_place(const PoseBoard& board, const ToolTrack& track, double now_s) const;
+  Expected<void> in_place(const tracker::PoseBoard& board, const robot::ToolTrack& track, double now_s) const;
 
   /// Both checks.
-  Expected<void> holds(const PoseBoard& board, const ToolTrack& track, double now_s) const;
+  Expected<void> holds(const tracker::PoseBoard& board, const robot::ToolTrack& track, double now_s) const;
 
   /// Since planning, at the point that moved most. Fails as `PoseBoard::latest`.
-  Expected<Motion> bone_motion(const PoseBoard& board, double now_s) const;
+  Expected<Motion> bone_motion(const tracker::PoseBoard& board, double now_s) const;
   /// Deviation of the tool's tracked pose from the robot's, as a motion of the base. During a move the
   /// nearest of the robot's poses within 0.1 s counts, because the delays of both devices are unknown; a
   /// motion of the base along the path is therefore detected only when the tool slows down. Also fails with
   /// stale_state without robot poses of that time.
-  Expected<Motion> base_motion(const PoseBoard& board, const ToolTrack& track, double now_s) const;
+  Expected<Motion> base_motion(const tracker::PoseBoard& board, const robot::ToolTrack& track,
+                               double now_s) const;
   /// Motion of the tool since planning, by the robot. Fails with stale_state without recent robot poses.
-  Expected<Motion> travelled(const ToolTrack& track, double now_s) const;
+  Expected<Motion> travelled(const robot::ToolTrack& track, double now_s) const;
 
  private:
   PlanLimits limits_;
@@ -86,4 +88,4 @@ class PlanWatch {
   PlanBasis basis_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

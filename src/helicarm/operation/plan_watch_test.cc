@@ -13,7 +13,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/operation/hand_eye_test.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
@@ -23,10 +23,12 @@ constexpr double rad = std::numbers::pi / 180;
 constexpr double period_s = 0.008;  ///< state period of a CB3
 constexpr const char* base_or_tool = "robot base or tool moved";
 
-RigidTransform shift(double x, double y, double z) { return {Eigen::Matrix3d::Identity(), {x, y, z}}; }
+geometry::RigidTransform shift(double x, double y, double z) {
+  return {Eigen::Matrix3d::Identity(), {x, y, z}};
+}
 
-RigidTransform turn_about(const Vector3d& point, const Vector3d& turn) {
-  const Eigen::Matrix3d rotation = rotation_from_vector(turn);
+geometry::RigidTransform turn_about(const Vector3d& point, const Vector3d& turn) {
+  const Eigen::Matrix3d rotation = geometry::rotation_from_vector(turn);
   return {rotation, point - rotation * point};
 }
 
@@ -41,26 +43,31 @@ struct Outcome {
 /// Robot, tracker and bone on one virtual clock. Motions are along the tracker's axes, functions of the time
 /// since the order began.
 struct Scene {
-  using Moves = std::function<RigidTransform(double)>;
+  using Moves = std::function<geometry::RigidTransform(double)>;
 
   explicit Scene(double rate_hz = 60, std::uint64_t seed = 1)
-      : tracker_period_s(1 / rate_hz), random(seed, 0), robot(ur5(), drill(), resting_joints()) {
-    const TunnelAxis tunnel = knee_tunnel();
+      : tracker_period_s(1 / rate_hz),
+        random(seed, 0),
+        robot(robot::ur5(), robot::drill(), robot::resting_joints()) {
+    const robot::TunnelAxis tunnel = robot::knee_tunnel();
     const Vector3d start = hand_eye.tracker_from_base * tunnel.start_in_base;
-    tracker_from_femur = {rotation_from_euler(0.4, -0.3, 1.2), start + Vector3d(70, -60, 80)};
+    tracker_from_femur = {geometry::rotation_from_euler(0.4, -0.3, 1.2), start + Vector3d(70, -60, 80)};
     for (const Vector3d& end : {tunnel.start_in_base, tunnel.end_in_base})
       points_in_femur.push_back(tracker_from_femur.inverse() * (hand_eye.tracker_from_base * end));
     for (int i = 0; i < 100; ++i) step();  // the gate accepts both markers
   }
 
   PlanWatch watch() const {
-    const RigidTransform from_tcp = hand_eye.flange_from_marker.inverse() * drill().flange_from_tcp;
+    const geometry::RigidTransform from_tcp =
+        hand_eye.flange_from_marker.inverse() * robot::drill().flange_from_tcp;
     return {PlanLimits(), TrackerPlan(),
             PlanBasis{time_s, "femur", tracker_from_femur, points_in_femur, from_tcp,
                       hand_eye.tracker_from_base, robot.state().base_from_tcp}};
   }
 
-  RigidTransform tip() const { return base_moves * hand_eye.tracker_from_base * robot.state().base_from_tcp; }
+  geometry::RigidTransform tip() const {
+    return base_moves * hand_eye.tracker_from_base * robot.state().base_from_tcp;
+  }
   double moved_mm() const {
     double most = 0;
     for (const Vector3d& point : points_in_femur) {
@@ -71,17 +78,19 @@ struct Scene {
                     ((base_moves * tool_moves).inverse() * tip().translation - tip().translation).norm());
   }
   bool astray() const {
-    const auto turn = [](const RigidTransform& moves) { return vector_from_rotation(moves.rotation).norm(); };
+    const auto turn = [](const geometry::RigidTransform& moves) {
+      return geometry::vector_from_rotation(moves.rotation).norm();
+    };
     const PlanLimits limits;
     return moved_mm() > limits.distance_mm ||
            std::max({turn(femur_moves), turn(base_moves), turn(tool_moves)}) > limits.turn_deg * rad;
   }
 
-  RigidTransform seen(const RigidTransform& truth) {
+  geometry::RigidTransform seen(const geometry::RigidTransform& truth) {
     const auto noise = [&](double sigma) {
       return Vector3d(sigma * Vector3d(random.normal(), random.normal(), random.normal()));
     };
-    return {rotation_from_vector(noise(sigma_deg * rad)) * truth.rotation,
+    return {geometry::rotation_from_vector(noise(sigma_deg * rad)) * truth.rotation,
             truth.translation + noise(sigma_mm)};
   }
 
@@ -92,22 +101,22 @@ struct Scene {
     if (time_s < next_sample_s) return;
     next_sample_s += tracker_period_s;
     // A slip of the tool in its mount moves the marker as a base motion would.
-    const RigidTransform marker = base_moves * tool_moves * hand_eye.tracker_from_base *
-                                  robot.state().base_from_tcp * drill().flange_from_tcp.inverse() *
-                                  hand_eye.flange_from_marker;
-    const RigidTransform femur = femur_moves * tracker_from_femur;
-    board.take({"tracker", stamp_from_seconds(1.7e9 + time_s),
-                IgtlTracking{{{"femur", 1, seen(taken_for_femur.value_or(femur)).matrix()},
-                              {"tool", 1, seen(marker).matrix()}}}},
+    const geometry::RigidTransform marker =
+        base_moves * tool_moves * hand_eye.tracker_from_base * robot.state().base_from_tcp *
+        robot::drill().flange_from_tcp.inverse() * hand_eye.flange_from_marker;
+    const geometry::RigidTransform femur = femur_moves * tracker_from_femur;
+    board.take({"tracker", tracker::stamp_from_seconds(1.7e9 + time_s),
+                tracker::IgtlTracking{{{"femur", 1, seen(taken_for_femur.value_or(femur)).matrix()},
+                                       {"tool", 1, seen(marker).matrix()}}}},
                time_s + delay_s);
   }
 
   /// Until the order is stopped or done.
-  Outcome carry_out(const RobotOrder& order, const Moves& femur, const Moves& base = {},
+  Outcome carry_out(const robot::RobotOrder& order, const Moves& femur, const Moves& base = {},
                     const Moves& tool = {}) {
     const PlanWatch plan = watch();
-    constexpr OrderNumber number{7, 1};
-    robot.run_script(script_of(order, ur5(), number));
+    constexpr robot::OrderNumber number{7, 1};
+    robot.run_script(robot::script_of(order, robot::ur5(), number));
     const double begun_s = time_s;
     Outcome outcome;
     std::optional<double> astray_s;
@@ -118,11 +127,11 @@ struct Scene {
       if (base) base_moves = base(since_s);
       if (tool) tool_moves = tool(since_s);
       if (!astray_s && astray()) astray_s = time_s, tip_then = tip().translation;
-      const ScriptReport script = robot.state().script;
+      const robot::ScriptReport script = robot.state().script;
       const bool may_move = !outcome.stopped && script.order == number && script.tick > 0;
-      robot.set_heartbeat({may_move ? script.tick : stop_beat, number});
+      robot.set_heartbeat({may_move ? script.tick : robot::stop_beat, number});
       step();
-      if (robot.state().runtime == RuntimeState::stopped && !robot.moving()) break;
+      if (robot.state().runtime == robot::RuntimeState::stopped && !robot.moving()) break;
       if (outcome.stopped) continue;
       if (const auto holds = plan.in_place(board, track, time_s); !holds) outcome.stopped = holds.error();
     }
@@ -145,23 +154,23 @@ struct Scene {
   double sigma_mm = 0.12, sigma_deg = 0.05;
   RandomStream random;
   double time_s = 0, next_sample_s = 0;
-  HandEye hand_eye = exact_hand_eye();
-  VirtualController robot;
-  PoseBoard board;
-  ToolTrack track;
-  RigidTransform tracker_from_femur;
+  tracker::HandEye hand_eye = exact_hand_eye();
+  robot::VirtualController robot;
+  tracker::PoseBoard board;
+  robot::ToolTrack track;
+  geometry::RigidTransform tracker_from_femur;
   std::vector<Vector3d> points_in_femur;
-  RigidTransform femur_moves, base_moves, tool_moves;
-  std::optional<RigidTransform> taken_for_femur;
+  geometry::RigidTransform femur_moves, base_moves, tool_moves;
+  std::optional<geometry::RigidTransform> taken_for_femur;
 };
 
 /// While the tool moves along the axis.
 constexpr double on_the_axis_s = 4;
 
-RigidTransform still(double) { return {}; }
+geometry::RigidTransform still(double) { return {}; }
 
 Scene::Moves from(double begin_s, const Scene::Moves& moves) {
-  return [=](double t) { return t < begin_s ? RigidTransform() : moves(t - begin_s); };
+  return [=](double t) { return t < begin_s ? geometry::RigidTransform() : moves(t - begin_s); };
 }
 
 void expect_stop(const Outcome& outcome, const char* what, double longest_s) {
@@ -178,7 +187,7 @@ void expect_stop(const Outcome& outcome, const char* what, double longest_s) {
 TEST(PlanWatch, OrderWithoutMotionIsCarriedOutDespiteNoise) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     Scene scene(seed % 2 ? 60 : 20, seed);
-    const Outcome outcome = scene.carry_out(planned(), still);
+    const Outcome outcome = scene.carry_out(robot::planned(), still);
     EXPECT_FALSE(outcome.stopped) << outcome.stopped->message;
   }
 }
@@ -203,7 +212,7 @@ TEST(PlanWatch, TenMinutesOfNoiseStayBelowTheLimit) {
 
 TEST(PlanWatch, CreepingBoneStopsTheRobot) {
   // Fifteen steps of 2 mm, as when someone shifts the leg.
-  const Outcome creep = Scene().carry_out(planned(), from(on_the_axis_s, [](double t) {
+  const Outcome creep = Scene().carry_out(robot::planned(), from(on_the_axis_s, [](double t) {
                                             return shift(2 * std::min(15.0, std::floor(6 * t)), 0, 0);
                                           }));
   expect_stop(creep, "femur moved", 0.2);
@@ -212,23 +221,22 @@ TEST(PlanWatch, CreepingBoneStopsTheRobot) {
 
 TEST(PlanWatch, SlowDriftStopsTheRobotAtTheLimit) {
   const Outcome drift =
-      Scene().carry_out(planned(), from(0.5, [](double t) { return shift(0, 0.5 * t, 0); }));
+      Scene().carry_out(robot::planned(), from(0.5, [](double t) { return shift(0, 0.5 * t, 0); }));
   expect_stop(drift, "femur moved", 0.5);
   EXPECT_LT(drift.error_mm, 1.3);
 }
 
 TEST(PlanWatch, JumpBeforeTheStandOffStopsTheRobot) {
-  expect_stop(Scene().carry_out(planned(), from(0.8, [](double) { return shift(0, 0, 3); })), "femur moved",
-              0.25);
+  expect_stop(Scene().carry_out(robot::planned(), from(0.8, [](double) { return shift(0, 0, 3); })),
+              "femur moved", 0.25);
 }
 
 TEST(PlanWatch, JumpOfTheBoneStopsTheRobotAtAnyTime) {
   Outcome worst;
   for (int i = 0; i < 6; ++i) {
-    const Outcome jump =
-        Scene(60, 1 + std::uint64_t(i)).carry_out(planned(), from(on_the_axis_s + 0.004 * i, [](double) {
-                                                    return shift(2, 2, -1);
-                                                  }));
+    const Outcome jump = Scene(60, 1 + std::uint64_t(i))
+                             .carry_out(robot::planned(), from(on_the_axis_s + 0.004 * i,
+                                                               [](double) { return shift(2, 2, -1); }));
     expect_stop(jump, "femur moved", 0.2);
     if (jump.rest_s > worst.rest_s) worst = jump;
   }
@@ -238,7 +246,7 @@ TEST(PlanWatch, JumpOfTheBoneStopsTheRobotAtAnyTime) {
 TEST(PlanWatch, BoneThatRotatesAboutTheTunnelStopsTheRobot) {
   Scene scene;
   const Vector3d start = scene.tracker_from_femur * scene.points_in_femur.front();
-  const Outcome turned = scene.carry_out(planned(), from(on_the_axis_s, [&](double t) {
+  const Outcome turned = scene.carry_out(robot::planned(), from(on_the_axis_s, [&](double t) {
                                            return turn_about(start, {0, 0, std::min(3.0, 6 * t) * rad});
                                          }));
   expect_stop(turned, "femur moved", 0.3);
@@ -246,20 +254,21 @@ TEST(PlanWatch, BoneThatRotatesAboutTheTunnelStopsTheRobot) {
 }
 
 TEST(PlanWatch, MovedBaseStopsTheRobot) {
-  expect_stop(Scene().carry_out(planned(), still, from(on_the_axis_s, [](double) { return shift(2, 2, 2); })),
-              base_or_tool, 0.2);
+  expect_stop(
+      Scene().carry_out(robot::planned(), still, from(on_the_axis_s, [](double) { return shift(2, 2, 2); })),
+      base_or_tool, 0.2);
 }
 
 TEST(PlanWatch, BaseThatCreepsStopsTheRobot) {
-  const Outcome creep =
-      Scene().carry_out(planned(), still, from(on_the_axis_s, [](double t) { return shift(0, 12 * t, 0); }));
+  const Outcome creep = Scene().carry_out(robot::planned(), still,
+                                          from(on_the_axis_s, [](double t) { return shift(0, 12 * t, 0); }));
   expect_stop(creep, base_or_tool, 0.4);
 }
 
 TEST(PlanWatch, ToolThatSlipsInItsMountStopsTheRobot) {
   Scene scene;
   const auto slips = [&](double) { return turn_about(scene.tip().translation, {0.05, 0, 0}); };
-  expect_stop(scene.carry_out(planned(), still, {}, from(on_the_axis_s, slips)), base_or_tool, 0.2);
+  expect_stop(scene.carry_out(robot::planned(), still, {}, from(on_the_axis_s, slips)), base_or_tool, 0.2);
 }
 
 TEST(PlanWatch, BaseMotionBeforeTheOrderIsDetectedInEveryDirection) {
@@ -301,7 +310,7 @@ TEST(PlanWatch, CalibratorTakenForTheBoneIsDetected) {
 
 TEST(PlanWatch, JumpThatTheGateDoesNotAcceptYetStopsTheRobot) {
   const Outcome jump =
-      Scene().carry_out(planned(), from(on_the_axis_s, [](double) { return shift(40, 0, 0); }));
+      Scene().carry_out(robot::planned(), from(on_the_axis_s, [](double) { return shift(40, 0, 0); }));
   expect_stop(jump, "femur moved", 0.2);
   EXPECT_NEAR(jump.stopped->figures.at("distance_mm"), 40, 1);
 }
@@ -323,9 +332,9 @@ TEST(PlanWatch, OneOrTwoOutliersHaveNoEffect) {
 TEST(PlanWatch, DelayedTrackerDoesNotStopAFastTool) {
   Scene scene;
   scene.delay_s = 0.06;
-  ApproachOptions fast;
+  robot::ApproachOptions fast;
   fast.travel_mm_s = 120;
-  const Outcome outcome = scene.carry_out(planned(fast), still);
+  const Outcome outcome = scene.carry_out(robot::planned(fast), still);
   EXPECT_FALSE(outcome.stopped) << outcome.stopped->message;
 }
 
@@ -343,8 +352,9 @@ TEST(PlanWatch, WithoutPosesOfTrackerOrRobotNoPlanHolds) {
   Scene scene;
   const PlanWatch watch = scene.watch();
   EXPECT_EQ(watch.in_place(scene.board, scene.track, scene.time_s + 0.2).error().reason, Reason::stale_pose);
-  EXPECT_EQ(watch.in_place(PoseBoard(), scene.track, scene.time_s).error().reason, Reason::no_pose);
-  EXPECT_EQ(watch.in_place(scene.board, ToolTrack(), scene.time_s).error().reason, Reason::stale_state);
+  EXPECT_EQ(watch.in_place(tracker::PoseBoard(), scene.track, scene.time_s).error().reason, Reason::no_pose);
+  EXPECT_EQ(watch.in_place(scene.board, robot::ToolTrack(), scene.time_s).error().reason,
+            Reason::stale_state);
 }
 
 TEST(PlanWatch, KinematicErrorWidensTheBaseLimitsWithTravel) {
@@ -356,4 +366,4 @@ TEST(PlanWatch, KinematicErrorWidensTheBaseLimitsWithTravel) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -3,67 +3,67 @@
 
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 constexpr Range any_place{-1e6, 1e6};
 
-Json pose_json(const std::optional<RigidTransform>& pose) {
-  return pose ? json_rows(pose->matrix()) : Json();
+Json pose_json(const std::optional<geometry::RigidTransform>& pose) {
+  return pose ? geometry::json_rows(pose->matrix()) : Json();
 }
 
 }  // namespace
 
-Json to_json(const Poses& poses) {
+Json to_json(const guidance::Poses& poses) {
   return {{"tracker_from_calibrator", pose_json(poses.tracker_from_calibrator)},
           {"tracker_from_femur", pose_json(poses.tracker_from_femur)},
           {"tracker_from_tibia", pose_json(poses.tracker_from_tibia)},
           {"tracker_from_tool", pose_json(poses.tracker_from_tool)}};
 }
 
-Json to_json(const HandEye& hand_eye) {
-  return {{"flange_from_marker", json_rows(hand_eye.flange_from_marker.matrix())},
-          {"tracker_from_base", json_rows(hand_eye.tracker_from_base.matrix())},
-          {"covariance", json_rows(hand_eye.covariance)},
+Json to_json(const tracker::HandEye& hand_eye) {
+  return {{"flange_from_marker", geometry::json_rows(hand_eye.flange_from_marker.matrix())},
+          {"tracker_from_base", geometry::json_rows(hand_eye.tracker_from_base.matrix())},
+          {"covariance", geometry::json_rows(hand_eye.covariance)},
           {"rms_mm", hand_eye.rms_mm},
           {"rms_deg", hand_eye.rms_deg}};
 }
 
-Json to_json(const std::vector<HandEyePair>& pairs) {
+Json to_json(const std::vector<tracker::HandEyePair>& pairs) {
   Json list = Json::array();
-  for (const HandEyePair& pair : pairs)
-    list.push_back({{"base_from_flange", json_rows(pair.base_from_flange.matrix())},
-                    {"tracker_from_marker", json_rows(pair.tracker_from_marker.matrix())}});
+  for (const tracker::HandEyePair& pair : pairs)
+    list.push_back({{"base_from_flange", geometry::json_rows(pair.base_from_flange.matrix())},
+                    {"tracker_from_marker", geometry::json_rows(pair.tracker_from_marker.matrix())}});
   return list;
 }
 
-Expected<std::vector<HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin) {
+Expected<std::vector<tracker::HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     if (!json.is_array()) throw BadInput(Reason::bad_value, origin + ": pairs must be a list");
-    std::vector<HandEyePair> pairs;
+    std::vector<tracker::HandEyePair> pairs;
     for (const Json& entry : json) {
       JsonReader reader(entry, origin);
-      pairs.push_back({exact_pose_from(reader, "base_from_flange", any_place),
-                       exact_pose_from(reader, "tracker_from_marker", any_place)});
+      pairs.push_back({geometry::exact_pose_from(reader, "base_from_flange", any_place),
+                       geometry::exact_pose_from(reader, "tracker_from_marker", any_place)});
       reader.finish();
     }
     return pairs;
   });
 }
 
-Json to_json(const std::vector<Miss>& loop) {
+Json to_json(const std::vector<robot::Miss>& loop) {
   Json misses = Json::array();
-  for (const Miss& miss : loop)
+  for (const robot::Miss& miss : loop)
     misses.push_back(
         {{"distance_mm", miss.distance_mm}, {"turn_deg", miss.turn_deg}, {"sigma_mm", miss.sigma_mm}});
   return misses;
 }
 
 Json to_json(const EndMiss& end) {
-  return {{"across_mm", json_list(end.across_mm)},
-          {"covariance_mm2", json_rows(end.covariance)},
+  return {{"across_mm", geometry::json_list(end.across_mm)},
+          {"covariance_mm2", geometry::json_rows(end.covariance)},
           {"distance_mm", end.distance_mm()},
           {"predicted_mm", end.predicted_mm()}};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

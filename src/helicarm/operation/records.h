@@ -9,14 +9,14 @@
 #include "helicarm/operation/tool_line.h"
 
 /// Values as the session log stores them: exact to the last bit.
-namespace helicarm {
+namespace helicarm::operation {
 
-Json to_json(const Poses& poses);
-Json to_json(const HandEye& hand_eye);
-Json to_json(const std::vector<HandEyePair>& pairs);
+Json to_json(const guidance::Poses& poses);
+Json to_json(const tracker::HandEye& hand_eye);
+Json to_json(const std::vector<tracker::HandEyePair>& pairs);
 /// Fails as JsonReader.
-Expected<std::vector<HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin);
-Json to_json(const std::vector<Miss>& loop);
+Expected<std::vector<tracker::HandEyePair>> hand_eye_pairs_from(const Json& json, const std::string& origin);
+Json to_json(const std::vector<robot::Miss>& loop);
 Json to_json(const EndMiss& end);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

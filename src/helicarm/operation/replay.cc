@@ -13,7 +13,7 @@
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 constexpr std::uintmax_t most_image_bytes = std::uintmax_t{256} << 20;
@@ -38,7 +38,7 @@ class Replay {
  public:
   explicit Replay(std::filesystem::path session) : session_(std::move(session)) {}
 
-  void take(const SessionRecord& record) {
+  void take(const session::SessionRecord& record) {
     const std::string origin = fmt::format("record {}", record.number);
     if (record.kind == "plan") plan_ = value_or_throw(plan_from(record.content, origin));
     if (record.kind == "exposure") exposure(record, origin);
@@ -61,7 +61,7 @@ class Replay {
                                  where(then, now)));
   }
 
-  void exposure(const SessionRecord& record, const std::string& origin) {
+  void exposure(const session::SessionRecord& record, const std::string& origin) {
     ++report.exposures;
     image_digests_[record.content.at("view").get<std::string>()] = record.content.at("picture");
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
@@ -69,17 +69,17 @@ class Replay {
     compare(record.content.at("poses"), poses ? to_json(*poses) : Json(), origin, "pose");
   }
 
-  void touched(const SessionRecord& record, const std::string& origin) {
+  void touched(const session::SessionRecord& record, const std::string& origin) {
     const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
     const auto check = std::ranges::find(
         plan_.check_points, record.content.at("check_point").get<std::string>(), &PlannedCheck::name);
     if (check == plan_.check_points.end()) return differ(origin, "its check point is not in the plan");
     const auto tip = touched_in_bone(window, plan_.tracker, check->bone);
-    compare(record.content.at("in_bone"), tip ? json_list(*tip) : Json(), origin, "touched point");
+    compare(record.content.at("in_bone"), tip ? geometry::json_list(*tip) : Json(), origin, "touched point");
   }
 
   /// The case must equal the recorded one, and its images those received.
-  void images(const SessionRecord& record, const std::string& origin) {
+  void images(const session::SessionRecord& record, const std::string& origin) {
     const std::string folder = record.content.at("folder").get<std::string>();
     if (record.content.contains("case")) {
       const std::string name = folder + "/case.json";
@@ -95,12 +95,12 @@ class Replay {
       const auto file = read_file(value_or_throw(path_inside(session_, name)), most_image_bytes);
       if (!file)
         differ(origin, file.error().message);
-      else if (digest(*file) != recorded)
+      else if (xray::digest(*file) != recorded)
         differ(origin, name + " is not the recorded image");
     }
   }
 
-  void result(const SessionRecord& record, const std::string& origin) {
+  void result(const session::SessionRecord& record, const std::string& origin) {
     ++report.results;
     const std::string folder = record.content.at("folder").get<std::string>();
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
@@ -109,20 +109,21 @@ class Replay {
     if (record.content.at("digest") == run->digest) return;
     const auto then = read_json(inside / "result.json");
     differ(origin,
-           fmt::format("{}: the result differs from the recorded one on recomputation{}", folder,
-                       then ? where(without_timing(*then), without_timing(to_json(run->result))) : ""));
+           fmt::format(
+               "{}: the result differs from the recorded one on recomputation{}", folder,
+               then ? where(without_timing(*then), without_timing(pipeline::to_json(run->result))) : ""));
   }
 
-  void hand_eye(const SessionRecord& record, const std::string& origin) {
+  void hand_eye(const session::SessionRecord& record, const std::string& origin) {
     ++report.hand_eyes;
     const auto pairs = value_or_throw(hand_eye_pairs_from(record.content.at("pairs"), origin));
-    const auto found = calibrate_hand_eye(pairs);
+    const auto found = tracker::calibrate_hand_eye(pairs);
     compare(record.content.at("found"), found ? to_json(*found) : Json(), origin, "hand-eye calibration");
   }
 
   std::filesystem::path session_;
   OperationPlan plan_;
-  CalibrationCache cache_;
+  pipeline::CalibrationCache cache_;
   std::map<std::string, std::string> image_digests_;
 };
 
@@ -130,13 +131,13 @@ class Replay {
 
 Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& go_on) {
   return guarded([&] {
-    const SessionHistory history = value_or_throw(read_session(session / "session.log"));
+    const session::SessionHistory history = value_or_throw(session::read_session(session / "session.log"));
     if (history.records.empty())
       throw BadInput(Reason::bad_value, fmt::format("{}: the record is empty", session.string()));
     Replay replay(session);
     replay.report.records = history.records.size();
     replay.report.torn = history.torn;
-    for (const SessionRecord& record : history.records) try {
+    for (const session::SessionRecord& record : history.records) try {
         if (!go_on(record.number, history.records.size()))
           throw BadInput(Reason::interrupted,
                          fmt::format("{}: stopped at record {}", session.string(), record.number));
@@ -149,4 +150,4 @@ Expected<ReplayReport> replay(const std::filesystem::path& session, const GoOn& 
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

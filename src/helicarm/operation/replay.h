@@ -8,7 +8,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 struct ReplayReport {
   std::size_t records = 0;
@@ -30,4 +30,4 @@ using GoOn = std::function<bool(std::size_t done, std::size_t all)>;
 Expected<ReplayReport> replay(
     const std::filesystem::path& session, const GoOn& go_on = [](std::size_t, std::size_t) { return true; });
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -11,7 +11,7 @@
 
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 /// Transfer of an image through the C-arm and a hospital network.
@@ -28,11 +28,12 @@ constexpr Range sample_range{-1e6, 1e6};
 std::vector<std::string> tools_of(const TrackerPlan& plan) {
   std::vector<std::string> tools{plan.femur, plan.tibia, plan.tool};
   if (plan.pointer) tools.push_back(plan.pointer->name);
-  for (const Facet& facet : plan.facets) tools.push_back(facet.name);
+  for (const tracker::Facet& facet : plan.facets) tools.push_back(facet.name);
   return tools;
 }
 
-PoseWindow window_about(const PoseBoard& board, const TrackerPlan& plan, double middle_s, double half_s) {
+PoseWindow window_about(const tracker::PoseBoard& board, const TrackerPlan& plan, double middle_s,
+                        double half_s) {
   PoseWindow window{middle_s, half_s, {}};
   for (const std::string& tool : tools_of(plan))
     window.samples[tool] = board.between(tool, middle_s - half_s, middle_s + half_s);
@@ -40,24 +41,24 @@ PoseWindow window_about(const PoseBoard& board, const TrackerPlan& plan, double 
 }
 
 /// Tracker error that averaging does not reduce, about the marker's origin.
-PoseCovariance systematic_covariance(const TrackerPlan& plan) {
+tracker::PoseCovariance systematic_covariance(const TrackerPlan& plan) {
   const double turn = plan.sigma_deg * std::numbers::pi / 180;
-  PoseCovariance covariance = PoseCovariance::Zero();
+  tracker::PoseCovariance covariance = tracker::PoseCovariance::Zero();
   covariance.diagonal().head<3>().setConstant(plan.sigma_mm * plan.sigma_mm);
   covariance.diagonal().tail<3>().setConstant(turn * turn);
   return covariance;
 }
 
-Expected<std::optional<RigidTransform>> bone_if_seen(const Expected<SeenPose>& seen) {
+Expected<std::optional<geometry::RigidTransform>> bone_if_seen(const Expected<SeenPose>& seen) {
   if (seen) return seen->tracker_from_marker;
   if (seen.error().reason == Reason::pose_spread) return tl::unexpected<Failure>(seen.error());
   return std::nullopt;
 }
 
 /// The longest gap between samples within the window.
-double longest_gap(const PoseWindow& window, const std::vector<PoseSample>& samples) {
+double longest_gap(const PoseWindow& window, const std::vector<tracker::PoseSample>& samples) {
   double last = window.middle_s - window.half_s, gap = 0;
-  for (const PoseSample& sample : samples)
+  for (const tracker::PoseSample& sample : samples)
     gap = std::max(gap, sample.time_s - std::exchange(last, sample.time_s));
   return std::max(gap, window.middle_s + window.half_s - last);
 }
@@ -73,11 +74,11 @@ Json to_json(const PoseWindow& window) {
   Json tools = Json::object();
   for (const auto& [tool, samples] : window.samples) {
     Json& list = tools[tool] = Json::array();
-    for (const PoseSample& sample : samples)
+    for (const tracker::PoseSample& sample : samples)
       list.push_back({{"time_s", sample.time_s},
                       {"device_s", sample.device_s},
                       {"arrival_s", sample.arrival_s},
-                      {"tracker_from_tool", json_rows(sample.tracker_from_tool.matrix())}});
+                      {"tracker_from_tool", geometry::json_rows(sample.tracker_from_tool.matrix())}});
   }
   return {{"middle_s", window.middle_s}, {"half_s", window.half_s}, {"tools", std::move(tools)}};
 }
@@ -90,12 +91,13 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
     if (!tools.is_object()) reader.refuse(Reason::bad_value, "tools", "must be an object");
     for (const auto& [tool, list] : tools.items()) {
       if (!list.is_array()) reader.refuse(Reason::bad_value, "tools", "must contain lists");
-      std::vector<PoseSample>& samples = window.samples[tool];
+      std::vector<tracker::PoseSample>& samples = window.samples[tool];
       for (const Json& entry : list) {
         JsonReader sample(entry, origin + ": " + tool);
         const double time = sample.number("time_s", any_time), device = sample.number("device_s", any_time);
         const double arrival = sample.number("arrival_s", any_time);
-        const RigidTransform pose = exact_pose_from(sample, "tracker_from_tool", sample_range);
+        const geometry::RigidTransform pose =
+            geometry::exact_pose_from(sample, "tracker_from_tool", sample_range);
         sample.finish();
         samples.push_back({time, device, arrival, pose});
       }
@@ -105,14 +107,14 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
   });
 }
 
-PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
+PoseWindow window_of_exposure(const tracker::PoseBoard& board, const TrackerPlan& plan, double arrival_s,
                               double coarse_s) {
   const double half_s = (longest_way_s + coarse_s) / 2;
   return window_about(board, plan, arrival_s - half_s, half_s);
 }
 
-PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end) {
-  const double from = monotonic_seconds();
+PoseWindow window_now(const tracker::PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end) {
+  const double from = tracker::monotonic_seconds();
   std::mutex alone;
   std::unique_lock lock(alone);
   std::condition_variable_any().wait_for(lock, end, std::chrono::duration<double>(now_s + settle_s),
@@ -130,10 +132,10 @@ Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, c
     return fail(Reason::stale_pose,
                 fmt::format("{}: was not visible for {:.3g} s, limit {:g} s", tool, gap, longest_gap_s),
                 {{"gap_s", gap}});
-  ExposurePoseOptions options;
+  tracker::ExposurePoseOptions options;
   options.window_s = window.half_s;
-  return exposure_pose(samples->second, window.middle_s, options)
-      .map([&](const ExposurePose& pose) {
+  return tracker::exposure_pose(samples->second, window.middle_s, options)
+      .map([&](const tracker::ExposurePose& pose) {
         return SeenPose{pose.tracker_from_tool, pose.covariance,
                         pose.covariance + systematic_covariance(plan)};
       })
@@ -141,9 +143,9 @@ Expected<SeenPose> see_tool(const PoseWindow& window, const TrackerPlan& plan, c
 }
 
 Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& plan) {
-  std::vector<FacetPose> seen;
+  std::vector<tracker::FacetPose> seen;
   std::optional<Failure> why_not;
-  for (const Facet& facet : plan.facets) {
+  for (const tracker::Facet& facet : plan.facets) {
     const auto pose = see_tool(window, plan, facet.name);
     if (pose)
       seen.push_back({facet.name, pose->tracker_from_marker, pose->covariance});
@@ -152,14 +154,14 @@ Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& p
   }
   if (why_not && (seen.empty() || why_not->reason == Reason::pose_spread))
     return tl::unexpected<Failure>(*why_not);
-  return fuse_facets(plan.facets, seen).map([](const FusedPose& fused) {
+  return tracker::fuse_facets(plan.facets, seen).map([](const tracker::FusedPose& fused) {
     return SeenPose{fused.tracker_from_calibrator, fused.covariance, fused.covariance};
   });
 }
 
-Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan) {
+Expected<guidance::Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan) {
   return guarded([&] {
-    Poses poses;
+    guidance::Poses poses;
     poses.tracker_from_calibrator = value_or_throw(see_calibrator(window, plan)).tracker_from_marker;
     poses.tracker_from_femur = value_or_throw(bone_if_seen(see_tool(window, plan, plan.femur)));
     poses.tracker_from_tibia = value_or_throw(bone_if_seen(see_tool(window, plan, plan.tibia)));
@@ -167,12 +169,12 @@ Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& p
   });
 }
 
-Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
+Expected<guidance::Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
   return guarded([&] {
     const auto see = [&](const std::string& tool) {
       return value_or_throw(see_tool(window, plan, tool)).tracker_from_marker;
     };
-    Poses poses;
+    guidance::Poses poses;
     poses.tracker_from_femur = see(plan.femur);
     poses.tracker_from_tibia = see(plan.tibia);
     poses.tracker_from_tool = see(plan.tool);
@@ -180,7 +182,8 @@ Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan) {
   });
 }
 
-Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan, Bone bone) {
+Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan,
+                                          guidance::Bone bone) {
   return guarded([&]() -> Eigen::Vector3d {
     if (!plan.pointer) throw BadInput(Reason::bad_value, "the plan has no pointer; add it to \"tracker\"");
     const auto see = [&](const std::string& tool) {
@@ -191,4 +194,4 @@ Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const Tracke
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

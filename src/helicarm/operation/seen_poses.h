@@ -9,13 +9,13 @@
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/operation/plan.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// Samples of every marker about one time (monotonic seconds).
 struct PoseWindow {
   double middle_s = 0;
   double half_s = 0;
-  std::map<std::string, std::vector<PoseSample>> samples;
+  std::map<std::string, std::vector<tracker::PoseSample>> samples;
 };
 
 Json to_json(const PoseWindow& window);
@@ -24,16 +24,16 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
 
 /// The 1.5 s before an image's arrival, which contain the acquisition; longer by the resolution of the
 /// acquisition time, which limits the estimate of its delay.
-PoseWindow window_of_exposure(const PoseBoard& board, const TrackerPlan& plan, double arrival_s,
+PoseWindow window_of_exposure(const tracker::PoseBoard& board, const TrackerPlan& plan, double arrival_s,
                               double coarse_s = 0);
 /// The next 0.75 s; waits until they are over. Throws BadInput (interrupted) on a stop request.
-PoseWindow window_now(const PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end);
+PoseWindow window_now(const tracker::PoseBoard& board, const TrackerPlan& plan, const std::stop_token& end);
 
 /// A marker at rest over a window.
 struct SeenPose {
-  RigidTransform tracker_from_marker;
-  PoseCovariance scatter;  ///< of the mean, from the samples
-  PoseCovariance
+  geometry::RigidTransform tracker_from_marker;
+  tracker::PoseCovariance scatter;  ///< of the mean, from the samples
+  tracker::PoseCovariance
       covariance;  ///< scatter plus the error that averaging does not reduce (sigmas of TrackerPlan)
 };
 
@@ -45,13 +45,14 @@ Expected<SeenPose> see_calibrator(const PoseWindow& window, const TrackerPlan& p
 
 /// Calibrator and bones during an acquisition. A bone whose marker is not visible is absent; one that moved
 /// is refused (pose_spread).
-Expected<Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan);
+Expected<guidance::Poses> poses_of_exposure(const PoseWindow& window, const TrackerPlan& plan);
 
 /// Position of the pointer's tip in the frame of the bone's marker. Refuses as `see_tool`; bad_value without
 /// a pointer.
-Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan, Bone bone);
+Expected<Eigen::Vector3d> touched_in_bone(const PoseWindow& window, const TrackerPlan& plan,
+                                          guidance::Bone bone);
 
 /// Bones and tool; all must be visible.
-Expected<Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan);
+Expected<guidance::Poses> poses_now(const PoseWindow& window, const TrackerPlan& plan);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

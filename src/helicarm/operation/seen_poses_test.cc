@@ -6,25 +6,25 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
-const RigidTransform at_rest{rotation_from_euler(0.3, -0.2, 1.1), {100, -50, 900}};
+const geometry::RigidTransform at_rest{geometry::rotation_from_euler(0.3, -0.2, 1.1), {100, -50, 900}};
 
 TrackerPlan plan() {
   TrackerPlan plan;
   plan.facets = {{"one", {Eigen::Matrix3d::Identity(), {85, 0, 0}}},
-                 {"two", {rotation_from_euler(0, 0, 1.5), {0, 85, 0}}}};
+                 {"two", {geometry::rotation_from_euler(0, 0, 1.5), {0, 85, 0}}}};
   plan.sigma_mm = 0.1;
   plan.sigma_deg = 0.02;
   return plan;
 }
 
 /// 31 samples about t = 10 s with a little noise.
-std::vector<PoseSample> samples_of(const RigidTransform& pose, std::uint32_t stream,
-                                   const Eigen::Vector3d& drift = Eigen::Vector3d::Zero()) {
+std::vector<tracker::PoseSample> samples_of(const geometry::RigidTransform& pose, std::uint32_t stream,
+                                            const Eigen::Vector3d& drift = Eigen::Vector3d::Zero()) {
   RandomStream random(1, stream);
-  std::vector<PoseSample> samples;
+  std::vector<tracker::PoseSample> samples;
   for (int i = 0; i <= 30; ++i) {
     const double time = 9.25 + 0.05 * i;
     const Eigen::Vector3d noise(random.normal(), random.normal(), random.normal());
@@ -39,7 +39,7 @@ PoseWindow window() {
   window.samples["femur"] = samples_of(at_rest, 1);
   window.samples["tibia"] = {};
   window.samples["tool"] = samples_of(at_rest, 2);
-  for (const Facet& facet : plan().facets)
+  for (const tracker::Facet& facet : plan().facets)
     window.samples[facet.name] = samples_of(at_rest * facet.calibrator_from_facet, 3);
   return window;
 }
@@ -65,7 +65,7 @@ TEST(SeenPoses, OneFacetIsEnough) {
 }
 
 TEST(SeenPoses, OccludedBoneIsAbsentFromTheAcquisition) {
-  const Poses poses = poses_of_exposure(window(), plan()).value();
+  const guidance::Poses poses = poses_of_exposure(window(), plan()).value();
   EXPECT_TRUE(poses.tracker_from_calibrator && poses.tracker_from_femur);
   EXPECT_FALSE(poses.tracker_from_tibia);
 }
@@ -99,4 +99,4 @@ TEST(SeenPoses, WindowIsRecordedToTheLastBit) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
@@ -25,18 +25,18 @@ Matrix6d carried(const Vector3d& lever) {
   return effect;
 }
 
-const RigidTransform& pose_of(const Poses& poses, Bone bone) {
+const geometry::RigidTransform& pose_of(const guidance::Poses& poses, guidance::Bone bone) {
   const auto& pose = poses.tracker_from(bone);
   if (!pose)
-    throw BadInput(Reason::no_pose,
-                   fmt::format("{}: its marker is not visible", bone == Bone::femur ? "femur" : "tibia"));
+    throw BadInput(Reason::no_pose, fmt::format("{}: its marker is not visible",
+                                                bone == guidance::Bone::femur ? "femur" : "tibia"));
   return *pose;
 }
 
-Vector3d located(const Result& result, const std::string& name, Bone bone) {
-  const auto point = std::ranges::find(result.points, name, &PointResult::name);
+Vector3d located(const pipeline::Result& result, const std::string& name, guidance::Bone bone) {
+  const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
   if (point != result.points.end() && point->place) {
-    const auto& in_bone = bone == Bone::femur ? point->place->in_femur : point->place->in_tibia;
+    const auto& in_bone = bone == guidance::Bone::femur ? point->place->in_femur : point->place->in_tibia;
     if (in_bone) return *in_bone;
   }
   throw BadInput(Reason::not_seen, fmt::format("{}: is not located in its bone's frame", name));
@@ -44,7 +44,7 @@ Vector3d located(const Result& result, const std::string& name, Bone bone) {
 
 }  // namespace
 
-Expected<TunnelInBone> tunnel_in_bone(const Result& result, const PlannedTunnel& tunnel) {
+Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel) {
   return guarded([&] {
     TunnelInBone in_bone{tunnel.bone, located(result, tunnel.start, tunnel.bone),
                          located(result, tunnel.end, tunnel.bone)};
@@ -53,24 +53,26 @@ Expected<TunnelInBone> tunnel_in_bone(const Result& result, const PlannedTunnel&
   });
 }
 
-TunnelAxis axis_in_base(const TunnelInBone& tunnel, const Poses& now, const HandEye& hand_eye) {
-  const RigidTransform base_from_bone = hand_eye.tracker_from_base.inverse() * pose_of(now, tunnel.bone);
+robot::TunnelAxis axis_in_base(const TunnelInBone& tunnel, const guidance::Poses& now,
+                               const tracker::HandEye& hand_eye) {
+  const geometry::RigidTransform base_from_bone =
+      hand_eye.tracker_from_base.inverse() * pose_of(now, tunnel.bone);
   return {base_from_bone * tunnel.enter, base_from_bone * tunnel.leave};
 }
 
-RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool) {
+geometry::RigidTransform marker_from_tcp(const tracker::HandEye& hand_eye, const robot::RobotTool& tool) {
   return hand_eye.flange_from_marker.inverse() * tool.flange_from_tcp;
 }
 
-Expected<ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
-                                       const HandEye& hand_eye, Bone bone,
-                                       const RigidTransform& bone_from_target) {
+Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
+                                              const tracker::HandEye& hand_eye, guidance::Bone bone,
+                                              const geometry::RigidTransform& bone_from_target) {
   return guarded([&] {
     const std::string& bone_marker = plan.tracker.marker_of(bone);
     const SeenPose tool = value_or_throw(see_tool(window, plan.tracker, plan.tracker.tool));
     const SeenPose target = value_or_throw(see_tool(window, plan.tracker, bone_marker));
-    const RigidTransform from_tcp = marker_from_tcp(hand_eye, plan.robot.tool);
-    ToolMeasurement measurement{
+    const geometry::RigidTransform from_tcp = marker_from_tcp(hand_eye, plan.robot.tool);
+    robot::ToolMeasurement measurement{
         tool.tracker_from_marker * from_tcp, target.tracker_from_marker * bone_from_target, {}};
     const Matrix6d of_tool = carried(tool.tracker_from_marker.rotation * from_tcp.translation);
     const Matrix6d of_target = carried(target.tracker_from_marker.rotation * bone_from_target.translation);
@@ -85,22 +87,23 @@ Expected<ToolMeasurement> measure_tool(const PoseWindow& window, const Operation
   });
 }
 
-Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& exposure, const Poses& now,
-                             const RigidTransform& marker_from_tip) {
+Expected<verification::ToolLine> tool_line(const std::string& tunnel, guidance::Bone bone,
+                                           const guidance::Poses& exposure, const guidance::Poses& now,
+                                           const geometry::RigidTransform& marker_from_tip) {
   return guarded([&] {
     if (!exposure.tracker_from_calibrator || !now.tracker_from_tool)
       throw BadInput(Reason::no_pose, "calibrator or tool: its marker is not visible");
-    const RigidTransform calibrator_from_tip = exposure.tracker_from_calibrator->inverse() *
-                                               pose_of(exposure, bone) * pose_of(now, bone).inverse() *
-                                               *now.tracker_from_tool * marker_from_tip;
-    return ToolLine{tunnel, tunnel, calibrator_from_tip * Vector3d(0, 0, -line_mm),
-                    calibrator_from_tip.translation};
+    const geometry::RigidTransform calibrator_from_tip =
+        exposure.tracker_from_calibrator->inverse() * pose_of(exposure, bone) * pose_of(now, bone).inverse() *
+        *now.tracker_from_tool * marker_from_tip;
+    return verification::ToolLine{tunnel, tunnel, calibrator_from_tip * Vector3d(0, 0, -line_mm),
+                                  calibrator_from_tip.translation};
   });
 }
 
-EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance, const HandEye& hand_eye,
-                 const RobotTool& tool) {
-  const RigidTransform& flange_from_marker = hand_eye.flange_from_marker;
+EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
+                 const tracker::HandEye& hand_eye, const robot::RobotTool& tool) {
+  const geometry::RigidTransform& flange_from_marker = hand_eye.flange_from_marker;
   const Eigen::Matrix3d tcp_from_flange = tool.flange_from_tcp.rotation.transpose();
   const Vector3d in_tcp = tool.flange_from_tcp.inverse() * (flange_from_marker * point_in_marker);
   const Eigen::Matrix<double, 3, 6> effect =
@@ -112,4 +115,4 @@ EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covaria
           (tcp_from_flange * in_flange * tcp_from_flange.transpose()).topLeftCorner<2, 2>()};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

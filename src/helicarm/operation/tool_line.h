@@ -8,33 +8,35 @@
 #include "helicarm/pipeline/result.h"
 #include "helicarm/verification/image_line.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 
 /// A tunnel in the frame of its bone's marker, mm.
 struct TunnelInBone {
-  Bone bone;
+  guidance::Bone bone;
   Eigen::Vector3d enter;  ///< entry point of the drill
   Eigen::Vector3d leave;
 };
 
 /// From the located picks. Refuses (not_seen) an end that is not located.
-Expected<TunnelInBone> tunnel_in_bone(const Result& result, const PlannedTunnel& tunnel);
+Expected<TunnelInBone> tunnel_in_bone(const pipeline::Result& result, const PlannedTunnel& tunnel);
 
 /// The tunnel in the robot's base frame at the bone's present pose.
-TunnelAxis axis_in_base(const TunnelInBone& tunnel, const Poses& now, const HandEye& hand_eye);
+robot::TunnelAxis axis_in_base(const TunnelInBone& tunnel, const guidance::Poses& now,
+                               const tracker::HandEye& hand_eye);
 
 /// The tool's tip (z along it) in its marker's frame.
-RigidTransform marker_from_tcp(const HandEye& hand_eye, const RobotTool& tool);
+geometry::RigidTransform marker_from_tcp(const tracker::HandEye& hand_eye, const robot::RobotTool& tool);
 
 /// Poses of the target's bone and of the tool in this window; covariance: scatter of the samples.
-Expected<ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
-                                       const HandEye& hand_eye, Bone bone,
-                                       const RigidTransform& bone_from_target);
+Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
+                                              const tracker::HandEye& hand_eye, guidance::Bone bone,
+                                              const geometry::RigidTransform& bone_from_target);
 
 /// The tool's line at each view's acquisition, as if the tool had moved with the bone: two points in the
 /// calibrator frame (3.3). Refuses no_pose if the bone was not visible then or is not now.
-Expected<ToolLine> tool_line(const std::string& tunnel, Bone bone, const Poses& exposure, const Poses& now,
-                             const RigidTransform& marker_from_tcp);
+Expected<verification::ToolLine> tool_line(const std::string& tunnel, guidance::Bone bone,
+                                           const guidance::Poses& exposure, const guidance::Poses& now,
+                                           const geometry::RigidTransform& marker_from_tcp);
 
 /// Distance of a tunnel's end from the tool's axis, perpendicular to it.
 struct EndMiss {
@@ -47,6 +49,6 @@ struct EndMiss {
 
 /// `point_in_marker` and its covariance are "in_tool" of `PointInFrames`.
 EndMiss end_miss(const Eigen::Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
-                 const HandEye& hand_eye, const RobotTool& tool);
+                 const tracker::HandEye& hand_eye, const robot::RobotTool& tool);
 
-}  // namespace helicarm
+}  // namespace helicarm::operation

@@ -9,15 +9,15 @@
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/outcome_table.h"
 
-namespace helicarm {
+namespace helicarm::operation {
 namespace {
 
 using Eigen::Vector3d;
 
-RobotTool drill() { return {{rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
+robot::RobotTool drill() { return {{geometry::rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
 
 TEST(ToolLine, ToolOnTheTunnelHasNoMiss) {
-  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
+  const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
       end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
   EXPECT_NEAR(miss.distance_mm(), 0, 1e-9);
@@ -25,7 +25,7 @@ TEST(ToolLine, ToolOnTheTunnelHasNoMiss) {
 }
 
 TEST(ToolLine, MissIsMeasuredAcrossTheAxisOnly) {
-  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
+  const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   const EndMiss miss =
       end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
   EXPECT_NEAR(miss.distance_mm(), 0.5, 1e-9);
@@ -33,7 +33,7 @@ TEST(ToolLine, MissIsMeasuredAcrossTheAxisOnly) {
 }
 
 TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
-  HandEye known = exact_hand_eye();
+  tracker::HandEye known = exact_hand_eye();
   const Vector3d point(20, -100, 60);
   const Eigen::Matrix3d of_point = Vector3d(0.04, 0.01, 0.09).asDiagonal();
   known.covariance.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
@@ -44,9 +44,10 @@ TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
   Eigen::Matrix2d drawn = Eigen::Matrix2d::Zero();
   constexpr int trials = 20000;
   for (int i = 0; i < trials; ++i) {
-    HandEye off = known;
+    tracker::HandEye off = known;
     off.flange_from_marker.translation += 0.1 * normal();
-    off.flange_from_marker.rotation = rotation_from_vector(1e-3 * normal()) * off.flange_from_marker.rotation;
+    off.flange_from_marker.rotation =
+        geometry::rotation_from_vector(1e-3 * normal()) * off.flange_from_marker.rotation;
     const Vector3d at = point + of_point.cwiseSqrt() * normal();
     const Eigen::Vector2d error =
         end_miss(at, Eigen::Matrix3d::Zero(), off, drill()).across_mm - expected.across_mm;
@@ -56,36 +57,39 @@ TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
 }
 
 TEST(ToolLine, LineAtTheAcquisitionFollowsTheBone) {
-  const RigidTransform tracker_from_calibrator{rotation_from_euler(0.1, 2, 0.4), {10, 20, 900}};
-  const RigidTransform femur_then{rotation_from_euler(1, 0, 0), {-50, 0, 880}};
-  const RigidTransform femur_now{rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
-  const RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
+  const geometry::RigidTransform tracker_from_calibrator{geometry::rotation_from_euler(0.1, 2, 0.4),
+                                                         {10, 20, 900}};
+  const geometry::RigidTransform femur_then{geometry::rotation_from_euler(1, 0, 0), {-50, 0, 880}};
+  const geometry::RigidTransform femur_now{geometry::rotation_from_euler(1.1, 0.05, 0), {-48, 3, 881}};
+  const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
   // A tip on a point of the bone, at the present poses.
   const Vector3d on_bone(30, 5, -20);
-  Poses exposure, now;
+  guidance::Poses exposure, now;
   exposure.tracker_from_calibrator = tracker_from_calibrator;
   exposure.tracker_from_femur = femur_then;
   now.tracker_from_femur = femur_now;
-  RigidTransform tip{rotation_from_euler(0.5, 0.5, 0.5), femur_now * on_bone};
+  geometry::RigidTransform tip{geometry::rotation_from_euler(0.5, 0.5, 0.5), femur_now * on_bone};
   now.tracker_from_tool = tip * marker_from_tip.inverse();
-  const ToolLine line = tool_line("femur", Bone::femur, exposure, now, marker_from_tip).value();
+  const verification::ToolLine line =
+      tool_line("femur", guidance::Bone::femur, exposure, now, marker_from_tip).value();
   EXPECT_LT((line.p2_in_calibrator - tracker_from_calibrator.inverse() * (femur_then * on_bone)).norm(),
             1e-9);
   EXPECT_NEAR((line.p2_in_calibrator - line.p1_in_calibrator).norm(), 100, 1e-9);
-  EXPECT_EQ(tool_line("tibia", Bone::tibia, exposure, now, marker_from_tip).error().reason, Reason::no_pose);
+  EXPECT_EQ(tool_line("tibia", guidance::Bone::tibia, exposure, now, marker_from_tip).error().reason,
+            Reason::no_pose);
 }
 
 TEST(HandEyeTour, TurnsAboutAllAxesAndEndsWhereItBegan) {
-  const RigidTransform begin{rotation_from_euler(3, 0.1, 0.2), {400, 100, 300}};
+  const geometry::RigidTransform begin{geometry::rotation_from_euler(3, 0.1, 0.2), {400, 100, 300}};
   const auto tour = hand_eye_tour(begin);
   EXPECT_TRUE(tour.back().matrix().isApprox(begin.matrix(), 1e-12));
-  std::vector<HandEyePair> pairs;
-  for (const RigidTransform& pose : tour) {
-    const RigidTransform base_from_flange = pose * drill().flange_from_tcp.inverse();
+  std::vector<tracker::HandEyePair> pairs;
+  for (const geometry::RigidTransform& pose : tour) {
+    const geometry::RigidTransform base_from_flange = pose * drill().flange_from_tcp.inverse();
     pairs.push_back({base_from_flange, exact_hand_eye().tracker_from_base * base_from_flange *
                                            exact_hand_eye().flange_from_marker});
   }
-  const HandEye found = calibrate_hand_eye(pairs).value();
+  const tracker::HandEye found = tracker::calibrate_hand_eye(pairs).value();
   EXPECT_LT((found.flange_from_marker.translation - exact_hand_eye().flange_from_marker.translation).norm(),
             1e-6);
 }
@@ -103,4 +107,4 @@ TEST(OutcomeTable, StatisticsAreThoseOfTheErrors) {
 TEST(OutcomeTable, EmptyInputIsMisuse) { EXPECT_THROW(figures_of({}), std::invalid_argument); }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::operation

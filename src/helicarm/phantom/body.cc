@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 using Polygon = std::vector<Eigen::Vector2d>;
@@ -181,4 +181,4 @@ Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOp
   return surface_of(body_distance(calibrator, options), box, options.step_mm);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

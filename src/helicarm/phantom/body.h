@@ -5,7 +5,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/mesh.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 /// The plastic body of 2.3.1 and 2.3.4 in the calibrator's frame: a truncated cone on a flange, open at the
 /// base and closed at the top.
@@ -29,4 +29,4 @@ SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& op
 /// connect balls named as in 2.3.4. Refuses (bad_value) a ball outside the wall, and a step out of range.
 Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 using Place = std::tuple<float, float, float>;
@@ -123,4 +123,4 @@ TEST(PrintableBody, BallOutsideTheConeIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

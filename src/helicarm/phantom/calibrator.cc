@@ -14,7 +14,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/phantom/conical_helix.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 constexpr std::size_t least_balls = 6;
@@ -247,4 +247,4 @@ bool same_places(const Calibrator& a, const Calibrator& b) {
          });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

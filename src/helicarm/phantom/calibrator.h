@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 struct CalibratorBall {
   std::string label;
@@ -68,4 +68,4 @@ std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator);
 /// Same labels in any order, each ball within 0.01 mm.
 bool same_places(const Calibrator& a, const Calibrator& b);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

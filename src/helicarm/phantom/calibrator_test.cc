@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 /// The built-in calibrator with a ball, a cross and a line end as targets.
@@ -184,4 +184,4 @@ TEST(SamePlaces, IgnoresOrderAndDetectsAShift) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 /// The conical spiral of Eq. 9 with the paper's parameters. Its axis is the calibrator's z; t = 0 at the
 /// base.
@@ -20,4 +20,4 @@ struct ConicalHelix {
   Eigen::Vector3d point(double t) const { return {radius(t) * std::cos(t), radius(t) * std::sin(t), h * t}; }
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 constexpr const char* ink = "#1d2733";
@@ -177,4 +177,4 @@ std::string drawing_of(const Calibrator& calibrator) {
   return sheet.finish();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -7,7 +7,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 /// SVG, 1 : 1 in mm, dimensioned, seen from the source. Refuses (bad_value) an unbounded lattice.
 Expected<std::string> drawing_of(const Plate& plate);
@@ -15,4 +15,4 @@ Expected<std::string> drawing_of(const Plate& plate);
 /// SVG, 1 : 1 in mm: the balls and targets from above (along -z) and from the side (along +y), with labels.
 std::string drawing_of(const Calibrator& calibrator);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

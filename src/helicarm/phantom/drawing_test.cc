@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 using testing::HasSubstr;
@@ -40,4 +40,4 @@ TEST(DrawingOfCalibrator, NamesAreEscaped) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

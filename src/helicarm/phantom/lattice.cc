@@ -7,7 +7,7 @@
 
 #include "helicarm/phantom/plate.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 /// Dots as complex numbers: a rotation is a factor of modulus 1.
@@ -74,4 +74,4 @@ std::optional<double> lattice_misfit(const std::vector<Eigen::Vector2d>& dots_mm
   return std::nullopt;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <unordered_map>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "STL is little endian");
@@ -160,4 +160,4 @@ std::string to_stl(const TriangleMesh& mesh) {
   return bytes;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

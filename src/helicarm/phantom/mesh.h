@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 /// A closed surface; triangle vertices run counter-clockwise seen from outside.
 struct TriangleMesh {
@@ -31,4 +31,4 @@ double volume(const TriangleMesh& mesh);
 /// Binary STL, little endian, coordinates in mm.
 std::string to_stl(const TriangleMesh& mesh);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -9,7 +9,7 @@
 
 #include "helicarm/core/files.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 constexpr std::size_t most_dots = 20000;
@@ -97,4 +97,4 @@ Json to_json(const Plate& plate) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

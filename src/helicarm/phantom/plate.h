@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 enum class DotKind { balls, holes };
 enum class Lattice { square, hexagonal };
@@ -51,4 +51,4 @@ Eigen::Matrix2d lattice_steps(Lattice lattice);
 std::optional<double> lattice_misfit(const std::vector<Eigen::Vector2d>& dots_mm, Lattice lattice,
                                      double pitch_mm, double limit_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 std::vector<Eigen::Vector2d> turned(const Plate& plate, double angle, const Eigen::Vector2d& shift) {
@@ -87,4 +87,4 @@ TEST(LatticeMisfit, TwentyThousandDotsFit) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -11,7 +11,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -65,7 +65,7 @@ double distance_to_helix_mm(const ConicalHelix& helix, const Eigen::Vector3d& po
   return distance(best);
 }
 
-double imaged(const Calibrator& calibrator, const View& view, const RuleOptions& options) {
+double imaged(const Calibrator& calibrator, const geometry::View& view, const RuleOptions& options) {
   return double(
       std::count_if(calibrator.balls.begin(), calibrator.balls.end(), [&](const CalibratorBall& ball) {
         const double radius =
@@ -76,7 +76,7 @@ double imaged(const Calibrator& calibrator, const View& view, const RuleOptions&
 
 /// Smallest turning angle (degrees) at a corner of the quadrilateral, in the majority's sense; not positive
 /// if it is not convex.
-double least_turn_deg(const View& view, const Points& corners) {
+double least_turn_deg(const geometry::View& view, const Points& corners) {
   std::array<double, 4> turns{};
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d at = view.project(corners[(i + 1) % 4]);
@@ -143,7 +143,7 @@ void check_helical(const Points& balls, const DesignViews& views, const RuleOpti
 DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options) {
   const auto view = [&](const Eigen::Matrix3d& rotation) {
     const double f = options.source_detector_mm;
-    return View{
+    return geometry::View{
         {f, f, 0, 0, 0},
         {rotation, Eigen::Vector3d(0, 0, options.source_calibrator_mm) - rotation * middle_of(calibrator)}};
   };
@@ -151,7 +151,7 @@ DesignViews design_views(const Calibrator& calibrator, const RuleOptions& option
           view((Eigen::Matrix3d() << 1, 0, 0, 0, 0, 1, 0, -1, 0).finished())};
 }
 
-double smallest_gap_mm(const Calibrator& calibrator, const View& view, double range_deg) {
+double smallest_gap_mm(const Calibrator& calibrator, const geometry::View& view, double range_deg) {
   const Eigen::Vector3d middle = view.camera_from_world * middle_of(calibrator);
   const int steps = range_deg > 0 ? 5 : 0;
   double smallest = infinity;
@@ -205,4 +205,4 @@ std::vector<RuleFinding> check_rules(const Calibrator& calibrator, const RuleOpt
   return findings;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

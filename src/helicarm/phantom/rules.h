@@ -9,7 +9,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/conical_helix.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 struct RuleOptions {
   ConicalHelix helix;
@@ -39,16 +39,16 @@ std::vector<RuleFinding> check_rules(const Calibrator& calibrator, const RuleOpt
 /// Views with the calibrator's centroid at the given distance from the source, the beam along +z (AP) or -y
 /// (lateral, alpha = 90 degrees in Eq. 5). Pixels are mm in the detector plane, from the central ray.
 struct DesignViews {
-  View ap;
-  View lateral;
+  geometry::View ap;
+  geometry::View lateral;
 };
 DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options = {});
 
 /// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative if they overlap.
 /// The source rotates about both image axes within `range_deg`.
-double smallest_gap_mm(const Calibrator& calibrator, const View& view, double range_deg);
+double smallest_gap_mm(const Calibrator& calibrator, const geometry::View& view, double range_deg);
 
 /// Depth of a point below the nearest face of the balls' convex hull, mm; negative outside.
 double depth_in_hull_mm(const Calibrator& calibrator, const Eigen::Vector3d& point_in_calibrator);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -98,4 +98,4 @@ TEST(DepthInHull, OfACube) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

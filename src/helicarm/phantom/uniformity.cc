@@ -6,7 +6,7 @@
 #include <limits>
 #include <queue>
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 /// A cube and an upper bound of the distance to the nearest point within it.
@@ -63,4 +63,4 @@ double uniformity(const std::vector<Eigen::Vector3d>& points, const SurgicalSpac
          std::sqrt(sum / (double(points.size()) - 1));  // Eq. 13
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::phantom {
 
 /// The ball of 2.3.3 that may contain targets.
 struct SurgicalSpace {
@@ -23,4 +23,4 @@ double largest_gap_mm(const std::vector<Eigen::Vector3d>& points, const Surgical
 double uniformity(const std::vector<Eigen::Vector3d>& points, const SurgicalSpace& space = {},
                   double tolerance_mm = 0.01);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom

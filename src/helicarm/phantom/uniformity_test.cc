@@ -8,7 +8,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/phantom/calibrator.h"
 
-namespace helicarm {
+namespace helicarm::phantom {
 namespace {
 
 std::vector<Eigen::Vector3d> random_points(std::uint64_t trial, int count) {
@@ -77,4 +77,4 @@ TEST(Uniformity, IsSmallerForTheCalibratorThanForACluster) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom

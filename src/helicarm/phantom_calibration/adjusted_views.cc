@@ -12,12 +12,13 @@
 #include "helicarm/phantom_calibration/from_scratch.h"
 #include "helicarm/pipeline/prior.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 constexpr double reversal_ratio = 1.5;  // of the rms of a depth-reversed phantom to that of the best
 
-std::optional<bool> mirrored(const DetectedView& detected, const CaseView& view, bool from_scratch) {
+std::optional<bool> mirrored(const pipeline::DetectedView& detected, const pipeline::CaseView& view,
+                             bool from_scratch) {
   if (view.mirrored) return view.mirrored;
   if (from_scratch && detected.xray_image->acquisition.flip_hint) return true;
   return std::nullopt;
@@ -36,8 +37,8 @@ Expected<void> check_handedness(const Reconstruction& r) {
 
 using Observations = std::vector<std::vector<std::optional<Observed>>>;
 
-Observations observe_all(const std::vector<DetectedView>& detected, const std::vector<PreparedView>& views,
-                         const Reconstruction& r, unsigned threads) {
+Observations observe_all(const std::vector<pipeline::DetectedView>& detected,
+                         const std::vector<PreparedView>& views, const Reconstruction& r, unsigned threads) {
   Observations observed(views.size());
   parallel_for(views.size(), threads, [&](std::size_t v) {
     if (r.views[v])
@@ -47,11 +48,12 @@ Observations observe_all(const std::vector<DetectedView>& detected, const std::v
 }
 
 /// The problem of the fiducials that two views or more show; `balls` and `used` index the reconstruction.
-BundleProblem problem_of(const std::vector<DetectedView>& detected, const std::vector<PreparedView>& views,
-                         const Reconstruction& r, const Observations& observed,
-                         std::vector<std::size_t>& balls, std::vector<std::size_t>& used) {
+BundleProblem problem_of(const std::vector<pipeline::DetectedView>& detected,
+                         const std::vector<PreparedView>& views, const Reconstruction& r,
+                         const Observations& observed, std::vector<std::size_t>& balls,
+                         std::vector<std::size_t>& used) {
   BundleProblem problem;
-  problem.c_arm = unknown_c_arm();
+  problem.c_arm = pipeline::unknown_c_arm();
   std::vector<std::size_t> index(r.centres.size());
   for (std::size_t ball = 0; ball < r.centres.size(); ++ball) {
     int seen = 0;
@@ -79,7 +81,7 @@ BundleProblem problem_of(const std::vector<DetectedView>& detected, const std::v
 
 /// Poses and centres by the observed images, which then are observed again: the offset of a ball's blob from
 /// its centre depends on them, and balls that were missed are looked for.
-Expected<Observations> observe_twice(const std::vector<DetectedView>& detected,
+Expected<Observations> observe_twice(const std::vector<pipeline::DetectedView>& detected,
                                      const std::vector<PreparedView>& views, Reconstruction& r,
                                      unsigned threads) {
   Observations observed = observe_all(detected, views, r, threads);
@@ -97,7 +99,7 @@ Expected<Observations> observe_twice(const std::vector<DetectedView>& detected,
 /// B1, B2, ... by descending diameter, then by u in the first view.
 void name_by_size(AdjustedViews& found) {
   const auto& first = found.observed.front();
-  const View& view = found.consistent.fit.views.front();
+  const geometry::View& view = found.consistent.fit.views.front();
   std::vector<std::size_t> order(found.diameters_mm.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
   const auto u_of = [&](std::size_t i) {
@@ -111,7 +113,7 @@ void name_by_size(AdjustedViews& found) {
 }
 
 void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& balls,
-                     const std::vector<PreparedView>& views, const Calibrator* nominal,
+                     const std::vector<PreparedView>& views, const phantom::Calibrator* nominal,
                      std::vector<Warning>& warnings) {
   for (std::size_t v = 0; v < views.size(); ++v)
     if (!r.views[v])
@@ -130,23 +132,26 @@ void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& ba
 
 }  // namespace
 
-Expected<std::vector<DetectedView>> detected_views(const Case& given, unsigned threads) {
-  RunOptions options;
+Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Case& given, unsigned threads) {
+  pipeline::RunOptions options;
   options.threads = threads;
   const auto stage = [&](auto work) {
     return [&, work](auto views) { return work(std::move(views), given, options); };
   };
-  auto views = read_views(given, options).and_then(stage(rectify_views)).and_then(stage(detect_in_views));
+  auto views = pipeline::read_views(given, options)
+                   .and_then(stage(pipeline::rectify_views))
+                   .and_then(stage(pipeline::detect_in_views));
   if (!views) return tl::unexpected<Failure>(views.error().failure);
   return *std::move(views);
 }
 
-Expected<AdjustedViews> adjusted_views(const std::vector<DetectedView>& detected, const Case& given,
-                                       bool from_scratch, std::size_t least_views, unsigned threads,
+Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
+                                       const pipeline::Case& given, bool from_scratch,
+                                       std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings) {
   std::vector<double> kinds = given.diameters_mm;
   if (!from_scratch)
-    for (const CalibratorBall& ball : given.calibrator.balls) kinds.push_back(ball.diameter_mm);
+    for (const phantom::CalibratorBall& ball : given.calibrator.balls) kinds.push_back(ball.diameter_mm);
   std::ranges::sort(kinds, std::greater{});
   kinds.erase(std::unique(kinds.begin(), kinds.end()), kinds.end());
   std::vector<PreparedView> views(detected.size());
@@ -191,4 +196,4 @@ Expected<AdjustedViews> adjusted_views(const std::vector<DetectedView>& detected
   return found;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -8,7 +8,7 @@
 #include "helicarm/phantom_calibration/consistent_fit.h"
 #include "helicarm/phantom_calibration/observe.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// Views with their fiducials observed, and the adjustment of all.
 struct AdjustedViews {
@@ -23,13 +23,14 @@ struct AdjustedViews {
 };
 
 /// The case's images, rectified and searched.
-Expected<std::vector<DetectedView>> detected_views(const Case& given, unsigned threads);
+Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Case& given, unsigned threads);
 
 /// Labels (by the nominal file) or finds (from scratch) the fiducials, observes them in the pixels and
 /// adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
 /// `least_views` are.
-Expected<AdjustedViews> adjusted_views(const std::vector<DetectedView>& detected, const Case& given,
-                                       bool from_scratch, std::size_t least_views, unsigned threads,
+Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
+                                       const pipeline::Case& given, bool from_scratch,
+                                       std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

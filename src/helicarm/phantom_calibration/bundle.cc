@@ -14,7 +14,7 @@
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/phantom_calibration/image_cost.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 constexpr double least_own_share = 0.1;  // of an image's variance beside the map's
@@ -100,7 +100,7 @@ bool has_nominal_focal(const BundleProblem& given) {
 }
 
 void add_priors(Blocks& blocks, const BundleProblem& given, std::size_t v) {
-  const IntrinsicsPrior& prior = given.views[v].prior;
+  const calibration::IntrinsicsPrior& prior = given.views[v].prior;
   ViewBlocks& view = blocks.views[v];
   double* own = view.intrinsics.data();
   double* shared = blocks.c_arm.data();
@@ -307,4 +307,4 @@ Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& opti
   return fit;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -13,7 +13,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// The image of a fiducial's centre in one view.
 struct FiducialImage {
@@ -24,8 +24,8 @@ struct FiducialImage {
 
 struct BundleView {
   std::string name;
-  View start;  ///< world: that of `BundleProblem::centres`; fx < 0 where the image is mirrored
-  IntrinsicsPrior prior;
+  geometry::View start;  ///< world: that of `BundleProblem::centres`; fx < 0 where the image is mirrored
+  calibration::IntrinsicsPrior prior;
   std::vector<FiducialImage> images;
   /// Of the distortion map among the images, per axis (n x n, px^2). Empty: the map is exact.
   Eigen::MatrixXd map_covariance_px2 = {};
@@ -35,7 +35,7 @@ struct BundleView {
 struct BundleProblem {
   std::vector<Eigen::Vector3d> centres;  ///< start, mm; each is seen in two views or more
   std::vector<BundleView> views;
-  CArmPrior c_arm;
+  calibration::CArmPrior c_arm;
 };
 
 struct BundleOptions {
@@ -47,7 +47,7 @@ struct BundleOptions {
 
 struct BundleFit {
   std::vector<Eigen::Vector3d> centres;
-  std::vector<View> views;
+  std::vector<geometry::View> views;
   std::vector<std::vector<Eigen::Vector2d>> residuals_px;  ///< projection less image, per view and image
   /// Fall of chi2 without an image: by chance it follows chi2 with 2 degrees of freedom.
   std::vector<std::vector<double>> falls;
@@ -64,4 +64,4 @@ struct BundleFit {
 /// C-arm (`CArmPrior`). Maximum likelihood. `uncertain` where the images do not determine the problem.
 Expected<BundleFit> adjust(const BundleProblem& problem, const BundleOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -8,7 +8,7 @@
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/phantom_calibration/synthetic_phantom_test.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 constexpr double sigma_px = 0.05;
@@ -80,4 +80,4 @@ TEST(Bundle, TwoViewsWithKnownIntrinsicsAreEnough) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -8,7 +8,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/triangulation.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 constexpr double rejection_probability = 1e-5;
@@ -77,8 +77,8 @@ void expect_as_others(BundleProblem& alone, const BundleProblem& others, const B
   double focal = 0;
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (std::size_t v = 0; v < fit.views.size(); ++v) {
-    const Intrinsics& k = fit.views[v].intrinsics;
-    const IntrinsicsPrior& prior = others.views[v].prior;
+    const geometry::Intrinsics& k = fit.views[v].intrinsics;
+    const calibration::IntrinsicsPrior& prior = others.views[v].prior;
     focal += (std::abs(k.fx) + k.fy) / 2 / prior.unit_px / n;
     const Eigen::Vector2d from_nominal =
         Eigen::Vector2d(k.u0, k.v0) - prior.principal_px.value_or(Eigen::Vector2d::Zero());
@@ -160,19 +160,19 @@ std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double lea
   for (const auto& [fiducial, images] : of_fiducial) {
     const Eigen::Vector3d& centre = fit.fit.centres[fiducial];
     MovedFiducial moved{fiducial, 0, {}};
-    std::vector<RayObservation> ray_observations;
+    std::vector<geometry::RayObservation> ray_observations;
     for (const RejectedImage* image : images) {
-      const View& view = fit.fit.views[image->view];
+      const geometry::View& view = fit.fit.views[image->view];
       ray_observations.push_back({view, image->image.uv});
       moved.views.push_back(image->view);
       // In the image plane through the fiducial: at least so far.
       moved.moved_mm =
           std::max(moved.moved_mm, image->off_px.norm() * view.depth(centre) / view.intrinsics.fy);
     }
-    if (ray_observations.size() > 1 && widest_angle(ray_observations) > 0.1) {
-      const auto place =
-          intersect(ray_observations, Eigen::MatrixXd::Identity(2 * Eigen::Index(ray_observations.size()),
-                                                                2 * Eigen::Index(ray_observations.size())));
+    if (ray_observations.size() > 1 && geometry::widest_angle(ray_observations) > 0.1) {
+      const auto place = geometry::intersect(
+          ray_observations, Eigen::MatrixXd::Identity(2 * Eigen::Index(ray_observations.size()),
+                                                      2 * Eigen::Index(ray_observations.size())));
       // They must agree among themselves to a pixel.
       if (!place || place->chi2 > 2.0 * double(ray_observations.size())) continue;
       moved.moved_mm = (place->point - centre).norm();
@@ -183,4 +183,4 @@ std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double lea
   return most;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -6,7 +6,7 @@
 
 #include "helicarm/phantom_calibration/bundle.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// An image that the others contradict.
 struct RejectedImage {
@@ -42,4 +42,4 @@ struct MovedFiducial {
 /// that is off by more than `least_mm`.
 std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double least_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

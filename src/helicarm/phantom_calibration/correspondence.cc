@@ -10,7 +10,7 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/phantom_calibration/bundle.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector2d;
@@ -26,8 +26,8 @@ constexpr double gates_px[] = {12, 6, 4, 3};
 constexpr double largest_shift_mm = 12;  // of a fiducial from its nominal place
 constexpr std::size_t least_track_views = 3;
 
-Calibrator calibrator_of(const Reconstruction& r) {
-  Calibrator calibrator;
+phantom::Calibrator calibrator_of(const Reconstruction& r) {
+  phantom::Calibrator calibrator;
   calibrator.name = "reconstruction";
   for (std::size_t i = 0; i < r.centres.size(); ++i)
     calibrator.balls.push_back({fmt::format("{}", i), r.centres[i], r.diameters_mm[i]});
@@ -38,12 +38,12 @@ std::size_t labelled_views(const Reconstruction& r) {
   return std::size_t(std::ranges::count_if(r.views, [](const auto& view) { return view.has_value(); }));
 }
 
-Expected<Labelling> label_tolerantly(const PhantomView& view, const Calibrator& nominal) {
-  Expected<Labelling> best = fail(Reason::too_few_fiducials, "no fiducial");
+Expected<fiducials::Labelling> label_tolerantly(const PhantomView& view, const phantom::Calibrator& nominal) {
+  Expected<fiducials::Labelling> best = fail(Reason::too_few_fiducials, "no fiducial");
   for (const double tolerance : tolerances) {
-    LabellingOptions options;
+    fiducials::LabellingOptions options;
     options.systematic_sigma = tolerance;
-    auto labels = label_balls(nominal, view.candidates, view.labelling, options);
+    auto labels = fiducials::label_balls(nominal, view.candidates, view.labelling, options);
     if (!labels) continue;
     if (!best || labels->matched > best->matched) best = std::move(labels);
     if (best->matched >= int(nominal.balls.size())) break;
@@ -51,11 +51,11 @@ Expected<Labelling> label_tolerantly(const PhantomView& view, const Calibrator& 
   return best;
 }
 
-double predicted_radius(const View& view, const Vector3d& centre, double diameter_mm) {
+double predicted_radius(const geometry::View& view, const Vector3d& centre, double diameter_mm) {
   return diameter_mm / 2 * std::abs(view.intrinsics.fy) / view.depth(centre);
 }
 
-bool is_of_size(const BallCandidate& candidate, double predicted_px) {
+bool is_of_size(const fiducials::BallCandidate& candidate, double predicted_px) {
   return std::abs(std::log(candidate.radius_px / predicted_px)) < largest_radius_error;
 }
 
@@ -107,10 +107,10 @@ std::optional<Support> best_support(const Reconstruction& r, const std::vector<P
       for (std::size_t a = 0; a < views[i].candidates.size(); ++a)
         for (std::size_t b = 0; b < views[j].candidates.size(); ++b) {
           if (taken[i][a] || taken[j][b]) continue;
-          const RayObservation ray_observations[] = {{*r.views[i], views[i].candidates[a].uv},
-                                                     {*r.views[j], views[j].candidates[b].uv}};
-          if (widest_angle(ray_observations) < 0.05) continue;
-          const auto place = intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
+          const geometry::RayObservation ray_observations[] = {{*r.views[i], views[i].candidates[a].uv},
+                                                               {*r.views[j], views[j].candidates[b].uv}};
+          if (geometry::widest_angle(ray_observations) < 0.05) continue;
+          const auto place = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
           if (!place || place->chi2 > 16) continue;
           if (about && (place->point - *about).norm() > reach_mm) continue;
           Support support = support_of(r, views, taken, place->point, diameter_mm);
@@ -140,12 +140,12 @@ void find_missing(Reconstruction& r, const std::vector<PhantomView>& views) {
 }
 
 void label_further_views(Reconstruction& r, const std::vector<PhantomView>& views) {
-  const Calibrator calibrator = calibrator_of(r);
-  LabellingOptions options;
+  const phantom::Calibrator calibrator = calibrator_of(r);
+  fiducials::LabellingOptions options;
   options.systematic_sigma = relabel_tolerance;
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (r.views[v]) continue;
-    const auto labels = label_balls(calibrator, views[v].candidates, views[v].labelling, options);
+    const auto labels = fiducials::label_balls(calibrator, views[v].candidates, views[v].labelling, options);
     if (!labels) continue;
     r.views[v] = labels->view;
     r.candidate_of[v] = labels->candidate_of_ball;
@@ -173,8 +173,9 @@ void drop_contradicting_views(Reconstruction& r, const std::vector<PhantomView>&
 
 }  // namespace
 
-std::vector<int> assign(const PhantomView& view, const View& pose, const std::vector<Vector3d>& centres,
-                        const std::vector<double>& diameters_mm, double gate_px) {
+std::vector<int> assign(const PhantomView& view, const geometry::View& pose,
+                        const std::vector<Vector3d>& centres, const std::vector<double>& diameters_mm,
+                        double gate_px) {
   std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
   for (std::size_t ball = 0; ball < centres.size(); ++ball) {
     if (!(pose.depth(centres[ball]) > 0)) continue;
@@ -211,7 +212,7 @@ Expected<void> readjust(Reconstruction& r, const std::vector<PhantomView>& views
     problem.centres.push_back(r.centres[ball]);
   }
   // A nominal focal length that is not known is assumed, within a fifth.
-  problem.c_arm = {IntrinsicsVariation{0, 1.4}, IntrinsicsVariation{7, 4.2}};
+  problem.c_arm = {calibration::IntrinsicsVariation{0, 1.4}, calibration::IntrinsicsVariation{7, 4.2}};
   for (std::size_t v = 0; v < views.size(); ++v) {
     if (!r.views[v]) continue;
     BundleView view{views[v].name, *r.views[v], views[v].prior, {}};
@@ -221,7 +222,7 @@ Expected<void> readjust(Reconstruction& r, const std::vector<PhantomView>& views
         (views[v].prior.focal_px ? 0.01 : 0.2) * *view.prior.focal_px / view.prior.unit_px;
     for (const std::size_t ball : balls)
       if (const int k = r.candidate_of[v][ball]; k >= 0) {
-        const BallCandidate& candidate = views[v].candidates[std::size_t(k)];
+        const fiducials::BallCandidate& candidate = views[v].candidates[std::size_t(k)];
         view.images.push_back(
             {index[ball], candidate.uv, std::hypot(candidate.sigma_px, candidate_sigma_px)});
       }
@@ -278,9 +279,9 @@ void add_fiducials(Reconstruction& r, const std::vector<PhantomView>& views,
 }
 
 Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& views,
-                                             const Calibrator& nominal) {
+                                             const phantom::Calibrator& nominal) {
   Reconstruction r;
-  for (const CalibratorBall& ball : nominal.balls) {
+  for (const phantom::CalibratorBall& ball : nominal.balls) {
     r.centres.push_back(ball.centre_in_calibrator);
     r.diameters_mm.push_back(ball.diameter_mm);
   }
@@ -298,4 +299,4 @@ Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& vie
   return r;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

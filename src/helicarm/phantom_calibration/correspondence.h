@@ -7,17 +7,17 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom_calibration/phantom_view.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// Labels the fiducials of a nominal file whose coordinates may be off by millimetres, and adjusts them:
 /// each view is labelled with growing tolerance, then views and centres support each other. Fiducials that
 /// the file misplaces are found by consistent candidates in three views. `too_few_views` where fewer than
 /// three views can be labelled.
 Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& views,
-                                             const Calibrator& nominal);
+                                             const phantom::Calibrator& nominal);
 
 /// Each fiducial's nearest candidate within `gate_px` and of a fitting radius, one to one.
-std::vector<int> assign(const PhantomView& view, const View& pose,
+std::vector<int> assign(const PhantomView& view, const geometry::View& pose,
                         const std::vector<Eigen::Vector3d>& centres, const std::vector<double>& diameters_mm,
                         double gate_px);
 
@@ -33,4 +33,4 @@ Expected<void> complete(Reconstruction& reconstruction, const std::vector<Phanto
 void add_fiducials(Reconstruction& reconstruction, const std::vector<PhantomView>& views,
                    const std::vector<double>& diameters_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -14,7 +14,7 @@
 #include "helicarm/phantom_calibration/correspondence.h"
 #include "helicarm/phantom_calibration/pair_match.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Matrix3d;
@@ -38,15 +38,16 @@ struct PlainView {
 
 /// Which kind of ball each candidate is: the kinds' radii in the image are as their diameters, and the balls
 /// of a kind, seen from 0.8 to 1.2 times the mean distance, differ by up to 20 %.
-std::vector<int> kinds_of(const std::vector<BallCandidate>& candidates, std::vector<double> diameters_mm) {
+std::vector<int> kinds_of(const std::vector<fiducials::BallCandidate>& candidates,
+                          std::vector<double> diameters_mm) {
   if (diameters_mm.size() == 1) return std::vector<int>(candidates.size(), 0);
   double best_cost = 1e300, best_scale = 1;
-  for (const BallCandidate& base : candidates)
+  for (const fiducials::BallCandidate& base : candidates)
     for (const double diameter : diameters_mm) {
       const double scale = base.radius_px / diameter;
       double cost = 0;
       std::vector<int> count(diameters_mm.size(), 0);
-      for (const BallCandidate& c : candidates) {
+      for (const fiducials::BallCandidate& c : candidates) {
         double nearest = 0.3;
         for (std::size_t kind = 0; kind < diameters_mm.size(); ++kind) {
           const double off = std::abs(std::log(c.radius_px / (scale * diameters_mm[kind])));
@@ -58,7 +59,7 @@ std::vector<int> kinds_of(const std::vector<BallCandidate>& candidates, std::vec
       if (cost < best_cost) best_cost = cost, best_scale = scale;
     }
   std::vector<int> kinds;
-  for (const BallCandidate& c : candidates) {
+  for (const fiducials::BallCandidate& c : candidates) {
     const auto off = [&](double d) { return std::abs(std::log(c.radius_px / (best_scale * d))); };
     kinds.push_back(int(std::ranges::min_element(diameters_mm, {}, off) - diameters_mm.begin()));
   }
@@ -134,8 +135,8 @@ std::vector<Triple> triples_of(const std::vector<PlainView>& views, const std::a
 
 /// Rotation by `angle` about the axis that lies at angle_a in the first image and at angle_b in the second.
 Matrix3d rotation_of(const PairHypothesis& h, double angle) {
-  return rotation_from_vector({0, 0, h.angle_b}) * rotation_from_vector({angle, 0, 0}) *
-         rotation_from_vector({0, 0, -h.angle_a});
+  return geometry::rotation_from_vector({0, 0, h.angle_b}) * geometry::rotation_from_vector({angle, 0, 0}) *
+         geometry::rotation_from_vector({0, 0, -h.angle_a});
 }
 
 /// Scaled orthographic views of the tracks at given rotations: squared residual, px^2, and the points in the
@@ -215,9 +216,9 @@ Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const s
     const PlainView& view = views[t.views[v]];
     const double depth = view.focal_px / (magnification * scales[v]);
     const Vector2d shift = means[v] / view.focal_px * depth;
-    r.views[t.views[v]] = View{{view.mirrored ? -view.focal_px : view.focal_px, view.focal_px,
-                                view.principal_px.x(), view.principal_px.y(), 0},
-                               {rotations[v], {shift.x(), shift.y(), depth}}};
+    r.views[t.views[v]] = geometry::View{{view.mirrored ? -view.focal_px : view.focal_px, view.focal_px,
+                                          view.principal_px.x(), view.principal_px.y(), 0},
+                                         {rotations[v], {shift.x(), shift.y(), depth}}};
   }
   if (auto adjusted = readjust(r, given); !adjusted) return tl::unexpected<Failure>(adjusted.error());
   return r;
@@ -283,7 +284,7 @@ Reconstruction reversed(const Reconstruction& r) {
   const Matrix3d depth = Vector3d(1, 1, -1).asDiagonal();
   for (auto& view : other.views) {
     if (!view) continue;
-    RigidTransform& pose = view->camera_from_world;
+    geometry::RigidTransform& pose = view->camera_from_world;
     const Vector3d at = pose * middle;
     pose.rotation = depth * pose.rotation * mirror;
     pose.translation = at - pose.rotation * middle;
@@ -347,4 +348,4 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
   return best;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

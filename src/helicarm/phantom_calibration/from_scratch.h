@@ -6,7 +6,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/phantom_calibration/phantom_view.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// Finds corresponding candidates in views of an unknown phantom and its shape, in mm by the balls' diameters
 /// as seen. Three views first: pairs by affine epipolar geometry, tracks that close over the three, rotations
@@ -16,4 +16,4 @@ namespace helicarm {
 Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>& views,
                                                   const std::vector<double>& diameters_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -9,7 +9,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -32,7 +32,8 @@ Eigen::MatrixXd similarity_motions(std::span<const Vector3d> points) {
   const Vector3d mean = weighted_mean(points, Eigen::VectorXd::Ones(Eigen::Index(points.size())));
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Vector3d offset = points[i] - mean;
-    motions.middleRows<3>(3 * Eigen::Index(i)) << Eigen::Matrix3d::Identity(), -cross_matrix(offset), offset;
+    motions.middleRows<3>(3 * Eigen::Index(i)) << Eigen::Matrix3d::Identity(),
+        -geometry::cross_matrix(offset), offset;
   }
   return motions;
 }
@@ -76,7 +77,7 @@ Similarity similarity_between(std::span<const Vector3d> from, std::span<const Ve
     spread += weight * (from[i] - from_mean).squaredNorm();
   }
   Similarity fit;
-  fit.a_from_b.rotation = nearest_rotation(cross);
+  fit.a_from_b.rotation = geometry::nearest_rotation(cross);
   if (scaled) fit.scale = (fit.a_from_b.rotation.transpose() * cross).trace() / spread;
   fit.a_from_b.translation = to_mean - fit.scale * (fit.a_from_b.rotation * from_mean);
   return fit;
@@ -102,4 +103,4 @@ RobustFit robust_similarity(std::span<const Vector3d> from, std::span<const Vect
   return fit;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -9,7 +9,7 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// Small motions of points (3n x 7): translation along x, y, z, rotation about x, y, z through their mean,
 /// and growth about it (the point's offset from the mean).
@@ -27,7 +27,7 @@ Eigen::MatrixXd in_frame_of(const Eigen::MatrixXd& covariance, const Eigen::Matr
 
 struct Similarity {
   double scale = 1;
-  RigidTransform a_from_b;  ///< a = scale * rotation * b + translation
+  geometry::RigidTransform a_from_b;  ///< a = scale * rotation * b + translation
 
   Eigen::Vector3d operator*(const Eigen::Vector3d& b) const {
     return scale * (a_from_b.rotation * b) + a_from_b.translation;
@@ -48,4 +48,4 @@ struct RobustFit {
 RobustFit robust_similarity(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to,
                             bool scaled);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -3,7 +3,7 @@
 #include "helicarm/phantom_calibration/verify_phantom.h"
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 constexpr std::size_t most_entries = 10000;
@@ -33,13 +33,13 @@ Json earlier_entries(const std::filesystem::path& path) {
 
 }  // namespace
 
-std::string digest_of(const Calibrator& calibrator) {
+std::string digest_of(const phantom::Calibrator& calibrator) {
   Json places = Json::array();
-  for (const CalibratorBall& ball : calibrator.balls) {
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
     const Eigen::Vector3d& c = ball.centre_in_calibrator;
     places.push_back({ball.label, c.x(), c.y(), c.z(), ball.diameter_mm});
   }
-  return digest(to_text(places));
+  return xray::digest(to_text(places));
 }
 
 Expected<void> add_to_history(const std::filesystem::path& path, const PhantomVerification& verification) {
@@ -59,4 +59,4 @@ Expected<void> add_to_history(const std::filesystem::path& path, const PhantomVe
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

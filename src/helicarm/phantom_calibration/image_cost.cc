@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using RowMatrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -19,9 +19,9 @@ struct Projected {
 };
 
 /// Nothing where the point is not in front of the source.
-bool project(const RigidTransform& pose, const double* intrinsics, bool mirrored,
+bool project(const geometry::RigidTransform& pose, const double* intrinsics, bool mirrored,
              const Eigen::Vector3d& centre, Projected& to) {
-  const Intrinsics k = read_intrinsics(intrinsics, mirrored);
+  const geometry::Intrinsics k = read_intrinsics(intrinsics, mirrored);
   const Eigen::Vector3d p = pose * centre;
   if (!(p.z() > 0)) return false;
   const double x = p.x() / p.z(), y = p.y() / p.z();
@@ -40,18 +40,18 @@ bool project(const RigidTransform& pose, const double* intrinsics, bool mirrored
 
 }  // namespace
 
-void write_pose(const RigidTransform& pose, double* to) {
+void write_pose(const geometry::RigidTransform& pose, double* to) {
   Eigen::Map<RowMatrix3> rotation(to);
   rotation = pose.rotation;
   Eigen::Map<Eigen::Vector3d> translation(to + 9);
   translation = pose.translation;
 }
 
-RigidTransform read_pose(const double* from) {
+geometry::RigidTransform read_pose(const double* from) {
   return {Eigen::Map<const RowMatrix3>(from), Eigen::Map<const Eigen::Vector3d>(from + 9)};
 }
 
-void write_intrinsics(const Intrinsics& intrinsics, double* to) {
+void write_intrinsics(const geometry::Intrinsics& intrinsics, double* to) {
   const double fx = std::abs(intrinsics.fx);
   to[0] = (fx + intrinsics.fy) / 2;
   to[1] = fx / intrinsics.fy;
@@ -59,15 +59,15 @@ void write_intrinsics(const Intrinsics& intrinsics, double* to) {
   to[3] = intrinsics.v0;
 }
 
-Intrinsics read_intrinsics(const double* from, bool mirrored) {
+geometry::Intrinsics read_intrinsics(const double* from, bool mirrored) {
   const double fy = 2 * from[0] / (1 + from[1]);
   return {(mirrored ? -1 : 1) * from[1] * fy, fy, from[2], from[3], 0};
 }
 
 bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_delta) const {
-  RigidTransform pose = read_pose(x);
+  geometry::RigidTransform pose = read_pose(x);
   const Eigen::Map<const Eigen::Vector3d> turn(delta), shift(delta + 3);
-  pose.rotation = nearest_rotation(rotation_from_vector(turn) * pose.rotation);
+  pose.rotation = geometry::nearest_rotation(geometry::rotation_from_vector(turn) * pose.rotation);
   pose.translation += shift;
   write_pose(pose, x_plus_delta);
   return true;
@@ -76,9 +76,9 @@ bool PoseManifold::Plus(const double* x, const double* delta, double* x_plus_del
 bool PoseManifold::PlusJacobian(const double* x, double* jacobian) const {
   Eigen::Map<Eigen::Matrix<double, pose_size, 6, Eigen::RowMajor>> by_delta(jacobian);
   by_delta.setZero();
-  const RigidTransform pose = read_pose(x);
+  const geometry::RigidTransform pose = read_pose(x);
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const RowMatrix3 turned = cross_matrix(Eigen::Vector3d::Unit(axis)) * pose.rotation;
+    const RowMatrix3 turned = geometry::cross_matrix(Eigen::Vector3d::Unit(axis)) * pose.rotation;
     by_delta.col(axis).head<9>() = Eigen::Map<const Eigen::Vector<double, 9>>(turned.data());
   }
   by_delta.bottomRightCorner<3, 3>().setIdentity();
@@ -86,9 +86,9 @@ bool PoseManifold::PlusJacobian(const double* x, double* jacobian) const {
 }
 
 bool PoseManifold::Minus(const double* y, const double* x, double* y_minus_x) const {
-  const RigidTransform a = read_pose(y), b = read_pose(x);
+  const geometry::RigidTransform a = read_pose(y), b = read_pose(x);
   Eigen::Map<Eigen::Vector3d> turn(y_minus_x), shift(y_minus_x + 3);
-  turn = vector_from_rotation(a.rotation * b.rotation.transpose());
+  turn = geometry::vector_from_rotation(a.rotation * b.rotation.transpose());
   shift = a.translation - b.translation;
   return true;
 }
@@ -113,7 +113,7 @@ ImageCost::ImageCost(std::vector<Eigen::Vector2d> images, Eigen::MatrixXd whiten
 
 bool ImageCost::Evaluate(const double* const* parameters, double* residuals, double** jacobians) const {
   const auto n = Eigen::Index(images_.size());
-  const RigidTransform pose = read_pose(parameters[0]);
+  const geometry::RigidTransform pose = read_pose(parameters[0]);
   std::vector<Projected> projected(images_.size());
   Eigen::MatrixX2d difference(n, 2);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -150,4 +150,4 @@ bool ImageCost::Evaluate(const double* const* parameters, double* residuals, dou
   return true;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -8,17 +8,17 @@
 
 #include "helicarm/phantom_calibration/bundle.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// A pose as Ceres holds it: rotation (row major), then translation.
 inline constexpr int pose_size = 12;
 /// Focal length (mean of |fx| and fy, px), |fx| / fy, u0, v0.
 inline constexpr int intrinsics_size = 4;
 
-void write_pose(const RigidTransform& pose, double* to);
-RigidTransform read_pose(const double* from);
-void write_intrinsics(const Intrinsics& intrinsics, double* to);
-Intrinsics read_intrinsics(const double* from, bool mirrored);
+void write_pose(const geometry::RigidTransform& pose, double* to);
+geometry::RigidTransform read_pose(const double* from);
+void write_intrinsics(const geometry::Intrinsics& intrinsics, double* to);
+geometry::Intrinsics read_intrinsics(const double* from, bool mirrored);
 
 /// (exp(w) R, t + dt): the parameters of `ViewCovariance`.
 class PoseManifold final : public ceres::Manifold {
@@ -44,4 +44,4 @@ class ImageCost final : public ceres::CostFunction {
   bool mirrored_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

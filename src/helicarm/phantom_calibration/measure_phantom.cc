@@ -15,7 +15,7 @@
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -44,8 +44,9 @@ Expected<void> check_apart(const AdjustedViews& found) {
   const auto& views = found.consistent.fit.views;
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      widest = std::max(widest, angle_between(ray_through(views[i], views[i].project(middle)),
-                                              ray_through(views[j], views[j].project(middle))));
+      widest = std::max(widest,
+                        geometry::angle_between(geometry::ray_through(views[i], views[i].project(middle)),
+                                                geometry::ray_through(views[j], views[j].project(middle))));
   widest *= 180 / std::numbers::pi;
   if (widest >= least_angle_deg) return {};
   return fail(
@@ -161,7 +162,7 @@ Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd&
 }
 
 /// Carried by a rotation and a translation; the covariance into the frame that weighted points fix.
-void carry(ScaledPoints& points, const RigidTransform& by, const Eigen::VectorXd& weights) {
+void carry(ScaledPoints& points, const geometry::RigidTransform& by, const Eigen::VectorXd& weights) {
   const auto n = Eigen::Index(points.centres.size());
   Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(3 * n, 3 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -175,7 +176,8 @@ void carry(ScaledPoints& points, const RigidTransform& by, const Eigen::VectorXd
 
 /// The frame of an unknown phantom: origin at the mean, axes along the principal directions, the longest
 /// first, x and y with their largest component positive in the first view's directions, right-handed.
-RigidTransform principal_frame(const std::vector<Vector3d>& centres, const Eigen::Matrix3d& view_rotation) {
+geometry::RigidTransform principal_frame(const std::vector<Vector3d>& centres,
+                                         const Eigen::Matrix3d& view_rotation) {
   Vector3d mean = Vector3d::Zero();
   for (const Vector3d& centre : centres) mean += centre / double(centres.size());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
@@ -194,7 +196,8 @@ RigidTransform principal_frame(const std::vector<Vector3d>& centres, const Eigen
   return {rotation, -(rotation * mean)};
 }
 
-void set_frame(ScaledPoints& points, const AdjustedViews& found, const std::optional<Calibrator>& nominal) {
+void set_frame(ScaledPoints& points, const AdjustedViews& found,
+               const std::optional<phantom::Calibrator>& nominal) {
   const auto n = Eigen::Index(points.centres.size());
   if (!nominal) {
     carry(points, principal_frame(points.centres, found.consistent.fit.views[0].camera_from_world.rotation),
@@ -331,11 +334,11 @@ Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixel
   return distance;
 }
 
-Expected<PhantomResult> measure_phantom(const Case& given, const PhantomOptions& options) {
+Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const PhantomOptions& options) {
   PhantomResult result;
   result.warnings = given.warnings;
   if (!options.from_scratch) result.nominal = given.calibrator;
-  result.calibrator = result.nominal.value_or(Calibrator{});
+  result.calibrator = result.nominal.value_or(phantom::Calibrator{});
   result.calibrator.tolerance_mm = 0;
   if (options.from_scratch) result.calibrator.name = "measured";
   const auto refuse = [&](const Failure& failure) -> Expected<PhantomResult> {
@@ -363,4 +366,4 @@ Expected<PhantomResult> measure_phantom(const Case& given, const PhantomOptions&
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

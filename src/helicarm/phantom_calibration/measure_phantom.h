@@ -15,7 +15,7 @@
 #include "helicarm/phantom_calibration/scale.h"
 #include "helicarm/pipeline/case.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// A fiducial by its label, or by a raw pixel in the first view.
 using FiducialName = std::variant<std::string, Eigen::Vector2d>;
@@ -48,7 +48,7 @@ struct MeasuredBall {
 struct MeasuredView {
   std::string name;
   std::string digest;  ///< of the pixels
-  View view;
+  geometry::View view;
   double rms_px = 0;  ///< per axis
   std::optional<double> left_out_rms_px;
   std::vector<std::pair<std::size_t, Eigen::Vector2d>> residuals_px;  ///< ball, projection less image
@@ -64,8 +64,8 @@ struct PhantomScale {
 struct PhantomResult {
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
-  Calibrator calibrator;  ///< as measured
-  std::optional<Calibrator> nominal;
+  phantom::Calibrator calibrator;  ///< as measured
+  std::optional<phantom::Calibrator> nominal;
   std::vector<MeasuredBall> balls;
   std::vector<MeasuredView> views;
   PhantomScale scale;
@@ -78,9 +78,9 @@ struct PhantomResult {
 
 /// Measures the phantom of a case by bundle adjustment of its views (docs/method.md). Refusals are results;
 /// only unusable input fails.
-Expected<PhantomResult> measure_phantom(const Case& given, const PhantomOptions& options);
+Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const PhantomOptions& options);
 
 /// result.json, `helicarm-phantom/1` (docs/formats.md).
 Json to_json(const PhantomResult& result);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -9,15 +9,15 @@
 #include "helicarm/phantom_calibration/phantom_view.h"
 #include "helicarm/pipeline/stages.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// A view's candidates for balls of these diameters (all sizes where the pixel's is not known), the clearest
 /// first, and what is known of its camera. `dots` has the dot of each candidate.
 struct PreparedView {
   PhantomView view;
-  std::vector<Dot> dots;
+  std::vector<detection::Dot> dots;
 };
-PreparedView prepared(const DetectedView& detected, const std::vector<double>& diameters_mm,
+PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<double>& diameters_mm,
                       std::optional<bool> mirrored);
 
 /// The image of a fiducial's centre, measured in the pixels.
@@ -30,9 +30,10 @@ struct Observed {
 
 /// Fits every fiducial's image with the appearance of this image's balls: at its candidate, or where the pose
 /// puts it. Nothing for one that is not seen.
-std::vector<std::optional<Observed>> observe(const DetectedView& detected, const PreparedView& prepared,
-                                             const View& pose, const std::vector<Eigen::Vector3d>& centres,
+std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detected,
+                                             const PreparedView& prepared, const geometry::View& pose,
+                                             const std::vector<Eigen::Vector3d>& centres,
                                              const std::vector<double>& diameters_mm,
                                              const std::vector<int>& candidate_of);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -10,7 +10,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector2d;
@@ -207,4 +207,4 @@ std::vector<PairHypothesis> match_pair(const std::vector<PlainCandidate>& a,
   return found;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

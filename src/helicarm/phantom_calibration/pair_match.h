@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// A candidate as a matcher sees it: px from the principal point, not mirrored, and which kind of ball (by
 /// its radius).
@@ -33,4 +33,4 @@ struct PairHypothesis {
 std::vector<PairHypothesis> match_pair(const std::vector<PlainCandidate>& a,
                                        const std::vector<PlainCandidate>& b, std::size_t most);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

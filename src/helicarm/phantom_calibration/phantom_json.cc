@@ -2,7 +2,7 @@
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 Json list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers) {
@@ -40,7 +40,7 @@ Json view_json(const MeasuredView& view, const std::vector<MeasuredBall>& balls)
 Json to_json(const PhantomResult& result) {
   Json json = {{"format", "helicarm-phantom/1"},
                {"status", result.failure ? "refused" : "ok"},
-               {"failure", result.failure ? to_json(*result.failure) : Json(nullptr)},
+               {"failure", result.failure ? pipeline::to_json(*result.failure) : Json(nullptr)},
                {"warnings", Json::array()},
                {"reprojection_rms_px", result.views.empty() ? Json(nullptr) : Json(result.rms_px)},
                {"chi2", result.views.empty() ? Json(nullptr) : Json(result.chi2)},
@@ -52,7 +52,7 @@ Json to_json(const PhantomResult& result) {
                {"measured", result.calibrator.measured},
                {"timing_ms", {{"after_detection", result.solve_ms}}},
                {"version", HELICARM_VERSION}};
-  for (const Warning& warning : result.warnings) json["warnings"].push_back(to_json(warning));
+  for (const Warning& warning : result.warnings) json["warnings"].push_back(pipeline::to_json(warning));
   for (const MeasuredView& view : result.views) json["views"].push_back(view_json(view, result.balls));
   for (const MeasuredBall& ball : result.balls) json["balls"].push_back(ball_json(ball));
   if (result.balls.empty()) return json;
@@ -64,4 +64,4 @@ Json to_json(const PhantomResult& result) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

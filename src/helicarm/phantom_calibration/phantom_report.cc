@@ -11,7 +11,7 @@
 #include "helicarm/report/markup.h"
 #include "helicarm/report/style.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector2d;
@@ -52,7 +52,7 @@ double measured_rms(const PhantomResult& result) {
 std::string summary(const PhantomResult& result) {
   if (result.failure)
     return fmt::format("<p><span class=\"state refused\">refused: {}</span></p>\n<p>{}</p>\n",
-                       code(result.failure->reason), escaped(result.failure->message));
+                       code(result.failure->reason), report::escaped(result.failure->message));
   std::string html = "<p><span class=\"state ok\">measured</span></p>\n<div class=\"cards\">\n";
   const auto card = [&](const std::string& value, const std::string& what) {
     html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
@@ -60,22 +60,23 @@ std::string summary(const PhantomResult& result) {
   card(fmt::format("{:.3f} px", result.rms_px), "reprojection error, rms per axis");
   card(fmt::format("{:.3f} mm", measured_rms(result)), "sigma of a ball's centre, all axes together");
   card(fmt::format("{:.2g} %", 100 * result.scale.relative_sigma),
-       fmt::format("sigma of the scale, by {}", escaped(result.scale.source)));
+       fmt::format("sigma of the scale, by {}", report::escaped(result.scale.source)));
   card(fmt::format("{:.0f} / {}", result.chi2, result.dof), "chi-square / degrees of freedom");
   html += "</div>\n";
   return html +
          fmt::format(
              "<p>Worth measuring by hand: {} to {}, about {:.1f} mm; it gives the scale to {:.2g} %.</p>\n",
-             escaped(result.balls[result.pair.a].label), escaped(result.balls[result.pair.b].label),
-             result.pair.distance_mm, 100 * result.pair.relative_sigma);
+             report::escaped(result.balls[result.pair.a].label),
+             report::escaped(result.balls[result.pair.b].label), result.pair.distance_mm,
+             100 * result.pair.relative_sigma);
 }
 
 std::string warnings(const PhantomResult& result) {
   if (result.warnings.empty()) return "";
   std::string html = "<h2>Warnings</h2>\n<ul>\n";
   for (const Warning& w : result.warnings)
-    html += fmt::format("<li>{}: {}{}{}</li>\n", code(w.reason), escaped(w.view), w.view.empty() ? "" : ": ",
-                        escaped(w.message));
+    html += fmt::format("<li>{}: {}{}{}</li>\n", code(w.reason), report::escaped(w.view),
+                        w.view.empty() ? "" : ": ", report::escaped(w.message));
   return html + "</ul>\n";
 }
 
@@ -105,7 +106,7 @@ std::string residual_figure(const MeasuredView& view) {
   return svg + fmt::format(
                    "</svg><figcaption>{}: residuals, {:g} times enlarged; {:.3f} px rms per axis{}"
                    "</figcaption></figure>\n",
-                   escaped(view.name), enlarged, view.rms_px,
+                   report::escaped(view.name), enlarged, view.rms_px,
                    view.left_out_rms_px
                        ? fmt::format(", {:.3f} px when the other views predict it", *view.left_out_rms_px)
                        : "");
@@ -113,11 +114,11 @@ std::string residual_figure(const MeasuredView& view) {
 
 std::string views_section(const PhantomResult& result) {
   if (result.views.empty()) return "";
-  HtmlTable table({"view", "# balls", "# rms px per axis", "# left out px"});
+  report::HtmlTable table({"view", "# balls", "# rms px per axis", "# left out px"});
   std::string figures;
   for (const MeasuredView& view : result.views) {
-    table.row({escaped(view.name), std::to_string(view.residuals_px.size()), fixed(view.rms_px, 3),
-               fixed(view.left_out_rms_px, 3)});
+    table.row({report::escaped(view.name), std::to_string(view.residuals_px.size()),
+               report::fixed(view.rms_px, 3), report::fixed(view.left_out_rms_px, 3)});
     figures += residual_figure(view);
   }
   return "<h2>Views</h2>\n" + table.html() +
@@ -132,18 +133,18 @@ std::string balls_section(const PhantomResult& result) {
   std::vector<std::string> headings = {"ball", "# x mm", "# y mm", "# z mm", "# sigma mm", "# views"};
   if (result.nominal)
     headings.insert(headings.end(), {"# dx mm", "# dy mm", "# dz mm", "# from nominal mm", ""});
-  HtmlTable table(headings);
+  report::HtmlTable table(headings);
   for (const MeasuredBall& ball : result.balls) {
-    std::vector<std::string> cells = {escaped(ball.label),
-                                      fixed(ball.centre.x(), 3),
-                                      fixed(ball.centre.y(), 3),
-                                      fixed(ball.centre.z(), 3),
-                                      fixed(std::sqrt(ball.covariance_mm2.trace() / 3), 4),
+    std::vector<std::string> cells = {report::escaped(ball.label),
+                                      report::fixed(ball.centre.x(), 3),
+                                      report::fixed(ball.centre.y(), 3),
+                                      report::fixed(ball.centre.z(), 3),
+                                      report::fixed(std::sqrt(ball.covariance_mm2.trace() / 3), 4),
                                       std::to_string(ball.views)};
     if (ball.from_nominal) {
       const Vector3d& d = *ball.from_nominal;
       const bool off = d.cwiseAbs().maxCoeff() > off_by * tolerance_of(result);
-      for (const double number : {d.x(), d.y(), d.z(), d.norm()}) cells.push_back(fixed(number, 3));
+      for (const double number : {d.x(), d.y(), d.z(), d.norm()}) cells.push_back(report::fixed(number, 3));
       cells.push_back(off ? fmt::format("<span class=\"bad\">off by more than {:g} x {:g} mm</span>", off_by,
                                         tolerance_of(result))
                           : "");
@@ -175,7 +176,7 @@ std::string arrows_figure(const PhantomResult& result, Eigen::Index across, Eige
         "class=\"residual\" style=\"stroke-width:0.8\" d=\"M{:.2f} {:.2f}L{:.2f} {:.2f}\"/>"
         "<text font-size=\"4\" x=\"{:.2f}\" y=\"{:.2f}\">{}</text>",
         from.x(), from.y(), from.x(), from.y(), to.x(), to.y(), from.x() + 3, from.y() - 2,
-        escaped(ball.label));
+        report::escaped(ball.label));
   }
   return svg +
          fmt::format(
@@ -187,17 +188,17 @@ std::string nominal_section(const PhantomResult& result) {
   if (result.balls.empty() || !result.nominal) return "";
   const std::vector<Vector3d> centres = centres_of(result);
   const Vector3d mean = mean_of(centres);
-  HtmlTable table({"point", "# nominal file mm", "# measured file mm"});
+  report::HtmlTable table({"point", "# nominal file mm", "# measured file mm"});
   double extent = 0;
   for (const Vector3d& centre : centres) extent = std::max(extent, (centre - mean).norm());
   for (const auto& [name, point] :
        {std::pair{"middle of the balls", mean},
         {"farthest ball's distance along x", Vector3d(mean + Vector3d(extent, 0, 0))},
         {"the same along z", Vector3d(mean + Vector3d(0, 0, extent))}})
-    table.row({name, fixed(predicted_tre_mm(centres, nominal_rms(result), point), 3),
-               fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), point),
-                                result.scale.relative_sigma * (point - mean).norm()),
-                     3)});
+    table.row({name, report::fixed(predicted_tre_mm(centres, nominal_rms(result), point), 3),
+               report::fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), point),
+                                        result.scale.relative_sigma * (point - mean).norm()),
+                             3)});
   return "<h2>From nominal</h2>\n<div class=\"views\">" +
          arrows_figure(result, 0, 2, "along y: x to the right, z up") +
          arrows_figure(result, 0, 1, "along z: x to the right, y up") +
@@ -232,7 +233,7 @@ std::string phantom_report_html(const PhantomResult& result) {
       "</head>\n<body>\n<header>\n<h1>Phantom {}</h1>\n<p class=\"notice\">Research instrument, not a "
       "medical "
       "device.</p>\n</header>\n<main>\n",
-      report_style, escaped(result.calibrator.name));
+      report::report_style, report::escaped(result.calibrator.name));
   html += summary(result) + warnings(result) + nominal_section(result) + balls_section(result) +
           views_section(result);
   return html +
@@ -242,4 +243,4 @@ std::string phantom_report_html(const PhantomResult& result) {
              HELICARM_VERSION);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -5,7 +5,7 @@
 
 #include "helicarm/phantom_calibration/measure_phantom.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// One page: what was measured, residuals of each view, differences from the nominal file as a table and as
 /// arrows on the phantom, and what they do to a located point.
@@ -16,4 +16,4 @@ std::string phantom_report_html(const PhantomResult& result);
 double predicted_tre_mm(const std::vector<Eigen::Vector3d>& balls, double ball_rms_mm,
                         const Eigen::Vector3d& point);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

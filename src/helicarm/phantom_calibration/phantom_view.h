@@ -10,25 +10,25 @@
 #include "helicarm/calibration/priors.h"
 #include "helicarm/fiducials/label.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// One X-ray image of the phantom before any fiducial is labelled.
 struct PhantomView {
   std::string name;
-  std::vector<BallCandidate> candidates;  ///< rectified px
-  LabellingPrior labelling;               ///< of the camera; `mirrored` where it is known
-  IntrinsicsPrior prior;
+  std::vector<fiducials::BallCandidate> candidates;  ///< rectified px
+  fiducials::LabellingPrior labelling;               ///< of the camera; `mirrored` where it is known
+  calibration::IntrinsicsPrior prior;
 };
 
 /// A phantom and its views as first found, by candidates' centres: to a fraction of a millimetre.
 struct Reconstruction {
   std::vector<Eigen::Vector3d> centres;  ///< mm
   std::vector<double> diameters_mm;
-  std::vector<std::optional<View>> views;      ///< nothing: not part of it
-  std::vector<std::vector<int>> candidate_of;  ///< per view and fiducial; -1: not seen
-  double rms_px = 0;                           ///< per axis
+  std::vector<std::optional<geometry::View>> views;  ///< nothing: not part of it
+  std::vector<std::vector<int>> candidate_of;        ///< per view and fiducial; -1: not seen
+  double rms_px = 0;                                 ///< per axis
   /// Reconstructed from scratch: rms of the depth-reversed phantom, which affine views show alike.
   std::optional<double> reversed_rms_px = {};
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -8,7 +8,7 @@
 
 #include "helicarm/phantom_calibration/gauge.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -115,4 +115,4 @@ PairToMeasure best_pair(const std::vector<Vector3d>& centres, const Eigen::Matri
   return best;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -9,7 +9,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 /// A distance between two fiducials' centres, measured by hand.
 struct CentreDistance {
@@ -48,4 +48,4 @@ struct PairToMeasure {
 PairToMeasure best_pair(const std::vector<Eigen::Vector3d>& centres, const Eigen::MatrixXd& covariance_mm2,
                         double sigma_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

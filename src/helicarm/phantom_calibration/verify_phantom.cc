@@ -13,7 +13,7 @@
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 namespace {
 
 using Eigen::Vector3d;
@@ -32,7 +32,7 @@ double chi2_limit(std::size_t count) {
 }
 
 /// The balls at their places in the file, whose own errors are added to their images'.
-BundleProblem with_file_centres(const AdjustedViews& found, const Calibrator& file,
+BundleProblem with_file_centres(const AdjustedViews& found, const phantom::Calibrator& file,
                                 const std::vector<Eigen::Matrix3d>& covariances) {
   BundleProblem problem = found.consistent.problem;
   for (const RejectedImage& rejected : found.consistent.rejected)
@@ -61,9 +61,9 @@ BundleProblem with_file_centres(const AdjustedViews& found, const Calibrator& fi
 void start_in_file_frame(BundleProblem& problem, const AdjustedViews& found) {
   const RobustFit fit = robust_similarity(found.consistent.fit.centres, problem.centres, true);
   for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    View view = found.consistent.fit.views[v];
-    const RigidTransform& by = fit.a_from_b.a_from_b;
-    RigidTransform& pose = view.camera_from_world;
+    geometry::View view = found.consistent.fit.views[v];
+    const geometry::RigidTransform& by = fit.a_from_b.a_from_b;
+    geometry::RigidTransform& pose = view.camera_from_world;
     // camera = pose * b and a = scale * R b + t, so scale * camera = (pose.R R') (a - t) + scale * pose.t
     pose.rotation = pose.rotation * by.rotation.transpose();
     pose.translation = fit.a_from_b.scale * pose.translation - pose.rotation * by.translation;
@@ -155,18 +155,19 @@ void judge(PhantomVerification& result) {
 }
 
 /// A ball in whose place one of another size is seen, in two views or more.
-bool is_swapped(const CalibratorBall& ball, const Calibrator& file, const std::vector<DetectedView>& detected,
-                const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
+bool is_swapped(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
+                const std::vector<pipeline::DetectedView>& detected, const std::vector<geometry::View>& views,
+                const std::vector<std::size_t>& view_of_case) {
   constexpr double reach_px = 6, alike = 0.1;
   int seen = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const DistortionMap& map = detected[view_of_case[v]].rectification.map;
+    const rectification::DistortionMap& map = detected[view_of_case[v]].rectification.map;
     const Eigen::Vector2d uv = views[v].project(ball.centre_in_calibrator);
     const double px_per_mm = views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
-    for (const Dot& dot : detected[view_of_case[v]].candidates.dots) {
+    for (const detection::Dot& dot : detected[view_of_case[v]].candidates.dots) {
       const auto at = map.rectified_from_raw(dot.centre_px);
       if (!at || (*at - uv).norm() > reach_px) continue;
-      seen += std::ranges::any_of(file.balls, [&](const CalibratorBall& other) {
+      seen += std::ranges::any_of(file.balls, [&](const phantom::CalibratorBall& other) {
         return other.diameter_mm != ball.diameter_mm &&
                std::abs(std::log(2 * dot.radius_px / px_per_mm / other.diameter_mm)) < alike;
       });
@@ -177,17 +178,17 @@ bool is_swapped(const CalibratorBall& ball, const Calibrator& file, const std::v
 
 /// Whether it is missing: in two views or more its place is in the image and free of any other dot that could
 /// hide it or be it.
-bool is_missing(const CalibratorBall& ball, const std::vector<DetectedView>& detected,
-                const std::vector<View>& views, const std::vector<std::size_t>& view_of_case) {
+bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline::DetectedView>& detected,
+                const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
   constexpr double reach = 2;  // radii
   int empty = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const DetectedView& image = detected[view_of_case[v]];
+    const pipeline::DetectedView& image = detected[view_of_case[v]];
     const Eigen::Vector2d raw =
         image.rectification.map.raw_from_rectified(views[v].project(ball.centre_in_calibrator));
     const double radius_px =
         ball.diameter_mm / 2 * views[v].intrinsics.fy / views[v].depth(ball.centre_in_calibrator);
-    const auto is_near = [&](const Dot& dot) {
+    const auto is_near = [&](const detection::Dot& dot) {
       return (dot.centre_px - raw).norm() < reach * std::max(radius_px, dot.radius_px);
     };
     if (!image.rectification.map.shows(raw)) continue;
@@ -197,9 +198,10 @@ bool is_missing(const CalibratorBall& ball, const std::vector<DetectedView>& det
   return empty >= 2;
 }
 
-void describe(const AdjustedViews& found, const Case& given, const std::vector<DetectedView>& detected,
-              unsigned threads, PhantomVerification& result) {
-  const auto covariances = ball_covariances(given.calibrator);
+void describe(const AdjustedViews& found, const pipeline::Case& given,
+              const std::vector<pipeline::DetectedView>& detected, unsigned threads,
+              PhantomVerification& result) {
+  const auto covariances = phantom::ball_covariances(given.calibrator);
   BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
   start_in_file_frame(problem, found);
   std::vector<bool> moved(problem.centres.size(), false);
@@ -213,7 +215,7 @@ void describe(const AdjustedViews& found, const Case& given, const std::vector<D
   }
   result.rms_px = fit->rms_px;
   for (std::size_t ball = 0; ball < given.calibrator.balls.size(); ++ball) {
-    const CalibratorBall& in_file = given.calibrator.balls[ball];
+    const phantom::CalibratorBall& in_file = given.calibrator.balls[ball];
     VerifiedBall verified{in_file.label, {}, 0, BallState::as_in_file, 0};
     const auto at = std::ranges::find(found.ball_of_nominal, ball);
     if (at == found.ball_of_nominal.end()) {
@@ -233,7 +235,7 @@ void describe(const AdjustedViews& found, const Case& given, const std::vector<D
       if (moved[i]) verified.state = BallState::moved;
       if (places[i]) {
         verified.distance_mm = places[i]->off.norm();
-        verified.bound_mm = length_at_95(places[i]->covariance);
+        verified.bound_mm = localization::length_at_95(places[i]->covariance);
       }
     }
     result.balls.push_back(std::move(verified));
@@ -257,7 +259,7 @@ std::string_view word(BallState state) {
   return "";
 }
 
-Expected<PhantomVerification> verify_phantom(const Case& given, unsigned threads) {
+Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsigned threads) {
   PhantomVerification result;
   result.warnings = given.warnings;
   result.calibrator = digest_of(given.calibrator);
@@ -278,14 +280,14 @@ Expected<PhantomVerification> verify_phantom(const Case& given, unsigned threads
 Json to_json(const PhantomVerification& v) {
   Json json = {{"format", "helicarm-phantom-verification/1"},
                {"status", v.failure ? "refused" : "ok"},
-               {"failure", v.failure ? to_json(*v.failure) : Json(nullptr)},
+               {"failure", v.failure ? pipeline::to_json(*v.failure) : Json(nullptr)},
                {"warnings", Json::array()},
                {"date", v.date},
                {"calibrator", v.calibrator},
                {"within_mm", v.balls.empty() ? Json(nullptr) : Json(v.within_mm)},
                {"reprojection_rms_px", v.balls.empty() ? Json(nullptr) : Json(v.rms_px)},
                {"balls", Json::array()}};
-  for (const Warning& warning : v.warnings) json["warnings"].push_back(to_json(warning));
+  for (const Warning& warning : v.warnings) json["warnings"].push_back(pipeline::to_json(warning));
   for (const VerifiedBall& ball : v.balls)
     json["balls"].push_back({{"label", ball.label},
                              {"distance_mm", ball.distance_mm ? Json(*ball.distance_mm) : Json(nullptr)},
@@ -295,4 +297,4 @@ Json to_json(const PhantomVerification& v) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -11,7 +11,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/pipeline/case.h"
 
-namespace helicarm {
+namespace helicarm::phantom_calibration {
 
 enum class BallState {
   as_in_file,
@@ -42,14 +42,14 @@ struct PhantomVerification {
 /// Whether the balls lie as in the case's calibrator file, from two views or more: each ball is intersected
 /// from views that the others calibrate. A refusal (`calibrator_mismatch`, `too_few_views`, ...) is a
 /// result; only unusable input fails.
-Expected<PhantomVerification> verify_phantom(const Case& given, unsigned threads);
+Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsigned threads);
 
 Json to_json(const PhantomVerification& verification);
 
 /// Of labels, coordinates and diameters.
-std::string digest_of(const Calibrator& calibrator);
+std::string digest_of(const phantom::Calibrator& calibrator);
 
 /// Adds to the history, a JSON file that is made where there is none.
 Expected<void> add_to_history(const std::filesystem::path& path, const PhantomVerification& verification);
 
-}  // namespace helicarm
+}  // namespace helicarm::phantom_calibration

@@ -10,53 +10,56 @@
 #include "helicarm/pipeline/residuals.h"
 #include "helicarm/pipeline/stopwatch.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 using LabelledViews = std::vector<LabelledView>;
 
-CommonPrior common_prior(const Calibrator& calibrator) {
-  return {unknown_c_arm(), ball_covariances(calibrator), calibrator.scale_sigma};
+calibration::CommonPrior common_prior(const phantom::Calibrator& calibrator) {
+  return {unknown_c_arm(), phantom::ball_covariances(calibrator), calibrator.scale_sigma};
 }
 
 /// The prior of these views from a C-arm history, without entries of these images.
-Expected<LearnedIntrinsics> prior_from_history(const LabelledViews& views, const CArmHistory& history) {
-  const IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
+Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews& views,
+                                                            const calibration::CArmHistory& history) {
+  const calibration::IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
       return fail(Reason::bad_value,
                   "a C-arm history (--machine) requires images with pixel size and source distance");
-  std::vector<HistoryEntry> earlier;
-  std::ranges::copy_if(history.entries, std::back_inserter(earlier), [&](const HistoryEntry& entry) {
-    return std::ranges::none_of(views, [&](const LabelledView& view) {
-      return view.xray_image->acquisition.instance_key == entry.image;
-    });
-  });
-  return learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
+  std::vector<calibration::HistoryEntry> earlier;
+  std::ranges::copy_if(history.entries, std::back_inserter(earlier),
+                       [&](const calibration::HistoryEntry& entry) {
+                         return std::ranges::none_of(views, [&](const LabelledView& view) {
+                           return view.xray_image->acquisition.instance_key == entry.image;
+                         });
+                       });
+  return calibration::learn_intrinsics(earlier, {*nominal.focal_px / nominal.unit_px, 0, 0}, unknown_c_arm());
 }
 
 /// Entries of these views for the C-arm history; none if their residuals are inconsistent with the noise
 /// model.
-std::vector<HistoryEntry> new_entries(const CaseCalibration& calibration, const CommonPrior& common) {
-  std::vector<HistoryEntry> entries;
+std::vector<calibration::HistoryEntry> new_entries(const CaseCalibration& calibration,
+                                                   const calibration::CommonPrior& common) {
+  std::vector<calibration::HistoryEntry> entries;
   if (calibration.variance_scale != 1) return entries;
   for (std::size_t i = 0; i < calibration.images.size(); ++i) {
-    ViewFiducials view = fiducials_of(calibration.images[i]);
+    calibration::ViewFiducials view = fiducials_of(calibration.images[i]);
     view.fiducials = calibration.fiducials[i];
-    if (const auto entry =
-            history_entry_of(view, calibration.images[i].xray_image->acquisition.instance_key, common))
+    if (const auto entry = calibration::history_entry_of(
+            view, calibration.images[i].xray_image->acquisition.instance_key, common))
       entries.push_back(*entry);
   }
   return entries;
 }
 
 /// Mean position of the used fiducials over all views.
-Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
+Eigen::Vector3d centre_of(const calibration::CalibrationResult& calibration) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double count = 0;
   for (const auto& of_view : calibration.fiducials)
-    for (const Fiducial& ball : of_view)
-      if (ball.status == FiducialStatus::used) {
+    for (const fiducials::Fiducial& ball : of_view)
+      if (ball.status == fiducials::FiducialStatus::used) {
         sum += ball.centre_in_calibrator;
         ++count;
       }
@@ -65,24 +68,26 @@ Eigen::Vector3d centre_of(const CalibrationResult& calibration) {
 
 Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
                                      const RunOptions& options) {
-  std::optional<LearnedIntrinsics> history;
+  std::optional<calibration::LearnedIntrinsics> history;
   if (options.history) {
     const auto prior = prior_from_history(views, *options.history);
     if (!prior) return tl::unexpected<Failure>(prior.error());
     history = *prior;
   }
-  std::vector<ViewFiducials> fiducials;
+  std::vector<calibration::ViewFiducials> fiducials;
   for (const LabelledView& view : views) fiducials.push_back(fiducials_of(view));
-  CalibrationOptions how;
+  calibration::CalibrationOptions how;
   how.common = common_prior(given.calibrator);
   if (history) {
     how.common.c_arm = history->prior;
     for (std::size_t i = 0; i < views.size(); ++i)
-      fiducials[i].prior = learned_prior(fiducials[i].prior, *history, views[i].fiducials.mirrored);
+      fiducials[i].prior =
+          calibration::learned_prior(fiducials[i].prior, *history, views[i].fiducials.mirrored);
   }
-  return (options.method == Method::paper ? calibrate_paper(fiducials, how) : calibrate(fiducials, how))
-      .and_then([&](CalibrationResult result) {
-        return check_views_apart(result.views, centre_of(result)).map([&] {
+  return (options.method == rectification::Method::paper ? calibration::calibrate_paper(fiducials, how)
+                                                         : calibration::calibrate(fiducials, how))
+      .and_then([&](calibration::CalibrationResult result) {
+        return calibration::check_views_apart(result.views, centre_of(result)).map([&] {
           return CaseCalibration{std::move(result), {}, history, {}, {}};
         });
       });
@@ -92,7 +97,7 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
 /// which otherwise require offsets of the fiducials: a wrong tag is the simpler cause.
 Expected<CaseCalibration> with_explanations(CaseCalibration calibration, const LabelledViews& views,
                                             const Case& given, const RunOptions& options) {
-  if (options.method == Method::paper) return calibration;
+  if (options.method == rectification::Method::paper) return calibration;
   for (Warning& warning : explain_residuals(views, calibration, common_prior(given.calibrator))) {
     if (warning.reason == Reason::intrinsics_inconsistent && calibration.found_tolerance_mm > 0) {
       warning.reason = Reason::calibrator_mismatch;
@@ -153,4 +158,4 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
       });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -8,18 +8,18 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/pipeline/stages.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// The jointly calibrated views of a case and their images: sufficient to observe and locate any picks and
 /// poses.
-struct CaseCalibration : CalibrationResult {
-  std::vector<LabelledView> images;          ///< one per view
-  std::optional<LearnedIntrinsics> history;  ///< from the C-arm history, if given
-  std::vector<HistoryEntry> entries;         ///< of these views, for the C-arm history
+struct CaseCalibration : calibration::CalibrationResult {
+  std::vector<LabelledView> images;                       ///< one per view
+  std::optional<calibration::LearnedIntrinsics> history;  ///< from the C-arm history, if given
+  std::vector<calibration::HistoryEntry> entries;         ///< of these views, for the C-arm history
   Timing timing_ms;
 };
 
 /// From image files to calibrated views (2.1, 2.2, 2.3.4; Eq. 1-7).
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

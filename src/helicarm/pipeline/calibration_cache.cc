@@ -6,25 +6,26 @@
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/read_xray_image.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
 
 Expected<std::string> digest_of(const std::filesystem::path& file) {
-  return read_file(file, most_file_bytes).map([](const std::string& bytes) { return digest(bytes); });
+  return read_file(file, most_file_bytes).map([](const std::string& bytes) { return xray::digest(bytes); });
 }
 
 /// Contents of all inputs of a case's calibration.
-Expected<std::string> key_of(const Case& given, Method method) {
-  Json key = {{"calibrator", to_json(given.calibrator)},
-              {"plate", given.plate ? to_json(*given.plate) : Json()},
-              {"paper", method == Method::paper},
+Expected<std::string> key_of(const Case& given, rectification::Method method) {
+  Json key = {{"calibrator", phantom::to_json(given.calibrator)},
+              {"plate", given.plate ? phantom::to_json(*given.plate) : Json()},
+              {"paper", method == rectification::Method::paper},
               {"views", Json::array()}};
   for (const CaseView& view : given.views) {
     Json files = Json::array();
-    for (const auto& file : {std::optional(view.image), sidecar_of(view.image), view.plate_image,
-                             view.plate_image ? sidecar_of(*view.plate_image) : std::nullopt, view.map}) {
+    for (const auto& file :
+         {std::optional(view.image), xray::sidecar_of(view.image), view.plate_image,
+          view.plate_image ? xray::sidecar_of(*view.plate_image) : std::nullopt, view.map}) {
       const auto content = file ? digest_of(*file) : Expected<std::string>();
       if (!content) return tl::unexpected<Failure>(content.error());
       files.push_back(*content);
@@ -58,4 +59,4 @@ Expected<Result> CalibrationCache::run(const Case& given, const RunOptions& opti
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -6,7 +6,7 @@
 
 #include "helicarm/pipeline/locate_case.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// Runs cases; calibrates only if images, maps, plate, calibrator or method differ from the previous case.
 class CalibrationCache {
@@ -22,4 +22,4 @@ class CalibrationCache {
   int calibrations_ = 0;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

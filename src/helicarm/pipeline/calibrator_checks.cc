@@ -9,7 +9,7 @@
 
 #include "helicarm/geometry/triangulation.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 using Eigen::Vector3d;
@@ -37,16 +37,17 @@ std::optional<Failure> check_handedness(const std::vector<LabelledView>& images,
 }
 
 /// Unlabelled candidates within the used fiducials' largest distance from their centroid.
-int unlabelled_among(const std::vector<Fiducial>& balls, const LabelledView& image) {
+int unlabelled_among(const std::vector<fiducials::Fiducial>& balls, const LabelledView& image) {
   std::vector<Eigen::Vector2d> used;
-  for (const Fiducial& ball : balls)
-    if (ball.status == FiducialStatus::used) used.push_back(ball.uv_raw);
+  for (const fiducials::Fiducial& ball : balls)
+    if (ball.status == fiducials::FiducialStatus::used) used.push_back(ball.uv_raw);
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& uv : used) middle += uv / double(used.size());
   double reach = 0;
   for (const Eigen::Vector2d& uv : used) reach = std::max(reach, (uv - middle).norm());
-  return int(std::ranges::count_if(image.fiducials.false_blobs,
-                                   [&](const Dot& dot) { return (dot.centre_px - middle).norm() <= reach; }));
+  return int(std::ranges::count_if(image.fiducials.false_blobs, [&](const detection::Dot& dot) {
+    return (dot.centre_px - middle).norm() <= reach;
+  }));
 }
 
 /// Refuses labels that leave at least a third of the fiducials, and as many candidates among them,
@@ -54,11 +55,12 @@ int unlabelled_among(const std::vector<Fiducial>& balls, const LabelledView& ima
 std::optional<Failure> check_labels(const CaseCalibration& calibration,
                                     const std::vector<LabelledView>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const auto count = [&](FiducialStatus status) {
-      return int(std::ranges::count(calibration.fiducials[i], status, &Fiducial::status));
+    const auto count = [&](fiducials::FiducialStatus status) {
+      return int(std::ranges::count(calibration.fiducials[i], status, &fiducials::Fiducial::status));
     };
-    const int used = count(FiducialStatus::used);
-    const int rejected = count(FiducialStatus::rejected), missing = count(FiducialStatus::not_found);
+    const int used = count(fiducials::FiducialStatus::used);
+    const int rejected = count(fiducials::FiducialStatus::rejected),
+              missing = count(fiducials::FiducialStatus::not_found);
     const int unlabelled = unlabelled_among(calibration.fiducials[i], images[i]);
     const int unexplained = rejected + missing;
     if (2 * unexplained < used || unlabelled < unexplained) continue;
@@ -77,13 +79,14 @@ std::optional<Failure> check_labels(const CaseCalibration& calibration,
 }
 
 /// Mean over all used fiducials of ln(measured / expected radius at the fiducial's distance).
-std::optional<double> mean_log_radius(const CalibrationResult& calibration, const Calibrator& calibrator) {
+std::optional<double> mean_log_radius(const calibration::CalibrationResult& calibration,
+                                      const phantom::Calibrator& calibrator) {
   double sum = 0, count = 0;
   for (std::size_t i = 0; i < calibration.views.size(); ++i)
     for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-      const Fiducial& ball = calibration.fiducials[i][k];
-      if (ball.status != FiducialStatus::used || !(ball.radius_px > 0)) continue;
-      const View& view = calibration.views[i].view;
+      const fiducials::Fiducial& ball = calibration.fiducials[i][k];
+      if (ball.status != fiducials::FiducialStatus::used || !(ball.radius_px > 0)) continue;
+      const geometry::View& view = calibration.views[i].view;
       const double expected = 0.5 * calibrator.balls[k].diameter_mm * view.intrinsics.fy /
                               view.depth(calibrator.balls[k].centre_in_calibrator);
       sum += std::log(ball.radius_px / expected);
@@ -100,17 +103,17 @@ struct DisplacedBall {
 
 std::optional<DisplacedBall> displaced_ball(const CaseCalibration& calibration,
                                             const std::vector<LabelledView>& images,
-                                            const CalibratorBall& ball) {
+                                            const phantom::CalibratorBall& ball) {
   struct Near {
     std::size_t view;
     Eigen::Vector2d uv;
   };
   std::vector<Near> near;
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const View& view = calibration.views[i].view;
+    const geometry::View& view = calibration.views[i].view;
     const double per_mm = view.intrinsics.fy / view.depth(ball.centre_in_calibrator);
     const Eigen::Vector2d expected = view.project(ball.centre_in_calibrator);
-    for (const Dot& dot : images[i].fiducials.false_blobs) {
+    for (const detection::Dot& dot : images[i].fiducials.false_blobs) {
       const auto uv = images[i].rectification.map.rectified_from_raw(dot.centre_px);
       if (uv && (*uv - expected).norm() < displaced_reach_mm * per_mm) near.push_back({i, *uv});
     }
@@ -119,10 +122,10 @@ std::optional<DisplacedBall> displaced_ball(const CaseCalibration& calibration,
   for (const Near& a : near)
     for (const Near& b : near) {
       if (a.view >= b.view) continue;
-      const std::array<RayObservation, 2> ray_observations{
-          RayObservation{calibration.views[a.view].view, a.uv},
-          RayObservation{calibration.views[b.view].view, b.uv}};
-      const auto met = intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
+      const std::array<geometry::RayObservation, 2> ray_observations{
+          geometry::RayObservation{calibration.views[a.view].view, a.uv},
+          geometry::RayObservation{calibration.views[b.view].view, b.uv}};
+      const auto met = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
       if (!met || met->ray_gap_mm > displaced_gap_mm) continue;
       if ((met->point - ball.centre_in_calibrator).norm() > displaced_reach_mm) continue;
       if (!best || met->ray_gap_mm < best->gap_mm) best = DisplacedBall{met->point, met->ray_gap_mm};
@@ -133,14 +136,14 @@ std::optional<DisplacedBall> displaced_ball(const CaseCalibration& calibration,
 /// Fiducials that no view uses, but two views show nearby.
 std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
                                        const std::vector<LabelledView>& images,
-                                       const Calibrator& calibrator) {
+                                       const phantom::Calibrator& calibrator) {
   std::vector<Warning> warnings;
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const bool used = std::ranges::any_of(calibration.fiducials, [&](const auto& of_view) {
-      return of_view[k].status == FiducialStatus::used;
+      return of_view[k].status == fiducials::FiducialStatus::used;
     });
     if (used) continue;
-    const CalibratorBall& ball = calibrator.balls[k];
+    const phantom::CalibratorBall& ball = calibrator.balls[k];
     const auto seen = displaced_ball(calibration, images, ball);
     if (!seen) continue;
     const double off = (seen->place - ball.centre_in_calibrator).norm();
@@ -160,8 +163,8 @@ std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
 
 }  // namespace
 
-ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
-                             const Calibrator& calibrator) {
+ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
+                             const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {
   if (calibration.joint_covariance.size() == 0) return {};  // `--method paper`: its circles' radii are rough
   double weight = 0, sum = 0;
   const auto add = [&](double excess, double sigma) {
@@ -171,7 +174,8 @@ ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::ve
   if (const auto radius = mean_log_radius(calibration, calibrator)) add(*radius, diameter_sigma);
   for (std::size_t i = 0; i < images.size(); ++i)
     if (const auto& stated = images[i].xray_image->acquisition.source_patient_mm)
-      add(calibration.views[i].view.depth(middle_of(calibrator)) / *stated - 1, patient_sigma_mm / *stated);
+      add(calibration.views[i].view.depth(phantom::middle_of(calibrator)) / *stated - 1,
+          patient_sigma_mm / *stated);
   if (weight == 0) return {};
   return {sum / weight, 1 / std::sqrt(weight)};
 }
@@ -210,7 +214,7 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points) {
   if (given.calibrator.scale_sigma > 0) return {};
-  const Vector3d middle = middle_of(given.calibrator);
+  const Vector3d middle = phantom::middle_of(given.calibrator);
   Warning note{Reason::scale_unverified, {}, {}, {}};
   const ScaleEvidence evidence = scale_evidence(calibration, calibration.images, given.calibrator);
   if (evidence.sigma > 0) {
@@ -225,7 +229,7 @@ std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calib
     most = std::max(most, per_cent_mm);
   }
   std::string distances;
-  for (const CalibratedView& view : calibration.views) {
+  for (const calibration::CalibratedView& view : calibration.views) {
     const double distance = (view.view.camera_from_world * middle).norm();
     note.figures["source_distance_mm " + view.name] = distance;
     distances += fmt::format("{}{} {:.0f} mm", distances.empty() ? "" : ", ", view.name, distance);
@@ -243,4 +247,4 @@ std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calib
   return {note};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

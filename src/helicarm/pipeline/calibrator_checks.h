@@ -6,7 +6,7 @@
 #include "helicarm/pipeline/calibrate_case.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// Estimate of the calibrator's scale that is independent of its coordinates.
 struct ScaleEvidence {
@@ -15,8 +15,8 @@ struct ScaleEvidence {
 };
 
 /// From the fiducials' measured diameters and Distance Source to Patient (0018,1111).
-ScaleEvidence scale_evidence(const CalibrationResult& calibration, const std::vector<LabelledView>& images,
-                             const Calibrator& calibrator);
+ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
+                             const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator);
 
 /// Checks the calibrator's file against the images. Refuses `ambiguous_labels` if a third of the fiducials
 /// and as many candidates are unexplained, `ambiguous_handedness` if every image is mirrored without a tag or
@@ -31,4 +31,4 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,
                                  const std::vector<PointResult>& points);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -11,7 +11,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,7 +45,7 @@ Eigen::Vector3d place_from(JsonReader& reader, const char* key) {
   return Eigen::Vector3d(reader.numbers(key, 3, place_range).data());
 }
 
-std::optional<RigidTransform> pose_from(JsonReader& reader, const char* key) {
+std::optional<geometry::RigidTransform> pose_from(JsonReader& reader, const char* key) {
   const Json& rows = reader.raw(key);
   if (rows.is_null()) return std::nullopt;
   const std::size_t count = rows.is_array() && rows.size() == 3 ? 3 : 4;
@@ -53,11 +53,12 @@ std::optional<RigidTransform> pose_from(JsonReader& reader, const char* key) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   for (std::size_t i = 0; i < numbers.size(); ++i)
     matrix(static_cast<Eigen::Index>(i / 4), static_cast<Eigen::Index>(i % 4)) = numbers[i];
-  return value_or_throw(rigid_transform_from(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
+  return value_or_throw(
+      geometry::rigid_transform_from(matrix, fmt::format("{}: \"{}\"", reader.where(), key)));
 }
 
-Poses poses_from(JsonReader reader, bool now) {
-  Poses poses;
+guidance::Poses poses_from(JsonReader reader, bool now) {
+  guidance::Poses poses;
   if (!now) poses.tracker_from_calibrator = pose_from(reader, "tracker_from_calibrator");
   poses.tracker_from_femur = pose_from(reader, "tracker_from_femur");
   poses.tracker_from_tibia = pose_from(reader, "tracker_from_tibia");
@@ -76,7 +77,7 @@ std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs:
 void refuse_metres(const Case& read) {
   constexpr double least_mm = 10;
   double farthest = 0;
-  const auto update = [&](const Poses& poses) {
+  const auto update = [&](const guidance::Poses& poses) {
     for (const auto* pose : {&poses.tracker_from_calibrator, &poses.tracker_from_femur,
                              &poses.tracker_from_tibia, &poses.tracker_from_tool})
       if (*pose) farthest = std::max(farthest, (*pose)->translation.norm());
@@ -119,13 +120,13 @@ Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
   pick.diameter_mm = reader.optional_number("diameter_mm", {0.5, 30}).value_or(pick.diameter_mm);
   pick.sigma_px = reader.optional_number("sigma_px", {0, 100});
   if (!reader.raw("moves_with").is_null())
-    pick.moves_with = static_cast<Bone>(reader.choice("moves_with", {"femur", "tibia"}));
+    pick.moves_with = static_cast<guidance::Bone>(reader.choice("moves_with", {"femur", "tibia"}));
   reader.finish();
   return pick;
 }
 
 std::vector<Pick> picks_of(JsonReader& reader, const std::vector<CaseView>& views,
-                           const std::vector<CalibratorTarget>& targets) {
+                           const std::vector<phantom::CalibratorTarget>& targets) {
   std::vector<Pick> picks;
   std::set<std::pair<std::string, std::string>> clicks;
   for (JsonReader& entry : reader.objects("picks", false, most_picks)) {
@@ -133,7 +134,7 @@ std::vector<Pick> picks_of(JsonReader& reader, const std::vector<CaseView>& view
     if (!clicks.emplace(pick.name, pick.view).second)
       entry.refuse(Reason::name_clash, "name",
                    fmt::format("\"{}\" is given twice in {}", pick.name, pick.view));
-    if (find_named(targets, pick.name, &CalibratorTarget::name))
+    if (find_named(targets, pick.name, &phantom::CalibratorTarget::name))
       entry.refuse(Reason::name_clash, "name",
                    fmt::format("\"{}\" is a target of the calibrator", pick.name));
     const Pick* other = find_named(picks, pick.name, &Pick::name);
@@ -160,12 +161,13 @@ std::vector<TunnelPlan> tunnels_from(JsonReader& reader, const std::vector<Pick>
   return tunnels;
 }
 
-std::vector<ToolLine> tool_lines_from(JsonReader& reader, const std::vector<TunnelPlan>& tunnels) {
-  std::vector<ToolLine> lines;
+std::vector<verification::ToolLine> tool_lines_from(JsonReader& reader,
+                                                    const std::vector<TunnelPlan>& tunnels) {
+  std::vector<verification::ToolLine> lines;
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("tool_lines", false, most_picks)) {
-    ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"), place_from(entry, "p1_in_calibrator"),
-                  place_from(entry, "p2_in_calibrator")};
+    verification::ToolLine line{name_from(entry, "name"), name_from(entry, "tunnel"),
+                                place_from(entry, "p1_in_calibrator"), place_from(entry, "p2_in_calibrator")};
     take_name(entry, names, line.name);
     if (!find_named(tunnels, line.tunnel, &TunnelPlan::name))
       entry.refuse(Reason::bad_value, "tunnel",
@@ -178,12 +180,12 @@ std::vector<ToolLine> tool_lines_from(JsonReader& reader, const std::vector<Tunn
   return lines;
 }
 
-TrackerNoise tracker_from(JsonReader reader) {
-  TrackerNoise noise;
+guidance::TrackerNoise tracker_from(JsonReader reader) {
+  guidance::TrackerNoise noise;
   noise.sigma_mm = reader.number("sigma_mm", {0, 100});
   noise.sigma_deg = reader.number("sigma_deg", {0, 90});
   if (!reader.raw("samples").is_null())
-    noise.samples = static_cast<Samples>(reader.choice("samples", {"shared", "independent"}));
+    noise.samples = static_cast<guidance::Samples>(reader.choice("samples", {"shared", "independent"}));
   reader.finish();
   return noise;
 }
@@ -207,7 +209,7 @@ void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
     reader.raw("calibrator");
     return;
   }
-  read.calibrator = value_or_throw(calibrator_named(reader.text("calibrator", 1000), read.folder));
+  read.calibrator = value_or_throw(phantom::calibrator_named(reader.text("calibrator", 1000), read.folder));
 }
 
 std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::size_t least_views) {
@@ -226,7 +228,8 @@ std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::siz
 }
 
 void warn_of_name(Case& read) {
-  if (read.calibrator.name == udcsc().name && !same_places(read.calibrator, udcsc()))
+  if (read.calibrator.name == phantom::udcsc().name &&
+      !phantom::same_places(read.calibrator, phantom::udcsc()))
     read.warnings.push_back(
         {Reason::name_differs,
          fmt::format("the calibrator is named \"{}\" but its coordinates differ from the built-in one's; the "
@@ -248,7 +251,7 @@ Case case_from(const fs::path& path, Purpose purpose) {
   read.folder = folder;
   read_calibrator_of(read, reader, purpose);
   if (const auto plate = reader.optional_text("plate", 1000))
-    read.plate = value_or_throw(plate_named(*plate, folder));
+    read.plate = value_or_throw(phantom::plate_named(*plate, folder));
   read.views = views_from(reader, read, purpose == Purpose::run ? least_views_of_run : 1);
   if (!reader.raw("poses_now").is_null()) read.poses_now = poses_from(reader.object("poses_now"), true);
   if (!reader.raw("tracker").is_null()) read.tracker = tracker_from(reader.object("tracker"));
@@ -264,10 +267,10 @@ Case case_from(const fs::path& path, Purpose purpose) {
 }  // namespace
 
 Json to_json(const Pick& pick) {
-  Json json = {{"name", pick.name}, {"view", pick.view}, {"uv", json_list(pick.uv_raw)}};
+  Json json = {{"name", pick.name}, {"view", pick.view}, {"uv", geometry::json_list(pick.uv_raw)}};
   if (pick.snap == Snap::ball) json["snap"] = "ball", json["diameter_mm"] = pick.diameter_mm;
   if (pick.sigma_px) json["sigma_px"] = *pick.sigma_px;
-  if (pick.moves_with) json["moves_with"] = *pick.moves_with == Bone::femur ? "femur" : "tibia";
+  if (pick.moves_with) json["moves_with"] = *pick.moves_with == guidance::Bone::femur ? "femur" : "tibia";
   return json;
 }
 
@@ -288,4 +291,4 @@ Expected<Case> read_phantom_case(const fs::path& path) {
   return guarded([&] { return case_from(path, Purpose::phantom); });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -15,7 +15,7 @@
 #include "helicarm/phantom/plate.h"
 #include "helicarm/verification/verify.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// One view of the case; the files are in the case's folder.
 struct CaseView {
@@ -25,7 +25,7 @@ struct CaseView {
   std::optional<std::filesystem::path> plate_image;  ///< a separate acquisition of the plate
   std::optional<std::filesystem::path> map;          ///< a known distortion map
   std::optional<bool> mirrored;                      ///< handedness, if known
-  Poses poses;                                       ///< at the acquisition
+  guidance::Poses poses;                             ///< at the acquisition
 };
 
 enum class Snap { none, ball };
@@ -38,7 +38,7 @@ struct Pick {
   Snap snap = Snap::none;
   double diameter_mm = 3;          ///< of the ball to snap to
   std::optional<double> sigma_px;  ///< per axis; 0: exact
-  std::optional<Bone> moves_with;
+  std::optional<guidance::Bone> moves_with;
 };
 
 /// An element of case.json's "picks".
@@ -57,14 +57,14 @@ struct TunnelPlan {
 /// Input of `helicarm run`: case.json and the files it names (docs/formats.md).
 struct Case {
   std::filesystem::path folder;
-  Calibrator calibrator;
-  std::optional<Plate> plate;  ///< nothing: flat panel
+  phantom::Calibrator calibrator;
+  std::optional<phantom::Plate> plate;  ///< nothing: flat panel
   std::vector<CaseView> views;
-  Poses poses_now;
-  TrackerNoise tracker;
+  guidance::Poses poses_now;
+  guidance::TrackerNoise tracker;
   std::vector<Pick> picks;
   std::vector<TunnelPlan> tunnels;
-  std::vector<ToolLine> tool_lines;
+  std::vector<verification::ToolLine> tool_lines;
   std::vector<double> diameters_mm;  ///< of the fiducials of a phantom without a file
   std::vector<Warning> warnings;
 };
@@ -77,4 +77,4 @@ Expected<Case> read_case(const std::filesystem::path& path);
 /// "diameters_mm" is given (`calibrator` then has no balls).
 Expected<Case> read_phantom_case(const std::filesystem::path& path);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -8,7 +8,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 using testing::HasSubstr;
@@ -86,10 +86,10 @@ TEST_F(CaseFile, ReadsAllValues) {
   EXPECT_EQ(read_back->views[0].poses.tracker_from_calibrator->translation, Eigen::Vector3d(5, 6, 7));
   EXPECT_FALSE(read_back->views[1].poses.tracker_from_calibrator);
   EXPECT_EQ(read_back->picks[0].snap, Snap::ball);
-  EXPECT_EQ(read_back->picks[0].moves_with, Bone::femur);
+  EXPECT_EQ(read_back->picks[0].moves_with, guidance::Bone::femur);
   EXPECT_EQ(read_back->picks[1].sigma_px, 0.0);
   EXPECT_FALSE(read_back->picks[2].moves_with);
-  EXPECT_EQ(read_back->tracker.samples, Samples::shared);
+  EXPECT_EQ(read_back->tracker.samples, guidance::Samples::shared);
   EXPECT_EQ(read_back->tool_lines[0].tunnel, "femur");
 }
 
@@ -186,7 +186,7 @@ TEST_F(CaseFile, PickMovesWithOneBone) {
 }
 
 TEST_F(CaseFile, PickAndTargetMayNotShareAName) {
-  Json calibrator = to_json(udcsc());
+  Json calibrator = phantom::to_json(phantom::udcsc());
   calibrator["name"] = "own";
   calibrator["targets"] =
       Json::parse(R"([{"name": "FS", "xyz_mm": [0, 0, 30], "kind": "ball", "diameter_mm": 3}])");
@@ -196,7 +196,7 @@ TEST_F(CaseFile, PickAndTargetMayNotShareAName) {
 }
 
 TEST_F(CaseFile, BuiltInNameWithOtherPlacesIsAWarning) {
-  Json calibrator = to_json(udcsc());
+  Json calibrator = phantom::to_json(phantom::udcsc());
   calibrator["balls"][3]["xyz_mm"][2] = 20.0;
   ASSERT_TRUE(write_file(folder_ / "calibrator.json", calibrator.dump()).has_value());
   json_["calibrator"] = "calibrator.json";
@@ -248,8 +248,8 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
 }
 
 TEST(Case, RoundTripOfPicks) {
-  std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, Bone::femur},
-                          {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, Bone::femur}};
+  std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, guidance::Bone::femur},
+                          {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, guidance::Bone::femur}};
   Json json = Json::array();
   for (const Pick& pick : picks) json.push_back(to_json(pick));
   std::vector<CaseView> views(2);
@@ -262,4 +262,4 @@ TEST(Case, RoundTripOfPicks) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

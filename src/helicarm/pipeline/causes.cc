@@ -9,7 +9,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/prior.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 /// One view of a case, measured again with other tags.
@@ -17,17 +17,17 @@ struct Trial {
   const Case& given;
   const RunOptions& options;
   std::string name;
-  const XrayImage& image;
+  const xray::XrayImage& image;
 
   ReadView with(std::optional<double> pixel_factor, std::optional<double> distance_factor) const {
-    XrayImage changed = image;
-    Acquisition& tags = changed.acquisition;
+    xray::XrayImage changed = image;
+    xray::Acquisition& tags = changed.acquisition;
     if (!pixel_factor)
       tags.pixel_mm.reset();
     else if (tags.pixel_mm)
       *tags.pixel_mm *= *pixel_factor;
     if (tags.source_detector_mm) *tags.source_detector_mm *= distance_factor.value_or(1);
-    return {{name}, std::make_shared<const XrayImage>(std::move(changed))};
+    return {{name}, std::make_shared<const xray::XrayImage>(std::move(changed))};
   }
 };
 
@@ -36,11 +36,11 @@ std::optional<double> pixel_by_plate(const Trial& trial) {
   constexpr int least_dots = 20;
   const auto rectified = rectify_views({trial.with({}, 1)}, trial.given, trial.options);
   if (!rectified) return std::nullopt;
-  const Rectification& found = rectified->front().rectification;
+  const rectification::Rectification& found = rectified->front().rectification;
   if (found.dots_found < least_dots || !found.map.rectified_pixel_mm) return std::nullopt;
   const auto& distance = trial.image.acquisition.source_detector_mm;
   const auto& height = trial.given.plate->height_above_receiver_mm;
-  const bool in_plate = found.map.rectified_plane != RectifiedPlane::detector;
+  const bool in_plate = found.map.rectified_plane != rectification::RectifiedPlane::detector;
   return *found.map.rectified_pixel_mm *
          (in_plate && distance && height ? *distance / (*distance - *height) : 1);
 }
@@ -54,18 +54,19 @@ struct FittedFocal {
 
 std::optional<FittedFocal> focal_of(const LabelledView& view, double factor) {
   constexpr double most_sigma = 0.03;  // relative
-  ViewFiducials fiducials = fiducials_of(view);
+  calibration::ViewFiducials fiducials = fiducials_of(view);
   const double wanted = 0.15 * *fiducials.prior.focal_px / fiducials.prior.unit_px;
-  CalibrationOptions options;
+  calibration::CalibrationOptions options;
   options.common.c_arm = unknown_c_arm();
-  options.common.c_arm.focal = IntrinsicsVariation{wanted, 0.01};
-  const auto fit = calibrate({fiducials}, options);
+  options.common.c_arm.focal = calibration::IntrinsicsVariation{wanted, 0.01};
+  const auto fit = calibration::calibrate({fiducials}, options);
   if (!fit || fit->variance_scale != 1) return std::nullopt;
-  const Intrinsics& k = fit->views[0].view.intrinsics;
+  const geometry::Intrinsics& k = fit->views[0].view.intrinsics;
   const double focal = 0.5 * (std::abs(k.fx) + k.fy);
   if (!(std::sqrt(fit->views[0].covariance(1, 1)) < most_sigma * focal)) return std::nullopt;
-  return FittedFocal{focal, factor,
-                     std::ranges::count(fit->fiducials[0], FiducialStatus::used, &Fiducial::status)};
+  return FittedFocal{
+      focal, factor,
+      std::ranges::count(fit->fiducials[0], fiducials::FiducialStatus::used, &fiducials::Fiducial::status)};
 }
 
 /// Labels the view with assumed focal lengths from half to twice the file's and returns the fit with the most
@@ -120,7 +121,7 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
   Failure failure = refusal.failure;
   const auto at = std::ranges::find(refusal.views, failure.view, &ViewResult::name);
   if (at == refusal.views.end() || !at->xray_image) return failure;
-  const Acquisition& tags = at->xray_image->acquisition;
+  const xray::Acquisition& tags = at->xray_image->acquisition;
   Case one = given;
   one.views = {given.views[std::size_t(at - refusal.views.begin())]};
   RunOptions alone = options;
@@ -145,4 +146,4 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
   return failure;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -3,7 +3,7 @@
 
 #include "helicarm/pipeline/stages.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// The failure of a refusal. If its view would be accepted with another pixel size or source distance
 /// (`plate_mismatch`, `plate_not_found`, `calibrator_mismatch`, `ambiguous_labels`, `too_few_fiducials`), the
@@ -11,4 +11,4 @@ namespace helicarm {
 /// `file_source_detector_mm`, `fitting_source_detector_mm`. Costs about twenty labellings.
 Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

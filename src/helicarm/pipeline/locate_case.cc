@@ -6,7 +6,7 @@
 #include "helicarm/pipeline/points.h"
 #include "helicarm/pipeline/stopwatch.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 void append(std::vector<Warning>& warnings, const std::vector<Warning>& more, const std::string& view = {}) {
@@ -81,11 +81,11 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   const auto done =
       plan_tunnels(given, result)  // Eq. 16
-          .and_then([&](std::vector<Tunnel> tunnels) {
+          .and_then([&](std::vector<guidance::Tunnel> tunnels) {
             result.tunnels = std::move(tunnels);
             return verify_tool_lines(given, calibration.views, result);  // Eq. 17
           })
-          .and_then([&](std::vector<Verification> verifications) {
+          .and_then([&](std::vector<verification::Verification> verifications) {
             result.verifications = std::move(verifications);
             return check_certain(result.points, options.max_error_mm);
           })
@@ -102,4 +102,4 @@ Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const Run
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -3,7 +3,7 @@
 
 #include "helicarm/pipeline/calibrate_case.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// From calibrated views to points, tunnels and the verification of tool lines (Eq. 8, 10-12, 16, 17). Uses
 /// from `given` what may differ from the calibrated case: picks, tunnels, tool lines, poses and the tracker's
@@ -14,4 +14,4 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
 /// The result of a case that was refused before calibration; unreadable input (exit code 2) stays a failure.
 Expected<Result> result_of_refusal(const Case& given, Refusal refusal, const RunOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

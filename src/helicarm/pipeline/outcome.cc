@@ -7,38 +7,42 @@
 
 #include "helicarm/xray/view_of.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 std::size_t index_of(const std::vector<PointResult>& points, const std::string& name) {
   return static_cast<std::size_t>(std::ranges::find(points, name, &PointResult::name) - points.begin());
 }
 
-std::optional<LineError> error_at(const PointResult& point, const std::vector<View>& views,
-                                  const ToolLine& line) {
+std::optional<verification::LineError> error_at(const PointResult& point,
+                                                const std::vector<geometry::View>& views,
+                                                const verification::ToolLine& line) {
   if (!point.place) return std::nullopt;
-  PlannedPoint planned{point.place->in_calibrator, {}};
+  verification::PlannedPoint planned{point.place->in_calibrator, {}};
   for (const auto& seen : point.seen)
     planned.uv.push_back(seen ? std::optional<Eigen::Vector2d>(seen->uv) : std::nullopt);
-  return value_or_throw(distance_to_line(views, planned, line));
+  return value_or_throw(verification::distance_to_line(views, planned, line));
 }
 
 }  // namespace
 
-Accuracy measure_accuracy(const Calibrator& calibrator, const CalibrationResult& calibration,
-                          const std::vector<PointResult>& points) {
-  Accuracy accuracy{
-      fiducial_localization_error(calibration), fiducial_registration_error(calibration), {}, {}};
+localization::Accuracy measure_accuracy(const phantom::Calibrator& calibrator,
+                                        const calibration::CalibrationResult& calibration,
+                                        const std::vector<PointResult>& points) {
+  localization::Accuracy accuracy{localization::fiducial_localization_error(calibration),
+                                  localization::fiducial_registration_error(calibration),
+                                  {},
+                                  {}};
   std::vector<double> errors;
-  for (const CalibratorTarget& target : calibrator.targets) {
+  for (const phantom::CalibratorTarget& target : calibrator.targets) {
     const PointResult& point = points[index_of(points, target.name)];
     if (!point.place) continue;
     const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
     errors.push_back((point.place->in_calibrator - target.point_in_calibrator).norm());  // Eq. 12
     accuracy.targets.push_back(
-        {target.name, errors.back(), std::sqrt(covariance.trace()), length_at_95(covariance)});
+        {target.name, errors.back(), std::sqrt(covariance.trace()), localization::length_at_95(covariance)});
   }
-  accuracy.tre_mm = statistics_of(errors);
+  accuracy.tre_mm = localization::statistics_of(errors);
   return accuracy;
 }
 
@@ -50,29 +54,29 @@ std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
   return ends;
 }
 
-Expected<std::vector<Tunnel>> plan_tunnels(const Case& given, const Result& result) {
+Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Result& result) {
   const std::vector<TunnelPlan>& plans = given.tunnels;
   return guarded([&] {
-    std::vector<Tunnel> tunnels;
+    std::vector<guidance::Tunnel> tunnels;
     for (std::size_t i = 0; i < plans.size(); ++i) {
       const auto& start = result.points[result.tunnel_ends[i].start].place;
       const auto& end = result.points[result.tunnel_ends[i].end].place;
-      tunnels.push_back(start && end ? value_or_throw(plan_tunnel(plans[i].name, *start, *end,
-                                                                  result.joint_covariance, given.tracker))
-                                     : Tunnel{plans[i].name, {}, {}, {}, {}});
+      tunnels.push_back(start && end
+                            ? value_or_throw(guidance::plan_tunnel(plans[i].name, *start, *end,
+                                                                   result.joint_covariance, given.tracker))
+                            : guidance::Tunnel{plans[i].name, {}, {}, {}, {}});
     }
     return tunnels;
   });
 }
 
-Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
-                                                      const std::vector<CalibratedView>& calibrated,
-                                                      const Result& result) {
-  std::vector<View> views;
-  for (const CalibratedView& view : calibrated) views.push_back(view.view);
+Expected<std::vector<verification::Verification>> verify_tool_lines(
+    const Case& given, const std::vector<calibration::CalibratedView>& calibrated, const Result& result) {
+  std::vector<geometry::View> views;
+  for (const calibration::CalibratedView& view : calibrated) views.push_back(view.view);
   return guarded([&] {
-    std::vector<Verification> verifications;
-    for (const ToolLine& line : given.tool_lines) {
+    std::vector<verification::Verification> verifications;
+    for (const verification::ToolLine& line : given.tool_lines) {
       const auto plan =
           std::ranges::find(given.tunnels, line.tunnel, &TunnelPlan::name) - given.tunnels.begin();
       const TunnelEnds& ends = result.tunnel_ends[static_cast<std::size_t>(plan)];
@@ -103,7 +107,7 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   for (const ViewResult& view : views) {
     if (!view.xray_image) continue;
-    const std::string other = view_of(view.xray_image->acquisition, view.name, names);
+    const std::string other = xray::view_of(view.xray_image->acquisition, view.name, names);
     if (other == view.name) continue;
     const double angle = *view.xray_image->acquisition.primary_angle_deg;
     warnings.push_back(
@@ -118,10 +122,10 @@ std::vector<Warning> exchanged_views(const std::vector<ViewResult>& views) {
 }
 
 std::vector<Warning> diagnose(const Case& given, const Result& result) {
-  const Calibrator& calibrator = given.calibrator;
+  const phantom::Calibrator& calibrator = given.calibrator;
   constexpr double largest_ratio = 3;
   std::vector<Warning> warnings;
-  for (const TargetError& target : result.accuracy.targets)
+  for (const localization::TargetError& target : result.accuracy.targets)
     if (target.error_mm > largest_ratio * target.predicted_95_mm)
       warnings.push_back(
           {Reason::residual_too_large,
@@ -133,7 +137,7 @@ std::vector<Warning> diagnose(const Case& given, const Result& result) {
            {{"error_mm", target.error_mm}, {"predicted_95_mm", target.predicted_95_mm}}});
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const auto rejected = std::ranges::count_if(result.views, [&](const ViewResult& view) {
-      return view.found->fiducials[k].status == FiducialStatus::rejected;
+      return view.found->fiducials[k].status == fiducials::FiducialStatus::rejected;
     });
     if (rejected > 1)
       warnings.push_back(
@@ -153,7 +157,7 @@ Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& poi
   std::vector<Warning> warnings;
   for (const PointResult& point : points) {
     if (!point.place) continue;
-    const double error = length_at_95(point.place->covariance_in_calibrator);
+    const double error = localization::length_at_95(point.place->covariance_in_calibrator);
     if (error <= limit) continue;
     const std::string message = fmt::format(
         "the 95 % error of \"{}\" is {:.3g} mm, over the limit of {:g} mm", point.name, error, limit);
@@ -164,4 +168,4 @@ Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& poi
   return warnings;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

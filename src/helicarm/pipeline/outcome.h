@@ -8,23 +8,23 @@
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// FLE and FRE of the fiducials, TRE of the located check targets.
-Accuracy measure_accuracy(const Calibrator& calibrator, const CalibrationResult& calibration,
-                          const std::vector<PointResult>& points);
+localization::Accuracy measure_accuracy(const phantom::Calibrator& calibrator,
+                                        const calibration::CalibrationResult& calibration,
+                                        const std::vector<PointResult>& points);
 
 /// Index of each tunnel's start and end among the points.
 std::vector<TunnelEnds> tunnel_ends(const std::vector<TunnelPlan>& plans,
                                     const std::vector<PointResult>& points);
 
 /// Eq. 16; a tunnel with an unlocated end has only a name. Refuses as `plan_tunnel`.
-Expected<std::vector<Tunnel>> plan_tunnels(const Case& given, const Result& result);
+Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Result& result);
 
 /// Eq. 17; unlocated ends are omitted. Refuses as `distance_to_line`.
-Expected<std::vector<Verification>> verify_tool_lines(const Case& given,
-                                                      const std::vector<CalibratedView>& views,
-                                                      const Result& result);
+Expected<std::vector<verification::Verification>> verify_tool_lines(
+    const Case& given, const std::vector<calibration::CalibratedView>& views, const Result& result);
 
 /// Different images with one SOP Instance UID (uid_reused).
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
@@ -40,4 +40,4 @@ std::vector<Warning> diagnose(const Case& given, const Result& result);
 Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& points,
                                              std::optional<double> max_error_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -9,24 +9,24 @@
 
 #include "helicarm/core/parallel.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact pick among other rays
 
-Expected<ImagePoint> observe_pick(const Pick& pick, const LabelledView& image, const View& camera,
-                                  const Eigen::Vector3d& centre) {
-  const DistortionMap& map = image.rectification.map;
+Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const LabelledView& image,
+                                             const geometry::View& camera, const Eigen::Vector3d& centre) {
+  const rectification::DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
-    auto seen = snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
-                             pick.diameter_mm, image.rectification.noise);
+    auto seen = fiducials::snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
+                                        pick.diameter_mm, image.rectification.noise);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
-  return point_of_click(map, pick.uv_raw, pick.sigma_px);
+  return fiducials::point_of_click(map, pick.uv_raw, pick.sigma_px);
 }
 
-void check_inside(const Pick& pick, const DistortionMap& map) {
+void check_inside(const Pick& pick, const rectification::DistortionMap& map) {
   if (!map.shows(pick.uv_raw))
     throw BadInput({Reason::bad_value,
                     fmt::format("case.json: pick \"{}\": {:g}, {:g} lies outside the image of {} x {} pixels",
@@ -36,15 +36,16 @@ void check_inside(const Pick& pick, const DistortionMap& map) {
 }
 
 /// The images of plate dots and fiducials, to be left out of a target's fit.
-std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
-                                const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
+std::vector<detection::Disc> detections_of(const LabelledView& image, const geometry::View& camera,
+                                           const std::vector<fiducials::Fiducial>& fiducials,
+                                           const phantom::Calibrator& calibrator) {
   constexpr double rim_share = 0.1;  // of the radius: the blur of the ball's edge
   constexpr double rim_px = 1.5;     // of a plate's dot
-  std::vector<Disc> discs;
-  for (const Dot& dot : image.rectification.plate_dots)
+  std::vector<detection::Disc> discs;
+  for (const detection::Dot& dot : image.rectification.plate_dots)
     discs.push_back({dot.centre_px, dot.radius_px + rim_px});
   for (std::size_t k = 0; k < fiducials.size(); ++k)
-    if (const Fiducial& ball = fiducials[k]; ball.status == FiducialStatus::used) {
+    if (const fiducials::Fiducial& ball = fiducials[k]; ball.status == fiducials::FiducialStatus::used) {
       const double px_per_mm = std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator);
       discs.push_back({ball.uv_raw, (1 + rim_share) * 0.5 * calibrator.balls[k].diameter_mm * px_per_mm});
     }
@@ -52,10 +53,11 @@ std::vector<Disc> detections_of(const LabelledView& image, const View& camera,
 }
 
 /// Label of the fiducial on whose image a point lies.
-std::optional<std::string> fiducial_at(const ImagePoint& seen, const View& camera,
-                                       const std::vector<Fiducial>& fiducials, const Calibrator& calibrator) {
+std::optional<std::string> fiducial_at(const fiducials::ImagePoint& seen, const geometry::View& camera,
+                                       const std::vector<fiducials::Fiducial>& fiducials,
+                                       const phantom::Calibrator& calibrator) {
   for (std::size_t k = 0; k < fiducials.size(); ++k) {
-    const Fiducial& ball = fiducials[k];
+    const fiducials::Fiducial& ball = fiducials[k];
     const double radius_px = 0.5 * calibrator.balls[k].diameter_mm * std::abs(camera.intrinsics.fy) /
                              camera.depth(ball.centre_in_calibrator);
     if ((camera.project(ball.centre_in_calibrator) - seen.uv).norm() < radius_px) return ball.label;
@@ -67,25 +69,28 @@ std::optional<std::string> fiducial_at(const ImagePoint& seen, const View& camer
 struct Task {
   std::size_t point;
   std::size_t view;
-  const Pick* pick;                ///< either this
-  const CalibratorTarget* target;  ///< or this
+  const Pick* pick;                         ///< either this
+  const phantom::CalibratorTarget* target;  ///< or this
 };
 
 std::vector<Task> tasks_of(const Case& given, std::vector<PointResult>& points) {
   const std::size_t views = given.views.size();
-  const auto add = [&](const std::string& name, PointSource source, std::optional<Bone> moves_with) {
-    points.push_back({name, source, moves_with, std::vector<std::optional<ImagePoint>>(views), {}, 0, {}});
+  const auto add = [&](const std::string& name, localization::PointSource source,
+                       std::optional<guidance::Bone> moves_with) {
+    points.push_back(
+        {name, source, moves_with, std::vector<std::optional<fiducials::ImagePoint>>(views), {}, 0, {}});
     return points.size() - 1;
   };
   std::vector<Task> tasks;
   std::map<std::string, std::size_t> index;
   for (const Pick& pick : given.picks) {
-    if (!index.contains(pick.name)) index[pick.name] = add(pick.name, PointSource::pick, pick.moves_with);
+    if (!index.contains(pick.name))
+      index[pick.name] = add(pick.name, localization::PointSource::pick, pick.moves_with);
     const auto view = std::ranges::find(given.views, pick.view, &CaseView::name) - given.views.begin();
     tasks.push_back({index[pick.name], static_cast<std::size_t>(view), &pick, nullptr});
   }
-  for (const CalibratorTarget& target : given.calibrator.targets) {
-    const std::size_t point = add(target.name, PointSource::target, {});
+  for (const phantom::CalibratorTarget& target : given.calibrator.targets) {
+    const std::size_t point = add(target.name, localization::PointSource::target, {});
     for (std::size_t view = 0; view < views; ++view) tasks.push_back({point, view, nullptr, &target});
   }
   return tasks;
@@ -97,47 +102,49 @@ void add_warning(PointResult& point, std::vector<Warning>& warnings, const Warni
 }
 
 struct Located {
-  LocatedPoint point;
-  std::optional<Bone> anchor;
-  std::vector<DatedView> views;
+  localization::LocatedPoint point;
+  std::optional<guidance::Bone> anchor;
+  std::vector<guidance::DatedView> views;
 };
 
 /// The bone in whose frame the rays intersect; nothing if there is none or a pose is missing.
-std::optional<Bone> anchor_of(const PointResult& point, const Case& given) {
+std::optional<guidance::Bone> anchor_of(const PointResult& point, const Case& given) {
   if (!point.moves_with) return std::nullopt;
   for (std::size_t i = 0; i < point.seen.size(); ++i)
-    if (point.seen[i] && !calibrator_from(*point.moves_with, given.views[i].poses)) return std::nullopt;
+    if (point.seen[i] && !guidance::calibrator_from(*point.moves_with, given.views[i].poses))
+      return std::nullopt;
   return point.moves_with;
 }
 
 /// Check targets are fixed to the calibrator; a tracked bone's motion is in its poses.
-bool may_move(const PointResult& point, std::optional<Bone> anchor) {
-  return point.source == PointSource::pick && !anchor;
+bool may_move(const PointResult& point, std::optional<guidance::Bone> anchor) {
+  return point.source == localization::PointSource::pick && !anchor;
 }
 
-Expected<Located> intersect_rays(const PointResult& point, const Case& given, const Calibration& calibration,
-                                 double motion_sigma_mm) {
+Expected<Located> intersect_rays(const PointResult& point, const Case& given,
+                                 const calibration::Calibration& calibration, double motion_sigma_mm) {
   const auto anchor = anchor_of(point, given);
   const double motion = may_move(point, anchor) ? motion_sigma_mm : 0;
-  std::vector<PointObservation> observations;
-  std::vector<DatedView> views;
+  std::vector<localization::PointObservation> observations;
+  std::vector<guidance::DatedView> views;
   for (std::size_t i = 0; i < point.seen.size(); ++i) {
     if (!point.seen[i]) continue;
-    const Poses& poses = given.views[i].poses;
+    const guidance::Poses& poses = given.views[i].poses;
     const double sigma = point.seen[i]->sigma_px;
-    observations.push_back({i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
-                            anchor ? *calibrator_from(*anchor, poses) : RigidTransform{}});
+    observations.push_back(
+        {i, point.seen[i]->uv, sigma * sigma * Eigen::Matrix2d::Identity(),
+         anchor ? *guidance::calibrator_from(*anchor, poses) : geometry::RigidTransform{}});
     views.push_back({calibration.views[i].view, poses, std::max(sigma, least_sigma_px)});
   }
-  auto located = locate(point.name, point.source, observations, calibration, motion);
+  auto located = localization::locate(point.name, point.source, observations, calibration, motion);
   // Independent tracker samples displace each ray independently, shared ones all rays equally.
-  if (located && anchor && given.tracker.samples == Samples::independent) {
-    for (PointObservation& observation : observations)
-      observation.anchor_covariance = noise_of_poses(located->point_in_anchor, *anchor,
-                                                     given.views[observation.view].poses, given.tracker);
-    located = locate(point.name, point.source, observations, calibration);
+  if (located && anchor && given.tracker.samples == guidance::Samples::independent) {
+    for (localization::PointObservation& observation : observations)
+      observation.anchor_covariance = guidance::noise_of_poses(
+          located->point_in_anchor, *anchor, given.views[observation.view].poses, given.tracker);
+    located = localization::locate(point.name, point.source, observations, calibration);
   }
-  return located.map([&](const LocatedPoint& found) { return Located{found, anchor, views}; });
+  return located.map([&](const localization::LocatedPoint& found) { return Located{found, anchor, views}; });
 }
 
 }  // namespace
@@ -146,7 +153,7 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
                                                   unsigned threads) {
   std::vector<PointResult> points;
   const std::vector<Task> tasks = tasks_of(given, points);
-  const Eigen::Vector3d centre = middle_of(given.calibrator);
+  const Eigen::Vector3d centre = phantom::middle_of(given.calibrator);
   std::vector<std::optional<Failure>> failures(tasks.size());
   const auto done = guarded([&] {
     for (const Task& task : tasks)
@@ -156,13 +163,13 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
   parallel_for(tasks.size(), threads, [&](std::size_t i) {
     const Task& task = tasks[i];
     const LabelledView& image = calibration.images[task.view];
-    const View& camera = calibration.views[task.view].view;
+    const geometry::View& camera = calibration.views[task.view].view;
     const auto seen =
-        task.pick
-            ? observe_pick(*task.pick, image, camera, centre)
-            : find_target(*image.xray_image, image.rectification.map, camera, *task.target,
-                          detections_of(image, camera, calibration.fiducials[task.view], given.calibrator),
-                          image.rectification.noise);
+        task.pick ? observe_pick(*task.pick, image, camera, centre)
+                  : fiducials::find_target(
+                        *image.xray_image, image.rectification.map, camera, *task.target,
+                        detections_of(image, camera, calibration.fiducials[task.view], given.calibrator),
+                        image.rectification.noise);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else
@@ -176,7 +183,7 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
   return points;
 }
 
-std::vector<Warning> locate_points(const Case& given, const Calibration& calibration,
+std::vector<Warning> locate_points(const Case& given, const calibration::Calibration& calibration,
                                    std::vector<PointResult>& points, double motion_sigma_mm) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
@@ -189,31 +196,31 @@ std::vector<Warning> locate_points(const Case& given, const Calibration& calibra
     if (located->point.missing_rays) add_warning(point, warnings, *located->point.missing_rays);
     point.rays_miss = located->point.missing_rays.has_value();
     point.ray_gap_mm = located->point.ray_gap_mm;
-    point.place = guide({located->point.point_in_anchor, located->point.covariance_in_anchor, located->anchor,
-                         located->views, located->point.by_calibration},
-                        given.poses_now, given.tracker);
+    point.place = guidance::guide({located->point.point_in_anchor, located->point.covariance_in_anchor,
+                                   located->anchor, located->views, located->point.by_calibration},
+                                  given.poses_now, given.tracker);
     if (point.moves_with && !located->anchor)
       add_warning(
           point, warnings,
           {Reason::bone_taken_as_fixed,
            fmt::format("\"{}\" moves with the {}, but poses of it or of the calibrator are missing: it "
                        "is taken as fixed to the calibrator",
-                       point.name, *point.moves_with == Bone::femur ? "femur" : "tibia"),
+                       point.name, *point.moves_with == guidance::Bone::femur ? "femur" : "tibia"),
            {},
            {}});
   }
   return warnings;
 }
 
-std::vector<Warning> note_motion(const Case& given, const Calibration& calibration,
+std::vector<Warning> note_motion(const Case& given, const calibration::Calibration& calibration,
                                  std::vector<PointResult>& points, double motion_sigma_mm) {
   std::vector<Warning> notes;
   for (PointResult& point : points) {
     if (!point.place || !may_move(point, anchor_of(point, given))) continue;
     const auto first = std::ranges::find_if(point.seen, [](const auto& seen) { return seen.has_value(); });
-    point.notes.push_back(unobservable_motion(point.name, point.place->in_calibrator,
-                                              calibration.views[std::size_t(first - point.seen.begin())],
-                                              motion_sigma_mm));
+    point.notes.push_back(localization::unobservable_motion(
+        point.name, point.place->in_calibrator, calibration.views[std::size_t(first - point.seen.begin())],
+        motion_sigma_mm));
     notes.push_back(point.notes.back());
   }
   return notes;
@@ -223,13 +230,13 @@ std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration
                                         std::vector<PointResult>& points) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
-    if (point.source != PointSource::pick || !point.place) continue;
+    if (point.source != localization::PointSource::pick || !point.place) continue;
     std::vector<std::string> hits;
     std::size_t views = 0;
     for (std::size_t i = 0; i < point.seen.size(); ++i) {
       if (!point.seen[i]) continue;
       ++views;
-      const CalibratedView& view = calibration.views[i];
+      const calibration::CalibratedView& view = calibration.views[i];
       if (const auto label =
               fiducial_at(*point.seen[i], view.view, calibration.fiducials[i], given.calibrator))
         hits.push_back(fmt::format("{} in {}", *label, view.name));
@@ -245,4 +252,4 @@ std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration
   return warnings;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -8,7 +8,7 @@
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// Observes picks, then check targets, in the calibrated images. `bad_value` for a pick outside its image.
 Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseCalibration& calibration,
@@ -17,16 +17,16 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
 /// Locates each point (Eq. 8), in the frame of the bone with which it moves, and transforms it to bones and
 /// tool (Eq. 16). `motion_sigma_mm`: of picks without a tracked bone. A bone with missing poses is taken as
 /// fixed, with a warning.
-std::vector<Warning> locate_points(const Case& given, const Calibration& calibration,
+std::vector<Warning> locate_points(const Case& given, const calibration::Calibration& calibration,
                                    std::vector<PointResult>& points, double motion_sigma_mm = 0);
 
 /// A note `unobservable_motion` for each located pick without tracked motion; also added to
 /// `PointResult::notes`.
-std::vector<Warning> note_motion(const Case& given, const Calibration& calibration,
+std::vector<Warning> note_motion(const Case& given, const calibration::Calibration& calibration,
                                  std::vector<PointResult>& points, double motion_sigma_mm);
 
 /// Picks on fiducials in all their views, or in some while the rays miss each other (pick_on_fiducial).
 std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration& calibration,
                                         std::vector<PointResult>& points);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

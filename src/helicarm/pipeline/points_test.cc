@@ -5,10 +5,10 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
-RigidTransform motion(double x, double y, double z, double degrees, const Eigen::Vector3d& axis) {
+geometry::RigidTransform motion(double x, double y, double z, double degrees, const Eigen::Vector3d& axis) {
   return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix(),
           {x, y, z}};
 }
@@ -17,14 +17,14 @@ RigidTransform motion(double x, double y, double z, double degrees, const Eigen:
 class TwoViews : public testing::Test {
  protected:
   TwoViews() {
-    CalibratedView frontal;
+    calibration::CalibratedView frontal;
     frontal.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 0, {0, 0, 1})};
-    CalibratedView lateral;
+    calibration::CalibratedView lateral;
     lateral.view = {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})};
     calibration.views = {frontal, lateral};
     calibration.joint_covariance = 1e-12 * Eigen::MatrixXd::Identity(22, 22);
-    const RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
-    const RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
+    const geometry::RigidTransform tracker_from_calibrator = motion(-80, -100, 750, 40, {1, 2, 3});
+    const geometry::RigidTransform tracker_from_femur = motion(-40, -140, 770, 120, {3, -1, 1});
     given.views.resize(2);
     given.views[0].poses = {tracker_from_calibrator, tracker_from_femur, {}, {}};
     given.views[1].poses = {
@@ -32,25 +32,25 @@ class TwoViews : public testing::Test {
   }
 
   Eigen::Vector3d in_calibrator(std::size_t view) const {
-    return *calibrator_from(Bone::femur, given.views[view].poses) * point_in_femur;
+    return *guidance::calibrator_from(guidance::Bone::femur, given.views[view].poses) * point_in_femur;
   }
 
-  PointResult image_point(std::optional<Bone> moves_with) const {
-    PointResult point{"FS", PointSource::pick, moves_with, {}, {}, 0, {}};
+  PointResult image_point(std::optional<guidance::Bone> moves_with) const {
+    PointResult point{"FS", localization::PointSource::pick, moves_with, {}, {}, 0, {}};
     for (std::size_t i = 0; i < 2; ++i) {
       const Eigen::Vector2d uv = calibration.views[i].view.project(in_calibrator(i));
-      point.seen.emplace_back(ImagePoint{uv, uv, 0.1});
+      point.seen.emplace_back(fiducials::ImagePoint{uv, uv, 0.1});
     }
     return point;
   }
 
-  Calibration calibration;
+  calibration::Calibration calibration;
   Case given;
   Eigen::Vector3d point_in_femur{12, -7, 30};
 };
 
 TEST_F(TwoViews, RaysMeetInTheFrameOfTheBoneThatMoved) {
-  std::vector<PointResult> points = {image_point(Bone::femur)};
+  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
   EXPECT_TRUE(locate_points(given, calibration, points).empty());
   ASSERT_TRUE(points[0].place);
   EXPECT_LT((*points[0].place->in_femur - point_in_femur).norm(), 1e-6);
@@ -69,21 +69,22 @@ TEST_F(TwoViews, RaysThatMissInflateTheCovariance) {
 TEST_F(TwoViews, TrackerNoiseExplainsARayGap) {
   // The second view's pose of the femur is 0.7 mm wrong: far more than the pixels explain.
   given.views[1].poses.tracker_from_femur->translation += Eigen::Vector3d(0.4, 0.4, 0.4);
-  PointResult seen = image_point(Bone::femur);
+  PointResult seen = image_point(guidance::Bone::femur);
   given.views[1].poses.tracker_from_femur->translation -= Eigen::Vector3d(0.4, 0.4, 0.4);
   std::vector<PointResult> points = {seen};
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
   given.tracker.sigma_mm = 0.4;
   points = {seen};
   EXPECT_TRUE(locate_points(given, calibration, points).empty());
-  given.tracker.samples = Samples::shared;  // one sample for both: its noise does not explain the ray gap
+  given.tracker.samples =
+      guidance::Samples::shared;  // one sample for both: its noise does not explain the ray gap
   points = {seen};
   EXPECT_EQ(locate_points(given, calibration, points).size(), 1u);
 }
 
 TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
   given.views[1].poses = given.views[0].poses;
-  std::vector<PointResult> points = {image_point(Bone::femur)};
+  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
   given.views[1].poses = {};
   const auto warnings = locate_points(given, calibration, points);
   ASSERT_EQ(warnings.size(), 1u);
@@ -93,7 +94,7 @@ TEST_F(TwoViews, BoneWithoutPosesIsTakenAsFixed) {
 
 TEST_F(TwoViews, UntrackedPointHasANoteOfUnobservableMotion) {
   given.views[1].poses = given.views[0].poses;
-  std::vector<PointResult> points = {image_point(Bone::femur), image_point(std::nullopt)};
+  std::vector<PointResult> points = {image_point(guidance::Bone::femur), image_point(std::nullopt)};
   points[1].name = "bare";
   locate_points(given, calibration, points);
   const auto notes = note_motion(given, calibration, points, 0);
@@ -108,12 +109,12 @@ TEST_F(TwoViews, UntrackedPointHasANoteOfUnobservableMotion) {
 
 TEST_F(TwoViews, MotionSigmaIsForUntrackedPointsOnly) {
   given.views[1].poses = given.views[0].poses;
-  const auto variance = [&](std::optional<Bone> moves_with, double sigma) {
+  const auto variance = [&](std::optional<guidance::Bone> moves_with, double sigma) {
     std::vector<PointResult> points = {image_point(moves_with)};
     locate_points(given, calibration, points, sigma);
     return points[0].place->covariance_in_calibrator.trace();
   };
-  EXPECT_EQ(variance(Bone::femur, 2), variance(Bone::femur, 0));
+  EXPECT_EQ(variance(guidance::Bone::femur, 2), variance(guidance::Bone::femur, 0));
   EXPECT_GT(variance(std::nullopt, 2), 3.9);
 }
 
@@ -128,12 +129,12 @@ TEST_F(TwoViews, WarningsAreAlsoInThePoint) {
 TEST_F(TwoViews, PickOnAFiducialInAllViewsIsWarnedOf) {
   given.views[1].poses = given.views[0].poses;
   CaseCalibration calibrated;
-  static_cast<Calibration&>(calibrated) = calibration;
+  static_cast<calibration::Calibration&>(calibrated) = calibration;
   const Eigen::Vector3d place = in_calibrator(0);
   given.calibrator.balls = {{"P1", place + Eigen::Vector3d(40, 0, 0), 4}, {"P2", place, 4}};
   for (std::size_t i = 0; i < 2; ++i) {
     calibrated.fiducials.emplace_back();
-    for (const CalibratorBall& ball : given.calibrator.balls)
+    for (const phantom::CalibratorBall& ball : given.calibrator.balls)
       calibrated.fiducials.back().push_back({ball.label, ball.centre_in_calibrator});
   }
   std::vector<PointResult> points = {image_point(std::nullopt)};
@@ -148,7 +149,7 @@ TEST_F(TwoViews, PickOnAFiducialInAllViewsIsWarnedOf) {
 }
 
 TEST_F(TwoViews, PointObservedOnceIsNotLocated) {
-  std::vector<PointResult> points = {image_point(Bone::femur)};
+  std::vector<PointResult> points = {image_point(guidance::Bone::femur)};
   points[0].seen[1].reset();
   locate_points(given, calibration, points);
   EXPECT_FALSE(points[0].place);
@@ -157,4 +158,4 @@ TEST_F(TwoViews, PointObservedOnceIsNotLocated) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

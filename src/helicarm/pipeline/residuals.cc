@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 using Kind = ImageChange::Kind;
@@ -25,12 +25,13 @@ Eigen::Vector2d without(const Eigen::Vector2d& uv, Kind kind, double amount, con
   return uv;
 }
 
-std::vector<ViewFiducials> without(std::vector<ViewFiducials> views, const ImageChange& change,
-                                   const std::vector<Eigen::Vector2d>& size_px) {
+std::vector<calibration::ViewFiducials> without(std::vector<calibration::ViewFiducials> views,
+                                                const ImageChange& change,
+                                                const std::vector<Eigen::Vector2d>& size_px) {
   for (std::size_t i = 0; i < views.size(); ++i)
     if (!change.view || *change.view == i)
-      for (Fiducial& ball : views[i].fiducials)
-        if (ball.status == FiducialStatus::used)
+      for (fiducials::Fiducial& ball : views[i].fiducials)
+        if (ball.status == fiducials::FiducialStatus::used)
           ball.uv = without(ball.uv, change.kind, change.amount, size_px[i]);
   return views;
 }
@@ -40,11 +41,12 @@ struct Fit {
   int dof;
 };
 
-std::optional<Fit> fit_of(const std::vector<ViewFiducials>& views, const CommonPrior& common) {
-  CalibrationOptions options;
+std::optional<Fit> fit_of(const std::vector<calibration::ViewFiducials>& views,
+                          const calibration::CommonPrior& common) {
+  calibration::CalibrationOptions options;
   options.common = common;
   options.rejection_probability = 0;
-  const auto fit = calibrate(views, options);
+  const auto fit = calibration::calibrate(views, options);
   return fit ? std::optional(Fit{fit->chi2, fit->dof}) : std::nullopt;
 }
 
@@ -56,8 +58,9 @@ bool is_excessive(double chi2, int dof) {
 }
 
 /// The amount of least chi2, by iterated parabolic interpolation.
-std::optional<ImageChange> fitted(ImageChange change, const std::vector<ViewFiducials>& views,
-                                  const std::vector<Eigen::Vector2d>& size_px, const CommonPrior& common) {
+std::optional<ImageChange> fitted(ImageChange change, const std::vector<calibration::ViewFiducials>& views,
+                                  const std::vector<Eigen::Vector2d>& size_px,
+                                  const calibration::CommonPrior& common) {
   constexpr double step = 1e-3;
   constexpr double most = 0.2;
   const auto chi2_at = [&](double amount) {
@@ -116,9 +119,9 @@ Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& v
 
 }  // namespace
 
-std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& views,
+std::optional<ImageChange> best_image_change(const std::vector<calibration::ViewFiducials>& views,
                                              const std::vector<Eigen::Vector2d>& size_px,
-                                             const CommonPrior& common) {
+                                             const calibration::CommonPrior& common) {
   constexpr double least_fall = 25;
   const auto plain = fit_of(views, common);
   if (!plain || !is_excessive(plain->chi2, plain->dof)) return std::nullopt;
@@ -137,12 +140,14 @@ std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& v
 }
 
 std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
-                                       const CalibrationResult& calibration, const CommonPrior& common) {
+                                       const calibration::CalibrationResult& calibration,
+                                       const calibration::CommonPrior& common) {
   const bool rejected = std::ranges::any_of(calibration.fiducials, [](const auto& fiducials) {
-    return std::ranges::count(fiducials, FiducialStatus::rejected, &Fiducial::status) > 0;
+    return std::ranges::count(fiducials, fiducials::FiducialStatus::rejected, &fiducials::Fiducial::status) >
+           0;
   });
   if (calibration.variance_scale == 1 && !rejected) return {};
-  std::vector<ViewFiducials> fiducials;
+  std::vector<calibration::ViewFiducials> fiducials;
   std::vector<Eigen::Vector2d> size_px;
   for (const LabelledView& view : views) {
     fiducials.push_back(fiducials_of(view));
@@ -152,4 +157,4 @@ std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
   return change ? std::vector<Warning>{warning_of(*change, views)} : std::vector<Warning>{};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

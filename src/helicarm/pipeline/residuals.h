@@ -6,7 +6,7 @@
 #include "helicarm/calibration/calibrate.h"
 #include "helicarm/pipeline/stages.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// A change of the images that explains the fiducials' residuals.
 struct ImageChange {
@@ -22,13 +22,14 @@ struct ImageChange {
 /// The one-parameter change that lowers chi2 most, by at least 25 (five standard deviations), to within three
 /// standard deviations of its degrees of freedom. Nothing if the fiducials fit without, or no change explains
 /// them. `size_px`: of each image (width, height).
-std::optional<ImageChange> best_image_change(const std::vector<ViewFiducials>& views,
+std::optional<ImageChange> best_image_change(const std::vector<calibration::ViewFiducials>& views,
                                              const std::vector<Eigen::Vector2d>& size_px,
-                                             const CommonPrior& common);
+                                             const calibration::CommonPrior& common);
 
 /// Warnings `residual_distortion` (radial distortion, aspect) and `intrinsics_inconsistent` (magnifications
 /// of two views) if the residuals imply them.
 std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
-                                       const CalibrationResult& calibration, const CommonPrior& common);
+                                       const calibration::CalibrationResult& calibration,
+                                       const calibration::CommonPrior& common);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -35,32 +35,34 @@ Json matrix(const Eigen::MatrixBase<Derived>& values) {
 Json optional_vector(const auto& values) { return values ? vector(*values) : Json(nullptr); }
 Json optional_matrix(const auto& values) { return values ? matrix(*values) : Json(nullptr); }
 
-std::string_view name_of(FiducialStatus status) {
+std::string_view name_of(fiducials::FiducialStatus status) {
   constexpr std::array names = {"used", "occluded", "outside", "rejected", "not_found"};
   return names[static_cast<std::size_t>(status)];
 }
 
-Json json_of(const Rectification& rectification) {
-  const DistortionMap& map = rectification.map;
+Json json_of(const rectification::Rectification& rectification) {
+  const rectification::DistortionMap& map = rectification.map;
   const bool fitted = !map.is_identity();
   const auto if_fitted = [&](double value) { return fitted ? number(value) : Json(nullptr); };
-  return {{"model", map.model},
-          {"dots_found", rectification.dots_found},
-          {"dots_expected", optional_number(rectification.dots_expected)},
-          {"residual_rms_px", if_fitted(map.residual_rms_px)},
-          {"residual_max_px", if_fitted(map.residual_max_px)},
-          {"held_out_rms_px", if_fitted(map.held_out_rms_px)},
-          {"raw_mean_px", if_fitted(rectification.raw_mean_px)},
-          {"raw_max_px", if_fitted(rectification.raw_max_px)},
-          {"rectified_pixel_mm", optional_number(map.rectified_pixel_mm)},
-          {"rectified_plane", !map.rectified_plane                            ? Json(nullptr)
-                              : *map.rectified_plane == RectifiedPlane::plate ? Json("plate")
-                                                                              : Json("detector")},
-          {"map", to_json(map)}};
+  return {
+      {"model", map.model},
+      {"dots_found", rectification.dots_found},
+      {"dots_expected", optional_number(rectification.dots_expected)},
+      {"residual_rms_px", if_fitted(map.residual_rms_px)},
+      {"residual_max_px", if_fitted(map.residual_max_px)},
+      {"held_out_rms_px", if_fitted(map.held_out_rms_px)},
+      {"raw_mean_px", if_fitted(rectification.raw_mean_px)},
+      {"raw_max_px", if_fitted(rectification.raw_max_px)},
+      {"rectified_pixel_mm", optional_number(map.rectified_pixel_mm)},
+      {"rectified_plane", !map.rectified_plane                                           ? Json(nullptr)
+                          : *map.rectified_plane == rectification::RectifiedPlane::plate ? Json("plate")
+                                                                                         : Json("detector")},
+      {"map", rectification::to_json(map)}};
 }
 
-Json json_of(const Fiducial& fiducial) {
-  const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+Json json_of(const fiducials::Fiducial& fiducial) {
+  const bool seen = fiducial.status == fiducials::FiducialStatus::used ||
+                    fiducial.status == fiducials::FiducialStatus::rejected;
   const auto if_seen = [&](Json value) { return seen ? std::move(value) : Json(nullptr); };
   return {{"label", fiducial.label},
           {"status", name_of(fiducial.status)},
@@ -72,10 +74,10 @@ Json json_of(const Fiducial& fiducial) {
 
 /// f_mm uses the pixel size on the detector: of the rectified image if known there, else of the file.
 Json intrinsics_of(const ViewResult& view) {
-  const Intrinsics& k = view.calibrated->view.intrinsics;
-  const DistortionMap& map = view.rectification->map;
+  const geometry::Intrinsics& k = view.calibrated->view.intrinsics;
+  const rectification::DistortionMap& map = view.rectification->map;
   std::optional<double> pixel_mm;
-  if (map.rectified_plane == RectifiedPlane::detector) pixel_mm = map.rectified_pixel_mm;
+  if (map.rectified_plane == rectification::RectifiedPlane::detector) pixel_mm = map.rectified_pixel_mm;
   if (!pixel_mm && view.xray_image && view.xray_image->acquisition.pixel_mm)
     pixel_mm = view.xray_image->acquisition.pixel_mm->y();
   return {{"fx_px", k.fx},
@@ -94,7 +96,8 @@ Json json_of(const ViewResult& view) {
   json["rectification"] = view.rectification ? json_of(*view.rectification) : Json(nullptr);
   json["fiducials"] = Json::array();
   if (view.found)
-    for (const Fiducial& fiducial : view.found->fiducials) json["fiducials"].push_back(json_of(fiducial));
+    for (const fiducials::Fiducial& fiducial : view.found->fiducials)
+      json["fiducials"].push_back(json_of(fiducial));
   json["false_blobs"] = view.found ? Json(view.found->false_blobs.size()) : Json(nullptr);
   json["mirrored"] = view.found ? Json(view.found->mirrored) : Json(nullptr);
   json["labelling"] = view.found ? Json{{"margin", view.found->margin},
@@ -118,14 +121,16 @@ Json json_of(const ViewResult& view) {
 }
 
 Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
-  Json json = {{"name", point.name}, {"source", point.source == PointSource::pick ? "pick" : "target"}};
+  Json json = {{"name", point.name},
+               {"source", point.source == localization::PointSource::pick ? "pick" : "target"}};
   const auto& place = point.place;
   json["xyz_mm"] = place ? vector(place->in_calibrator) : Json(nullptr);
   json["frame"] = "calibrator";
   json["covariance_mm2"] = place ? matrix(place->covariance_in_calibrator) : Json(nullptr);
   json["sigma_mm"] =
       place ? vector(place->covariance_in_calibrator.diagonal().cwiseMax(0).cwiseSqrt()) : Json(nullptr);
-  json["error_95_mm"] = place ? number(length_at_95(place->covariance_in_calibrator)) : Json(nullptr);
+  json["error_95_mm"] =
+      place ? number(localization::length_at_95(place->covariance_in_calibrator)) : Json(nullptr);
   json["ray_gap_mm"] = place ? number(point.ray_gap_mm) : Json(nullptr);
   json["views"] = Json::array();
   json["seen"] = Json::object();
@@ -148,18 +153,18 @@ Json json_of(const PointResult& point, const std::vector<ViewResult>& views) {
   return json;
 }
 
-Json json_of(const Statistics& s) {
+Json json_of(const localization::Statistics& s) {
   if (s.n == 0) return nullptr;
   return {{"mean", s.mean}, {"rms", s.rms}, {"max", s.max}, {"min", s.min}, {"n", s.n}};
 }
 
-Json json_of(const Accuracy& accuracy) {
+Json json_of(const localization::Accuracy& accuracy) {
   Json json;
   json["fle_px"] = json_of(accuracy.fle_px);
   json["fre_mm"] = json_of(accuracy.fre_mm);
   json["tre_mm"] = json_of(accuracy.tre_mm);
   json["targets"] = Json::array();
-  for (const TargetError& target : accuracy.targets)
+  for (const localization::TargetError& target : accuracy.targets)
     json["targets"].push_back({{"name", target.name},
                                {"error_mm", target.error_mm},
                                {"predicted_mm", target.predicted_mm},
@@ -167,7 +172,7 @@ Json json_of(const Accuracy& accuracy) {
   return json;
 }
 
-Json json_of(const Tunnel& tunnel) {
+Json json_of(const guidance::Tunnel& tunnel) {
   return {{"name", tunnel.name},
           {"start_in_tool", optional_vector(tunnel.start_in_tool)},
           {"end_in_tool", optional_vector(tunnel.end_in_tool)},
@@ -178,26 +183,27 @@ Json json_of(const Tunnel& tunnel) {
           {"axis_covariance", optional_matrix(tunnel.axis_covariance)}};
 }
 
-Json json_of(const Verification& verification, const std::vector<ViewResult>& views) {
-  const auto per_view = [&](const std::optional<LineError>& error) {
+Json json_of(const verification::Verification& verification, const std::vector<ViewResult>& views) {
+  const auto per_view = [&](const std::optional<verification::LineError>& error) {
     Json json = Json::object();
     for (std::size_t i = 0; i < views.size(); ++i)
       json[views[i].name] = error ? optional_number(error->per_view_px[i]) : Json(nullptr);
     return json;
   };
   const auto& [name, start, end] = verification;
-  const auto figure = [](const std::optional<LineError>& error, double LineError::*which) {
+  const auto figure = [](const std::optional<verification::LineError>& error,
+                         double verification::LineError::*which) {
     return error ? number((*error).*which) : Json(nullptr);
   };
   return {{"name", name},
           {"start_px", per_view(start)},
           {"end_px", per_view(end)},
-          {"err_start_px", figure(start, &LineError::combined_px)},
-          {"err_end_px", figure(end, &LineError::combined_px)},
-          {"err_start_mm", figure(start, &LineError::combined_mm)},
-          {"err_end_mm", figure(end, &LineError::combined_mm)},
-          {"distance_start_mm", figure(start, &LineError::distance_mm)},
-          {"distance_end_mm", figure(end, &LineError::distance_mm)}};
+          {"err_start_px", figure(start, &verification::LineError::combined_px)},
+          {"err_end_px", figure(end, &verification::LineError::combined_px)},
+          {"err_start_mm", figure(start, &verification::LineError::combined_mm)},
+          {"err_end_mm", figure(end, &verification::LineError::combined_mm)},
+          {"distance_start_mm", figure(start, &verification::LineError::distance_mm)},
+          {"distance_end_mm", figure(end, &verification::LineError::distance_mm)}};
 }
 
 Json json_of(const Timing& timing) {
@@ -227,9 +233,9 @@ Json to_json(const Failure& failure) {
 
 namespace {
 
-Json json_of(const std::optional<LearnedIntrinsics>& history) {
+Json json_of(const std::optional<calibration::LearnedIntrinsics>& history) {
   if (!history) return nullptr;
-  const auto variation = [](const IntrinsicsVariation& d) {
+  const auto variation = [](const calibration::IntrinsicsVariation& d) {
     return Json{{"common_mm", d.common}, {"of_view_mm", d.of_view}};
   };
   return Json{{"focal_mm", history->mean_mm.x()},
@@ -268,11 +274,11 @@ Json to_json(const Result& result) {
   json["verification"] = list_of(result.verifications, result.views);
   json["timing_ms"] = json_of(result.timing_ms);
   json["version"] = HELICARM_VERSION;
-  json["options"] = {{"method", result.options.method == Method::paper ? "paper" : "best"},
+  json["options"] = {{"method", result.options.method == rectification::Method::paper ? "paper" : "best"},
                      {"max_error_mm", optional_number(result.options.max_error_mm)},
                      {"motion_sigma_mm", result.options.motion_sigma_mm},
                      {"threads", result.options.threads}};
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -24,13 +24,13 @@
 #include "helicarm/verification/verify.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 struct RunOptions {
-  Method method = Method::best;
-  std::optional<double> max_error_mm;       ///< refuse (uncertain) if a point's 95 % error exceeds it
-  unsigned threads = 0;                     ///< 0: all cores
-  std::optional<CArmHistory> history = {};  ///< C-arm history, used as prior
+  rectification::Method method = rectification::Method::best;
+  std::optional<double> max_error_mm;  ///< refuse (uncertain) if a point's 95 % error exceeds it
+  unsigned threads = 0;                ///< 0: all cores
+  std::optional<calibration::CArmHistory> history = {};  ///< C-arm history, used as prior
   /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;
   /// Called before each stage, in the calling thread, with its name as in Timing. An exception ends the run.
@@ -40,19 +40,19 @@ struct RunOptions {
 /// Results of the stages for one view; absent if not reached.
 struct ViewResult {
   std::string name;
-  std::shared_ptr<const XrayImage> xray_image;
-  std::optional<Rectification> rectification;
-  std::optional<LabelledFiducials> found;  ///< with residuals and rejections after calibration
-  std::optional<CalibratedView> calibrated;
+  std::shared_ptr<const xray::XrayImage> xray_image;
+  std::optional<rectification::Rectification> rectification;
+  std::optional<fiducials::LabelledFiducials> found;  ///< with residuals and rejections after calibration
+  std::optional<calibration::CalibratedView> calibrated;
 };
 
 /// One pick or check target: observations and position, or the reason why it was not located.
 struct PointResult {
   std::string name;
-  PointSource source;
-  std::optional<Bone> moves_with;
-  std::vector<std::optional<ImagePoint>> seen;  ///< one per view
-  std::optional<PointInFrames> place;
+  localization::PointSource source;
+  std::optional<guidance::Bone> moves_with;
+  std::vector<std::optional<fiducials::ImagePoint>> seen;  ///< one per view
+  std::optional<guidance::PointInFrames> place;
   double ray_gap_mm = 0;
   std::optional<Failure> reason;                   ///< if not located
   bool rays_miss = false;                          ///< ray gap larger than the errors explain
@@ -86,16 +86,16 @@ struct Result {
   std::vector<Warning> notes;  ///< valid for all data of this kind
   CalibratorSource calibrator;
   std::vector<ViewResult> views;
-  Eigen::MatrixXd joint_covariance;          ///< of all views' parameters; as CalibratedView::covariance
-  double variance_scale = 1;                 ///< as CalibrationResult::variance_scale
-  std::optional<LearnedIntrinsics> history;  ///< from the C-arm history, if given
-  std::vector<HistoryEntry> entries;         ///< of this case, for the C-arm history
+  Eigen::MatrixXd joint_covariance;  ///< of all views' parameters; as CalibratedView::covariance
+  double variance_scale = 1;         ///< as CalibrationResult::variance_scale
+  std::optional<calibration::LearnedIntrinsics> history;  ///< from the C-arm history, if given
+  std::vector<calibration::HistoryEntry> entries;         ///< of this case, for the C-arm history
   std::vector<PointResult> points;
-  Accuracy accuracy;
+  localization::Accuracy accuracy;
   std::vector<TunnelEnds> tunnel_ends;
-  std::vector<Tunnel> tunnels;
-  std::vector<ToolLine> tool_lines;
-  std::vector<Verification> verifications;
+  std::vector<guidance::Tunnel> tunnels;
+  std::vector<verification::ToolLine> tool_lines;
+  std::vector<verification::Verification> verifications;
   Timing timing_ms;
 };
 
@@ -108,4 +108,4 @@ Json to_json(const Failure& failure);
 /// A list of them.
 Json json_list_of(std::span<const Failure> failures);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 void expect_keys(const Json& json, std::initializer_list<const char*> keys) {
@@ -15,13 +15,14 @@ Result two_views() {
   for (const char* name : {"AP", "LAT"}) {
     ViewResult view;
     view.name = name;
-    view.xray_image = std::make_shared<const XrayImage>(XrayImage{name, Image<float>(8, 6), 0, 4095, {}, {}});
-    view.rectification = Rectification{};
-    view.found = LabelledFiducials{};
-    Fiducial fiducial{"P1", Eigen::Vector3d::Zero()};
-    fiducial.status = FiducialStatus::used;
+    view.xray_image = std::make_shared<const xray::XrayImage>(
+        xray::XrayImage{name, image::Image<float>(8, 6), 0, 4095, {}, {}});
+    view.rectification = rectification::Rectification{};
+    view.found = fiducials::LabelledFiducials{};
+    fiducials::Fiducial fiducial{"P1", Eigen::Vector3d::Zero()};
+    fiducial.status = fiducials::FiducialStatus::used;
     view.found->fiducials = {fiducial, {"P2", Eigen::Vector3d::Zero()}};
-    view.calibrated = CalibratedView{};
+    view.calibrated = calibration::CalibratedView{};
     view.calibrated->view.intrinsics = {4000, 4000, 4, 3, 0};
     result.views.push_back(std::move(view));
   }
@@ -30,11 +31,13 @@ Result two_views() {
 
 TEST(ResultJson, HasEveryKeyOfTheContract) {
   Result result = two_views();
-  PointResult point{"FS", PointSource::pick, {}, {ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
-  point.place = PointInFrames{};
+  PointResult point{
+      "FS", localization::PointSource::pick, {}, {fiducials::ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, {}, 0, {}};
+  point.place = guidance::PointInFrames{};
   result.points.push_back(point);
   result.tunnels.push_back({"femur", {}, {}, {}, 30});
-  result.verifications.push_back({"drill", LineError{{1.0, {}}, 1, 2, 3}, LineError{{1.0, {}}, 1, 2, 3}});
+  result.verifications.push_back(
+      {"drill", verification::LineError{{1.0, {}}, 1, 2, 3}, verification::LineError{{1.0, {}}, 1, 2, 3}});
   const Json json = to_json(result);
 
   expect_keys(json, {"format", "status", "failure", "warnings", "views", "points", "accuracy", "tunnels",
@@ -75,8 +78,13 @@ TEST(ResultJson, FiducialNotFoundHasNoPixels) {
 
 TEST(ResultJson, PointNotLocatedHasAReason) {
   Result result = two_views();
-  result.points.push_back(
-      {"T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, "no ball", "", {}}});
+  result.points.push_back({"T1",
+                           localization::PointSource::target,
+                           {},
+                           {{}, {}},
+                           {},
+                           0,
+                           Failure{Reason::target_not_found, "no ball", "", {}}});
   const Json point = to_json(result)["points"][0];
   EXPECT_TRUE(point["xyz_mm"].is_null());
   EXPECT_EQ(point["reason"], "target_not_found");
@@ -96,4 +104,4 @@ TEST(ResultJson, RefusalHasFiguresAndViewsNotReachedAreNull) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

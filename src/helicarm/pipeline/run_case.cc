@@ -4,7 +4,7 @@
 #include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/stopwatch.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 Expected<Result> run_case(const Case& given, const RunOptions& options) {
   std::optional<double> total;
@@ -17,4 +17,4 @@ Expected<Result> run_case(const Case& given, const RunOptions& options) {
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

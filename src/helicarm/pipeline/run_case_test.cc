@@ -12,7 +12,7 @@
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/simulation/write_case.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 /// One simulated case for all tests: 512 x 512 pixels, tunnels, tracker and tool lines.
@@ -62,7 +62,7 @@ const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) 
 }
 
 TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
-  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
@@ -79,7 +79,7 @@ TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
   EXPECT_NEAR(note->figures.at("file_over_true"), 1, 0.025);
   EXPECT_GT(note->figures.at("source_distance_mm AP"), 300);
 
-  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator *= 1.07;
+  for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator *= 1.07;
   const auto scaled = run_case(given_, {});
   ASSERT_TRUE(scaled.has_value());
   const Warning* warning = find_reason(scaled->warnings, Reason::scale_disagrees);
@@ -93,7 +93,7 @@ TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
 }
 
 TEST_F(SimulatedNavigation, DisplacedBallIsWarnedOf) {
-  CalibratorBall& ball = given_.calibrator.balls[4];
+  phantom::CalibratorBall& ball = given_.calibrator.balls[4];
   const Eigen::Vector3d seen = ball.centre_in_calibrator;
   ball.centre_in_calibrator += Eigen::Vector3d(1.5, -1, 1.2);
   const auto result = run_case(given_, {});
@@ -169,7 +169,7 @@ TEST_F(SimulatedNavigation, ScaleErrorIsInEveryCovariance) {
   for (std::size_t i = 0; i < exact->points.size(); ++i) {
     const auto& place = exact->points[i].place;
     ASSERT_TRUE(place);
-    const Eigen::Vector3d by_scale = 0.01 * (place->in_calibrator - middle_of(given_.calibrator));
+    const Eigen::Vector3d by_scale = 0.01 * (place->in_calibrator - phantom::middle_of(given_.calibrator));
     const Eigen::Matrix3d added =
         scaled->points[i].place->covariance_in_calibrator - place->covariance_in_calibrator;
     EXPECT_LT((added - by_scale * by_scale.transpose()).norm(), 0.03 * by_scale.squaredNorm());
@@ -179,8 +179,8 @@ TEST_F(SimulatedNavigation, ScaleErrorIsInEveryCovariance) {
 }
 
 TEST_F(SimulatedNavigation, ResultDoesNotDependOnTheThreads) {
-  const auto one = run_case(given_, {Method::best, {}, 1});
-  const auto two = run_case(given_, {Method::best, {}, 2});
+  const auto one = run_case(given_, {rectification::Method::best, {}, 1});
+  const auto two = run_case(given_, {rectification::Method::best, {}, 2});
   for (std::size_t i = 0; i < one->points.size(); ++i)
     EXPECT_EQ(one->points[i].place->in_calibrator, two->points[i].place->in_calibrator);
 }
@@ -194,13 +194,14 @@ TEST_F(SimulatedNavigation, SameImageTwiceIsRefused) {
   EXPECT_TRUE(result->views[0].xray_image);
 }
 
-std::shared_ptr<const XrayImage> image_with(const std::string& instance_key, const std::string& uid_key) {
-  XrayImage xray_image;
-  xray_image.pixels = Image<float>(64, 64);
+std::shared_ptr<const xray::XrayImage> image_with(const std::string& instance_key,
+                                                  const std::string& uid_key) {
+  xray::XrayImage xray_image;
+  xray_image.pixels = image::Image<float>(64, 64);
   xray_image.highest = 4095;
   xray_image.acquisition.instance_key = instance_key;
   xray_image.acquisition.uid_key = uid_key;
-  return std::make_shared<const XrayImage>(std::move(xray_image));
+  return std::make_shared<const xray::XrayImage>(std::move(xray_image));
 }
 
 TEST(CheckImages, BlankImageTwiceIsRefusedAsBlank) {
@@ -221,7 +222,7 @@ TEST(CheckImages, DifferentImagesOfOneUidAreAcceptedWithAWarning) {
 }
 
 TEST_F(SimulatedNavigation, PlateOfTheOtherKindIsRefused) {
-  given_.plate->kind = DotKind::holes;
+  given_.plate->kind = phantom::DotKind::holes;
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result.has_value());
   ASSERT_TRUE(result->failure);
@@ -246,11 +247,11 @@ TEST_F(SimulatedNavigation, WrongSourceDistanceIsRefusedWithTheOneThatFits) {
   for (const double factor : {1.1, 1.3}) {
     double right_mm = 0;
     for (std::size_t i = 0; i < given_.views.size(); ++i) {
-      DerivedImage image = simulation::dicom_of(truth_, i);
+      xray::DerivedImage image = simulation::dicom_of(truth_, i);
       right_mm = *image.acquisition.source_detector_mm;
       *image.acquisition.source_detector_mm *= factor;
       given_.views[i].image = folder_ / (given_.views[i].name + "_wrong_distance.dcm");
-      ASSERT_TRUE(write_dicom(given_.views[i].image, image));
+      ASSERT_TRUE(xray::write_dicom(given_.views[i].image, image));
     }
     const auto result = run_case(given_, {});
     ASSERT_TRUE(result && result->failure) << factor;
@@ -265,10 +266,10 @@ TEST_F(SimulatedNavigation, WrongSourceDistanceIsRefusedWithTheOneThatFits) {
 TEST_F(SimulatedNavigation, WrongPixelSizeIsRefusedWithTheOneThatFits) {
   auto read = read_views(given_, {});
   ASSERT_TRUE(read.has_value());
-  XrayImage changed = *read->front().xray_image;
+  xray::XrayImage changed = *read->front().xray_image;
   const double right_mm = changed.acquisition.pixel_mm->mean();
   *changed.acquisition.pixel_mm *= 1.15;
-  read->front().xray_image = std::make_shared<const XrayImage>(std::move(changed));
+  read->front().xray_image = std::make_shared<const xray::XrayImage>(std::move(changed));
   const auto rectified = rectify_views(*read, given_, {});
   ASSERT_FALSE(rectified.has_value());
   EXPECT_EQ(rectified.error().failure.reason, Reason::plate_mismatch);
@@ -278,8 +279,8 @@ TEST_F(SimulatedNavigation, WrongPixelSizeIsRefusedWithTheOneThatFits) {
 }
 
 TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsIsUnchanged) {
-  given_.calibrator = *calibrator_named("udcsc", folder_);
-  for (CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  given_.calibrator = *phantom::calibrator_named("udcsc", folder_);
+  for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
   for (CaseView& view : given_.views) view.mirrored = false;
   const auto result = run_case(given_, {});
   ASSERT_TRUE(result && result->failure);
@@ -287,7 +288,7 @@ TEST_F(SimulatedNavigation, RefusalThatNoTagExplainsIsUnchanged) {
 }
 
 TEST_F(SimulatedNavigation, LimitOnTheErrorRefusesButKeepsThePoints) {
-  const auto result = run_case(given_, {Method::best, 1e-4, 0});
+  const auto result = run_case(given_, {rectification::Method::best, 1e-4, 0});
   ASSERT_TRUE(result->failure);
   EXPECT_EQ(result->failure->reason, Reason::uncertain);
   EXPECT_FALSE(result->points.empty());
@@ -317,4 +318,4 @@ TEST_F(SimulatedNavigation, MissingImageIsBadInput) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -6,7 +6,7 @@
 #include "helicarm/core/field.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 inline constexpr std::array<std::string_view, 2> method_words{"best", "paper"};
 
@@ -35,4 +35,4 @@ inline constexpr std::array<Field<RunOptions>, 4> run_fields{
     bound<&RunOptions::threads>(
         {.name = "threads", .range = {0, 1024}, .step = 1, .help = "Threads to use; 0: all cores"})};
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

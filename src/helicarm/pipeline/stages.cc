@@ -11,7 +11,7 @@
 #include "helicarm/rectification/usable.h"
 #include "helicarm/xray/read_xray_image.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 namespace {
 
 /// A stage's result for each view, or its failure.
@@ -40,47 +40,52 @@ OrRefusal<std::vector<Next>> joined(std::vector<View> views, std::vector<Expecte
   return next;
 }
 
-Expected<DistortionMap> map_of(const XrayImage& xray_image, const CaseView& from,
-                               const std::optional<Plate>& plate, Method method) {
+Expected<rectification::DistortionMap> map_of(const xray::XrayImage& xray_image, const CaseView& from,
+                                              const std::optional<phantom::Plate>& plate,
+                                              rectification::Method method) {
   if (from.map)
-    return read_json(*from.map).and_then(
-        [&](const Json& json) { return distortion_map_from_json(json, from.map->filename().string()); });
+    return read_json(*from.map).and_then([&](const Json& json) {
+      return rectification::distortion_map_from_json(json, from.map->filename().string());
+    });
   if (from.plate_image)
-    return read_xray_image(*from.plate_image, from.name, std::nullopt)
-        .and_then([&](const XrayImage& apart) {
-          return rectify(apart, *plate, {method, {}});
+    return xray::read_xray_image(*from.plate_image, from.name, std::nullopt)
+        .and_then([&](const xray::XrayImage& apart) {
+          return rectification::rectify(apart, *plate, {method, {}});
         })
-        .map([](const Rectification& apart) { return apart.map; });
-  return flat_panel_map(xray_image);
+        .map([](const rectification::Rectification& apart) { return apart.map; });
+  return rectification::flat_panel_map(xray_image);
 }
 
-Expected<Rectification> rectify_view(const XrayImage& xray_image, const CaseView& from,
-                                     const std::optional<Plate>& plate, Method method) {
-  if (plate && !from.map && !from.plate_image) return rectify(xray_image, *plate, {method, {}});
-  return map_of(xray_image, from, plate, method).and_then([&](const DistortionMap& map) {
-    return with_map(xray_image, map, plate);
+Expected<rectification::Rectification> rectify_view(const xray::XrayImage& xray_image, const CaseView& from,
+                                                    const std::optional<phantom::Plate>& plate,
+                                                    rectification::Method method) {
+  if (plate && !from.map && !from.plate_image)
+    return rectification::rectify(xray_image, *plate, {method, {}});
+  return map_of(xray_image, from, plate, method).and_then([&](const rectification::DistortionMap& map) {
+    return rectification::with_map(xray_image, map, plate);
   });
 }
 
-bool is_ambiguous(const Expected<LabelledFiducials>& labels) {
+bool is_ambiguous(const Expected<fiducials::LabelledFiducials>& labels) {
   return !labels && labels.error().reason == Reason::ambiguous_labels;
 }
 
 /// The plate's kind determines the polarity of metal: it is wrong if the opposite polarity gives labels.
-bool is_plate_of_other_kind(const DetectedView& view, const Calibrator& calibrator,
-                            const FiducialOptions& options) {
+bool is_plate_of_other_kind(const DetectedView& view, const phantom::Calibrator& calibrator,
+                            const fiducials::FiducialOptions& options) {
   if (view.rectification.dots_found == 0) return false;
-  Rectification inverted = view.rectification;
-  inverted.metal = opposite(inverted.metal);
+  rectification::Rectification inverted = view.rectification;
+  inverted.metal = detection::opposite(inverted.metal);
   inverted.other_dots.reset();
-  const auto labels = label_fiducials(*view.xray_image, inverted,
-                                      detect_candidates(*view.xray_image, inverted), calibrator, options);
+  const auto labels = fiducials::label_fiducials(*view.xray_image, inverted,
+                                                 fiducials::detect_candidates(*view.xray_image, inverted),
+                                                 calibrator, options);
   return labels || is_ambiguous(labels);
 }
 
 /// Relative radius bias of the view whose labels have the largest margin; nothing if no view is labelled.
-std::optional<double> common_radius_bias(const std::vector<Expected<LabelledFiducials>>& views) {
-  const LabelledFiducials* surest = nullptr;
+std::optional<double> common_radius_bias(const std::vector<Expected<fiducials::LabelledFiducials>>& views) {
+  const fiducials::LabelledFiducials* surest = nullptr;
   for (const auto& view : views)
     if (view && (!surest || view->margin > surest->margin)) surest = &*view;
   return surest ? std::optional(surest->radius_bias) : std::nullopt;
@@ -103,13 +108,13 @@ ViewResult reported(const LabelledView& view) {
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      const Acquisition& a = views[j].xray_image->acquisition;
-      const Acquisition& b = views[i].xray_image->acquisition;
+      const xray::Acquisition& a = views[j].xray_image->acquisition;
+      const xray::Acquisition& b = views[i].xray_image->acquisition;
       if (!a.patient_key.empty() && !b.patient_key.empty() && a.patient_key != b.patient_key)
         return fail(Reason::patient_mismatch, fmt::format("{} and {} are of different patients or studies",
                                                           views[j].name, views[i].name));
       if (!a.instance_key.empty() && a.instance_key == b.instance_key)
-        return check_usable(*views[i].xray_image).and_then([&]() -> Expected<void> {
+        return rectification::check_usable(*views[i].xray_image).and_then([&]() -> Expected<void> {
           return fail(Reason::views_too_close,
                       fmt::format("{} and {} are the same image", views[j].name, views[i].name));
         });
@@ -122,8 +127,8 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
   for (const CaseView& view : given.views) views.push_back({view.name});
   auto images = of_each(views.size(), options.threads, [&](std::size_t i) {
     const CaseView& from = given.views[i];
-    return read_xray_image(from.image, from.name, from.frame).map([](XrayImage xray_image) {
-      return std::make_shared<const XrayImage>(std::move(xray_image));
+    return xray::read_xray_image(from.image, from.name, from.frame).map([](xray::XrayImage xray_image) {
+      return std::make_shared<const xray::XrayImage>(std::move(xray_image));
     });
   });
   return joined<ReadView>(std::move(views), std::move(images))
@@ -146,17 +151,18 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
 
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case&,
                                                      const RunOptions& options) {
-  auto candidates = of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<Candidates> {
-    return detect_candidates(*views[i].xray_image, views[i].rectification);
-  });
+  auto candidates =
+      of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<fiducials::Candidates> {
+        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification);
+      });
   return joined<DetectedView>(std::move(views), std::move(candidates));
 }
 
-ViewFiducials fiducials_of(const LabelledView& view) {
-  const DistortionMap& map = view.rectification.map;
+calibration::ViewFiducials fiducials_of(const LabelledView& view) {
+  const rectification::DistortionMap& map = view.rectification.map;
   std::vector<Eigen::Vector2d> used;
-  for (const Fiducial& ball : view.fiducials.fiducials)
-    if (ball.status == FiducialStatus::used) used.push_back(ball.uv);
+  for (const fiducials::Fiducial& ball : view.fiducials.fiducials)
+    if (ball.status == fiducials::FiducialStatus::used) used.push_back(ball.uv);
   return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.xray_image, map), view.fiducials.view,
           map.covariance_px2(used)};
 }
@@ -164,9 +170,9 @@ ViewFiducials fiducials_of(const LabelledView& view) {
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
                                                  const RunOptions& options) {
   const auto label = [&](std::size_t i, std::optional<double> radius_bias) {
-    const FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
-    auto labels = label_fiducials(*views[i].xray_image, views[i].rectification, views[i].candidates,
-                                  given.calibrator, how);
+    const fiducials::FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
+    auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].rectification,
+                                             views[i].candidates, given.calibrator, how);
     if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given.calibrator, how))
       labels = fail(Reason::plate_mismatch,
                     "the calibrator is found with the opposite polarity of metal: exchange \"holes\" and "
@@ -182,4 +188,4 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
   return joined<LabelledView>(std::move(views), std::move(labels));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

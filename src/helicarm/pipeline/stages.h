@@ -11,23 +11,23 @@
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// A view after each stage, with the results of the stages before it.
 struct NamedView {
   std::string name;
 };
 struct ReadView : NamedView {
-  std::shared_ptr<const XrayImage> xray_image;
+  std::shared_ptr<const xray::XrayImage> xray_image;
 };
 struct RectifiedView : ReadView {
-  Rectification rectification;
+  rectification::Rectification rectification;
 };
 struct DetectedView : RectifiedView {
-  Candidates candidates;
+  fiducials::Candidates candidates;
 };
 struct LabelledView : DetectedView {
-  LabelledFiducials fiducials;
+  fiducials::LabelledFiducials fiducials;
 };
 
 /// As reported in a result.
@@ -61,11 +61,11 @@ OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> 
                                                      const RunOptions& options);
 
 /// The calibration's input from a labelled view.
-ViewFiducials fiducials_of(const LabelledView& view);
+calibration::ViewFiducials fiducials_of(const LabelledView& view);
 
 /// 2.3.4. Ambiguous labels of a view are tried again with the radius bias of the view with the largest
 /// margin.
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,
                                                  const RunOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

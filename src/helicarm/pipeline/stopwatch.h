@@ -4,7 +4,7 @@
 #include <chrono>
 #include <optional>
 
-namespace helicarm {
+namespace helicarm::pipeline {
 
 /// Writes its lifetime, ms, on destruction.
 class Stopwatch {
@@ -26,4 +26,4 @@ auto timed(std::optional<double>& ms, auto&& work) {
   return work();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::pipeline

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// Number of monomials in two variables up to an order.
 constexpr Eigen::Index term_count(int order) { return (order + 1) * (order + 2) / 2; }
@@ -56,4 +56,4 @@ inline Eigen::VectorXd basis_row(const Eigen::Vector2d& t, int order, const Eige
   return row;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -7,7 +7,7 @@
 
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Matrix2d;
@@ -203,4 +203,4 @@ Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::st
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

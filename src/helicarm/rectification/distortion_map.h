@@ -12,7 +12,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 enum class RectifiedPlane { detector, plate };
 
@@ -68,4 +68,4 @@ DistortionMap identity_map(int width, int height, std::optional<double> pixel_mm
 Json to_json(const DistortionMap& map);
 Expected<DistortionMap> distortion_map_from_json(const Json& json, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -6,7 +6,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -161,4 +161,4 @@ TEST(DistortionMapJson, InconsistentFieldsAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -11,7 +11,7 @@
 #include "helicarm/rectification/basis.h"
 #include "helicarm/rectification/kriging.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Index;
@@ -253,4 +253,4 @@ Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int
   return fit;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -8,7 +8,7 @@
 
 #include "helicarm/rectification/distortion_map.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// A plate dot: position on the plate and in the raw image.
 struct Correspondence {
@@ -38,4 +38,4 @@ struct MapFit {
 Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
                          const MapOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -10,7 +10,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -279,4 +279,4 @@ TEST(FitMap, HullContainsTheUsedDots) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

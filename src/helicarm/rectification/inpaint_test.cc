@@ -5,31 +5,31 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
-Dot dot_at(double u, double v, double radius) {
-  Dot dot;
+detection::Dot dot_at(double u, double v, double radius) {
+  detection::Dot dot;
   dot.centre_px = {u, v};
   dot.radius_px = radius;
   return dot;
 }
 
 TEST(Inpainted, DotOnASlopeIsFilledWithTheSlope) {
-  Image<float> image(80, 60);
+  image::Image<float> image(80, 60);
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u)
       image(u, v) = std::hypot(u - 40.0, v - 30.0) < 5 ? 10.f : 1000.f + 4.f * float(u);
-  const Image<float> filled = inpainted(image, {dot_at(40, 30, 5)});
+  const image::Image<float> filled = inpainted(image, {dot_at(40, 30, 5)});
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u) EXPECT_NEAR(filled(u, v), 1000 + 4 * u, 25) << u << ' ' << v;
 }
 
 TEST(Inpainted, PixelsAwayFromTheDotsAreUnchanged) {
-  Image<float> image(80, 60);
+  image::Image<float> image(80, 60);
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u) image(u, v) = float((u * 37 + v * 91) % 256);
-  const Image<float> filled = inpainted(image, {dot_at(20, 20, 4)});
+  const image::Image<float> filled = inpainted(image, {dot_at(20, 20, 4)});
   for (int v = 0; v < 60; ++v)
     for (int u = 0; u < 80; ++u)
       if (std::hypot(u - 20.0, v - 20.0) > 9) {
@@ -38,4 +38,4 @@ TEST(Inpainted, PixelsAwayFromTheDotsAreUnchanged) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -8,7 +8,7 @@
 
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Index;
@@ -148,4 +148,4 @@ KrigingModel smooth_model(const KrigingData& data, int order, const MatrixX2d& k
   return model;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

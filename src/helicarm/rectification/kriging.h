@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// Dots of a plate, normalised, and their raw pixels.
 struct KrigingData {
@@ -40,4 +40,4 @@ KrigingModel polynomial_model(const KrigingData& data, int order);
 /// Universal kriging. Length, strength and dot noise maximise the restricted likelihood.
 KrigingModel smooth_model(const KrigingData& data, int order, const Eigen::MatrixX2d& knots);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -17,7 +17,7 @@ using Eigen::Vector2i;
 /// Dots in square cells, for constant-time neighbour search.
 class Cells {
  public:
-  Cells(const std::vector<Dot>& dots, double size) : dots_(dots), size_(size) {
+  Cells(const std::vector<detection::Dot>& dots, double size) : dots_(dots), size_(size) {
     for (std::size_t i = 0; i < dots.size(); ++i) cells_[key(dots[i].centre_px)].push_back(i);
   }
   /// Nearest dot to a position within `reach` (at most the cell size), or -1.
@@ -45,16 +45,16 @@ class Cells {
   std::pair<int, int> key(const Vector2d& p) const {
     return {static_cast<int>(std::floor(p.x() / size_)), static_cast<int>(std::floor(p.y() / size_))};
   }
-  const std::vector<Dot>& dots_;
+  const std::vector<detection::Dot>& dots_;
   double size_;
   std::map<std::pair<int, int>, std::vector<std::size_t>> cells_;
 };
 
-double commonest_spacing(const std::vector<Dot>& dots) {
+double commonest_spacing(const std::vector<detection::Dot>& dots) {
   std::vector<double> nearest;
-  for (const Dot& dot : dots) {
+  for (const detection::Dot& dot : dots) {
     double least = 1e9;
-    for (const Dot& other : dots)
+    for (const detection::Dot& other : dots)
       if (&other != &dot) least = std::min(least, (dot.centre_px - other.centre_px).norm());
     nearest.push_back(least);
   }
@@ -72,8 +72,8 @@ double commonest_spacing(const std::vector<Dot>& dots) {
   return spacing;
 }
 
-std::vector<Vector2i> steps_of(Lattice kind) {
-  if (kind == Lattice::square) return {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+std::vector<Vector2i> steps_of(phantom::Lattice kind) {
+  if (kind == phantom::Lattice::square) return {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
   return {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
 }
 
@@ -84,9 +84,9 @@ struct Seed {
 };
 
 /// Dots whose neighbours match the lattice, best first.
-std::vector<Seed> seeds(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, double pitch,
-                        double tolerance) {
-  const double turn = kind == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
+std::vector<Seed> seeds(const std::vector<detection::Dot>& dots, const Cells& cells, phantom::Lattice kind,
+                        double pitch, double tolerance) {
+  const double turn = kind == phantom::Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   std::vector<Seed> found;
   for (std::size_t i = 0; i < dots.size(); ++i) {
     const Vector2d here = dots[i].centre_px;
@@ -129,8 +129,8 @@ struct Frame {
   Vector2d a, b;
 };
 
-Places grow(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, double pitch, const Seed& seed,
-            const LatticeOptions& options) {
+Places grow(const std::vector<detection::Dot>& dots, const Cells& cells, phantom::Lattice kind, double pitch,
+            const Seed& seed, const LatticeOptions& options) {
   Places places;
   std::map<Vector2i, Frame, IndexLess> frames;
   std::vector<bool> taken(dots.size(), false);
@@ -182,12 +182,13 @@ Places grow(const std::vector<Dot>& dots, const Cells& cells, Lattice kind, doub
 
 }  // namespace
 
-Vector2d lattice_point(const Vector2i& index, Lattice kind) {
-  if (kind == Lattice::square) return index.cast<double>();
+Vector2d lattice_point(const Vector2i& index, phantom::Lattice kind) {
+  if (kind == phantom::Lattice::square) return index.cast<double>();
   return {index.x() + 0.5 * index.y(), 0.5 * std::numbers::sqrt3 * index.y()};
 }
 
-IndexedLattice index_lattice(const std::vector<Dot>& dots, Lattice kind, const LatticeOptions& options) {
+IndexedLattice index_lattice(const std::vector<detection::Dot>& dots, phantom::Lattice kind,
+                             const LatticeOptions& options) {
   IndexedLattice lattice;
   if (dots.size() < 5) return lattice;
   const double pitch = options.pitch_px.value_or(commonest_spacing(dots));
@@ -212,4 +213,4 @@ IndexedLattice index_lattice(const std::vector<Dot>& dots, Lattice kind, const L
   return lattice;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -10,7 +10,7 @@
 #include "helicarm/detection/dot.h"
 #include "helicarm/phantom/plate.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// A dot with its lattice index: position = index.x() a + index.y() b.
 struct IndexedDot {
@@ -33,9 +33,10 @@ struct IndexedLattice {
 /// Indexes dots of a distorted lattice with missing and extra dots, from the image geometry alone: a regular
 /// neighbourhood is the seed and is grown with the local spacing. The lattice axes are those nearest to +u
 /// and (square) +v, or (hexagonal) 60 degrees from it. Fewer than 5 indexed dots give an empty lattice.
-IndexedLattice index_lattice(const std::vector<Dot>& dots, Lattice kind, const LatticeOptions& options);
+IndexedLattice index_lattice(const std::vector<detection::Dot>& dots, phantom::Lattice kind,
+                             const LatticeOptions& options);
 
 /// Lattice coordinates of an index in pitches: square (i, j); hexagonal (i + j/2, j sqrt(3)/2).
-Eigen::Vector2d lattice_point(const Eigen::Vector2i& index, Lattice kind);
+Eigen::Vector2d lattice_point(const Eigen::Vector2i& index, phantom::Lattice kind);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

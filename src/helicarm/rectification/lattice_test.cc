@@ -9,14 +9,14 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector2i;
 
 struct Scatter {
-  std::vector<Dot> dots;
+  std::vector<detection::Dot> dots;
   std::vector<Vector2i> index;  ///< of the first dots; the rest are extra
   double pitch;
 };
@@ -29,18 +29,18 @@ struct Trouble {
 
 /// A field of 1000 px with a lattice of about 9 x 9, rotated within the range that keeps the axes'
 /// assignment.
-Scatter scatter(Lattice kind, const Trouble& trouble, std::uint64_t seed) {
+Scatter scatter(phantom::Lattice kind, const Trouble& trouble, std::uint64_t seed) {
   RandomStream random(seed, 1);
   Scatter made;
   made.pitch = random.uniform(60, 110);
-  const double sector = kind == Lattice::square ? M_PI / 2 : M_PI / 3;
+  const double sector = kind == phantom::Lattice::square ? M_PI / 2 : M_PI / 3;
   const Eigen::Rotation2Dd turn(random.uniform(-0.35, 0.35) * sector);
   const Vector2d shift(random.uniform(-30, 30), random.uniform(-30, 30));
   for (int j = -12; j <= 12; ++j)
     for (int i = -18; i <= 18; ++i) {
       const Vector2d p = turn * (made.pitch * lattice_point({i, j}, kind)) + shift;
       if (p.norm() > 430 || random.uniform() < trouble.missing) continue;
-      Dot dot;
+      detection::Dot dot;
       dot.centre_px = Vector2d(500, 500) +
                       (1 + trouble.pincushion_px / 430 * (p.squaredNorm() / (430 * 430))) * p +
                       0.3 * Vector2d(random.normal(), random.normal());
@@ -48,7 +48,7 @@ Scatter scatter(Lattice kind, const Trouble& trouble, std::uint64_t seed) {
       made.index.emplace_back(i, j);
     }
   for (auto n = static_cast<std::size_t>(trouble.extra * double(made.dots.size())); n > 0; --n) {
-    Dot stray;
+    detection::Dot stray;
     stray.centre_px = {random.uniform(60, 940), random.uniform(60, 940)};
     made.dots.push_back(stray);
   }
@@ -80,7 +80,7 @@ Score score(const Scatter& made, const IndexedLattice& lattice) {
   return score;
 }
 
-class IndexLatticeOf : public testing::TestWithParam<Lattice> {};
+class IndexLatticeOf : public testing::TestWithParam<phantom::Lattice> {};
 
 TEST_P(IndexLatticeOf, CleanLatticeIsIndexedCompletely) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -126,25 +126,27 @@ TEST_P(IndexLatticeOf, IndicesAndDotsAreUnique) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, IndexLatticeOf, testing::Values(Lattice::square, Lattice::hexagonal),
+INSTANTIATE_TEST_SUITE_P(Kinds, IndexLatticeOf,
+                         testing::Values(phantom::Lattice::square, phantom::Lattice::hexagonal),
                          [](const auto& kind) {
-                           return kind.param == Lattice::square ? "Square" : "Hexagonal";
+                           return kind.param == phantom::Lattice::square ? "Square" : "Hexagonal";
                          });
 
 TEST(IndexLattice, FewDotsGiveNoLattice) {
-  EXPECT_TRUE(index_lattice({}, Lattice::square, {}).dots.empty());
-  const Scatter made = scatter(Lattice::square, {0, 0, 0}, 1);
-  EXPECT_TRUE(index_lattice({made.dots.begin(), made.dots.begin() + 4}, Lattice::square, {}).dots.empty());
+  EXPECT_TRUE(index_lattice({}, phantom::Lattice::square, {}).dots.empty());
+  const Scatter made = scatter(phantom::Lattice::square, {0, 0, 0}, 1);
+  EXPECT_TRUE(
+      index_lattice({made.dots.begin(), made.dots.begin() + 4}, phantom::Lattice::square, {}).dots.empty());
 }
 
 TEST(IndexLattice, CoincidentDotsGiveNoLattice) {
-  EXPECT_TRUE(index_lattice(std::vector<Dot>(50), Lattice::square, {}).dots.empty());
+  EXPECT_TRUE(index_lattice(std::vector<detection::Dot>(50), phantom::Lattice::square, {}).dots.empty());
 }
 
 TEST(LatticePoint, HexagonalNeighboursAreOnePitchApart) {
   for (const Vector2i& step : {Vector2i(1, 0), Vector2i(0, 1), Vector2i(-1, 1)})
-    EXPECT_NEAR(lattice_point(step, Lattice::hexagonal).norm(), 1, 1e-15);
+    EXPECT_NEAR(lattice_point(step, phantom::Lattice::hexagonal).norm(), 1, 1e-15);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -8,12 +8,12 @@
 
 #include "helicarm/image/opencv.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
-std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float highest, double min_radius_px,
-                                 double max_radius_px) {
+std::vector<detection::Dot> find_dots_paper(const image::Image<float>& image, float lowest, float highest,
+                                            double min_radius_px, double max_radius_px) {
   cv::Mat filtered;
-  cv::medianBlur(as_mat(image), filtered, 5);
+  cv::medianBlur(image::as_mat(image), filtered, 5);
   // To eight bits as for display: the square root raises dark values.
   cv::Mat lifted = cv::max(filtered - double(lowest), 0.0) / std::max(1e-6, double(highest - lowest));
   cv::sqrt(lifted, lifted);
@@ -28,9 +28,9 @@ std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float 
   cv::HoughCircles(grey, circles, cv::HOUGH_GRADIENT, 1, 2 * zoom * min_radius_px, canny_threshold, votes,
                    static_cast<int>(std::floor(zoom * min_radius_px)),
                    static_cast<int>(std::ceil(zoom * max_radius_px)));
-  std::vector<Dot> dots;
+  std::vector<detection::Dot> dots;
   for (const cv::Vec3f& circle : circles) {
-    Dot dot;
+    detection::Dot dot;
     dot.centre_px = {(double(circle[0]) + 0.5) / zoom - 0.5, (double(circle[1]) + 0.5) / zoom - 0.5};
     dot.sigma_px = 0.45;
     dot.radius_px = double(circle[2]) / zoom;
@@ -39,4 +39,4 @@ std::vector<Dot> find_dots_paper(const Image<float>& image, float lowest, float 
   return dots;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

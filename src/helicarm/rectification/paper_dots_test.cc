@@ -7,30 +7,30 @@
 
 #include "helicarm/detection/drawn_image_test.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
 
 TEST(FindDotsPaper, CirclesOfTheGivenSizeWithinOneAndAHalfPixels) {
-  drawn::Shade shade(256, 256);
+  detection::drawn::Shade shade(256, 256);
   std::vector<Vector2d> places;
   for (int k = 0; k < 9; ++k) places.emplace_back(50.3 + 75.4 * (k % 3), 50.6 + 75.2 * (k / 3));
-  for (const Vector2d& place : places) drawn::add_ball(shade, place, 8, 0.9, 3);
-  Image<float> image = drawn::grey(shade, 1500);
+  for (const Vector2d& place : places) detection::drawn::add_ball(shade, place, 8, 0.9, 3);
+  image::Image<float> image = detection::drawn::grey(shade, 1500);
   RandomStream random(1, 1);
-  drawn::add_noise(image, 20, random);
+  detection::drawn::add_noise(image, 20, random);
   const auto dots = find_dots_paper(image, 0, 4095, 6, 10);
   EXPECT_EQ(dots.size(), places.size());
   for (const Vector2d& place : places)
-    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {
+    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const detection::Dot& dot) {
       return (dot.centre_px - place).norm() < 1.5 && dot.sigma_px == 0.45;
     })) << place.transpose();
 }
 
 TEST(FindDotsPaper, EmptyFieldHasNone) {
-  EXPECT_TRUE(find_dots_paper(Image<float>(128, 128, 2000), 0, 4095, 6, 10).empty());
+  EXPECT_TRUE(find_dots_paper(image::Image<float>(128, 128, 2000), 0, 4095, 6, 10).empty());
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

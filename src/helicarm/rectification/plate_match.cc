@@ -10,7 +10,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Matrix2d;
@@ -19,7 +19,7 @@ using Eigen::Vector2i;
 using Cell = std::pair<int, int>;
 
 /// Columns: the lattice's axes, in pitches.
-Matrix2d basis(Lattice kind) {
+Matrix2d basis(phantom::Lattice kind) {
   Matrix2d axes;
   axes << lattice_point({1, 0}, kind), lattice_point({0, 1}, kind);
   return axes;
@@ -35,7 +35,7 @@ struct PlateLattice {
 };
 
 /// The plate's lattice: its dots as indices relative to the first. The dots may be rotated.
-PlateLattice lattice_of(const Plate& plate) {
+PlateLattice lattice_of(const phantom::Plate& plate) {
   double pitch = plate.pitch_mm.value_or(0);
   const Vector2d origin = plate.dots_mm.front();
   Vector2d axis(1e9, 0);
@@ -43,7 +43,8 @@ PlateLattice lattice_of(const Plate& plate) {
     for (const Vector2d& q : plate.dots_mm)
       if (const Vector2d d = q - p; &p != &q && d.norm() < axis.norm() - 1e-6) axis = d;
   if (pitch == 0) pitch = axis.norm();
-  const double sector = plate.lattice == Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
+  const double sector =
+      plate.lattice == phantom::Lattice::square ? std::numbers::pi / 2 : std::numbers::pi / 3;
   const double angle = std::atan2(axis.y(), axis.x());
   const double turn = angle - sector * std::round(angle / sector);
   const Matrix2d to_index =
@@ -54,8 +55,8 @@ PlateLattice lattice_of(const Plate& plate) {
 }
 
 /// All symmetries of a lattice about a node: proper ones first, smallest rotation first.
-std::vector<Eigen::Matrix2i> symmetries(Lattice kind) {
-  const int n = kind == Lattice::square ? 4 : 6;
+std::vector<Eigen::Matrix2i> symmetries(phantom::Lattice kind) {
+  const int n = kind == phantom::Lattice::square ? 4 : 6;
   const Matrix2d axes = basis(kind);
   std::vector<Eigen::Matrix2i> ways;
   for (const bool mirror : {false, true})
@@ -71,8 +72,9 @@ std::vector<Eigen::Matrix2i> symmetries(Lattice kind) {
 
 }  // namespace
 
-Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const std::vector<Dot>& dots,
-                                            const Plate& plate, const Vector2d& image_centre) {
+Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice,
+                                            const std::vector<detection::Dot>& dots,
+                                            const phantom::Plate& plate, const Vector2d& image_centre) {
   std::vector<PlateDot> matched;
   if (plate.dots_mm.empty()) {
     for (const IndexedDot& d : lattice.dots)
@@ -152,4 +154,4 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice, const
   return matched;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -61,4 +61,4 @@ std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Vecto
   return paths;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

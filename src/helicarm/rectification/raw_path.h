@@ -6,7 +6,7 @@
 
 #include "helicarm/rectification/distortion_map.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// A polyline in pixels.
 using PixelPath = std::vector<Eigen::Vector2d>;
@@ -15,4 +15,4 @@ using PixelPath = std::vector<Eigen::Vector2d>;
 /// image or the map folds.
 std::vector<PixelPath> raw_paths(const DistortionMap& map, std::span<const Eigen::Vector2d> rectified);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

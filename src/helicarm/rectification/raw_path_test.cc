@@ -5,7 +5,7 @@
 
 #include "helicarm/rectification/basis.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -81,4 +81,4 @@ TEST(RawPaths, LineFromFarAwayContinuesAtACorner) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

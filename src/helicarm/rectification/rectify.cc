@@ -14,7 +14,7 @@
 #include "helicarm/rectification/plate_match.h"
 #include "helicarm/rectification/usable.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -24,11 +24,11 @@ constexpr std::size_t least_dots = 10;
 /// Without a plate description a plate may still be present: more dots than a calibrator's balls and some
 /// outliers can form.
 constexpr std::size_t least_dots_of_any_plate = 20;
-const Plate any_plate{"", DotKind::balls, Lattice::square, {}, 2.5, {}, {}};
+const phantom::Plate any_plate{"", phantom::DotKind::balls, phantom::Lattice::square, {}, 2.5, {}, {}};
 constexpr double max_ball_radius = 0.04;  // relative to the image width: no larger ball is accepted
 
 /// Pixels per plate millimetre at the image centre, if file and plate provide it.
-std::optional<double> expected_scale(const XrayImage& xray_image, const Plate& plate) {
+std::optional<double> expected_scale(const xray::XrayImage& xray_image, const phantom::Plate& plate) {
   const auto& pixel = xray_image.acquisition.pixel_mm;
   if (!pixel) return std::nullopt;
   const double height = plate.height_above_receiver_mm.value_or(0);
@@ -36,22 +36,23 @@ std::optional<double> expected_scale(const XrayImage& xray_image, const Plate& p
   return distance / (distance - height) / std::sqrt(pixel->x() * pixel->y());
 }
 
-std::vector<Dot> with_radius_near(const std::vector<Dot>& dots, double radius) {
-  std::vector<Dot> near;
-  for (const Dot& dot : dots)
+std::vector<detection::Dot> with_radius_near(const std::vector<detection::Dot>& dots, double radius) {
+  std::vector<detection::Dot> near;
+  for (const detection::Dot& dot : dots)
     if (dot.radius_px > 0.7 * radius && dot.radius_px < 1.35 * radius) near.push_back(dot);
   return near;
 }
 
 /// The dots as a lattice: of the expected pitch if known, else of the pitch that gives the largest lattice.
 struct SeenLattice {
-  std::vector<Dot> dots;
+  std::vector<detection::Dot> dots;
   IndexedLattice lattice;
 };
 
-SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::optional<double> scale) {
+SeenLattice seen_lattice(const std::vector<detection::Dot>& dots, const phantom::Plate& plate,
+                         std::optional<double> scale) {
   SeenLattice best;
-  const auto consider = [&](std::vector<Dot> some, std::optional<double> pitch_px) {
+  const auto consider = [&](std::vector<detection::Dot> some, std::optional<double> pitch_px) {
     LatticeOptions options;
     options.pitch_px = pitch_px;
     IndexedLattice lattice = index_lattice(some, plate.lattice, options);
@@ -62,7 +63,7 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
     if (best.lattice.dots.size() >= least_dots) return best;
   }
   std::vector<double> radii;
-  for (const Dot& dot : dots) radii.push_back(dot.radius_px);
+  for (const detection::Dot& dot : dots) radii.push_back(dot.radius_px);
   std::sort(radii.begin(), radii.end());
   for (const double q : {0.2, 0.5, 0.8})
     if (!radii.empty())
@@ -72,14 +73,14 @@ SeenLattice seen_lattice(const std::vector<Dot>& dots, const Plate& plate, std::
 }
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
-DotAppearance refit_lattice_dots(const XrayImage& xray_image, const NoiseCorrelation& noise,
-                                 const std::vector<Dot>& all, SeenLattice& seen) {
-  std::vector<Dot> members;
+detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image, const detection::NoiseCorrelation& noise,
+                                 const std::vector<detection::Dot>& all, SeenLattice& seen) {
+  std::vector<detection::Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
-  const DotAppearance appearance = estimate_appearance(xray_image, noise, members);
+  const detection::DotAppearance appearance = detection::estimate_appearance(xray_image, noise, members);
   for (const IndexedDot& d : seen.lattice.dots) {
     const auto refitted =
-        refit_dots(xray_image, {seen.dots[d.dot]}, appearance, all.size() > 500 ? members : all);
+        detection::refit_dots(xray_image, {seen.dots[d.dot]}, appearance, all.size() > 500 ? members : all);
     if (!refitted.empty() &&
         (refitted[0].centre_px - seen.dots[d.dot].centre_px).norm() < seen.dots[d.dot].radius_px)
       seen.dots[d.dot] = refitted[0];
@@ -87,8 +88,8 @@ DotAppearance refit_lattice_dots(const XrayImage& xray_image, const NoiseCorrela
   return appearance;
 }
 
-Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, std::optional<double> scale,
-                           const MapFit& fit) {
+Expected<void> check_pitch(const IndexedLattice& lattice, const phantom::Plate& plate,
+                           std::optional<double> scale, const MapFit& fit) {
   if (!scale || !plate.pitch_mm) return {};
   const double ratio = fit.px_per_mm / *scale;
   if (std::abs(ratio - 1) <= pitch_tolerance) return {};
@@ -99,7 +100,8 @@ Expected<void> check_pitch(const IndexedLattice& lattice, const Plate& plate, st
       {{"pitch_px", lattice.pitch_px}, {"pitch_mm", *plate.pitch_mm * ratio}});
 }
 
-void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& plate, double px_per_mm) {
+void set_metric(DistortionMap& map, const xray::XrayImage& xray_image, const phantom::Plate& plate,
+                double px_per_mm) {
   if (!plate.pitch_mm) return;
   map.rectified_pixel_mm = 1 / px_per_mm;
   map.rectified_plane = RectifiedPlane::plate;
@@ -110,20 +112,20 @@ void set_metric(DistortionMap& map, const XrayImage& xray_image, const Plate& pl
 }
 
 /// Fits plate dots that the search missed at the positions predicted by the map.
-void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const MapFit& fit,
-                      const DotAppearance& appearance, const std::vector<Dot>& all,
-                      std::vector<Dot>& plate_dots, std::vector<Correspondence>& seen) {
+void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& plate, const MapFit& fit,
+                      const detection::DotAppearance& appearance, const std::vector<detection::Dot>& all,
+                      std::vector<detection::Dot>& plate_dots, std::vector<Correspondence>& seen) {
   if (plate.dots_mm.empty() || plate_dots.empty()) return;
   double radius = 0;
-  for (const Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
+  for (const detection::Dot& dot : plate_dots) radius += dot.radius_px / double(plate_dots.size());
   for (const Vector2d& place : plate.dots_mm) {
     const bool known =
         std::any_of(seen.begin(), seen.end(), [&](const auto& c) { return c.place_mm == place; });
     if (known) continue;
-    Dot start;
+    detection::Dot start;
     start.centre_px = fit.map.raw_from_rectified(fit.rectified_from_plate * place);
     start.radius_px = radius;
-    const auto dot = refit_dots(xray_image, {start}, appearance, all);
+    const auto dot = detection::refit_dots(xray_image, {start}, appearance, all);
     if (dot.empty() || dot[0].sigma_px > 0.2 || dot[0].misfit > 0.3) continue;
     if ((dot[0].contrast > 0) != (plate_dots[0].contrast > 0)) continue;
     if (std::abs(dot[0].contrast) < 0.3 * std::abs(plate_dots[plate_dots.size() / 2].contrast)) continue;
@@ -134,45 +136,46 @@ void fit_missing_dots(const XrayImage& xray_image, const Plate& plate, const Map
   }
 }
 
-std::vector<Dot> search(const XrayImage& xray_image, const Plate& plate, Polarity polarity, Method method,
-                        std::optional<double> scale) {
+std::vector<detection::Dot> search(const xray::XrayImage& xray_image, const phantom::Plate& plate,
+                                   detection::Polarity polarity, Method method, std::optional<double> scale) {
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * xray_image.pixels.width();
   if (method == Method::best) {
-    DotOptions options = metal_search(xray_image, polarity);
+    detection::DotOptions options = metal_search(xray_image, polarity);
     if (scale) options.min_radius_px = std::max(options.min_radius_px, 0.75 * radius);
-    return find_dots(xray_image, options);
+    return detection::find_dots(xray_image, options);
   }
   return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.7 * radius,
                          1.35 * radius);
 }
 
 struct Attempt {
-  Polarity polarity;
-  std::vector<Dot> all;
+  detection::Polarity polarity;
+  std::vector<detection::Dot> all;
   SeenLattice seen;
   std::size_t size() const { return seen.lattice.dots.size(); }
 };
 
 /// Metal is dark and holes are bright, unless the whole image is inverted.
-Attempt find_lattice(const XrayImage& xray_image, const Plate& plate, Method method,
+Attempt find_lattice(const xray::XrayImage& xray_image, const phantom::Plate& plate, Method method,
                      std::optional<double> scale) {
-  const auto attempt = [&](Polarity polarity) {
+  const auto attempt = [&](detection::Polarity polarity) {
     Attempt now{polarity, search(xray_image, plate, polarity, method, scale), {}};
     now.seen = seen_lattice(now.all, plate, scale);
     return now;
   };
-  const Polarity expected = plate.kind == DotKind::balls ? Polarity::dark : Polarity::bright;
+  const detection::Polarity expected =
+      plate.kind == phantom::DotKind::balls ? detection::Polarity::dark : detection::Polarity::bright;
   Attempt first = attempt(expected);
   if (first.size() >= least_dots) return first;
-  Attempt second = attempt(opposite(expected));
+  Attempt second = attempt(detection::opposite(expected));
   return second.size() > first.size() ? second : first;
 }
 
 /// Why the plate's lattice was not found: there is none, or one of the other kind.
-Failure without_lattice(const XrayImage& xray_image, Plate plate, Method method, std::optional<double> scale,
-                        std::size_t found) {
-  const bool square = plate.lattice == Lattice::square;
-  plate.lattice = square ? Lattice::hexagonal : Lattice::square;
+Failure without_lattice(const xray::XrayImage& xray_image, phantom::Plate plate, Method method,
+                        std::optional<double> scale, std::size_t found) {
+  const bool square = plate.lattice == phantom::Lattice::square;
+  plate.lattice = square ? phantom::Lattice::hexagonal : phantom::Lattice::square;
   const std::size_t of_other_kind = find_lattice(xray_image, plate, method, scale).size();
   if (of_other_kind >= least_dots)
     return {Reason::plate_mismatch,
@@ -189,7 +192,7 @@ Failure without_lattice(const XrayImage& xray_image, Plate plate, Method method,
 
 }  // namespace
 
-Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
+Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom::Plate& plate,
                                 const RectificationOptions& options) {
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   const auto scale = expected_scale(xray_image, plate);
@@ -199,18 +202,18 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
   if (attempt.size() < least_dots)
     return tl::unexpected<Failure>(without_lattice(xray_image, plate, options.method, scale, attempt.size()));
 
-  const NoiseCorrelation noise = noise_correlation(xray_image);
-  std::optional<DotAppearance> appearance;
+  const detection::NoiseCorrelation noise = detection::noise_correlation(xray_image);
+  std::optional<detection::DotAppearance> appearance;
   if (options.method == Method::best)
     appearance = refit_lattice_dots(xray_image, noise, attempt.all, attempt.seen);
   const Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const auto matched = match_plate(attempt.seen.lattice, attempt.seen.dots, plate, middle);
   if (!matched) return tl::unexpected<Failure>(matched.error());
 
-  std::vector<Dot> dots;
+  std::vector<detection::Dot> dots;
   std::vector<Correspondence> seen;
   for (const PlateDot& d : *matched) {
-    const Dot& dot = attempt.seen.dots[d.dot];
+    const detection::Dot& dot = attempt.seen.dots[d.dot];
     dots.push_back(dot);
     seen.push_back({d.place_mm, dot.centre_px, dot.error_px()});
   }
@@ -243,27 +246,28 @@ Expected<Rectification> rectify(const XrayImage& xray_image, const Plate& plate,
   result.dots_found = static_cast<int>(result.plate_dots.size());
   result.raw_mean_px /= std::max(1, result.dots_found);
   if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
-  result.metal = plate.kind == DotKind::balls ? attempt.polarity : opposite(attempt.polarity);
-  if (options.method == Method::best && plate.kind == DotKind::balls)
-    result.other_dots = dots_except(attempt.all, result.plate_dots);
+  result.metal =
+      plate.kind == phantom::DotKind::balls ? attempt.polarity : detection::opposite(attempt.polarity);
+  if (options.method == Method::best && plate.kind == phantom::DotKind::balls)
+    result.other_dots = detection::dots_except(attempt.all, result.plate_dots);
   return result;
 }
 
-DistortionMap flat_panel_map(const XrayImage& xray_image) {
+DistortionMap flat_panel_map(const xray::XrayImage& xray_image) {
   const auto& pixel = xray_image.acquisition.pixel_mm;
   return identity_map(xray_image.pixels.width(), xray_image.pixels.height(),
                       pixel ? std::optional(std::sqrt(pixel->x() * pixel->y())) : std::nullopt);
 }
 
-DotOptions metal_search(const XrayImage& xray_image, Polarity metal) {
-  DotOptions options;
+detection::DotOptions metal_search(const xray::XrayImage& xray_image, detection::Polarity metal) {
+  detection::DotOptions options;
   options.polarity = metal;
   options.max_radius_px = std::max(16.0, max_ball_radius * xray_image.pixels.width());
   return options;
 }
 
-Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMap& map,
-                                 const std::optional<Plate>& plate) {
+Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
+                                 const std::optional<phantom::Plate>& plate) {
   if (map.width != xray_image.pixels.width() || map.height != xray_image.pixels.height())
     return fail(Reason::plate_mismatch,
                 fmt::format("the map is for {} x {} pixels, the image has {} x {}", map.width, map.height,
@@ -271,17 +275,17 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
   if (auto usable = check_usable(xray_image); !usable) return tl::unexpected<Failure>(usable.error());
   Rectification result;
   result.map = map;
-  result.noise = noise_correlation(xray_image);
-  result.other_dots = find_dots(xray_image, metal_search(xray_image, result.metal));
-  const Plate sought = plate.value_or(any_plate);
-  if (sought.kind == DotKind::holes) return result;
+  result.noise = detection::noise_correlation(xray_image);
+  result.other_dots = detection::find_dots(xray_image, metal_search(xray_image, result.metal));
+  const phantom::Plate sought = plate.value_or(any_plate);
+  if (sought.kind == phantom::DotKind::holes) return result;
   // A plate in the image verifies the map: rectified, its dots must form a lattice.
   const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(xray_image, sought));
   if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
-  std::vector<Dot> members;
+  std::vector<detection::Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) {
-    const Dot& dot = seen.dots[d.dot];
+    const detection::Dot& dot = seen.dots[d.dot];
     members.push_back(dot);
     if (const auto uv = map.rectified_from_raw(dot.centre_px))
       dots.push_back({lattice_point(d.index, sought.lattice), *uv, dot.error_px()});
@@ -299,11 +303,11 @@ Expected<Rectification> with_map(const XrayImage& xray_image, const DistortionMa
             map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
-  result.other_dots = dots_except(*result.other_dots, members);
+  result.other_dots = detection::dots_except(*result.other_dots, members);
   return result;
 }
 
-Image<float> resample(const XrayImage& xray_image, const DistortionMap& map) {
+image::Image<float> resample(const xray::XrayImage& xray_image, const DistortionMap& map) {
   if (map.is_identity()) return xray_image.pixels;
   // The map is smooth: exact at every 8th pixel, bilinear in between.
   constexpr int step = 8;
@@ -319,11 +323,11 @@ Image<float> resample(const XrayImage& xray_image, const DistortionMap& map) {
   cv::Mat places;
   cv::warpAffine(coarse, places, enlarge, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                  cv::BORDER_REPLICATE);
-  Image<float> rectified(width, height);
-  cv::Mat target = as_mat(rectified);
-  cv::remap(as_mat(xray_image.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
+  image::Image<float> rectified(width, height);
+  cv::Mat target = image::as_mat(rectified);
+  cv::remap(image::as_mat(xray_image.pixels), target, places, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT,
             double(xray_image.lowest));
   return rectified;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

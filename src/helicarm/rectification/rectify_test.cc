@@ -12,7 +12,7 @@
 #include "helicarm/rectification/lattice.h"
 #include "helicarm/rectification/simulated_image_test.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using namespace std::complex_literals;
@@ -26,7 +26,8 @@ const SimulatedCase& simulated_case() {
 }
 
 const Rectification& rectified_ap() {
-  static const Rectification result = rectify(exposure_of(simulated_case().views[0]), plate48(), {}).value();
+  static const Rectification result =
+      rectify(exposure_of(simulated_case().views[0]), phantom::plate48(), {}).value();
   return result;
 }
 
@@ -76,12 +77,12 @@ TEST(Rectify, FindsEveryClearDotOfThePlate) {
   });
   EXPECT_GE(rectified_ap().dots_found, clear - 2);
   EXPECT_EQ(rectified_ap().dots_expected, 48);
-  EXPECT_EQ(rectified_ap().metal, Polarity::dark);
+  EXPECT_EQ(rectified_ap().metal, detection::Polarity::dark);
 }
 
 TEST(Rectify, DotsAreWithinATenthOfAPixelOfTheTruth) {
   int near = 0;
-  for (const Dot& dot : rectified_ap().plate_dots)
+  for (const detection::Dot& dot : rectified_ap().plate_dots)
     for (const auto& truth : simulated_case().views[0].plate_dots)
       if (truth.visibility == simulation::Visibility::clear && (truth.raw - dot.centre_px).norm() < 0.1)
         ++near;
@@ -114,9 +115,9 @@ TEST(Rectify, PixelSizeIsThatOfTheDetector) {
 }
 
 TEST(Rectify, WithoutDistancePixelSizeIsThatOfThePlate) {
-  XrayImage xray_image = exposure_of(simulated_case().views[0]);
+  xray::XrayImage xray_image = exposure_of(simulated_case().views[0]);
   xray_image.acquisition.source_detector_mm.reset();
-  const auto result = rectify(xray_image, plate48(), {});
+  const auto result = rectify(xray_image, phantom::plate48(), {});
   ASSERT_TRUE(result);
   EXPECT_EQ(result->map.rectified_plane, RectifiedPlane::plate);
   EXPECT_NEAR(*result->map.rectified_pixel_mm * 997 / (997 - 15) / *rectified_ap().map.rectified_pixel_mm, 1,
@@ -124,11 +125,11 @@ TEST(Rectify, WithoutDistancePixelSizeIsThatOfThePlate) {
 }
 
 TEST(Rectify, InvertedImageGivesTheSameMap) {
-  XrayImage inverted = exposure_of(simulated_case().views[0]);
+  xray::XrayImage inverted = exposure_of(simulated_case().views[0]);
   for (float& grey : inverted.pixels.pixels()) grey = inverted.highest - grey;
-  const auto result = rectify(inverted, plate48(), {});
+  const auto result = rectify(inverted, phantom::plate48(), {});
   ASSERT_TRUE(result) << result.error().message;
-  EXPECT_EQ(result->metal, Polarity::bright);
+  EXPECT_EQ(result->metal, detection::Polarity::bright);
   double most = 0;
   for (const auto& dot : simulated_case().views[0].plate_dots)
     if (const auto seen = rectified_ap().map.rectified_from_raw(dot.raw);
@@ -140,7 +141,7 @@ TEST(Rectify, InvertedImageGivesTheSameMap) {
 TEST(Rectify, PaperMethodIsAQuadraticAndLessAccurate) {
   RectificationOptions options;
   options.method = Method::paper;
-  const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
+  const auto result = rectify(exposure_of(simulated_case().views[0]), phantom::plate48(), options);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->map.order, 2);
   EXPECT_EQ(result->map.knots.rows(), 0);
@@ -152,14 +153,14 @@ TEST(Rectify, PaperMethodIsAQuadraticAndLessAccurate) {
 TEST(Rectify, OrderIsTheRequestedOne) {
   RectificationOptions options;
   options.order = 4;
-  const auto result = rectify(exposure_of(simulated_case().views[0]), plate48(), options);
+  const auto result = rectify(exposure_of(simulated_case().views[0]), phantom::plate48(), options);
   ASSERT_TRUE(result);
   EXPECT_EQ(result->map.order, 4);
   EXPECT_EQ(result->map.knots.rows(), 0);
 }
 
 TEST(Rectify, PlateOfAnotherPitchIsAMismatch) {
-  Plate other = plate48();
+  phantom::Plate other = phantom::plate48();
   other.pitch_mm = 20;
   for (Vector2d& place : other.dots_mm) place *= 0.8;
   const auto result = rectify(exposure_of(simulated_case().views[0]), other, {});
@@ -169,23 +170,24 @@ TEST(Rectify, PlateOfAnotherPitchIsAMismatch) {
 }
 
 TEST(Rectify, PlateOfTheOtherLatticeIsAMismatch) {
-  Plate hexagonal = plate48();
-  hexagonal.lattice = Lattice::hexagonal;
+  phantom::Plate hexagonal = phantom::plate48();
+  hexagonal.lattice = phantom::Lattice::hexagonal;
   hexagonal.dots_mm.clear();
   const auto result = rectify(exposure_of(simulated_case().views[0]), hexagonal, {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 
-  drawn::Shade shade(384, 384);
+  detection::drawn::Shade shade(384, 384);
   for (int row = -3; row <= 3; ++row)
     for (int column = -3; column <= 3; ++column)
-      drawn::add_ball(shade,
-                      Vector2d(191, 193) + 50 * lattice_point({column - row / 2, row}, Lattice::hexagonal), 5,
-                      0.9, 3);
-  Image<float> image = drawn::grey(shade, 1200);
+      detection::drawn::add_ball(
+          shade,
+          Vector2d(191, 193) + 50 * lattice_point({column - row / 2, row}, phantom::Lattice::hexagonal), 5,
+          0.9, 3);
+  image::Image<float> image = detection::drawn::grey(shade, 1200);
   RandomStream random(1, 1);
-  drawn::add_noise(image, 10, random);
-  const auto square = rectify(drawn::xray_image(std::move(image)), plate48(), {});
+  detection::drawn::add_noise(image, 10, random);
+  const auto square = rectify(detection::drawn::xray_image(std::move(image)), phantom::plate48(), {});
   ASSERT_FALSE(square);
   EXPECT_EQ(square.error().reason, Reason::plate_mismatch);
 }
@@ -194,63 +196,67 @@ TEST(Rectify, BallsOfThePhantomAreLeftAsCandidates) {
   for (const auto& ball : simulated_case().views[0].balls) {
     if (ball.visibility != simulation::Visibility::clear) continue;
     const auto& dots = *rectified_ap().other_dots;
-    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const Dot& dot) {
+    EXPECT_TRUE(std::any_of(dots.begin(), dots.end(), [&](const detection::Dot& dot) {
       return (dot.centre_px - ball.raw).norm() < 1;
     })) << ball.name;
   }
 }
 
 /// Some dots on no lattice.
-XrayImage uniform(const drawn::Shade& shade) {
-  Image<float> image = drawn::grey(shade, 1200);
+xray::XrayImage uniform(const detection::drawn::Shade& shade) {
+  image::Image<float> image = detection::drawn::grey(shade, 1200);
   RandomStream random(1, 1);
   for (int v = 0; v < image.height(); ++v)
     for (int u = 0; u < image.width(); ++u) image(u, v) -= 2 * float(u);
-  drawn::add_noise(image, 10, random);
-  return drawn::xray_image(std::move(image));
+  detection::drawn::add_noise(image, 10, random);
+  return detection::drawn::xray_image(std::move(image));
 }
 
 TEST(Rectify, ImageWithoutPlateIsRefused) {
-  drawn::Shade shade(256, 256);
+  detection::drawn::Shade shade(256, 256);
   for (const Vector2d& place : {Vector2d(60, 70), Vector2d(190, 40), Vector2d(140, 199), Vector2d(77, 150)})
-    drawn::add_ball(shade, place, 5, 0.9, 3);
-  const auto result = rectify(uniform(shade), plate48(), {});
+    detection::drawn::add_ball(shade, place, 5, 0.9, 3);
+  const auto result = rectify(uniform(shade), phantom::plate48(), {});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_not_found);
 }
 
-Expected<Rectification> flat_panel(const XrayImage& xray_image) {
+Expected<Rectification> flat_panel(const xray::XrayImage& xray_image) {
   return with_map(xray_image, flat_panel_map(xray_image), {});
 }
 
 TEST(Rectify, BlankAndSaturatedImagesAreRefused) {
-  EXPECT_EQ(rectify(drawn::xray_image(Image<float>(256, 256, 1800)), plate48(), {}).error().reason,
+  EXPECT_EQ(
+      rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 1800)), phantom::plate48(), {}).error().reason,
+      Reason::blank_image);
+  EXPECT_EQ(
+      rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 4095)), phantom::plate48(), {}).error().reason,
+      Reason::saturated);
+  EXPECT_EQ(flat_panel(detection::drawn::xray_image(image::Image<float>(256, 256, 1800))).error().reason,
             Reason::blank_image);
-  EXPECT_EQ(rectify(drawn::xray_image(Image<float>(256, 256, 4095)), plate48(), {}).error().reason,
-            Reason::saturated);
-  EXPECT_EQ(flat_panel(drawn::xray_image(Image<float>(256, 256, 1800))).error().reason, Reason::blank_image);
 }
 
 TEST(Rectify, PlateOfHoles) {
-  Plate plate = plate48();
-  plate.kind = DotKind::holes;
+  phantom::Plate plate = phantom::plate48();
+  plate.kind = phantom::DotKind::holes;
   plate.diameter_mm = 5;
-  drawn::Shade shade(384, 384);
+  detection::drawn::Shade shade(384, 384);
   for (const Vector2d& place : plate.dots_mm)
-    drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
-  Image<float> image = drawn::grey(shade, -1200);
+    detection::drawn::add_ball(shade, Vector2d(191, 193) + 2 * place, 5, 0.9, 30);
+  image::Image<float> image = detection::drawn::grey(shade, -1200);
   RandomStream random(1, 1);
-  drawn::add_noise(image, 10, random);
-  const auto result = rectify(drawn::xray_image(std::move(image)), plate, {});
+  detection::drawn::add_noise(image, 10, random);
+  const auto result = rectify(detection::drawn::xray_image(std::move(image)), plate, {});
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(result->dots_found, 48);
-  EXPECT_EQ(result->metal, Polarity::dark);
+  EXPECT_EQ(result->metal, detection::Polarity::dark);
   EXPECT_LT(result->map.residual_rms_px, 0.03);
   EXPECT_LT(result->raw_max_px, 0.1);
 }
 
 TEST(WithMap, OwnMapIsAcceptedAndTheBallsFound) {
-  const auto result = with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, plate48());
+  const auto result =
+      with_map(exposure_of(simulated_case().views[0]), rectified_ap().map, phantom::plate48());
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_EQ(to_json(result->map), to_json(rectified_ap().map));
   EXPECT_GE(result->other_dots->size(), 10u);
@@ -263,7 +269,7 @@ TEST(WithMap, MapOfAnotherAngleIsAMismatch) {
   Eigen::Matrix<double, 4, 2> twist;
   twist << 0, 3, -3, 0, 0, 3, -3, 0;
   turned.coefficients.middleRows(6, 4) += twist;
-  const auto result = with_map(exposure_of(simulated_case().views[0]), turned, plate48());
+  const auto result = with_map(exposure_of(simulated_case().views[0]), turned, phantom::plate48());
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().reason, Reason::plate_mismatch);
 }
@@ -296,11 +302,11 @@ TEST(FlatPanel, MapIsTheIdentityWithTheDetectorsPixelSize) {
 }
 
 TEST(Resample, SamplesEachPixelAtItsMappedPosition) {
-  XrayImage ramp = exposure_of(simulated_case().views[0]);
+  xray::XrayImage ramp = exposure_of(simulated_case().views[0]);
   for (int v = 0; v < 512; ++v)
     for (int u = 0; u < 512; ++u) ramp.pixels(u, v) = 1000 + 3 * float(u) - 2 * float(v);
   const DistortionMap& map = rectified_ap().map;
-  const Image<float> image = resample(ramp, map);
+  const image::Image<float> image = resample(ramp, map);
   for (int v = 60; v < 450; v += 13)
     for (int u = 60; u < 450; u += 13) {
       const Vector2d raw = map.raw_from_rectified({u, v});
@@ -309,23 +315,23 @@ TEST(Resample, SamplesEachPixelAtItsMappedPosition) {
 }
 
 TEST(Resample, OutsideTheRawImageIsBlack) {
-  XrayImage white = exposure_of(simulated_case().views[0]);
+  xray::XrayImage white = exposure_of(simulated_case().views[0]);
   white.lowest = 7;
   std::fill(white.pixels.pixels().begin(), white.pixels.pixels().end(), 3000.f);
   DistortionMap shifted = identity_map(512, 512, {});
   shifted.order = 1;
   shifted.coefficients.resize(3, 2);
   shifted.coefficients << 100, 0, 1, 0, 0, 1;
-  const Image<float> image = resample(white, shifted);
+  const image::Image<float> image = resample(white, shifted);
   EXPECT_EQ(image(500, 100), 7);
   EXPECT_EQ(image(300, 100), 3000);
 }
 
 TEST(Resample, IdentityLeavesThePixels) {
-  const XrayImage xray_image = exposure_of(simulated_case().views[0]);
-  const Image<float> image = resample(xray_image, identity_map(512, 512, {}));
+  const xray::XrayImage xray_image = exposure_of(simulated_case().views[0]);
+  const image::Image<float> image = resample(xray_image, identity_map(512, 512, {}));
   EXPECT_TRUE(std::equal(image.pixels().begin(), image.pixels().end(), xray_image.pixels.pixels().begin()));
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

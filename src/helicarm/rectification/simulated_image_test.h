@@ -3,7 +3,7 @@
 
 #include "helicarm/simulation/simulate_case.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 /// A case of 512 pixels per side.
 inline simulation::SimulatedCase small_case(std::uint64_t seed, simulation::CaseKind kind,
@@ -18,4 +18,4 @@ inline simulation::SimulatedCase small_case(std::uint64_t seed, simulation::Case
   return simulation::simulate_case(options).value();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

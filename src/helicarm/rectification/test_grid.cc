@@ -16,7 +16,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/rectification/lattice.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -67,7 +67,7 @@ struct IndexLess {
     return p.x() != q.x() ? p.x() < q.x() : p.y() < q.y();
   }
 };
-using Grid = std::map<Vector2i, Dot, IndexLess>;
+using Grid = std::map<Vector2i, detection::Dot, IndexLess>;
 
 /// A missing crossing predicted by its neighbours in one direction: between two, or beyond two.
 std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Vector2i& step) {
@@ -87,10 +87,10 @@ struct Likeness {
   double radius_px = 0;
   double sigma_px = 0;
 
-  explicit Likeness(const std::vector<Dot>& crosses) {
+  explicit Likeness(const std::vector<detection::Dot>& crosses) {
     std::vector<double> radii;
     std::vector<double> sigmas;
-    for (const Dot& cross : crosses) {
+    for (const detection::Dot& cross : crosses) {
       radii.push_back(cross.radius_px);
       sigmas.push_back(cross.sigma_px);
     }
@@ -98,10 +98,10 @@ struct Likeness {
     radius_px = middle_of(radii);
     sigma_px = middle_of(sigmas);
   }
-  bool width_fits(const Dot& cross) const {
+  bool width_fits(const detection::Dot& cross) const {
     return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px;
   }
-  bool holds(const Dot& cross) const { return width_fits(cross) && cross.sigma_px < 4 * sigma_px; }
+  bool holds(const detection::Dot& cross) const { return width_fits(cross) && cross.sigma_px < 4 * sigma_px; }
 
  private:
   static double middle_of(std::vector<double> values) {
@@ -113,16 +113,16 @@ struct Likeness {
 
 /// Plate dots that cover crossings: those found, and those that a wire hides from the search, between or
 /// beyond two others.
-std::vector<Disc> plate_dots(const XrayImage& xray_image, const Grid& crossings) {
-  std::vector<Dot> found = find_dots(xray_image, {});
-  std::erase_if(found, [&](const Dot& dot) {
+std::vector<detection::Disc> plate_dots(const xray::XrayImage& xray_image, const Grid& crossings) {
+  std::vector<detection::Dot> found = detection::find_dots(xray_image, {});
+  std::erase_if(found, [&](const detection::Dot& dot) {
     return dot.misfit >= 0.15 || std::any_of(crossings.begin(), crossings.end(), [&](const auto& entry) {
              return (entry.second.centre_px - dot.centre_px).norm() < 0.6 * dot.radius_px;
            });
   });
-  std::vector<Disc> discs;
-  for (const Dot& dot : found) discs.push_back({dot.centre_px, dot.radius_px + 2});
-  const IndexedLattice lattice = index_lattice(found, Lattice::square, {});
+  std::vector<detection::Disc> discs;
+  for (const detection::Dot& dot : found) discs.push_back({dot.centre_px, dot.radius_px + 2});
+  const IndexedLattice lattice = index_lattice(found, phantom::Lattice::square, {});
   Grid plate;
   for (const IndexedDot& d : lattice.dots) plate[d.index] = found[d.dot];
   std::set<Vector2i, IndexLess> missing;
@@ -138,11 +138,11 @@ std::vector<Disc> plate_dots(const XrayImage& xray_image, const Grid& crossings)
 
 }  // namespace
 
-std::vector<Dot> find_grid(const XrayImage& xray_image) {
-  std::vector<Dot> crosses = find_crosses(xray_image, {});
+std::vector<detection::Dot> find_grid(const xray::XrayImage& xray_image) {
+  std::vector<detection::Dot> crosses = detection::find_crosses(xray_image, {});
   const Likeness alike(crosses);
-  std::erase_if(crosses, [&](const Dot& cross) { return !alike.holds(cross); });
-  const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
+  std::erase_if(crosses, [&](const detection::Dot& cross) { return !alike.holds(cross); });
+  const IndexedLattice lattice = index_lattice(crosses, phantom::Lattice::square, {});
   if (lattice.dots.empty()) return crosses;
   Grid grid;
   Vector2i low = lattice.dots.front().index;
@@ -152,13 +152,13 @@ std::vector<Dot> find_grid(const XrayImage& xray_image) {
     low = low.cwiseMin(d.index);
     high = high.cwiseMax(d.index);
   }
-  const std::vector<Disc> dots = plate_dots(xray_image, grid);
-  const Dot typical = grid.begin()->second;
-  std::vector<Dot> complete;
+  const std::vector<detection::Disc> dots = plate_dots(xray_image, grid);
+  const detection::Dot typical = grid.begin()->second;
+  std::vector<detection::Dot> complete;
   for (int j = low.y(); j <= high.y(); ++j)
     for (int i = low.x(); i <= high.x(); ++i) {
       const Vector2i at(i, j);
-      Dot start = typical;
+      detection::Dot start = typical;
       const auto known = grid.find(at);
       if (known != grid.end()) {
         start = known->second;
@@ -168,7 +168,7 @@ std::vector<Dot> find_grid(const XrayImage& xray_image) {
         if (!along_i && !along_j) continue;
         start.centre_px = along_i && along_j ? 0.5 * (*along_i + *along_j) : along_i.value_or(*along_j);
       }
-      const bool disturbed = std::any_of(dots.begin(), dots.end(), [&](const Disc& disc) {
+      const bool disturbed = std::any_of(dots.begin(), dots.end(), [&](const detection::Disc& disc) {
         return (disc.centre - start.centre_px).norm() < disc.radius + 4 * start.radius_px + 4;
       });
       if (known != grid.end() && !disturbed) {
@@ -183,8 +183,8 @@ std::vector<Dot> find_grid(const XrayImage& xray_image) {
           }
         return fallback;
       };
-      const auto cross =
-          fit_cross(xray_image, start, angle_of({1, 0}, 0), angle_of({0, 1}, std::numbers::pi / 2), dots);
+      const auto cross = detection::fit_cross(xray_image, start, angle_of({1, 0}, 0),
+                                              angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
           cross->sigma_px < 0.5 && alike.width_fits(*cross))
         complete.push_back(*cross);
@@ -192,8 +192,9 @@ std::vector<Dot> find_grid(const XrayImage& xray_image) {
   return complete;
 }
 
-Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map, GridFit fit) {
-  const IndexedLattice lattice = index_lattice(crosses, Lattice::square, {});
+Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses, const DistortionMap& map,
+                                     GridFit fit) {
+  const IndexedLattice lattice = index_lattice(crosses, phantom::Lattice::square, {});
   TestGrid grid;
   std::vector<Vector2i> indices;
   for (const IndexedDot& d : lattice.dots) {
@@ -244,4 +245,4 @@ Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const Dist
   return grid;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -10,7 +10,7 @@
 #include "helicarm/rectification/distortion_map.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 
 struct GridError {
   double mean_px = 0;
@@ -32,7 +32,7 @@ struct TestGrid {
 
 /// Crossings of a square wire grid; those disturbed by a plate dot are fitted at the position predicted by
 /// their neighbours, with the dots' pixels masked.
-std::vector<Dot> find_grid(const XrayImage& xray_image);
+std::vector<detection::Dot> find_grid(const xray::XrayImage& xray_image);
 
 /// The crossings that define the ideal grid: the paper's nine, or all.
 enum class GridFit { nine, all };
@@ -40,7 +40,7 @@ enum class GridFit { nine, all };
 /// Least-squares similarity of the nine central crossings (Eq. 14, Umeyama 1991), then the distance of every
 /// crossing from its ideal position (Eq. 15), before and after rectification. too_few_fiducials without the
 /// nine.
-Expected<TestGrid> measure_test_grid(const std::vector<Dot>& crosses, const DistortionMap& map,
+Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses, const DistortionMap& map,
                                      GridFit fit = GridFit::nine);
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

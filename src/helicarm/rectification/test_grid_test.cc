@@ -10,7 +10,7 @@
 #include "helicarm/detection/drawn_image_test.h"
 #include "helicarm/simulation/simulate_case.h"
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 using Eigen::Vector2d;
@@ -19,11 +19,11 @@ constexpr int side = 192;
 const Vector2d middle(95.5, 95.5);
 
 /// 7 x 7 crossings, 30 px apart, slightly rotated.
-std::vector<Dot> grid() {
-  std::vector<Dot> crosses;
+std::vector<detection::Dot> grid() {
+  std::vector<detection::Dot> crosses;
   for (int j = -3; j <= 3; ++j)
     for (int i = -3; i <= 3; ++i) {
-      Dot cross;
+      detection::Dot cross;
       cross.centre_px = middle + Vector2d(0.4, -0.3) + 30 * (Eigen::Rotation2Dd(0.05) * Vector2d(i, j));
       crosses.push_back(cross);
     }
@@ -69,7 +69,7 @@ TEST(MeasureTestGrid, MovedCornerIsTheLargestErrorAndSetsTheMean) {
 
 TEST(MeasureTestGrid, CorrectMapRemovesTheDistortion) {
   auto crosses = grid();
-  for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
+  for (detection::Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
   const auto measured = measure_test_grid(crosses, pincushion_map());
   ASSERT_TRUE(measured);
   EXPECT_GT(measured->raw.max_px, 4);
@@ -78,7 +78,7 @@ TEST(MeasureTestGrid, CorrectMapRemovesTheDistortion) {
 
 TEST(MeasureTestGrid, GridThroughAllCrossingsFitsBetterThanThroughNine) {
   auto crosses = grid();
-  for (Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
+  for (detection::Dot& cross : crosses) cross.centre_px = pincushion(cross.centre_px);
   const auto nine = measure_test_grid(crosses, pincushion_map());
   const auto all = measure_test_grid(crosses, pincushion_map(), GridFit::all);
   ASSERT_TRUE(nine && all);
@@ -88,7 +88,7 @@ TEST(MeasureTestGrid, GridThroughAllCrossingsFitsBetterThanThroughNine) {
 
 TEST(MeasureTestGrid, WithoutItsCentreIsRefused) {
   auto crosses = grid();
-  std::erase_if(crosses, [](const Dot& cross) {  // two rows remain
+  std::erase_if(crosses, [](const detection::Dot& cross) {  // two rows remain
     return cross.centre_px.y() - middle.y() < -40 || cross.centre_px.y() - middle.y() > 12;
   });
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
@@ -98,23 +98,23 @@ TEST(MeasureTestGrid, WithoutItsCentreIsRefused) {
 }
 
 /// Five wires in each direction.
-drawn::Shade wires() {
-  std::vector<drawn::Wire> wires;
+detection::drawn::Shade wires() {
+  std::vector<detection::drawn::Wire> wires;
   for (int k = -2; k <= 2; ++k) {
     const Vector2d offset = 30.3 * Vector2d(k, k);
     wires.push_back({{-5, middle.y() + offset.y()}, {197, middle.y() + offset.y() + 4}});
     wires.push_back({{middle.x() + offset.x() + 2, -5}, {middle.x() + offset.x() - 2, 197}});
   }
-  drawn::Shade shade(side, side);
-  drawn::add_wires(shade, wires, 2.2, 0.9);
+  detection::drawn::Shade shade(side, side);
+  detection::drawn::add_wires(shade, wires, 2.2, 0.9);
   return shade;
 }
 
-XrayImage noisy(const drawn::Shade& shade) {
+xray::XrayImage noisy(const detection::drawn::Shade& shade) {
   RandomStream random(4, 2);
-  Image<float> image = drawn::grey(shade, 1200);
-  drawn::add_noise(image, 12, random);
-  return drawn::xray_image(std::move(image));
+  image::Image<float> image = detection::drawn::grey(shade, 1200);
+  detection::drawn::add_noise(image, 12, random);
+  return detection::drawn::xray_image(std::move(image));
 }
 
 TEST(FindGrid, EveryCrossingOfAGridOfWires) {
@@ -127,8 +127,8 @@ TEST(FindGrid, EveryCrossingOfAGridOfWires) {
 
 TEST(FindGrid, DotBesideACrossingDoesNotMoveIt) {
   const Vector2d crossing = middle + Vector2d(30.3, 30.3);
-  drawn::Shade shade = wires();
-  drawn::add_ball(shade, crossing + Vector2d(9, 10), 5, 0.9, 3);
+  detection::drawn::Shade shade = wires();
+  detection::drawn::add_ball(shade, crossing + Vector2d(9, 10), 5, 0.9, 3);
   const auto crosses = find_grid(noisy(shade));
   EXPECT_GE(crosses.size(), 24u);
   const auto measured = measure_test_grid(crosses, identity_map(side, side, {}));
@@ -143,9 +143,9 @@ TEST(FindGrid, PlateDotsAndFieldRimDoNotMoveCrossings) {
     options.kind = simulation::CaseKind::grid;
     options.grid_distances_mm = {seed == 1 ? 90.0 : 30.0};
     const simulation::SimulatedView view = simulation::simulate_case(options)->views[1];
-    const std::vector<Dot> crosses = find_grid(exposure_of(view));
+    const std::vector<detection::Dot> crosses = find_grid(exposure_of(view));
     EXPECT_GE(crosses.size(), 70u);
-    for (const Dot& cross : crosses) {
+    for (const detection::Dot& cross : crosses) {
       double nearest = 1e9;
       for (const simulation::TruePoint& truth : view.crosses)
         nearest = std::min(nearest, (truth.raw - cross.centre_px).norm());
@@ -154,7 +154,7 @@ TEST(FindGrid, PlateDotsAndFieldRimDoNotMoveCrossings) {
   }
 }
 
-TEST(FindGrid, EmptyFieldHasNoCrossings) { EXPECT_TRUE(find_grid(noisy(drawn::Shade(side, side))).empty()); }
+TEST(FindGrid, EmptyFieldHasNoCrossings) { EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(side, side))).empty()); }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rectification

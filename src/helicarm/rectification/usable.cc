@@ -6,14 +6,14 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::rectification {
 namespace {
 
 constexpr double least_range = 0.01;    // of block means, relative to the grey scale
 constexpr double most_saturated = 0.9;  // of the field
 
 /// Means of 16 x 16 pixel blocks: averages noise, keeps structure.
-std::vector<float> block_means(const Image<float>& image) {
+std::vector<float> block_means(const image::Image<float>& image) {
   constexpr int side = 16;
   std::vector<float> means;
   for (int v = 0; v + side <= image.height(); v += side)
@@ -28,7 +28,7 @@ std::vector<float> block_means(const Image<float>& image) {
 
 }  // namespace
 
-double saturated_share(const XrayImage& xray_image) {
+double saturated_share(const xray::XrayImage& xray_image) {
   const float black = xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);
   std::size_t field = 0;
   std::size_t clipped = 0;
@@ -39,7 +39,7 @@ double saturated_share(const XrayImage& xray_image) {
   return field == 0 ? 0 : double(clipped) / double(field);
 }
 
-Expected<void> check_usable(const XrayImage& xray_image) {
+Expected<void> check_usable(const xray::XrayImage& xray_image) {
   std::vector<float> means = block_means(xray_image.pixels);
   if (means.size() < 9)
     return fail(Reason::bad_size, fmt::format("{} x {} pixels are too few for a calibrator",
@@ -61,4 +61,4 @@ Expected<void> check_usable(const XrayImage& xray_image) {
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rectification

@@ -11,7 +11,7 @@
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
 
-namespace helicarm {
+namespace helicarm::rehearsal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -33,8 +33,9 @@ class FaultyOperation : public testing::Test {
     virtual_or_ = VirtualDevices::open(options).value();
     folder_ = std::make_unique<TemporaryFolder>();
     plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
-    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_->path() / "inbox").value());
-    ReceiverOptions receiving;
+    devices_ = std::make_unique<operation::Connections>(
+        plan_, receiver::Inbox::open(folder_->path() / "inbox").value());
+    receiver::ReceiverOptions receiving;
     receiving.port = 0;
     ASSERT_TRUE(devices_->listen(receiving));
     std::this_thread::sleep_for(window);
@@ -50,17 +51,18 @@ class FaultyOperation : public testing::Test {
   }
   void TearDown() override { operation_.reset(); }
 
-  Expected<std::unique_ptr<Operation>> begin() {
-    return Operation::begin(plan_, session_, devices_->board(), devices_->robot(),
-                            [this](Step, const std::string& what) { reported_.push_back(what); });
+  Expected<std::unique_ptr<operation::Operation>> begin() {
+    return operation::Operation::begin(
+        plan_, session_, devices_->board(), devices_->robot(),
+        [this](operation::Step, const std::string& what) { reported_.push_back(what); });
   }
-  DatedArrival acquired_view(const std::string& view, CArmFault fault = CArmFault::none) {
+  operation::DatedArrival acquired_view(const std::string& view, CArmFault fault = CArmFault::none) {
     EXPECT_TRUE(virtual_devices::shoot(virtual_or_->simulated_scene(), view,
                                        {"127.0.0.1", devices_->receiver_port()}, fault));
     return devices_->next_image(20).value();
   }
   Expected<void> take(const std::string& view, CArmFault fault = CArmFault::none) {
-    const DatedArrival image = acquired_view(view, fault);
+    const operation::DatedArrival image = acquired_view(view, fault);
     return operation_->take(view, image.arrival, image.time_s);
   }
   /// Repeated where a busy machine delayed the tracker.
@@ -76,16 +78,16 @@ class FaultyOperation : public testing::Test {
   std::string log() const { return read_file(session_ / "session.log", 1 << 24).value(); }
 
   static std::unique_ptr<VirtualDevices> virtual_or_;
-  static std::unique_ptr<Connections> devices_;
-  static OperationPlan plan_;
+  static std::unique_ptr<operation::Connections> devices_;
+  static operation::OperationPlan plan_;
   static std::unique_ptr<TemporaryFolder> folder_;
   fs::path session_;
   std::vector<std::string> reported_;
-  std::unique_ptr<Operation> operation_;
+  std::unique_ptr<operation::Operation> operation_;
 };
 std::unique_ptr<VirtualDevices> FaultyOperation::virtual_or_;
-std::unique_ptr<Connections> FaultyOperation::devices_;
-OperationPlan FaultyOperation::plan_;
+std::unique_ptr<operation::Connections> FaultyOperation::devices_;
+operation::OperationPlan FaultyOperation::plan_;
 std::unique_ptr<TemporaryFolder> FaultyOperation::folder_;
 
 TEST_F(FaultyOperation, SameImageForBothViewsIsRefusedAndTheNextOneAccepted) {
@@ -108,22 +110,22 @@ TEST_F(FaultyOperation, ImagesInTheOtherOrderAreSortedByTheirAngles) {
   EXPECT_EQ(operation_->views_to_come(), std::vector<std::string>{"AP"});
   expose("AP");
   ASSERT_TRUE(operation_->measure());
-  for (const PlannedTunnel& tunnel : plan_.tunnels)
-    EXPECT_TRUE(tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
+  for (const operation::PlannedTunnel& tunnel : plan_.tunnels)
+    EXPECT_TRUE(operation::tunnel_in_bone(operation_->result(), tunnel)) << tunnel.name;
 }
 
 TEST_F(FaultyOperation, UndetectableExchangeOfViewsLeavesTunnelsUnmeasured) {
   for (const auto& [view, taken_as] : {std::pair{"LAT", "AP"}, std::pair{"AP", "LAT"}}) {
     Expected<void> taken = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_takes && !taken; ++i) {
-      const DatedArrival image = acquired_view(view, CArmFault::no_tags);
+      const operation::DatedArrival image = acquired_view(view, CArmFault::no_tags);
       taken = operation_->take(taken_as, image.arrival, image.time_s);
     }
     ASSERT_TRUE(taken) << taken.error().message;
   }
   ASSERT_TRUE(operation_->measure());
-  for (const PlannedTunnel& tunnel : plan_.tunnels)
-    EXPECT_EQ(tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
+  for (const operation::PlannedTunnel& tunnel : plan_.tunnels)
+    EXPECT_EQ(operation::tunnel_in_bone(operation_->result(), tunnel).error().reason, Reason::not_seen);
   const auto warnings = std::ranges::count_if(reported_, [](const std::string& what) {
     return what.find("no acquisition time") != std::string::npos;
   });
@@ -152,13 +154,13 @@ TEST_F(FaultyOperation, DelayedFirstImageIsRequestedAgainAfterTheSecond) {
 }
 
 TEST_F(FaultyOperation, RepeatedImageIsRefused) {
-  DatedArrival again = acquired_view("AP");
+  operation::DatedArrival again = acquired_view("AP");
   again.arrival.repeated = true;
   EXPECT_EQ(operation_->take("AP", again.arrival, again.time_s).error().reason, Reason::stale_pose);
 }
 
 TEST_F(FaultyOperation, ImageOfATimeWithoutPosesIsRefused) {
-  const DatedArrival image = acquired_view("AP");
+  const operation::DatedArrival image = acquired_view("AP");
   for (const double off_s : {3600.0, -3600.0})  // the later one first, else it would count as delayed
     EXPECT_EQ(operation_->take("AP", image.arrival, image.time_s + off_s).error().reason, Reason::no_pose);
   EXPECT_EQ(operation_->views_to_come().size(), 2u);
@@ -198,9 +200,10 @@ class CheckedOperation : public FaultyOperation {
     FaultyOperation::SetUp();
     operation_.reset();
     fs::remove_all(session_);
-    OperationPlan plan = plan_;
-    plan.check_points = {{"femur notch", Bone::femur, 1.5}, {"tibia notch", Bone::tibia, 1.5}};
-    operation_ = Operation::begin(plan, session_, devices_->board(), devices_->robot()).value();
+    operation::OperationPlan plan = plan_;
+    plan.check_points = {{"femur notch", guidance::Bone::femur, 1.5},
+                         {"tibia notch", guidance::Bone::tibia, 1.5}};
+    operation_ = operation::Operation::begin(plan, session_, devices_->board(), devices_->robot()).value();
   }
   void TearDown() override {
     virtual_or_->lift_pointer();
@@ -234,10 +237,10 @@ TEST_F(CheckedOperation, DisplacedMarkerIsDetectedAtItsCheckPoint) {
   EXPECT_NEAR(femur.error().figures.at("off_mm"), 2.5, 0.8);
   ASSERT_TRUE(tibia) << tibia.error().message;
   EXPECT_LT(*tibia, 1.5);
-  EXPECT_EQ(operation_->checks_to_come(Bone::femur).size(), 1u);
-  EXPECT_TRUE(operation_->checks_to_come(Bone::tibia).empty());
+  EXPECT_EQ(operation_->checks_to_come(guidance::Bone::femur).size(), 1u);
+  EXPECT_TRUE(operation_->checks_to_come(guidance::Bone::tibia).empty());
   operation_.reset();
-  const auto replayed = replay(session_);
+  const auto replayed = operation::replay(session_);
   ASSERT_TRUE(replayed) << replayed.error().message;
   EXPECT_TRUE(replayed->differences.empty());
 }
@@ -307,7 +310,7 @@ class FullDisk {
 
 TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndKeepsTheRecordIntact) {
   expose("AP");
-  const DatedArrival lateral = acquired_view("LAT");
+  const operation::DatedArrival lateral = acquired_view("LAT");
   {
     const FullDisk full(fs::file_size(session_ / "session.log") + 10);
     const auto taken = operation_->take("LAT", lateral.arrival, lateral.time_s);
@@ -325,10 +328,10 @@ TEST_F(FaultyOperation, FullDiskAtAnyWriteIsReportedAndKeepsTheRecordIntact) {
   }
   ASSERT_TRUE(operation_->measure());
   operation_.reset();
-  const auto replayed = replay(session_);
+  const auto replayed = operation::replay(session_);
   ASSERT_TRUE(replayed) << replayed.error().message;
   EXPECT_TRUE(replayed->differences.empty());
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rehearsal

@@ -8,7 +8,7 @@
 
 #include "helicarm/operation/outcome_table.h"
 
-namespace helicarm {
+namespace helicarm::rehearsal {
 namespace {
 
 std::vector<double> collected(std::span<const Rehearsal> rehearsals, char end, double EndError::*value) {
@@ -19,7 +19,7 @@ std::vector<double> collected(std::span<const Rehearsal> rehearsals, char end, d
   return values;
 }
 
-double root_mean_square(const std::vector<double>& values) { return figures_of(values).rms; }
+double root_mean_square(const std::vector<double>& values) { return operation::figures_of(values).rms; }
 
 std::size_t covered(std::span<const Rehearsal> rehearsals) {
   std::size_t count = 0;
@@ -42,7 +42,7 @@ Json to_json(std::span<const Rehearsal> rehearsals) {
                       {"covered", end.covered},
                       {"in_xrays_mm", end.in_xrays_mm ? Json(*end.in_xrays_mm) : Json()}});
   const auto figures = [&](char end, double EndError::*value) {
-    return to_json(figures_of(collected(rehearsals, end, value)));
+    return operation::to_json(operation::figures_of(collected(rehearsals, end, value)));
   };
   return {{"format", "helicarm-rehearsal/1"},
           {"table",
@@ -65,26 +65,26 @@ std::string to_csv(std::span<const Rehearsal> rehearsals) {
 }
 
 std::string table_of(std::span<const Rehearsal> rehearsals) {
-  const auto start = figures_of(collected(rehearsals, 'S', &EndError::true_mm));
-  const auto end = figures_of(collected(rehearsals, 'E', &EndError::true_mm));
+  const auto start = operation::figures_of(collected(rehearsals, 'S', &EndError::true_mm));
+  const auto end = operation::figures_of(collected(rehearsals, 'E', &EndError::true_mm));
   const auto all = collected(rehearsals, '*', &EndError::true_mm);
   std::string text = fmt::format(
       "Positioning errors, mm: distance of the tunnel's end from the tool's axis, {} points\n"
       "          start     end   | paper: start   end\n",
       all.size());
-  const auto row = [&](const char* name, double ErrorFigures::*figure, const char* paper) {
+  const auto row = [&](const char* name, double operation::ErrorFigures::*figure, const char* paper) {
     text += fmt::format("  {:<5} {:>7.2f} {:>7.2f}   | {}\n", name, start.*figure, end.*figure, paper);
   };
-  row("max", &ErrorFigures::max, "        1.55  1.89");
-  row("min", &ErrorFigures::min, "        0.34  0.19");
-  row("mean", &ErrorFigures::mean, "        0.81  0.88");
-  row("SD", &ErrorFigures::sd, "        0.45  0.55   (printed as RMS)");
-  row("RMS", &ErrorFigures::rms, "        0.93  1.04   (from its mean and SD)");
+  row("max", &operation::ErrorFigures::max, "        1.55  1.89");
+  row("min", &operation::ErrorFigures::min, "        0.34  0.19");
+  row("mean", &operation::ErrorFigures::mean, "        0.81  0.88");
+  row("SD", &operation::ErrorFigures::sd, "        0.45  0.55   (printed as RMS)");
+  row("RMS", &operation::ErrorFigures::rms, "        0.93  1.04   (from its mean and SD)");
   text += fmt::format(
       "  mean of all {:.2f}; RMS {:.2f}, predicted {:.2f}; {} of {} within their 95 % ellipses\n",
-      figures_of(all).mean, root_mean_square(all),
+      operation::figures_of(all).mean, root_mean_square(all),
       root_mean_square(collected(rehearsals, '*', &EndError::predicted_mm)), covered(rehearsals), all.size());
   return text;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rehearsal

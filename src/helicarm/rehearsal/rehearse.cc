@@ -12,7 +12,7 @@
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/connections.h"
 
-namespace helicarm {
+namespace helicarm::rehearsal {
 namespace {
 
 using virtual_devices::VirtualDevices;
@@ -34,7 +34,7 @@ Json clicks_of(const simulation::SimulatedCase& virtual_or) {
     for (std::size_t i = 0; i < view.clicks.size(); ++i)
       picks.push_back({{"name", view.clicks[i].point},
                        {"view", view.true_view.name},
-                       {"uv", json_list(view.clicks[i].raw)},
+                       {"uv", geometry::json_list(view.clicks[i].raw)},
                        {"snap", "ball"},
                        {"diameter_mm", simulation::tunnel_ball_mm},
                        {"moves_with", virtual_or.navigation->points[i].bone}});
@@ -44,15 +44,15 @@ Json clicks_of(const simulation::SimulatedCase& virtual_or) {
 /// Small motion of a leg that is not fixed.
 void stir(virtual_devices::SimulatedScene& simulated_scene) {
   const auto motion = [](double degrees, const Eigen::Vector3d& axis, const Eigen::Vector3d& shift) {
-    return RigidTransform{
+    return geometry::RigidTransform{
         Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix(), shift};
   };
   simulated_scene.move_bone("femur", motion(1.5, {1, 2, -1}, {2, -1.5, 1}));
   simulated_scene.move_bone("tibia", motion(-2, {2, -1, 1}, {-1, 2, 1.5}));
 }
 
-EndError end_error(const std::string& name, const EndMiss& miss, const std::optional<LineError>& in_xrays,
-                   VirtualDevices& virtual_or) {
+EndError end_error(const std::string& name, const operation::EndMiss& miss,
+                   const std::optional<verification::LineError>& in_xrays, VirtualDevices& virtual_or) {
   const Eigen::Vector2d across =
       (virtual_or.tracker_from_tip().inverse() * virtual_or.simulated_scene().point_in_tracker(name))
           .head<2>();
@@ -66,8 +66,8 @@ EndError end_error(const std::string& name, const EndMiss& miss, const std::opti
 }
 
 /// Acquires an image; repeats where a busy machine delayed the tracker.
-Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, Connections& devices,
-                      Operation& operation) {
+Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, operation::Connections& devices,
+                      operation::Operation& operation) {
   Expected<void> taken = fail(Reason::not_connected, "no image received");
   for (int attempt = 0; attempt < most_attempts && !taken; ++attempt) {
     std::this_thread::sleep_for(before_exposure);
@@ -83,8 +83,8 @@ Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, Conne
 
 }  // namespace
 
-OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
-  OperationPlan plan;
+operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
+  operation::OperationPlan plan;
   plan.tracker.port = tracker_port;
   for (const virtual_devices::TrackedFacet& facet : virtual_devices::calibrator_facets())
     plan.tracker.facets.push_back({facet.name, facet.calibrator_from_facet});
@@ -98,9 +98,9 @@ OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   plan.robot.approach.corrections.tolerance_mm = 0.25;
   plan.robot.approach.corrections.tolerance_deg = 0.25;
   // Both tunnels are drilled from outside the joint.
-  plan.tunnels = {{"femur", Bone::femur, "FS", "FE", TunnelEnd::end},
-                  {"tibia", Bone::tibia, "TS", "TE", TunnelEnd::start}};
-  plan.tracker.pointer = Pointer{virtual_devices::pointer_marker, virtual_devices::tip_in_pointer};
+  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", operation::TunnelEnd::end},
+                  {"tibia", guidance::Bone::tibia, "TS", "TE", operation::TunnelEnd::start}};
+  plan.tracker.pointer = operation::Pointer{virtual_devices::pointer_marker, virtual_devices::tip_in_pointer};
   plan.picks = clicks_of(virtual_or.simulated_scene().simulated_case());
   return plan;
 }
@@ -112,22 +112,24 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     virtual_devices::VirtualDevicesOptions ports{seed, options.image_size, options.tracker_rate_hz, 0, 0, 0,
                                                  0};
     const auto virtual_or = value_or_throw(VirtualDevices::open(ports));
-    const OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
+    const operation::OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
 
-    Connections devices(plan, value_or_throw(Inbox::open(folder / "inbox")));
-    ReceiverOptions receiving;
+    operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
+    receiver::ReceiverOptions receiving;
     receiving.port = 0;
     value_or_throw(devices.listen(receiving));
-    RobotLink& robot = devices.robot();
-    const auto operation = value_or_throw(
-        Operation::begin(plan, folder, devices.board(), robot, [&](Step step, const std::string& what) {
-          options.notify(fmt::format("{}: {}", name_of(step), what));
+    robot::RobotLink& robot = devices.robot();
+    const auto operation = value_or_throw(operation::Operation::begin(
+        plan, folder, devices.board(), robot, [&](operation::Step step, const std::string& what) {
+          options.notify(fmt::format("{}: {}", operation::name_of(step), what));
         }));
 
     for (const std::string& view : plan.views) value_or_throw(expose(view, *virtual_or, devices, *operation));
     value_or_throw(operation->measure());
 
-    const auto nod = [&](const RobotOrder& order) -> Expected<std::string> { return robot.confirm(order); };
+    const auto nod = [&](const robot::RobotOrder& order) -> Expected<std::string> {
+      return robot.confirm(order);
+    };
     value_or_throw(robot.wait_connected(patience));
     operation->confirmed_by("the rehearsal");
     value_or_throw(robot.unlock("the rehearsal"));
@@ -136,18 +138,19 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
     std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
     Rehearsal done{seed, {}, operation->hand_eye().rms_mm, 0};
-    for (const PlannedTunnel& tunnel : plan.tunnels) {
-      const RobotState rest = value_or_throw(robot.wait_connected(patience));
-      const RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
+    for (const operation::PlannedTunnel& tunnel : plan.tunnels) {
+      const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
+      const robot::RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
       value_or_throw(value_or_throw(operation->live_tool()).overlay(devices.board(), tunnel.bone));
-      const TunnelOutcome outcome = value_or_throw(operation->go(order, robot.confirm(order)));
-      const auto in_xrays =
-          [&](const std::optional<LineError> Verification::*end) -> std::optional<LineError> {
+      const operation::TunnelOutcome outcome = value_or_throw(operation->go(order, robot.confirm(order)));
+      const auto in_xrays = [&](const std::optional<verification::LineError> verification::Verification::*end)
+          -> std::optional<verification::LineError> {
         return outcome.verification ? (*outcome.verification).*end : std::nullopt;
       };
       done.ends.push_back(
-          end_error(tunnel.start, outcome.start, in_xrays(&Verification::start), *virtual_or));
-      done.ends.push_back(end_error(tunnel.end, outcome.end, in_xrays(&Verification::end), *virtual_or));
+          end_error(tunnel.start, outcome.start, in_xrays(&verification::Verification::start), *virtual_or));
+      done.ends.push_back(
+          end_error(tunnel.end, outcome.end, in_xrays(&verification::Verification::end), *virtual_or));
       done.corrections += static_cast<int>(outcome.loop.size()) - 1;
       value_or_throw(operation->withdraw(order, rest, nod));
     }
@@ -156,4 +159,4 @@ Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& fo
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::rehearsal

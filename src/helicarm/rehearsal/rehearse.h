@@ -10,7 +10,7 @@
 #include "helicarm/operation/operation.h"
 #include "helicarm/virtual_devices/virtual_devices.h"
 
-namespace helicarm {
+namespace helicarm::rehearsal {
 
 struct RehearsalOptions {
   int image_size = 1024;
@@ -38,7 +38,7 @@ struct Rehearsal {
 
 /// The plan for an operation with the virtual devices; the picks lie near the balls, as a surgeon's clicks
 /// would.
-OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_t tracker_port);
+operation::OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_t tracker_port);
 
 /// One pair of bones from the first X-ray image to verification, over the real protocols through sockets:
 /// C-STORE, OpenIGTLink, RTDE, dashboard and script. `folder` holds the session. Fails with the first
@@ -46,4 +46,4 @@ OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_
 Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& folder,
                              const RehearsalOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::rehearsal

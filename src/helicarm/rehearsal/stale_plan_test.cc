@@ -8,7 +8,7 @@
 #include "helicarm/operation/replay.h"
 #include "helicarm/rehearsal/rehearse.h"
 
-namespace helicarm {
+namespace helicarm::rehearsal {
 namespace {
 
 using namespace std::chrono_literals;
@@ -34,11 +34,13 @@ class StalePlan : public testing::Test {
     virtual_or_ = VirtualDevices::open(options).value();
     plan_ = plan_for(*virtual_or_, virtual_or_->tracker().port());
     plan_.check_points = check_points();
-    devices_ = std::make_unique<Connections>(plan_, Inbox::open(folder_.path() / "inbox").value());
-    ReceiverOptions receiving;
+    devices_ = std::make_unique<operation::Connections>(
+        plan_, receiver::Inbox::open(folder_.path() / "inbox").value());
+    receiver::ReceiverOptions receiving;
     receiving.port = 0;
     ASSERT_TRUE(devices_->listen(receiving));
-    operation_ = Operation::begin(plan_, folder_.path() / "session", devices_->board(), robot()).value();
+    operation_ =
+        operation::Operation::begin(plan_, folder_.path() / "session", devices_->board(), robot()).value();
     if (!plan_.check_points.empty()) {
       ASSERT_TRUE(touch());
     }
@@ -48,9 +50,9 @@ class StalePlan : public testing::Test {
     try_to([&] { return operation_->register_robot(nod_); });
   }
   void TearDown() override { operation_.reset(); }
-  virtual std::vector<PlannedCheck> check_points() const { return {}; }
+  virtual std::vector<operation::PlannedCheck> check_points() const { return {}; }
 
-  RobotLink& robot() { return devices_->robot(); }
+  robot::RobotLink& robot() { return devices_->robot(); }
 
   void expose(const std::string& view) {
     Expected<void> taken = fail(Reason::usage, "not tried");
@@ -58,7 +60,7 @@ class StalePlan : public testing::Test {
       std::this_thread::sleep_for(1800ms);  // the pose window of an acquisition
       ASSERT_TRUE(virtual_devices::shoot(virtual_or_->simulated_scene(), view,
                                          {"127.0.0.1", devices_->receiver_port()}));
-      const DatedArrival image = devices_->next_image(20).value();
+      const operation::DatedArrival image = devices_->next_image(20).value();
       taken = operation_->take(view, image.arrival, image.time_s);
     }
     ASSERT_TRUE(taken) << taken.error().message;
@@ -78,7 +80,7 @@ class StalePlan : public testing::Test {
   void try_to(const Act& act) {
     Expected<void> done = fail(Reason::usage, "not tried");
     for (int i = 0; i < most_attempts && !done; ++i) {
-      if (robot().status().phase != LinkPhase::ready) {
+      if (robot().status().phase != robot::LinkPhase::ready) {
         ASSERT_TRUE(robot().unlock("tester"));
       }
       done = act();
@@ -88,15 +90,16 @@ class StalePlan : public testing::Test {
     }
     ASSERT_TRUE(done) << done.error().message;
   }
-  RobotOrder plan(const std::string& tunnel = "femur") {
-    std::optional<RobotOrder> order;
+  robot::RobotOrder plan(const std::string& tunnel = "femur") {
+    std::optional<robot::RobotOrder> order;
     try_to([&]() -> Expected<void> {
-      return operation_->plan_tunnel(tunnel).map([&](RobotOrder planned) { order = std::move(planned); });
+      return operation_->plan_tunnel(tunnel).map(
+          [&](robot::RobotOrder planned) { order = std::move(planned); });
     });
     return order.value();
   }
   /// Until it is found stale, as while a confirmation is open.
-  Failure wait_until_stale(const RobotOrder& order) {
+  Failure wait_until_stale(const robot::RobotOrder& order) {
     Expected<void> held;
     for (int i = 0; i < 2000; ++i) {
       held = operation_->check_plan(order);
@@ -106,11 +109,11 @@ class StalePlan : public testing::Test {
     ADD_FAILURE() << "the plan still holds: " << (held ? "" : held.error().message);
     return {Reason::usage, "", {}, {{"distance_mm", 0}}};
   }
-  void expect_nothing_moves(const RobotOrder& order) {
-    if (robot().status().phase != LinkPhase::ready) {
+  void expect_nothing_moves(const robot::RobotOrder& order) {
+    if (robot().status().phase != robot::LinkPhase::ready) {
       ASSERT_TRUE(robot().unlock("tester"));
     }
-    const Joints before = virtual_or_->robot().truth().state.joints;
+    const robot::Joints before = virtual_or_->robot().truth().state.joints;
     const auto gone = operation_->go(order, robot().confirm(order));
     ASSERT_FALSE(gone);
     EXPECT_EQ(gone.error().reason, Reason::plan_stale) << gone.error().message;
@@ -122,17 +125,17 @@ class StalePlan : public testing::Test {
 
   TemporaryFolder folder_;
   std::unique_ptr<VirtualDevices> virtual_or_;
-  OperationPlan plan_;
-  std::unique_ptr<Connections> devices_;
-  std::unique_ptr<Operation> operation_;
-  const Operation::Confirm nod_ = [this](const RobotOrder& order) -> Expected<std::string> {
+  operation::OperationPlan plan_;
+  std::unique_ptr<operation::Connections> devices_;
+  std::unique_ptr<operation::Operation> operation_;
+  const operation::Operation::Confirm nod_ = [this](const robot::RobotOrder& order) -> Expected<std::string> {
     return robot().confirm(order);
   };
 };
 
 TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   // The leg moves while the confirmation is open; the plan stays stale even if the leg returns.
-  RobotOrder order = plan();
+  robot::RobotOrder order = plan();
   move_femur(40);
   const Failure moved = wait_until_stale(order);
   EXPECT_NEAR(moved.figures.at("distance_mm"), 40, 1);
@@ -142,9 +145,9 @@ TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   std::this_thread::sleep_for(1s);
   expect_nothing_moves(order);
   // Another plan to the same tunnel replaces it.
-  const RobotOrder former = plan();
+  const robot::RobotOrder former = plan();
   order = plan();
-  if (to_json(former) != to_json(order)) expect_nothing_moves(former);
+  if (robot::to_json(former) != robot::to_json(order)) expect_nothing_moves(former);
   // The tracker takes the calibrator for the femur.
   ASSERT_TRUE(virtual_or_->set_fault("swapped_calibrator", true));
   EXPECT_GT(wait_until_stale(order).figures.at("distance_mm"), 10);
@@ -157,24 +160,24 @@ TEST_F(StalePlan, StaleOrderDoesNotMoveTheRobotThoughConfirmed) {
   EXPECT_THAT(wait_until_stale(order).message, testing::HasSubstr("robot base or tool moved"));
   expect_nothing_moves(order);
   std::this_thread::sleep_for(1s);
-  Expected<RobotOrder> again = operation_->plan_tunnel("femur");
+  Expected<robot::RobotOrder> again = operation_->plan_tunnel("femur");
   for (int i = 0; i < most_attempts && !again && is_timing_failure(again.error()); ++i)
     again = operation_->plan_tunnel("femur");
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().reason, Reason::plan_stale) << again.error().message;
   EXPECT_THAT(again.error().message, testing::HasSubstr("since registration"));
   operation_.reset();
-  const auto replayed = replay(folder_.path() / "session");
+  const auto replayed = operation::replay(folder_.path() / "session");
   ASSERT_TRUE(replayed) << replayed.error().message;
   EXPECT_TRUE(replayed->differences.empty());
 }
 
 TEST_F(StalePlan, TwoTunnelsAreCarriedOutOnOneCalibration) {
-  for (const PlannedTunnel& tunnel : plan_.tunnels) {
+  for (const operation::PlannedTunnel& tunnel : plan_.tunnels) {
     bool done = false;
     for (int attempt = 0; attempt < most_attempts && !done; ++attempt) {
-      const RobotState rest = robot().wait_connected(5s).value();
-      const RobotOrder order = plan(tunnel.name);
+      const robot::RobotState rest = robot().wait_connected(5s).value();
+      const robot::RobotOrder order = plan(tunnel.name);
       const auto gone = operation_->go(order, robot().confirm(order));
       done = gone.has_value();
       if (!done) {
@@ -191,12 +194,13 @@ TEST_F(StalePlan, OrderToABoneAtRestIsCarriedOutWithinTheLimits) {
   double most_mm = 0, most_deg = 0;
   bool done = false;
   for (int attempt = 0; attempt < most_attempts && !done; ++attempt) {
-    const RobotState rest = robot().wait_connected(5s).value();
-    const RobotOrder order = plan();
-    const PlanWatch watch = operation_->plan_watch(order).value();
+    const robot::RobotState rest = robot().wait_connected(5s).value();
+    const robot::RobotOrder order = plan();
+    const operation::PlanWatch watch = operation_->plan_watch(order).value();
     std::jthread look([&](const std::stop_token& over) {
       for (; !over.stop_requested(); std::this_thread::sleep_for(15ms))
-        if (const auto moved = watch.base_motion(devices_->board(), robot().track(), monotonic_seconds())) {
+        if (const auto moved =
+                watch.base_motion(devices_->board(), robot().track(), tracker::monotonic_seconds())) {
           most_mm = std::max(most_mm, moved->distance_mm);
           most_deg = std::max(most_deg, moved->turn_deg);
         }
@@ -217,8 +221,8 @@ TEST_F(StalePlan, OrderToABoneAtRestIsCarriedOutWithinTheLimits) {
 
 TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
   for (int attempt = 0; attempt < most_attempts; ++attempt) {
-    const RobotState rest = robot().wait_connected(5s).value();
-    const RobotOrder order = plan();
+    const robot::RobotState rest = robot().wait_connected(5s).value();
+    const robot::RobotOrder order = plan();
     const std::string token = robot().confirm(order);
     std::jthread creep([&](const std::stop_token& over) {
       while (!virtual_or_->robot().truth().moving && !over.stop_requested()) std::this_thread::sleep_for(5ms);
@@ -231,11 +235,11 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
     creep.request_stop();
     creep.join();
     ASSERT_FALSE(gone);
-    EXPECT_EQ(robot().status().phase, LinkPhase::stopped);
+    EXPECT_EQ(robot().status().phase, robot::LinkPhase::stopped);
     EXPECT_FALSE(virtual_or_->robot().truth().moving);
     const Failure refused = gone.error();
     try_to([&] { return operation_->withdraw(order, rest, nod_); });
-    const RobotState back = robot().wait_connected(5s).value();
+    const robot::RobotState back = robot().wait_connected(5s).value();
     EXPECT_LT((back.base_from_tcp.translation - rest.base_from_tcp.translation).norm(), 0.5);
     if (is_timing_failure(refused)) continue;  // unrelated to the bone
     EXPECT_EQ(refused.reason, Reason::plan_stale) << refused.message;
@@ -246,19 +250,21 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
 
 class StalePlanToACheckedBone : public StalePlan {
  protected:
-  std::vector<PlannedCheck> check_points() const override { return {{"femur notch", Bone::femur, 1.5}}; }
+  std::vector<operation::PlannedCheck> check_points() const override {
+    return {{"femur notch", guidance::Bone::femur, 1.5}};
+  }
 };
 
 TEST_F(StalePlanToACheckedBone, IsMadeAgainOnlyAfterTouchingTheCheckPointAgain) {
   ASSERT_TRUE(touch());
-  const RobotOrder order = plan();
-  EXPECT_TRUE(operation_->checks_to_come(Bone::femur).empty());
+  const robot::RobotOrder order = plan();
+  EXPECT_TRUE(operation_->checks_to_come(guidance::Bone::femur).empty());
   virtual_or_->simulated_scene().bump_marker("femur", {3, 0, 0});
   EXPECT_EQ(wait_until_stale(order).reason, Reason::plan_stale);
-  EXPECT_EQ(operation_->checks_to_come(Bone::femur), std::vector<std::string>{"femur notch"});
+  EXPECT_EQ(operation_->checks_to_come(guidance::Bone::femur), std::vector<std::string>{"femur notch"});
   EXPECT_EQ(operation_->plan_tunnel("femur").error().reason, Reason::usage);
   EXPECT_EQ(touch().error().reason, Reason::residual_too_large);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::rehearsal

@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// A round step that divides a range into about `count` parts.
 inline double round_step(double range, int count) {
@@ -45,4 +45,4 @@ inline std::vector<std::pair<double, std::string>> ticks(const Axis& axis,
   return marks;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

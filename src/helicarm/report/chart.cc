@@ -13,7 +13,7 @@
 #include "helicarm/report/isoline.h"
 #include "helicarm/report/markup.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 constexpr double chart_width = 460, chart_height = 360;  // of the frame
@@ -278,4 +278,4 @@ std::string chart_svg(std::span<const Chart> charts, std::size_t columns) {
       width, height, escaped(title), chart_style, body);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

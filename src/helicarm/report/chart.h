@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// Points joined by a line with a marker at each (a non-finite value breaks the line), or (`scattered`) small
 /// dots without a line.
@@ -63,4 +63,4 @@ struct Chart {
 /// axes, ticks and legends. Equal input gives equal bytes.
 std::string chart_svg(std::span<const Chart> charts, std::size_t columns = 0);
 
-}  // namespace helicarm
+}  // namespace helicarm::report

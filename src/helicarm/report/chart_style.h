@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// CSS of all charts.
 inline constexpr const char* chart_style =
@@ -10,4 +10,4 @@ inline constexpr const char* chart_style =
     ".end{text-anchor:end} .title{font-size:14px;font-weight:600} .note{fill:#555} "
     ".level{text-anchor:middle;paint-order:stroke;stroke:#fff;stroke-width:4px}";
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -10,7 +10,7 @@
 
 #include "helicarm/report/isoline.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 using ::testing::HasSubstr;
@@ -93,4 +93,4 @@ TEST(Isoline, OfAConeIsACircle) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::report

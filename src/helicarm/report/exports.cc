@@ -11,7 +11,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/report/overlay.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 using Files = std::map<std::string, std::string>;
@@ -24,19 +24,20 @@ std::string csv_field(const std::string& text) {
   return quoted + '"';
 }
 
-std::string csv_row(const PointResult& point, std::string_view frame, const Eigen::Vector3d& place,
+std::string csv_row(const pipeline::PointResult& point, std::string_view frame, const Eigen::Vector3d& place,
                     const Eigen::Matrix3d& covariance) {
   const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(point.name),
-                     point.source == PointSource::pick ? "pick" : "target", frame, place.x(), place.y(),
-                     place.z(), sigma.x(), sigma.y(), sigma.z(), length_at_95(covariance));
+                     point.source == localization::PointSource::pick ? "pick" : "target", frame, place.x(),
+                     place.y(), place.z(), sigma.x(), sigma.y(), sigma.z(),
+                     localization::length_at_95(covariance));
 }
 
-std::string points_csv(const Result& result) {
+std::string points_csv(const pipeline::Result& result) {
   std::string rows;
-  for (const PointResult& point : result.points) {
+  for (const pipeline::PointResult& point : result.points) {
     if (!point.place) continue;
-    const PointInFrames& at = *point.place;
+    const guidance::PointInFrames& at = *point.place;
     rows += csv_row(point, "calibrator", at.in_calibrator, at.covariance_in_calibrator);
     if (at.in_femur && at.covariance_in_femur)
       rows += csv_row(point, "femur", *at.in_femur, *at.covariance_in_femur);
@@ -49,12 +50,12 @@ std::string points_csv(const Result& result) {
   return "name,source,frame,x_mm,y_mm,z_mm,sigma_x_mm,sigma_y_mm,sigma_z_mm,error_95_mm\n" + rows;
 }
 
-Json control_point(const PointResult& point) {
+Json control_point(const pipeline::PointResult& point) {
   const Eigen::Vector3d& at = point.place->in_calibrator;
   return {{"id", point.name},
           {"label", point.name},
           {"description", fmt::format("within {:.3f} mm (95 %), calibrator frame",
-                                      length_at_95(point.place->covariance_in_calibrator))},
+                                      localization::length_at_95(point.place->covariance_in_calibrator))},
           {"position", {at.x(), at.y(), at.z()}},
           {"positionStatus", "defined"}};
 }
@@ -71,15 +72,15 @@ Json markup(const char* type, const std::string& name, Json points) {
           {"controlPoints", std::move(points)}};
 }
 
-std::string slicer_markups(const Result& result) {
+std::string slicer_markups(const pipeline::Result& result) {
   Json points = Json::array(), markups = Json::array();
-  for (const PointResult& point : result.points)
+  for (const pipeline::PointResult& point : result.points)
     if (point.place) points.push_back(control_point(point));
   if (points.empty()) return {};
   markups.push_back(markup("Fiducial", "helicarm points, calibrator frame", std::move(points)));
   for (std::size_t i = 0; i < result.tunnel_ends.size(); ++i) {
-    const PointResult& start = result.points[result.tunnel_ends[i].start];
-    const PointResult& end = result.points[result.tunnel_ends[i].end];
+    const pipeline::PointResult& start = result.points[result.tunnel_ends[i].start];
+    const pipeline::PointResult& end = result.points[result.tunnel_ends[i].end];
     if (start.place && end.place && i < result.tunnels.size())
       markups.push_back(markup("Line", "tunnel " + result.tunnels[i].name,
                                Json::array({control_point(start), control_point(end)})));
@@ -99,40 +100,40 @@ std::string rows_of(const Eigen::MatrixXd& matrix, std::string_view between) {
   return rows;
 }
 
-std::string maya_cam(const ViewResult& view) {
-  const View& of = view.calibrated->view;
+std::string maya_cam(const pipeline::ViewResult& view) {
+  const geometry::View& of = view.calibrated->view;
   return fmt::format("image size\n{},{}\n\ncamera matrix\n{}\nrotation\n{}\ntranslation\n{}",
                      view.xray_image->pixels.width(), view.xray_image->pixels.height(),
                      rows_of(of.intrinsics.matrix(), ","), rows_of(of.camera_from_world.rotation, ","),
                      rows_of(of.camera_from_world.translation, ","));
 }
 
-std::string matrix_text(const ViewResult& view) {
+std::string matrix_text(const pipeline::ViewResult& view) {
   return "# 3x4: calibrator (mm) to rectified pixels, (0, 0) is the centre of the top-left one\n" +
          rows_of(view.calibrated->view.projection(), " ");
 }
 
 /// L1 to L11, one column per view: u = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y + L11 z + 1), v with L5 to
 /// L8.
-std::string dlt_csv(const std::vector<const ViewResult*>& views) {
+std::string dlt_csv(const std::vector<const pipeline::ViewResult*>& views) {
   Eigen::MatrixXd columns(11, Eigen::Index(views.size()));
   for (Eigen::Index i = 0; i < columns.cols(); ++i) {
-    const ViewResult& view = *views[std::size_t(i)];
-    const Projection p = view.calibrated->view.projection();
-    if (!factors_from_projection(p))
+    const pipeline::ViewResult& view = *views[std::size_t(i)];
+    const geometry::Projection p = view.calibrated->view.projection();
+    if (!geometry::factors_from_projection(p))
       throw BadInput(
           {Reason::point_at_infinity,
            "has no DLT coefficients: the calibrator's origin lies in the plane of the X-ray source",
            view.name,
            {}});
-    const Projection scaled = p / p(2, 3);
+    const geometry::Projection scaled = p / p(2, 3);
     columns.col(i) << scaled.row(0).transpose(), scaled.row(1).transpose(),
         scaled.row(2).head<3>().transpose();
   }
   return rows_of(columns, ",");
 }
 
-Files files_of(const Result& result, std::span<const Export> kinds) {
+Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
   const auto wanted = [&](Export kind) { return std::ranges::find(kinds, kind) != kinds.end(); };
   Files files;
   const auto add = [&](const std::string& name, std::string text) {
@@ -141,9 +142,9 @@ Files files_of(const Result& result, std::span<const Export> kinds) {
   };
   if (wanted(Export::csv)) add("points.csv", points_csv(result));
   if (wanted(Export::slicer)) add("points.mrk.json", slicer_markups(result));
-  std::vector<const ViewResult*> calibrated;
+  std::vector<const pipeline::ViewResult*> calibrated;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
-    const ViewResult& view = result.views[i];
+    const pipeline::ViewResult& view = result.views[i];
     if (!view.calibrated || !view.xray_image) continue;
     calibrated.push_back(&view);
     const std::string stem = file_stem(view.name, i);
@@ -156,7 +157,7 @@ Files files_of(const Result& result, std::span<const Export> kinds) {
 
 }  // namespace
 
-Expected<std::vector<std::filesystem::path>> write_exports(const Result& result,
+Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
                                                            std::span<const Export> kinds) {
   if (result.failure) return tl::unexpected<Failure>(*result.failure);
@@ -174,4 +175,4 @@ Expected<std::vector<std::filesystem::path>> write_exports(const Result& result,
   return paths;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -9,7 +9,7 @@
 
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// Export formats: table of points, 3D Slicer markups, MayaCam 2.0 per view, DLT coefficients of the views,
 /// 3x4 matrix per view (docs/formats.md).
@@ -22,8 +22,8 @@ inline constexpr std::array<std::string_view, 5> export_words{"csv", "slicer", "
 /// Writes the available parts of a result into `folder` and returns the files' paths; all files or none.
 /// Refuses with the result's own failure, `point_at_infinity` for a view without DLT coefficients,
 /// `name_clash` if two views would share a file, `cannot_write`.
-Expected<std::vector<std::filesystem::path>> write_exports(const Result& result,
+Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
                                                            std::span<const Export> kinds = every_export);
 
-}  // namespace helicarm
+}  // namespace helicarm::report

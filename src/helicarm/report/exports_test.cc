@@ -13,11 +13,11 @@
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 namespace fs = std::filesystem;
 
-View view_at(double turn, double fx) {
+geometry::View view_at(double turn, double fx) {
   const Eigen::Matrix3d rotation =
       Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 0.2, 0.1).normalized()).matrix();
   return {{fx, 4000.25, 511.1, 490.7, 0.3}, {rotation, {3, -5, 801.0 / 3}}};
@@ -30,24 +30,24 @@ class Exports : public testing::Test {
     ASSERT_TRUE(mkdtemp(name.data()));
     folder_ = name;
     for (const auto& [view, turn, fx] : {std::tuple{"AP", 0.1, 4000.5}, std::tuple{"LAT", 1.7, -4100.75}}) {
-      ViewResult& of = result_.views.emplace_back();
+      pipeline::ViewResult& of = result_.views.emplace_back();
       of.name = view;
-      of.xray_image =
-          std::make_shared<const XrayImage>(XrayImage{view, Image<float>(64, 48), 0, 4095, {}, {}});
-      of.calibrated = CalibratedView{};
+      of.xray_image = std::make_shared<const xray::XrayImage>(
+          xray::XrayImage{view, image::Image<float>(64, 48), 0, 4095, {}, {}});
+      of.calibrated = calibration::CalibratedView{};
       of.calibrated->view = view_at(turn, fx);
     }
     for (const char* name_of_point : {"a, \"b\"", "end"}) {
-      PointResult& point = result_.points.emplace_back();
+      pipeline::PointResult& point = result_.points.emplace_back();
       point.name = name_of_point;
-      point.source = PointSource::pick;
-      point.place = PointInFrames{};
+      point.source = localization::PointSource::pick;
+      point.place = guidance::PointInFrames{};
       point.place->in_calibrator = {1.0 / 3, 2, -3};
       point.place->covariance_in_calibrator = Eigen::Vector3d(0.01, 0.04, 0.09).asDiagonal();
     }
     result_.points[1].place->in_femur = Eigen::Vector3d(7, 8, 9);
     result_.points[1].place->covariance_in_femur = Eigen::Matrix3d::Identity();
-    PointResult& lost = result_.points.emplace_back();
+    pipeline::PointResult& lost = result_.points.emplace_back();
     lost.name = "lost";
     result_.tunnel_ends = {{0, 1}};
     result_.tunnels.push_back({"femur", {}, {}, {}, 30});
@@ -56,7 +56,7 @@ class Exports : public testing::Test {
   std::string text(const char* name) const { return read_file(folder_ / name, 1 << 20).value(); }
 
   fs::path folder_;
-  Result result_;
+  pipeline::Result result_;
 };
 
 TEST_F(Exports, AllAreWritten) {
@@ -70,8 +70,8 @@ TEST_F(Exports, AllAreWritten) {
 
 TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
   ASSERT_TRUE(write_exports(result_, folder_));
-  for (const ViewResult& view : result_.views) {
-    const auto back = import_matrix(folder_ / (view.name + "_mayacam.txt"));
+  for (const pipeline::ViewResult& view : result_.views) {
+    const auto back = geometry::import_matrix(folder_ / (view.name + "_mayacam.txt"));
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(back->view.projection(), view.calibrated->view.projection());
     EXPECT_EQ(back->image_size, Eigen::Vector2i(64, 48));
@@ -80,10 +80,10 @@ TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
 
 TEST_F(Exports, MatrixReadsBack) {
   ASSERT_TRUE(write_exports(result_, folder_));
-  for (const ViewResult& view : result_.views) {
-    const auto back = import_matrix(folder_ / (view.name + "_matrix.txt"));
+  for (const pipeline::ViewResult& view : result_.views) {
+    const auto back = geometry::import_matrix(folder_ / (view.name + "_matrix.txt"));
     ASSERT_TRUE(back) << back.error().message;
-    const Projection expected = view.calibrated->view.projection();
+    const geometry::Projection expected = view.calibrated->view.projection();
     EXPECT_LT((back->view.projection() - expected).norm(), 1e-9 * expected.norm()) << view.name;
     EXPECT_EQ(std::signbit(back->view.intrinsics.fx), view.name == "LAT");
   }
@@ -161,4 +161,4 @@ TEST_F(Exports, ViewWithoutDltCoefficientsIsNamedInTheMessage) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::report

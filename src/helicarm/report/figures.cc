@@ -11,7 +11,7 @@
 #include "helicarm/report/markup.h"
 #include "helicarm/report/rectified_image.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 using Pixel = Eigen::Vector2d;
@@ -64,7 +64,7 @@ class Drawing {
   std::string elements_;
 };
 
-double unit_of(const ViewResult& view) { return view.xray_image->pixels.width() / 1024.0; }
+double unit_of(const pipeline::ViewResult& view) { return view.xray_image->pixels.width() / 1024.0; }
 
 /// Scale bar in the lower left corner: the true length that the magnified bar shows.
 void scale_bar(Drawing& drawing, int height, double length, double magnification, std::string_view what) {
@@ -100,19 +100,21 @@ void draw_points(Drawing& drawing, const ViewMarks& marks) {
 }
 
 void draw_lines(Drawing& drawing, const ViewMarks& marks) {
-  for (const PixelPath& tunnel : marks.tunnels) drawing.line("planned", tunnel.front(), tunnel.back());
-  for (const PixelPath& tool : marks.tool_lines) drawing.line("tool", tool.front(), tool.back());
+  for (const rectification::PixelPath& tunnel : marks.tunnels)
+    drawing.line("planned", tunnel.front(), tunnel.back());
+  for (const rectification::PixelPath& tool : marks.tool_lines)
+    drawing.line("tool", tool.front(), tool.back());
 }
 
 }  // namespace
 
-std::string view_figure(const Result& result, std::size_t index) {
-  const ViewResult& view = result.views[index];
+std::string view_figure(const pipeline::Result& result, std::size_t index) {
+  const pipeline::ViewResult& view = result.views[index];
   if (!view.xray_image) return {};
-  const Image<std::uint8_t> view_image = rectified_image(view);
+  const image::Image<std::uint8_t> view_image = rectified_image(view);
   Drawing drawing(unit_of(view));
   drawing.put(R"(<image x="-0.5" y="-0.5" width="{}" height="{}" href="data:image/png;base64,{}"/>)",
-              view_image.width(), view_image.height(), base64(encode_png(view_image)));
+              view_image.width(), view_image.height(), base64(image::encode_png(view_image)));
   const ViewMarks marks = marks_of(result, index);
   draw_dots(drawing, marks);
   draw_balls(drawing, marks, view_image.height());
@@ -121,9 +123,9 @@ std::string view_figure(const Result& result, std::size_t index) {
   return drawing.svg("X-ray " + view.name, view_image.width(), view_image.height());
 }
 
-std::string distortion_figure(const ViewResult& view) {
+std::string distortion_figure(const pipeline::ViewResult& view) {
   if (!view.rectification || view.rectification->map.is_identity()) return {};
-  const DistortionMap& map = view.rectification->map;
+  const rectification::DistortionMap& map = view.rectification->map;
   const Pixel size = map.hull_high - map.hull_low;
   if (!(size.minCoeff() > 0)) return {};
   constexpr int cells = 16;
@@ -145,4 +147,4 @@ std::string distortion_figure(const ViewResult& view) {
   return drawing.svg("Distortion of " + view.name, map.width, map.height);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// A segment of an isoline within one lattice cell: column and row of both ends.
 using IsolinePiece = std::array<std::array<double, 2>, 2>;
@@ -51,4 +51,4 @@ inline std::vector<LatticeRun> lattice_runs(int columns, const std::vector<bool>
   return runs;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

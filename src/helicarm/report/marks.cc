@@ -6,23 +6,24 @@
 
 #include "helicarm/verification/image_line.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 using Eigen::Vector2d;
 
-std::vector<DotMark> rectified_dots(const DistortionMap& map, const std::vector<Dot>& dots) {
+std::vector<DotMark> rectified_dots(const rectification::DistortionMap& map,
+                                    const std::vector<detection::Dot>& dots) {
   std::vector<DotMark> marks;
-  for (const Dot& dot : dots)
+  for (const detection::Dot& dot : dots)
     if (const auto at = map.rectified_from_raw(dot.centre_px)) marks.push_back({*at, dot.radius_px});
   return marks;
 }
 
-std::vector<BallMark> balls_of(const ViewResult& view) {
+std::vector<BallMark> balls_of(const pipeline::ViewResult& view) {
   std::vector<BallMark> marks;
-  for (const Fiducial& fiducial : view.found->fiducials) {
-    const bool used = fiducial.status == FiducialStatus::used;
-    if (!used && fiducial.status != FiducialStatus::rejected) continue;
+  for (const fiducials::Fiducial& fiducial : view.found->fiducials) {
+    const bool used = fiducial.status == fiducials::FiducialStatus::used;
+    if (!used && fiducial.status != fiducials::FiducialStatus::rejected) continue;
     BallMark ball{fiducial.label, fiducial.uv, used, fiducial.sigma_px};
     if (view.calibrated)
       ball.residual = fiducial.uv - view.calibrated->view.project(fiducial.centre_in_calibrator);
@@ -31,45 +32,47 @@ std::vector<BallMark> balls_of(const ViewResult& view) {
   return marks;
 }
 
-std::vector<PointMark> points_of(const Result& result, std::size_t view) {
+std::vector<PointMark> points_of(const pipeline::Result& result, std::size_t view) {
   std::vector<PointMark> marks;
-  for (const PointResult& point : result.points)
+  for (const pipeline::PointResult& point : result.points)
     if (const auto& seen = point.seen[view]) {
       PointMark mark{point.name, seen->uv, point.source};
-      if (point.place) mark.error_95_mm = length_at_95(point.place->covariance_in_calibrator);
+      if (point.place) mark.error_95_mm = localization::length_at_95(point.place->covariance_in_calibrator);
       if (point.reason) mark.reason = point.reason->message;
       marks.push_back(std::move(mark));
     }
   return marks;
 }
 
-void add_lines(ViewMarks& marks, const Result& result, std::size_t view) {
+void add_lines(ViewMarks& marks, const pipeline::Result& result, std::size_t view) {
   for (const auto& [start, end] : result.tunnel_ends) {
     const auto &from = result.points[start].seen[view], &to = result.points[end].seen[view];
     if (from && to) marks.tunnels.push_back({from->uv, to->uv});
   }
-  for (const ToolLine& tool : result.tool_lines)
-    if (const auto line = line_in_xray(result.views[view].calibrated->view, tool)) {
+  for (const verification::ToolLine& tool : result.tool_lines)
+    if (const auto line = verification::line_in_xray(result.views[view].calibrated->view, tool)) {
       const Vector2d beyond = 3 * (line->tip - line->back);
       marks.tool_lines.push_back({line->back - beyond, line->tip + beyond});
     }
 }
 
 template <class Mark>
-void carry(std::vector<Mark>& marks, const DistortionMap& map) {
+void carry(std::vector<Mark>& marks, const rectification::DistortionMap& map) {
   for (Mark& mark : marks) mark.place = map.raw_from_rectified(mark.place);
 }
 
-std::vector<PixelPath> carried(const std::vector<PixelPath>& paths, const DistortionMap& map) {
-  std::vector<PixelPath> raw;
-  for (const PixelPath& path : paths) std::ranges::move(raw_paths(map, path), std::back_inserter(raw));
+std::vector<rectification::PixelPath> carried(const std::vector<rectification::PixelPath>& paths,
+                                              const rectification::DistortionMap& map) {
+  std::vector<rectification::PixelPath> raw;
+  for (const rectification::PixelPath& path : paths)
+    std::ranges::move(rectification::raw_paths(map, path), std::back_inserter(raw));
   return raw;
 }
 
 }  // namespace
 
-ViewMarks marks_of(const Result& result, std::size_t index) {
-  const ViewResult& view = result.views[index];
+ViewMarks marks_of(const pipeline::Result& result, std::size_t index) {
+  const pipeline::ViewResult& view = result.views[index];
   ViewMarks marks;
   if (view.rectification)
     marks.plate_dots = rectified_dots(view.rectification->map, view.rectification->plate_dots);
@@ -81,7 +84,7 @@ ViewMarks marks_of(const Result& result, std::size_t index) {
   return marks;
 }
 
-ViewMarks raw_marks(const ViewMarks& rectified, const DistortionMap& map) {
+ViewMarks raw_marks(const ViewMarks& rectified, const rectification::DistortionMap& map) {
   ViewMarks raw = rectified;
   for (BallMark& ball : raw.balls)
     if (ball.residual)
@@ -103,4 +106,4 @@ double largest_residual(const ViewMarks& marks) {
   return largest;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -8,7 +8,7 @@
 #include "helicarm/pipeline/result.h"
 #include "helicarm/rectification/raw_path.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// A detected fiducial.
 struct BallMark {
@@ -28,7 +28,7 @@ struct DotMark {
 struct PointMark {
   std::string name;
   Eigen::Vector2d place;
-  PointSource source = PointSource::pick;
+  localization::PointSource source = localization::PointSource::pick;
   std::optional<double> error_95_mm = {};  ///< empty: not located
   std::string reason = {};                 ///< why it was not located
 };
@@ -39,17 +39,17 @@ struct ViewMarks {
   std::vector<DotMark> plate_dots;
   std::vector<DotMark> false_blobs;
   std::vector<PointMark> points;
-  std::vector<PixelPath> tunnels;     ///< from start to end
-  std::vector<PixelPath> tool_lines;  ///< extended beyond the tool's two points
+  std::vector<rectification::PixelPath> tunnels;     ///< from start to end
+  std::vector<rectification::PixelPath> tool_lines;  ///< extended beyond the tool's two points
 };
 
 /// Detections of a view in rectified pixels.
-ViewMarks marks_of(const Result& result, std::size_t view);
+ViewMarks marks_of(const pipeline::Result& result, std::size_t view);
 
 /// As above, in raw pixels. Marks outside the map's range are left out.
-ViewMarks raw_marks(const ViewMarks& rectified, const DistortionMap& map);
+ViewMarks raw_marks(const ViewMarks& rectified, const rectification::DistortionMap& map);
 
 /// Length of the largest residual of a used fiducial; 0 without any.
 double largest_residual(const ViewMarks& marks);
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -3,14 +3,14 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 using Eigen::Vector2d;
 
 /// A scaling about the image's corner, with simple expected values.
-DistortionMap doubling_map() {
-  DistortionMap map = identity_map(200, 200, {});
+rectification::DistortionMap doubling_map() {
+  rectification::DistortionMap map = rectification::identity_map(200, 200, {});
   map.order = 1;
   map.scale = 200;
   map.coefficients = Eigen::MatrixX2d::Zero(3, 2);
@@ -19,31 +19,37 @@ DistortionMap doubling_map() {
   return map;
 }
 
-Result one_view() {
-  Result result;
-  ViewResult view;
+pipeline::Result one_view() {
+  pipeline::Result result;
+  pipeline::ViewResult view;
   view.name = "AP";
-  view.rectification = Rectification{};
+  view.rectification = rectification::Rectification{};
   view.rectification->map = doubling_map();
-  view.rectification->plate_dots = {Dot{.centre_px = {100, 40}, .radius_px = 3}};
-  view.found = LabelledFiducials{};
-  view.found->false_blobs = {Dot{.centre_px = {20, 60}, .radius_px = 5}};
-  Fiducial used{"P1", {0, 0, 0}}, rejected{"P2", {0, 0, 0}}, hidden{"P3", {0, 0, 0}};
-  used.status = FiducialStatus::used;
+  view.rectification->plate_dots = {detection::Dot{.centre_px = {100, 40}, .radius_px = 3}};
+  view.found = fiducials::LabelledFiducials{};
+  view.found->false_blobs = {detection::Dot{.centre_px = {20, 60}, .radius_px = 5}};
+  fiducials::Fiducial used{"P1", {0, 0, 0}}, rejected{"P2", {0, 0, 0}}, hidden{"P3", {0, 0, 0}};
+  used.status = fiducials::FiducialStatus::used;
   used.uv = {30.5, 40.25};
   used.sigma_px = 0.02;
-  rejected.status = FiducialStatus::rejected;
+  rejected.status = fiducials::FiducialStatus::rejected;
   rejected.uv = {50, 40};
-  hidden.status = FiducialStatus::occluded;
+  hidden.status = fiducials::FiducialStatus::occluded;
   view.found->fiducials = {used, rejected, hidden};
-  view.calibrated = CalibratedView{};
+  view.calibrated = calibration::CalibratedView{};
   view.calibrated->view = {{400, 400, 30, 40, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
   result.views.push_back(std::move(view));
-  const auto seen = [](double u, double v) { return ImagePoint{{2 * u, 2 * v}, {u, v}, 0.1}; };
+  const auto seen = [](double u, double v) { return fiducials::ImagePoint{{2 * u, 2 * v}, {u, v}, 0.1}; };
   result.points = {
-      {"start", PointSource::pick, {}, {seen(10, 20)}, PointInFrames{}, 0, {}},
-      {"end", PointSource::pick, {}, {seen(60, 20)}, {}, 0, Failure{Reason::not_seen, "alone", "", {}}},
-      {"T1", PointSource::target, {}, {{}}, {}, 0, {}}};
+      {"start", localization::PointSource::pick, {}, {seen(10, 20)}, guidance::PointInFrames{}, 0, {}},
+      {"end",
+       localization::PointSource::pick,
+       {},
+       {seen(60, 20)},
+       {},
+       0,
+       Failure{Reason::not_seen, "alone", "", {}}},
+      {"T1", localization::PointSource::target, {}, {{}}, {}, 0, {}}};
   result.tunnel_ends = {{0, 1}};
   result.tool_lines = {{"drill", "t", {0, 0, 0}, {2, 0, 0}}, {"behind", "t", {0, 0, -900}, {2, 0, 0}}};
   return result;
@@ -77,11 +83,11 @@ TEST(RawMarks, AreMappedByTheDistortionMap) {
 }
 
 TEST(MarksOf, ImageWithoutDetectionsHasNone) {
-  Result result;
-  result.views.push_back({"AP", std::make_shared<const XrayImage>(), {}, {}, {}});
+  pipeline::Result result;
+  result.views.push_back({"AP", std::make_shared<const xray::XrayImage>(), {}, {}, {}});
   const ViewMarks marks = marks_of(result, 0);
   EXPECT_TRUE(marks.balls.empty() && marks.plate_dots.empty() && marks.points.empty());
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::report {
 
 std::string escaped(std::string_view text) {
   std::string safe;
@@ -73,4 +73,4 @@ std::string HtmlTable::html() const {
   return html + "</tbody></table></div>\n";
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

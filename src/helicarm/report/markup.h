@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// Escapes markup for HTML and SVG content and attributes, and replaces control characters.
 std::string escaped(std::string_view text);
@@ -29,4 +29,4 @@ class HtmlTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 TEST(Escaped, MarkupAndControlCharactersAreEscaped) {
@@ -39,4 +39,4 @@ TEST(HtmlTable, NumericColumnsAreMarked) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::report

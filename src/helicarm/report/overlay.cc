@@ -12,7 +12,7 @@
 #include "helicarm/report/marks.h"
 #include "helicarm/report/rectified_image.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 const cv::Scalar green(74, 222, 128), red(248, 113, 113), blue(147, 197, 253), violet(240, 171, 252),
@@ -27,8 +27,8 @@ cv::Point fixed_point(const Eigen::Vector2d& at) {
 
 class Canvas {
  public:
-  explicit Canvas(const Image<std::uint8_t>& grey) : scale_(grey.width() / 1024.0) {
-    cv::cvtColor(as_mat(grey), image_, cv::COLOR_GRAY2RGB);
+  explicit Canvas(const image::Image<std::uint8_t>& grey) : scale_(grey.width() / 1024.0) {
+    cv::cvtColor(image::as_mat(grey), image_, cv::COLOR_GRAY2RGB);
   }
   void circle(const Eigen::Vector2d& at, double radius, const cv::Scalar& colour) {
     cv::circle(image_, fixed_point(at), static_cast<int>(radius * scale_ * (1 << shift)), colour, 1,
@@ -48,7 +48,7 @@ class Canvas {
     for (const auto& [ink, thickness] : {std::pair{cv::Scalar(0, 0, 0), 3}, {colour, 1}})
       cv::putText(image_, words, place, cv::FONT_HERSHEY_SIMPLEX, 0.5 * scale_, ink, thickness, cv::LINE_AA);
   }
-  std::string png() const { return encode_png(image_); }
+  std::string png() const { return image::encode_png(image_); }
 
  private:
   cv::Mat image_;
@@ -57,7 +57,8 @@ class Canvas {
 
 }  // namespace
 
-std::string overlay_png(const Result& result, std::size_t index, std::span<const Eigen::Vector2d> path) {
+std::string overlay_png(const pipeline::Result& result, std::size_t index,
+                        std::span<const Eigen::Vector2d> path) {
   Canvas canvas(rectified_image(result.views[index]));
   const ViewMarks marks = marks_of(result, index);
   for (const DotMark& dot : marks.plate_dots) canvas.circle(dot.place, 9, blue);
@@ -70,8 +71,10 @@ std::string overlay_png(const Result& result, std::size_t index, std::span<const
     canvas.cross(point.place, 7, violet);
     canvas.text(point.place, point.name, violet);
   }
-  for (const PixelPath& tunnel : marks.tunnels) canvas.line(tunnel.front(), tunnel.back(), yellow);
-  for (const PixelPath& tool : marks.tool_lines) canvas.line(tool.front(), tool.back(), crimson);
+  for (const rectification::PixelPath& tunnel : marks.tunnels)
+    canvas.line(tunnel.front(), tunnel.back(), yellow);
+  for (const rectification::PixelPath& tool : marks.tool_lines)
+    canvas.line(tool.front(), tool.back(), crimson);
   for (std::size_t i = 1; i < path.size(); ++i) canvas.line(path[i - 1], path[i], orange);
   return canvas.png();
 }
@@ -88,4 +91,4 @@ std::string overlay_name(const std::string& view_name, std::size_t index) {
   return file_stem(view_name, index) + "_overlay.png";
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -5,13 +5,14 @@
 
 #include "helicarm/image/grey_window.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
-Image<std::uint8_t> rectified_image(const ViewResult& view) {
+image::Image<std::uint8_t> rectified_image(const pipeline::ViewResult& view) {
   const bool as_stored = !view.rectification || view.rectification->map.is_identity();
-  const Image<float> image =
-      as_stored ? view.xray_image->pixels : resample(*view.xray_image, view.rectification->map);
-  return eight_bit(image, usual_window(image, view.xray_image->lowest));
+  const image::Image<float> image = as_stored
+                                        ? view.xray_image->pixels
+                                        : rectification::resample(*view.xray_image, view.rectification->map);
+  return image::eight_bit(image, image::usual_window(image, view.xray_image->lowest));
 }
 
 double round_below(double limit) {
@@ -21,4 +22,4 @@ double round_below(double limit) {
   return decade;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

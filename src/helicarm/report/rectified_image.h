@@ -6,13 +6,13 @@
 #include "helicarm/image/image.h"
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// The X-ray image resampled to rectified pixels (raw if it was not rectified), windowed for display: 8 bit,
 /// the darkest and brightest 0.5 % clipped.
-Image<std::uint8_t> rectified_image(const ViewResult& view);
+image::Image<std::uint8_t> rectified_image(const pipeline::ViewResult& view);
 
 /// The largest round number (1, 2 or 5 times a power of ten) at or below `limit`.
 double round_below(double limit);
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -8,9 +8,9 @@
 #include "helicarm/report/sections.h"
 #include "helicarm/report/style.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
-std::string report_html(const Result& result) {
+std::string report_html(const pipeline::Result& result) {
   std::string html =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>helicarm "
@@ -24,11 +24,11 @@ std::string report_html(const Result& result) {
   html += fmt::format(
       "</main>\n<footer><p class=\"soft\">helicarm {}, method {}. Units: mm and px; pixel (0, 0) is the "
       "centre of the top-left pixel.</p></footer>\n</body>\n</html>\n",
-      HELICARM_VERSION, result.options.method == Method::paper ? "paper" : "best");
+      HELICARM_VERSION, result.options.method == rectification::Method::paper ? "paper" : "best");
   return html;
 }
 
-Expected<void> write_report(const Result& result, const std::filesystem::path& folder) {
+Expected<void> write_report(const pipeline::Result& result, const std::filesystem::path& folder) {
   if (auto written = write_file(folder / "report.html", report_html(result)); !written) return written;
   for (std::size_t i = 0; i < result.views.size(); ++i)
     if (result.views[i].xray_image)
@@ -38,4 +38,4 @@ Expected<void> write_report(const Result& result, const std::filesystem::path& f
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

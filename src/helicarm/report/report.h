@@ -6,12 +6,12 @@
 
 #include "helicarm/pipeline/result.h"
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// The report as one HTML page: images embedded, no external resources, no patient identity.
-std::string report_html(const Result& result);
+std::string report_html(const pipeline::Result& result);
 
 /// Writes report.html and NAME_overlay.png for each view into `folder`.
-Expected<void> write_report(const Result& result, const std::filesystem::path& folder);
+Expected<void> write_report(const pipeline::Result& result, const std::filesystem::path& folder);
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -9,41 +9,52 @@
 
 #include "helicarm/report/overlay.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 const char* const nasty = "<script>alert('&')</script>";
 
-Result full_result() {
-  Result result;
+pipeline::Result full_result() {
+  pipeline::Result result;
   for (const char* name : {"AP", nasty}) {
-    ViewResult view;
+    pipeline::ViewResult view;
     view.name = name;
-    XrayImage xray_image{name, Image<float>(64, 48, 7), 0, 4095, {}, {}};
+    xray::XrayImage xray_image{name, image::Image<float>(64, 48, 7), 0, 4095, {}, {}};
     xray_image.acquisition.patient_key = "CANARY";
     xray_image.pixels(3, 3) = 900;
-    view.xray_image = std::make_shared<const XrayImage>(std::move(xray_image));
-    view.rectification = Rectification{};
-    view.rectification->map = identity_map(64, 48, 0.2);
-    Fiducial ball{nasty, Eigen::Vector3d::Zero()};
-    ball.status = FiducialStatus::used;
+    view.xray_image = std::make_shared<const xray::XrayImage>(std::move(xray_image));
+    view.rectification = rectification::Rectification{};
+    view.rectification->map = rectification::identity_map(64, 48, 0.2);
+    fiducials::Fiducial ball{nasty, Eigen::Vector3d::Zero()};
+    ball.status = fiducials::FiducialStatus::used;
     ball.uv = {20, 20};
     ball.residual_px = 0.1;
-    view.found = LabelledFiducials{};
+    view.found = fiducials::LabelledFiducials{};
     view.found->fiducials = {ball, {"P2", Eigen::Vector3d::Zero()}};
-    view.calibrated = CalibratedView{};
+    view.calibrated = calibration::CalibratedView{};
     view.calibrated->view = {{400, 400, 20, 20.1, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
     result.views.push_back(std::move(view));
   }
-  PointResult seen{nasty, PointSource::pick, {}, {ImagePoint{{1, 2}, {3, 4}, 0.1}, {}}, PointInFrames{}, 0.2,
-                   {}};
-  PointResult lost{
-      "T1", PointSource::target, {}, {{}, {}}, {}, 0, Failure{Reason::target_not_found, nasty, "", {}}};
+  pipeline::PointResult seen{nasty,
+                             localization::PointSource::pick,
+                             {},
+                             {fiducials::ImagePoint{{1, 2}, {3, 4}, 0.1}, {}},
+                             guidance::PointInFrames{},
+                             0.2,
+                             {}};
+  pipeline::PointResult lost{"T1",
+                             localization::PointSource::target,
+                             {},
+                             {{}, {}},
+                             {},
+                             0,
+                             Failure{Reason::target_not_found, nasty, "", {}}};
   result.points = {seen, lost};
   result.tunnel_ends = {{0, 0}};
   result.tunnels.push_back({nasty, {}, {}, {}, 30});
   result.tool_lines.push_back({nasty, nasty, {0, 0, 0}, {0, 10, 0}});
-  result.verifications.push_back({nasty, LineError{{1.0, {}}, 1, 2, 3}, LineError{{1.0, {}}, 1, 2, 3}});
+  result.verifications.push_back(
+      {nasty, verification::LineError{{1.0, {}}, 1, 2, 3}, verification::LineError{{1.0, {}}, 1, 2, 3}});
   result.warnings.push_back({Reason::few_fiducials, nasty, nasty, {}});
   result.accuracy.fre_mm = {0.1, 0.1, 0.2, 0.05, 12};
   result.accuracy.targets.push_back({nasty, 0.1, 0.1, 0.2});
@@ -87,7 +98,7 @@ TEST(ReportHtml, LoadsNoExternalResources) {
 }
 
 TEST(ReportHtml, RefusalBeforeTheFirstStageStillGivesAReport) {
-  Result result;
+  pipeline::Result result;
   result.views.push_back({"AP", {}, {}, {}, {}});
   result.failure = Failure{Reason::blank_image, "nothing to see", "AP", {}};
   const std::string html = report_html(result);
@@ -110,4 +121,4 @@ TEST(OverlayPng, IsAPngOfTheImage) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -9,7 +9,7 @@
 #include "helicarm/report/figures.h"
 #include "helicarm/report/markup.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 std::string headed(std::string_view heading, const std::string& content) {
@@ -32,10 +32,11 @@ std::string message_of(const Failure& failure) {
                      code(failure.reason));
 }
 
-double largest_error_95(const Result& result) {
+double largest_error_95(const pipeline::Result& result) {
   double largest = 0;
-  for (const PointResult& point : result.points)
-    if (point.place) largest = std::max(largest, length_at_95(point.place->covariance_in_calibrator));
+  for (const pipeline::PointResult& point : result.points)
+    if (point.place)
+      largest = std::max(largest, localization::length_at_95(point.place->covariance_in_calibrator));
   return largest;
 }
 
@@ -45,13 +46,15 @@ std::string error_bar(double error, double largest) {
                      largest > 0 ? 8 * error / largest : 0);
 }
 
-std::string status_cell(const Fiducial& fiducial) {
+std::string status_cell(const fiducials::Fiducial& fiducial) {
   constexpr std::array words = {"used", "occluded", "outside", "rejected", "not found"};
   const char* word = words[static_cast<std::size_t>(fiducial.status)];
-  return fiducial.status == FiducialStatus::used ? word : fmt::format("<span class=\"bad\">{}</span>", word);
+  return fiducial.status == fiducials::FiducialStatus::used
+             ? word
+             : fmt::format("<span class=\"bad\">{}</span>", word);
 }
 
-void statistics_row(HtmlTable& table, std::string_view what, const Statistics& s) {
+void statistics_row(HtmlTable& table, std::string_view what, const localization::Statistics& s) {
   if (s.n > 0)
     table.row({std::string(what), fixed(s.mean, 3), fixed(s.rms, 3), fixed(s.max, 3), fixed(s.min, 3),
                std::to_string(s.n)});
@@ -59,14 +62,14 @@ void statistics_row(HtmlTable& table, std::string_view what, const Statistics& s
 
 }  // namespace
 
-std::string summary_section(const Result& result) {
+std::string summary_section(const pipeline::Result& result) {
   std::string html;
   if (result.failure)
     html +=
         fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure));
   else
     html += "<p><span class=\"state ok\">measured</span></p>\n";
-  const Accuracy& accuracy = result.accuracy;
+  const localization::Accuracy& accuracy = result.accuracy;
   std::string cards;
   if (accuracy.fre_mm.n)
     cards += card(fixed(accuracy.fre_mm.mean, 3), "mm", "fiducial registration error, mean");
@@ -82,10 +85,10 @@ std::string summary_section(const Result& result) {
   return html;
 }
 
-std::string views_section(const Result& result) {
+std::string views_section(const pipeline::Result& result) {
   std::string html;
   for (std::size_t i = 0; i < result.views.size(); ++i) {
-    const ViewResult& view = result.views[i];
+    const pipeline::ViewResult& view = result.views[i];
     const std::string figure = view_figure(result, i);
     if (figure.empty()) continue;
     std::string caption = "<b>" + escaped(view.name) + "</b>";
@@ -102,12 +105,12 @@ std::string views_section(const Result& result) {
                     "tool.</p>\n");
 }
 
-std::string points_section(const Result& result) {
+std::string points_section(const pipeline::Result& result) {
   HtmlTable table({"Point", "Kind", "In calibrator, mm", "#&#963; x", "#&#963; y", "#&#963; z",
                    "#Error at 95 %, mm", "", "#Ray gap, mm"});
   const double largest = largest_error_95(result);
-  for (const PointResult& point : result.points) {
-    const std::string kind = point.source == PointSource::pick ? "pick" : "target";
+  for (const pipeline::PointResult& point : result.points) {
+    const std::string kind = point.source == localization::PointSource::pick ? "pick" : "target";
     if (!point.place) {
       const std::string why = point.reason ? message_of(*point.reason) : std::string("–");
       table.row(
@@ -116,7 +119,7 @@ std::string points_section(const Result& result) {
     }
     const Eigen::Matrix3d& covariance = point.place->covariance_in_calibrator;
     const Eigen::Vector3d sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-    const double error = length_at_95(covariance);
+    const double error = localization::length_at_95(covariance);
     const std::string gap = fixed(point.ray_gap_mm, 3);
     table.row({escaped(point.name), kind, coordinates(point.place->in_calibrator), fixed(sigma.x(), 3),
                fixed(sigma.y(), 3), fixed(sigma.z(), 3), fixed(error, 3), error_bar(error, largest),
@@ -125,26 +128,26 @@ std::string points_section(const Result& result) {
   return table.empty() ? std::string{} : headed("Points", table.html());
 }
 
-std::string accuracy_section(const Result& result) {
-  const Accuracy& accuracy = result.accuracy;
+std::string accuracy_section(const pipeline::Result& result) {
+  const localization::Accuracy& accuracy = result.accuracy;
   HtmlTable table({"Error, mm", "#Mean", "#RMS", "#Max", "#Min", "#n"});
   statistics_row(table, "FRE of the fiducials (Eq. 11)", accuracy.fre_mm);
   statistics_row(table, "TRE of the check targets (Eq. 12)", accuracy.tre_mm);
   if (table.empty()) return {};
   std::string html = table.html();
   HtmlTable targets({"Target", "#Error, mm", "#Predicted rms, mm", "#Predicted at 95 %, mm"});
-  for (const TargetError& target : accuracy.targets)
+  for (const localization::TargetError& target : accuracy.targets)
     targets.row({escaped(target.name), fixed(target.error_mm, 3), fixed(target.predicted_mm, 3),
                  fixed(target.predicted_95_mm, 3)});
   if (!targets.empty()) html += targets.html();
   return headed("Accuracy", html);
 }
 
-std::string guidance_section(const Result& result) {
+std::string guidance_section(const pipeline::Result& result) {
   std::string html;
   HtmlTable tunnels(
       {"Tunnel", "Start in tool, mm", "End in tool, mm", "Axis in tool", "#Axis ±, °", "#Length, mm"});
-  for (const Tunnel& tunnel : result.tunnels)
+  for (const guidance::Tunnel& tunnel : result.tunnels)
     tunnels.row({escaped(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
                  tunnel.axis_in_tool ? fmt::format("{:.4f}, {:.4f}, {:.4f}", tunnel.axis_in_tool->x(),
                                                    tunnel.axis_in_tool->y(), tunnel.axis_in_tool->z())
@@ -152,7 +155,7 @@ std::string guidance_section(const Result& result) {
                  fixed(tunnel.axis_sigma_deg(), 3), fixed(tunnel.length_mm, 2)});
   if (!tunnels.empty()) html += headed("Tunnels", tunnels.html());
   HtmlTable lines({"Tool line", "End", "#Eq. 17, px", "#Eq. 17, mm", "#In space, mm"});
-  for (const Verification& verification : result.verifications)
+  for (const verification::Verification& verification : result.verifications)
     for (const auto& [end, error] : {std::pair{"start", &verification.start}, {"end", &verification.end}})
       if (*error)
         lines.row({escaped(verification.name), end, fixed((*error)->combined_px, 2),
@@ -161,14 +164,14 @@ std::string guidance_section(const Result& result) {
   return html;
 }
 
-std::string fiducials_section(const Result& result) {
+std::string fiducials_section(const pipeline::Result& result) {
   std::string html;
-  for (const ViewResult& view : result.views) {
+  for (const pipeline::ViewResult& view : result.views) {
     if (!view.found) continue;
     HtmlTable table({"Fiducial", "Status", "#u raw", "#v raw", "#u", "#v", "#&#963;, px", "#Residual, px"});
-    for (const Fiducial& fiducial : view.found->fiducials) {
-      const bool seen =
-          fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+    for (const fiducials::Fiducial& fiducial : view.found->fiducials) {
+      const bool seen = fiducial.status == fiducials::FiducialStatus::used ||
+                        fiducial.status == fiducials::FiducialStatus::rejected;
       const auto if_seen = [&](double value, int digits) {
         return seen ? fixed(value, digits) : std::string("–");
       };
@@ -182,13 +185,13 @@ std::string fiducials_section(const Result& result) {
   return html.empty() ? html : headed("Fiducials", "<div class=\"views\">" + html + "</div>");
 }
 
-std::string rectification_section(const Result& result) {
+std::string rectification_section(const pipeline::Result& result) {
   HtmlTable table({"View", "Model", "#Dots", "#Residual rms, px", "#Largest, px", "#Held out rms, px",
                    "#Distortion mean, px", "#Largest, px"});
   std::string figures;
-  for (const ViewResult& view : result.views) {
+  for (const pipeline::ViewResult& view : result.views) {
     if (!view.rectification || view.rectification->map.is_identity()) continue;
-    const Rectification& r = *view.rectification;
+    const rectification::Rectification& r = *view.rectification;
     table.row({escaped(view.name), escaped(r.map.model),
                r.dots_expected ? fmt::format("{} of {}", r.dots_found, *r.dots_expected)
                                : std::to_string(r.dots_found),
@@ -204,9 +207,9 @@ std::string rectification_section(const Result& result) {
   return headed("Rectification", table.html() + "<div class=\"views\">\n" + figures + "</div>\n");
 }
 
-std::string timing_section(const Result& result) {
+std::string timing_section(const pipeline::Result& result) {
   HtmlTable table({"Stage", "#Time, ms"});
-  const Timing& t = result.timing_ms;
+  const pipeline::Timing& t = result.timing_ms;
   for (const auto& [stage, time] : {std::pair{"read", t.read},
                                     {"rectify", t.rectify},
                                     {"detect", t.detect},
@@ -218,16 +221,16 @@ std::string timing_section(const Result& result) {
   return table.empty() ? std::string{} : headed("Time", table.html());
 }
 
-std::string notes_section(const Result& result) {
+std::string notes_section(const pipeline::Result& result) {
   std::string html;
   for (const Warning& note : result.notes) html += "<li>" + message_of(note) + "</li>\n";
   return html.empty() ? html : headed("Notes: what these data cannot show", "<ul>\n" + html + "</ul>\n");
 }
 
-std::string warnings_section(const Result& result) {
+std::string warnings_section(const pipeline::Result& result) {
   std::string html;
   for (const Warning& warning : result.warnings) html += "<li>" + message_of(warning) + "</li>\n";
   return html.empty() ? html : headed("Warnings", "<ul>\n" + html + "</ul>\n");
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

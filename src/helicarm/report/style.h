@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-namespace helicarm {
+namespace helicarm::report {
 
 /// Style sheet of the report, light or dark by the reader's system setting.
 inline constexpr const char* report_style = R"css(
@@ -46,4 +46,4 @@ svg .field { stroke: var(--accent); } svg .frame { stroke: var(--rule); }
 @media print { body { max-width: none; padding: 0; } h2 { break-after: avoid; } figure, tr { break-inside: avoid; } }
 )css";
 
-}  // namespace helicarm
+}  // namespace helicarm::report

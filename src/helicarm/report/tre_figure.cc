@@ -11,7 +11,7 @@
 #include "helicarm/report/axis.h"
 #include "helicarm/report/isoline.h"
 
-namespace helicarm {
+namespace helicarm::report {
 namespace {
 
 constexpr double slice_px = 380, left_px = 60, top_px = 40, gap_px = 80;
@@ -36,7 +36,7 @@ struct Scale {
 };
 
 /// Range over the two displayed slices.
-Scale scale_of(const TreVolume& volume) {
+Scale scale_of(const localization::TreVolume& volume) {
   double low = 1e300, high = 0;
   const int middle = volume.side / 2;
   for (int i = 0; i < volume.side; ++i)
@@ -53,7 +53,7 @@ Scale scale_of(const TreVolume& volume) {
 
 class Slice {
  public:
-  Slice(const TreVolume& volume, const Scale& scale, bool upright, double x0)
+  Slice(const localization::TreVolume& volume, const Scale& scale, bool upright, double x0)
       : volume_(volume), scale_(scale), upright_(upright), x0_(x0), cell_(slice_px / volume.side) {}
 
   std::string svg() const {
@@ -118,7 +118,7 @@ class Slice {
     return path;
   }
 
-  const TreVolume& volume_;
+  const localization::TreVolume& volume_;
   const Scale& scale_;
   bool upright_;  ///< XOZ instead of XOY
   double x0_;
@@ -150,7 +150,7 @@ std::string legend(const Scale& scale, double x0) {
 
 }  // namespace
 
-std::string tre_figure(const TreVolume& volume) {
+std::string tre_figure(const localization::TreVolume& volume) {
   const Scale scale = scale_of(volume);
   const double second = left_px + slice_px + gap_px;
   const double third = second + slice_px + 30;
@@ -162,4 +162,4 @@ std::string tre_figure(const TreVolume& volume) {
       Slice(volume, scale, true, second).svg(), legend(scale, third));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::report

@@ -16,7 +16,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/system_message.h"
 
-namespace helicarm {
+namespace helicarm::session {
 namespace fs = std::filesystem;
 
 namespace {
@@ -141,4 +141,4 @@ Expected<void> SessionLog::append(const std::string& kind, Json content) {
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::session

@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 
-namespace helicarm {
+namespace helicarm::session {
 
 /// One event of an operation.
 struct SessionRecord {
@@ -63,4 +63,4 @@ class SessionLog {
   std::size_t size_ = 0;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::session

@@ -13,7 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/temporary_folder.h"
 
-namespace helicarm {
+namespace helicarm::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -174,4 +174,4 @@ TEST_F(Session, FolderThatCannotBeCreatedIsReported) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::session

@@ -12,7 +12,8 @@ namespace helicarm::simulation {
 namespace {
 
 /// Mesh of the outer solids of these bones: a bone's first body in the scene.
-TriangleMesh mesh_of(const Scene& knee, std::initializer_list<std::string_view> names, double step_mm) {
+phantom::TriangleMesh mesh_of(const Scene& knee, std::initializer_list<std::string_view> names,
+                              double step_mm) {
   std::vector<Solid> solids;
   Eigen::AlignedBox3d box;
   for (const std::string_view name : names)
@@ -26,7 +27,7 @@ TriangleMesh mesh_of(const Scene& knee, std::initializer_list<std::string_view> 
     for (const Solid& solid : solids) least = std::min(least, signed_distance(solid, point));
     return least;
   };
-  return surface_of(distance, {box.min() - margin, box.max() + margin}, step_mm);
+  return phantom::surface_of(distance, {box.min() - margin, box.max() + margin}, step_mm);
 }
 
 }  // namespace
@@ -36,9 +37,9 @@ BoneMeshes bone_meshes(double step_mm) {
   return {mesh_of(knee, {"femur"}, step_mm), mesh_of(knee, {"tibia", "fibula", "patella"}, step_mm)};
 }
 
-BoneMeshes moved(const BoneMeshes& bones, const RigidTransform& a_from_knee) {
+BoneMeshes moved(const BoneMeshes& bones, const geometry::RigidTransform& a_from_knee) {
   BoneMeshes there = bones;
-  for (TriangleMesh* mesh : {&there.femur, &there.tibia})
+  for (phantom::TriangleMesh* mesh : {&there.femur, &there.tibia})
     for (Eigen::Vector3d& corner : mesh->corners) corner = a_from_knee * corner;
   return there;
 }

@@ -8,14 +8,14 @@ namespace helicarm::simulation {
 
 /// Surfaces of rigid groups: fibula and patella (on its tendon) move with the tibia.
 struct BoneMeshes {
-  TriangleMesh femur;
-  TriangleMesh tibia;
+  phantom::TriangleMesh femur;
+  phantom::TriangleMesh tibia;
 };
 
 /// Outer surfaces of knee_body's bones in the knee's frame, mm, by marching with the given step.
 BoneMeshes bone_meshes(double step_mm);
 
 /// The surfaces in another frame.
-BoneMeshes moved(const BoneMeshes& bones, const RigidTransform& a_from_knee);
+BoneMeshes moved(const BoneMeshes& bones, const geometry::RigidTransform& a_from_knee);
 
 }  // namespace helicarm::simulation

@@ -22,9 +22,9 @@ double volume_by_rays(const std::string& name) {
 
 TEST(BoneMeshes, VolumesAgreeWithTheBones) {
   const BoneMeshes bones = bone_meshes(2);
-  EXPECT_NEAR(volume(bones.femur) / volume_by_rays("femur"), 1, 0.01);
+  EXPECT_NEAR(phantom::volume(bones.femur) / volume_by_rays("femur"), 1, 0.01);
   const double below = volume_by_rays("tibia") + volume_by_rays("fibula") + volume_by_rays("patella");
-  EXPECT_NEAR(volume(bones.tibia) / below, 1, 0.02);  // the fibula's head overlaps the tibia
+  EXPECT_NEAR(phantom::volume(bones.tibia) / below, 1, 0.02);  // the fibula's head overlaps the tibia
 }
 
 TEST(BoneMeshes, CoarseMeshesAreSmall) {
@@ -35,7 +35,8 @@ TEST(BoneMeshes, CoarseMeshesAreSmall) {
 
 TEST(BoneMeshes, MoveRigidly) {
   const BoneMeshes bones = bone_meshes(8);
-  const RigidTransform motion{Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()).toRotationMatrix(), {1, 2, 3}};
+  const geometry::RigidTransform motion{Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()).toRotationMatrix(),
+                                        {1, 2, 3}};
   const BoneMeshes there = moved(bones, motion);
   EXPECT_EQ(there.femur.corners[7], motion * bones.femur.corners[7]);
   EXPECT_EQ(there.tibia.triangles, bones.tibia.triangles);

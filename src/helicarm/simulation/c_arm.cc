@@ -61,7 +61,7 @@ TrueView named_view(const SimulationOptions& options, const ViewAngles& view, st
 /// middle of the cone: from its base the top of the spiral is outside the lateral image.
 std::vector<TrueView> paper_stand(const SimulationOptions& options) {
   const CArmModel model = model_of(Preset::paper_sim);
-  const ConicalHelix helix;
+  const phantom::ConicalHelix helix;
   const Vector3d middle(0, 0, 0.5 * helix.h * helix.t_end);
   const double pixel_mm = model.receiver_mm / options.size;
   const double f = model.source_detector_mm / pixel_mm;
@@ -71,8 +71,8 @@ std::vector<TrueView> paper_stand(const SimulationOptions& options) {
     TrueView true_view = named_view(options, view, static_cast<std::uint32_t>(true_views.size()));
     true_view.f_mm = true_view.nominal_f_mm = model.source_detector_mm;
     true_view.view.intrinsics = {f, f, 0.5 * options.size, 0.5 * options.size};
-    const Matrix3d rotation =
-        rotation_from_euler(view.angles.primary_deg * radian, view.angles.secondary_deg * radian, 0);
+    const Matrix3d rotation = geometry::rotation_from_euler(view.angles.primary_deg * radian,
+                                                            view.angles.secondary_deg * radian, 0);
     true_view.view.camera_from_world = {rotation,
                                         Vector3d(0, 0, model.source_isocentre_mm) - rotation * middle};
     true_view.detector = {options.size, options.size, pixel_mm, {}, {}};
@@ -94,8 +94,8 @@ Matrix3d pointing(const ArmAngles& angles) {
 
 }  // namespace
 
-View TrueView::stored_view() const {
-  View stored = view;
+geometry::View TrueView::stored_view() const {
+  geometry::View stored = view;
   if (mirrored) {
     stored.intrinsics.fx = -stored.intrinsics.fx;
     stored.intrinsics.u0 = detector.width - 1 - stored.intrinsics.u0;
@@ -114,7 +114,7 @@ Vector2d TrueView::raw_image(const Vector3d& point_in_calibrator) const {
 }
 
 std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_height_mm,
-                                 const RigidTransform& calibrator_from_patient) {
+                                 const geometry::RigidTransform& calibrator_from_patient) {
   if (options.c_arm_preset() == Preset::paper_sim) return paper_stand(options);
   const CArmModel model = model_of(options.c_arm_preset());
   const ArmFlex arm = draw_arm(options.arm_seed.value_or(options.seed), model, options.size);
@@ -137,7 +137,7 @@ std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_
     true_view.view.intrinsics = {true_view.f_mm / pixel_mm, true_view.f_mm / pixel_mm, centre.x(),
                                  centre.y()};
     const Matrix3d rotation = turn(state.roll_deg, Vector3d::UnitZ()) * unbent;
-    const RigidTransform camera_from_patient{
+    const geometry::RigidTransform camera_from_patient{
         rotation, Vector3d(0, 0, model.source_isocentre_mm) - state.source_mm - rotation * isocentre};
     true_view.view.camera_from_world = camera_from_patient * calibrator_from_patient.inverse();
 

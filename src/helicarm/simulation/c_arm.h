@@ -16,11 +16,11 @@ namespace helicarm::simulation {
 struct TrueView {
   std::string name;
   std::uint32_t number = 0;  ///< in the case, from 0
-  View view;                 ///< projects to ideal pixels before mirroring; world = calibrator
+  geometry::View view;       ///< projects to ideal pixels before mirroring; world = calibrator
   VirtualDetector detector;
   Imaging imaging;
-  RigidTransform camera_from_plate;  ///< origin in the plate's plane
-  bool mirrored = false;             ///< the stored image is flipped left to right
+  geometry::RigidTransform camera_from_plate;  ///< origin in the plate's plane
+  bool mirrored = false;                       ///< the stored image is flipped left to right
   double f_mm = 0;
   double nominal_f_mm = 0;  ///< value in the tag
   ArmAngles true_angles;
@@ -29,7 +29,7 @@ struct TrueView {
 
   double pixel_mm() const { return detector.pixel_mm; }
   /// View with the K of the stored image: fx < 0 if it is mirrored.
-  View stored_view() const;
+  geometry::View stored_view() const;
   /// Pixels of the stored image, mirrored or not.
   Eigen::Vector2d ideal_image(const Eigen::Vector3d& point_in_calibrator) const;
   Eigen::Vector2d raw_image(const Eigen::Vector3d& point_in_calibrator) const;
@@ -39,6 +39,6 @@ struct TrueView {
 /// share its flex and distortion except for a small random part. For paper_sim exactly the poses of 2.3.3
 /// about the middle of the cone.
 std::vector<TrueView> take_stand(const SimulationOptions& options, double plate_height_mm,
-                                 const RigidTransform& calibrator_from_patient);
+                                 const geometry::RigidTransform& calibrator_from_patient);
 
 }  // namespace helicarm::simulation

@@ -22,16 +22,16 @@ Solid cone(const ConeWall& wall, double bottom, double top, double offset) {
   return frustum({0, 0, bottom}, {0, 0, top}, wall.radius_at(bottom) + offset, wall.radius_at(top) + offset);
 }
 
-double wire_length(const CalibratorTarget& target) {
+double wire_length(const phantom::CalibratorTarget& target) {
   return target.length_mm > 0 ? target.length_mm : wire_length_mm;
 }
 
 /// Half of the wire to the end that faces this one, or its given length if there is none.
-Solid wire_from(const CalibratorTarget& end, const std::vector<CalibratorTarget>& targets) {
+Solid wire_from(const phantom::CalibratorTarget& end, const std::vector<phantom::CalibratorTarget>& targets) {
   const Vector3d& into = end.directions.front();
   double length = wire_length(end);
-  for (const CalibratorTarget& other : targets) {
-    if (other.kind != TargetKind::line_end || other.name == end.name) continue;
+  for (const phantom::CalibratorTarget& other : targets) {
+    if (other.kind != phantom::TargetKind::line_end || other.name == end.name) continue;
     const Vector3d gap = other.point_in_calibrator - end.point_in_calibrator;
     if (gap.dot(into) > 0 && gap.cross(into).norm() < 0.1 && other.directions.front().dot(into) < -0.99)
       length = 0.5 * gap.dot(into);
@@ -39,10 +39,11 @@ Solid wire_from(const CalibratorTarget& end, const std::vector<CalibratorTarget>
   return cylinder(end.point_in_calibrator, end.point_in_calibrator + length * into, 0.5 * end.diameter_mm);
 }
 
-Body target_body(const CalibratorTarget& target, const std::vector<CalibratorTarget>& all) {
+Body target_body(const phantom::CalibratorTarget& target, const std::vector<phantom::CalibratorTarget>& all) {
   const Vector3d& at = target.point_in_calibrator;
-  if (target.kind == TargetKind::ball) return steel(target.name, {sphere(at, 0.5 * target.diameter_mm)});
-  if (target.kind == TargetKind::line_end) return steel(target.name, {wire_from(target, all)});
+  if (target.kind == phantom::TargetKind::ball)
+    return steel(target.name, {sphere(at, 0.5 * target.diameter_mm)});
+  if (target.kind == phantom::TargetKind::line_end) return steel(target.name, {wire_from(target, all)});
   std::vector<Solid> wires;
   for (const Vector3d& axis : target.directions) {
     const Vector3d half = 0.5 * wire_length(target) * axis;
@@ -53,11 +54,11 @@ Body target_body(const CalibratorTarget& target, const std::vector<CalibratorTar
 
 }  // namespace
 
-ConeWall cone_wall(const Calibrator& calibrator) {
+ConeWall cone_wall(const phantom::Calibrator& calibrator) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   Vector2d mean = Vector2d::Zero();  // of z and radius
-  for (const CalibratorBall& ball : calibrator.balls) {
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
     const Vector3d& centre = ball.centre_in_calibrator;
     low = std::min(low, centre.z());
     high = std::max(high, centre.z());
@@ -65,7 +66,7 @@ ConeWall cone_wall(const Calibrator& calibrator) {
   }
   double squares = 0;
   double products = 0;
-  for (const CalibratorBall& ball : calibrator.balls) {
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
     const double dz = ball.centre_in_calibrator.z() - mean.x();
     squares += dz * dz;
     products += dz * (ball.centre_in_calibrator.head<2>().norm() - mean.y());
@@ -74,37 +75,37 @@ ConeWall cone_wall(const Calibrator& calibrator) {
   return {mean.y() - slope * mean.x(), slope, low - 6, high + 8};
 }
 
-std::vector<CalibratorTarget> check_targets(const Calibrator& calibrator) {
+std::vector<phantom::CalibratorTarget> check_targets(const phantom::Calibrator& calibrator) {
   const ConeWall wall = cone_wall(calibrator);
   const auto cross = [&](std::string name, double azimuth_deg, double z) {
     const double azimuth = azimuth_deg * EIGEN_PI / 180;
     const Vector3d outward(std::cos(azimuth), std::sin(azimuth), 0);
     const Vector3d along(-std::sin(azimuth), std::cos(azimuth), 0);
     const Vector3d up = (wall.slope * outward + Vector3d::UnitZ()).normalized();
-    return CalibratorTarget{std::move(name),
-                            wall.radius_at(z) * outward + z * Vector3d::UnitZ(),
-                            TargetKind::cross,
-                            2,
-                            {(along + up).normalized(), (along - up).normalized()},
-                            wire_length_mm};
+    return phantom::CalibratorTarget{std::move(name),
+                                     wall.radius_at(z) * outward + z * Vector3d::UnitZ(),
+                                     phantom::TargetKind::cross,
+                                     2,
+                                     {(along + up).normalized(), (along - up).normalized()},
+                                     wire_length_mm};
   };
   const double on_top = wall.top_mm + disc_mm + 1;
   const Vector3d from(-14, 9, on_top);
   const Vector3d to(12, 15, on_top);
   const Vector3d axis = (to - from).normalized();
   const double length = (to - from).norm();
-  return {{"T1", {3, -4, 44}, TargetKind::ball, 3, {}, 0},
+  return {{"T1", {3, -4, 44}, phantom::TargetKind::ball, 3, {}, 0},
           cross("T2", 75, 30),
           cross("T3", 255, 52),
-          {"T4", from, TargetKind::line_end, 2, {axis}, length},
-          {"T5", to, TargetKind::line_end, 2, {-axis}, length}};
+          {"T4", from, phantom::TargetKind::line_end, 2, {axis}, length},
+          {"T5", to, phantom::TargetKind::line_end, 2, {-axis}, length}};
 }
 
-Scene calibrator_body(const Calibrator& calibrator) {
+Scene calibrator_body(const phantom::Calibrator& calibrator) {
   Scene scene;
-  for (const CalibratorBall& ball : calibrator.balls)
+  for (const phantom::CalibratorBall& ball : calibrator.balls)
     scene.push_back(steel(ball.label, {sphere(ball.centre_in_calibrator, 0.5 * ball.diameter_mm)}));
-  for (const CalibratorTarget& target : calibrator.targets)
+  for (const phantom::CalibratorTarget& target : calibrator.targets)
     scene.push_back(target_body(target, calibrator.targets));
 
   const ConeWall wall = cone_wall(calibrator);
@@ -118,8 +119,8 @@ Scene calibrator_body(const Calibrator& calibrator) {
                    {cone(wall, wall.bottom_mm, wall.top_mm, -half_wall_mm),
                     cylinder({0, 0, wall.bottom_mm - 4}, {0, 0, wall.bottom_mm}, foot - half_wall_mm)},
                    -material::plastic});
-  for (const CalibratorTarget& target : calibrator.targets)
-    if (target.kind == TargetKind::ball) {
+  for (const phantom::CalibratorTarget& target : calibrator.targets)
+    if (target.kind == phantom::TargetKind::ball) {
       const Vector3d& at = target.point_in_calibrator;
       scene.push_back({"post", {cylinder(at, {at.x(), at.y(), wall.top_mm}, 2.5)}, material::plastic});
     }
@@ -128,8 +129,9 @@ Scene calibrator_body(const Calibrator& calibrator) {
 
 std::string plate_dot_name(std::size_t index) { return fmt::format("plate {}", index); }
 
-Scene plate_body(const Plate& plate, const RigidTransform& camera_from_plate, const View& view) {
-  const RigidTransform world_from_plate = view.camera_from_world.inverse() * camera_from_plate;
+Scene plate_body(const phantom::Plate& plate, const geometry::RigidTransform& camera_from_plate,
+                 const geometry::View& view) {
+  const geometry::RigidTransform world_from_plate = view.camera_from_world.inverse() * camera_from_plate;
   Scene scene;
   for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
     const Vector3d centre(plate.dots_mm[i].x(), plate.dots_mm[i].y(), 0);

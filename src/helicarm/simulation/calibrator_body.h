@@ -23,19 +23,20 @@ struct ConeWall {
 };
 
 /// Least squares through the balls, from 6 mm below the lowest to 8 mm above the highest.
-ConeWall cone_wall(const Calibrator& calibrator);
+ConeWall cone_wall(const phantom::Calibrator& calibrator);
 
 /// Check targets as in the paper's 3.2: a 3 mm ball on a post, two wire crosses on the wall, the two ends of
 /// one wire on the top.
-std::vector<CalibratorTarget> check_targets(const Calibrator& calibrator);
+std::vector<phantom::CalibratorTarget> check_targets(const phantom::Calibrator& calibrator);
 
 /// The manufactured calibrator: steel balls and targets, plastic cone, flange, top disc and posts.
-Scene calibrator_body(const Calibrator& calibrator);
+Scene calibrator_body(const phantom::Calibrator& calibrator);
 
 /// Name of the body of a plate dot.
 std::string plate_dot_name(std::size_t index);
 
 /// The plate's balls on the receiver. `camera_from_plate` has its origin in the plate's plane.
-Scene plate_body(const Plate& plate, const RigidTransform& camera_from_plate, const View& view);
+Scene plate_body(const phantom::Plate& plate, const geometry::RigidTransform& camera_from_plate,
+                 const geometry::View& view);
 
 }  // namespace helicarm::simulation

@@ -15,13 +15,13 @@ const Attenuation water{0.02683, 0.02059, 0.01837};
 constexpr double bone_hu = 1600;
 constexpr double air_hu = -800;
 
-constexpr Ramp water_ramp{1, 1e-3, 0, 1, air_hu};
-constexpr Ramp bone_ramp{0, 1 / bone_hu, 0, 1e30, air_hu};
+constexpr volume::Ramp water_ramp{1, 1e-3, 0, 1, air_hu};
+constexpr volume::Ramp bone_ramp{0, 1 / bone_hu, 0, 1e30, air_hu};
 
 }  // namespace
 
-RigidTransform knee_from_patient(const CtOptions& options) {
-  RigidTransform placed;
+geometry::RigidTransform knee_from_patient(const CtOptions& options) {
+  geometry::RigidTransform placed;
   placed.rotation << 0, 0, -1, 1, 0, 0, 0, -1, 0;
   const Eigen::Vector3d turn = options.turn_deg * (EIGEN_PI / 180);
   placed.rotation = (Eigen::AngleAxisd(turn.z(), Eigen::Vector3d::UnitZ()) *
@@ -33,7 +33,7 @@ RigidTransform knee_from_patient(const CtOptions& options) {
   return placed;
 }
 
-CtBody::CtBody(const CtOptions& options, const RigidTransform& world_from_knee, unsigned threads)
+CtBody::CtBody(const CtOptions& options, const geometry::RigidTransform& world_from_knee, unsigned threads)
     : patient_from_world_((world_from_knee * knee_from_patient(options)).inverse()),
       water_(options.volume, water_ramp, threads),
       bone_(options.volume, bone_ramp, threads) {}

@@ -40,7 +40,7 @@ TEST(CtBody, AirWaterAndBoneAttenuateAsTabulated) {
 TEST(CtBody, SupineLeftKneeIsOrientedDistalLateralAnterior) {
   CtOptions ct = block(0);
   ct.centre = Vector3d(1, 2, 3);
-  const RigidTransform placed = knee_from_patient(ct);
+  const geometry::RigidTransform placed = knee_from_patient(ct);
   EXPECT_TRUE((placed * Vector3d(1, 2, 3)).isZero(1e-12));
   EXPECT_TRUE((placed * Vector3d(1, 2, -7)).isApprox(Vector3d(10, 0, 0)));  // to the feet
   EXPECT_TRUE((placed * Vector3d(11, 2, 3)).isApprox(Vector3d(0, 10, 0)));  // to the left

@@ -16,18 +16,19 @@ namespace {
 /// Logarithmic images: this fraction of the open beam is black.
 constexpr double floor_signal = 0.004;
 
-void blur(Image<float>& image, double sigma_px) {
+void blur(image::Image<float>& image, double sigma_px) {
   if (sigma_px <= 0) return;
-  cv::Mat mat = as_mat(image);
+  cv::Mat mat = image::as_mat(image);
   cv::GaussianBlur(mat, mat, {}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
 }
 
 /// Wide blur on a coarse grid: scatter has no detail.
-void add_scatter(Image<float>& image, double fraction, double sigma_px) {
+void add_scatter(image::Image<float>& image, double fraction, double sigma_px) {
   if (fraction <= 0) return;
   constexpr int coarse = 16;
   cv::Mat small;
-  cv::resize(as_mat(image), small, {image.width() / coarse, image.height() / coarse}, 0, 0, cv::INTER_AREA);
+  cv::resize(image::as_mat(image), small, {image.width() / coarse, image.height() / coarse}, 0, 0,
+             cv::INTER_AREA);
   cv::GaussianBlur(small, small, {}, sigma_px / coarse, sigma_px / coarse, cv::BORDER_CONSTANT);
   cv::Mat scatter;
   cv::resize(small, scatter, {image.width(), image.height()}, 0, 0, cv::INTER_CUBIC);
@@ -37,7 +38,7 @@ void add_scatter(Image<float>& image, double fraction, double sigma_px) {
         image(u, v) += static_cast<float>(fraction) * std::max(0.0f, scatter.at<float>(v, u));
 }
 
-void darken_towards_the_edge(Image<float>& image, double vignette, double radius_px) {
+void darken_towards_the_edge(image::Image<float>& image, double vignette, double radius_px) {
   const double u0 = 0.5 * (image.width() - 1);
   const double v0 = 0.5 * (image.height() - 1);
   for (int v = 0; v < image.height(); ++v)
@@ -47,7 +48,7 @@ void darken_towards_the_edge(Image<float>& image, double vignette, double radius
     }
 }
 
-double mean_of_the_field(const Image<float>& image) {
+double mean_of_the_field(const image::Image<float>& image) {
   double sum = 0;
   std::size_t count = 0;
   for (float pixel : image.pixels())
@@ -73,7 +74,7 @@ double poisson(double mean, RandomStream& random) {
 
 }  // namespace
 
-Light illuminate(const Image<float>& signal, const Imaging& imaging) {
+Light illuminate(const image::Image<float>& signal, const Imaging& imaging) {
   Light light{signal, 0};
   blur(light.level, imaging.focus_sigma_px);
   add_scatter(light.level, imaging.scatter_fraction, imaging.scatter_sigma_px);
@@ -81,8 +82,8 @@ Light illuminate(const Image<float>& signal, const Imaging& imaging) {
   return light;
 }
 
-Image<std::uint16_t> detector_response(const Image<float>& signal, const Imaging& imaging, std::uint64_t seed,
-                                       std::uint32_t stream, unsigned threads) {
+image::Image<std::uint16_t> detector_response(const image::Image<float>& signal, const Imaging& imaging,
+                                              std::uint64_t seed, std::uint32_t stream, unsigned threads) {
   auto [light, quanta_of_open_beam] = illuminate(signal, imaging);
   const double quanta = quanta_of_open_beam;  // a structured binding cannot be captured
   const auto rows = static_cast<std::size_t>(light.height());
@@ -96,7 +97,7 @@ Image<std::uint16_t> detector_response(const Image<float>& signal, const Imaging
   darken_towards_the_edge(light, imaging.vignette, imaging.field_radius_px);
 
   const double highest = (1 << imaging.bits) - 1;
-  Image<std::uint16_t> grey(light.width(), light.height());
+  image::Image<std::uint16_t> grey(light.width(), light.height());
   parallel_for(rows, threads, [&](std::size_t row) {
     RandomStream random(seed, stream + 1, row);
     const int v = static_cast<int>(row);

@@ -24,22 +24,22 @@ struct Imaging {
 
 /// Expected light on the screen.
 struct Light {
-  Image<float> level;  ///< open beam, without scatter = 1
-  double quanta;       ///< per pixel at level 1
+  image::Image<float> level;  ///< open beam, without scatter = 1
+  double quanta;              ///< per pixel at level 1
 };
 
 /// Adds the focal spot's penumbra and scatter to a noise-free image (open beam = 1).
-Light illuminate(const Image<float>& signal, const Imaging& imaging);
+Light illuminate(const image::Image<float>& signal, const Imaging& imaging);
 
 /// Grey values of a noise-free image (open beam = 1). `stream` separates views of one seed. The result does
 /// not depend on `threads` (0: all cores).
-Image<std::uint16_t> detector_response(const Image<float>& signal, const Imaging& imaging, std::uint64_t seed,
-                                       std::uint32_t stream, unsigned threads = 0);
+image::Image<std::uint16_t> detector_response(const image::Image<float>& signal, const Imaging& imaging,
+                                              std::uint64_t seed, std::uint32_t stream, unsigned threads = 0);
 
 /// Mirrors the image left to right.
 template <class T>
-Image<T> mirrored(const Image<T>& image) {
-  Image<T> mirror(image.width(), image.height());
+image::Image<T> mirrored(const image::Image<T>& image) {
+  image::Image<T> mirror(image.width(), image.height());
   for (int v = 0; v < image.height(); ++v)
     for (int u = 0; u < image.width(); ++u) mirror(u, v) = image(image.width() - 1 - u, v);
   return mirror;

@@ -22,7 +22,7 @@ Imaging plain() {
   return imaging;
 }
 
-bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
+bool same(const image::Image<std::uint16_t>& a, const image::Image<std::uint16_t>& b) {
   return std::equal(a.pixels().begin(), a.pixels().end(), b.pixels().begin(), b.pixels().end());
 }
 
@@ -32,7 +32,8 @@ TEST_P(QuantumNoise, VarianceAndMeanFollowPoisson) {
   Imaging imaging = plain();
   imaging.quanta_per_pixel = GetParam();
   imaging.open_level = 0.1;  // headroom for the largest count
-  const Image<std::uint16_t> grey = detector_response(Image<float>(256, 256, 1.0f), imaging, 3, 0);
+  const image::Image<std::uint16_t> grey =
+      detector_response(image::Image<float>(256, 256, 1.0f), imaging, 3, 0);
   const double unit = 0.1 * 65535 / GetParam();  // grey levels per quantum
   double sum = 0;
   double squares = 0;
@@ -50,7 +51,7 @@ TEST_P(QuantumNoise, VarianceAndMeanFollowPoisson) {
 INSTANTIATE_TEST_SUITE_P(FewAndMany, QuantumNoise, testing::Values(4.0, 30.0, 50.0, 1000.0));
 
 TEST(DetectorResponse, ReproducibleFromTheSeedForAnyNumberOfThreads) {
-  const Image<float> signal(64, 48, 0.5f);
+  const image::Image<float> signal(64, 48, 0.5f);
   const Imaging imaging;
   const auto one = detector_response(signal, imaging, 7, 0, 1);
   EXPECT_TRUE(same(one, detector_response(signal, imaging, 7, 0, 2)));
@@ -63,7 +64,8 @@ TEST(DetectorResponse, OverexposureIsWhiteAtEveryBitDepth) {
     Imaging imaging = plain();
     imaging.bits = bits;
     imaging.open_level = 1.5;
-    const Image<std::uint16_t> grey = detector_response(Image<float>(16, 16, 1.0f), imaging, 1, 0);
+    const image::Image<std::uint16_t> grey =
+        detector_response(image::Image<float>(16, 16, 1.0f), imaging, 1, 0);
     for (std::uint16_t pixel : grey.pixels()) EXPECT_EQ(pixel, (1 << bits) - 1);
   }
 }
@@ -72,7 +74,7 @@ TEST(DetectorResponse, LogarithmMapsEqualFactorsToEqualSteps) {
   Imaging imaging = plain();
   imaging.logarithmic = true;
   imaging.quanta_per_pixel = 1e9;
-  Image<float> steps(48, 16, 1.0f);
+  image::Image<float> steps(48, 16, 1.0f);
   for (int v = 0; v < 16; ++v)
     for (int u = 16; u < 48; ++u) steps(u, v) = u < 32 ? 0.2f : 0.04f;
   const auto grey = detector_response(steps, imaging, 1, 0);
@@ -85,7 +87,7 @@ TEST(DetectorResponse, ScatterAddsTheFractionOfTheSurroundings) {
   imaging.quanta_per_pixel = 1e9;
   imaging.scatter_fraction = 0.1;
   imaging.scatter_sigma_px = 40;
-  Image<float> signal(512, 512, 0.5f);
+  image::Image<float> signal(512, 512, 0.5f);
   for (int v = 252; v < 260; ++v)
     for (int u = 252; u < 260; ++u) signal(u, v) = 0.01f;
   const auto grey = detector_response(signal, imaging, 1, 0);
@@ -93,7 +95,7 @@ TEST(DetectorResponse, ScatterAddsTheFractionOfTheSurroundings) {
 }
 
 TEST(Mirrored, TwiceIsTheIdentityAndOnceSwapsTheColumns) {
-  Image<std::uint16_t> image(5, 2);
+  image::Image<std::uint16_t> image(5, 2);
   for (std::size_t i = 0; i < 10; ++i) image.pixels()[i] = static_cast<std::uint16_t>(i);
   const auto mirror = mirrored(image);
   EXPECT_EQ(mirror(0, 1), image(4, 1));

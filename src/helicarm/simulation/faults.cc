@@ -28,8 +28,9 @@ Body screw(const Vector3d& tip, const Vector3d& axis, double length) {
 
 }  // namespace
 
-Scene stray_metal(const SimulationOptions& options, const Calibrator& calibrator,
-                  const std::vector<TrueView>& true_views, const RigidTransform& calibrator_from_knee) {
+Scene stray_metal(const SimulationOptions& options, const phantom::Calibrator& calibrator,
+                  const std::vector<TrueView>& true_views,
+                  const geometry::RigidTransform& calibrator_from_knee) {
   RandomStream random(options.seed, stream::faults);
   Scene scene;
   if (options.has(Fault::decoys))
@@ -57,7 +58,7 @@ Scene shutter_leaves(const SimulationOptions& options, const TrueView& true_view
   const double field_mm = 0.5 * true_view.pixel_mm() * true_view.detector.width;
   constexpr double depth_mm = 100;
   const double scale = depth_mm / true_view.f_mm;
-  const RigidTransform world_from_camera = true_view.view.camera_from_world.inverse();
+  const geometry::RigidTransform world_from_camera = true_view.view.camera_from_world.inverse();
   const double reach = field_mm * scale * 2;
   Scene leaves;
   for (int side : {-1, 1}) {

@@ -14,11 +14,11 @@ namespace {
 using Eigen::Vector3d;
 
 /// Random pose around a position in the tracker's frame, with an orientation visible to the tracker.
-RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
-                         RandomStream& random) {
+geometry::RigidTransform somewhere(const TrackedBody& body, const Vector3d& place, double spread_mm,
+                                   RandomStream& random) {
   for (;;) {
-    const RigidTransform pose{random_rotation(random),
-                              place + random_motion(random, 0, spread_mm).translation};
+    const geometry::RigidTransform pose{random_rotation(random),
+                                        place + random_motion(random, 0, spread_mm).translation};
     if (pose_covariance(virtual_tracker(), body, pose)) return pose;
   }
 }
@@ -79,13 +79,14 @@ TrackerModel virtual_tracker() {
   return model;
 }
 
-NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& calibrator_from_knee) {
+NavigationTruth set_up_navigation(std::uint64_t seed, const geometry::RigidTransform& calibrator_from_knee) {
   RandomStream random(seed, stream::tracker);
   NavigationTruth truth;
   std::map<std::string, TrackedBody> bodies;
   for (const char* frame : {"femur", "tibia", "tool"}) bodies[frame] = marker_array();
   bodies["calibrator"] = calibrator_markers();
-  const RigidTransform tracker_from_calibrator = somewhere(bodies["calibrator"], {-80, -60, 900}, 40, random);
+  const geometry::RigidTransform tracker_from_calibrator =
+      somewhere(bodies["calibrator"], {-80, -60, 900}, 40, random);
   // Markers on both bones at a distance from the joint, the tool beside the knee.
   truth.tracker_from["calibrator"] = tracker_from_calibrator;
   const auto beside = [&](const char* frame, const Vector3d& in_calibrator, double spread_mm) {
@@ -97,7 +98,8 @@ NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& cali
   beside("tool", {80, -220, 160}, 30);
   read_poses(truth, bodies, seed);
 
-  const RigidTransform tool_from_calibrator = truth.tracker_from["tool"].inverse() * tracker_from_calibrator;
+  const geometry::RigidTransform tool_from_calibrator =
+      truth.tracker_from["tool"].inverse() * tracker_from_calibrator;
   const auto add = [&](const char* name, const char* bone, const Vector3d& in_knee) {
     const Vector3d in_calibrator = calibrator_from_knee * in_knee;
     const Vector3d in_bone = truth.tracker_from[bone].inverse() * (tracker_from_calibrator * in_calibrator);

@@ -47,14 +47,15 @@ inline constexpr double tracker_rate_hz = 60;
 struct NavigationTruth {
   double sigma_mm = 0;  ///< of a reading per axis: rms over axes and bodies
   double sigma_deg = 0;
-  std::map<std::string, RigidTransform> tracker_from;  ///< true
-  std::map<std::string, RigidTransform> read;  ///< one reading is used for every view and for the present
+  std::map<std::string, geometry::RigidTransform> tracker_from;  ///< true
+  std::map<std::string, geometry::RigidTransform>
+      read;                                    ///< one reading is used for every view and for the present
   std::map<std::string, Matrix6d> covariance;  ///< of `read`, in the convention of pose_covariance
   std::vector<TunnelPoint> points;
   std::vector<ToolLine> lines;
 };
 
-NavigationTruth set_up_navigation(std::uint64_t seed, const RigidTransform& calibrator_from_knee);
+NavigationTruth set_up_navigation(std::uint64_t seed, const geometry::RigidTransform& calibrator_from_knee);
 
 /// Distance of a point from the line through two others.
 double distance_to_line(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b);

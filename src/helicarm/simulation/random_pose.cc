@@ -7,14 +7,14 @@ namespace helicarm::simulation {
 
 using Eigen::Vector3d;
 
-RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm) {
+geometry::RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm) {
   Vector3d spin;
   Vector3d shift;
   for (int axis = 0; axis < 3; ++axis) {
     spin[axis] = sigma_deg * radian * random.normal();
     shift[axis] = sigma_mm * random.normal();
   }
-  return {rotation_from_vector(spin), shift};
+  return {geometry::rotation_from_vector(spin), shift};
 }
 
 Eigen::Matrix3d random_rotation(RandomStream& random) {

@@ -9,7 +9,7 @@ namespace helicarm::simulation {
 inline constexpr double radian = EIGEN_PI / 180;
 
 /// Rotation of normal spread (deg) and translation of normal spread (mm) per axis.
-RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm);
+geometry::RigidTransform random_motion(RandomStream& random, double sigma_deg, double sigma_mm);
 
 /// Uniform random rotation.
 Eigen::Matrix3d random_rotation(RandomStream& random);

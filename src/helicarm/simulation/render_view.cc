@@ -32,7 +32,7 @@ struct Bounds {
 const Bounds everywhere{Bounds{}.high, Bounds{}.low};
 
 /// A rectangle of ideal pixels that contains the solid's shadow.
-Bounds shadow(const Solid& solid, const View& view) {
+Bounds shadow(const Solid& solid, const geometry::View& view) {
   Bounds bounds;
   for (const Vector3d& corner : solid.corners()) {
     if (view.depth(corner) <= 1) return everywhere;
@@ -70,7 +70,7 @@ RayRange lit_range(const std::vector<double>& weight) {
 
 class RayTracer {
  public:
-  RayTracer(const Scene& scene, const VirtualDetector& detector, const View& view, const CtBody* ct)
+  RayTracer(const Scene& scene, const VirtualDetector& detector, const geometry::View& view, const CtBody* ct)
       : scene_(scene), detector_(detector), ct_(ct), source_(view.source_in_world()) {
     direction_from_pixel_ = view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
     for (const Body& body : scene) {
@@ -180,7 +180,7 @@ class RayTracer {
   std::vector<std::vector<Bounds>> bounds_;  ///< for each body's solids
 };
 
-bool at_edge(const Image<float>& metal, int u, int v) {
+bool at_edge(const image::Image<float>& metal, int u, int v) {
   const float here = metal(u, v);
   for (int row = std::max(v - 1, 0); row <= std::min(v + 1, metal.height() - 1); ++row)
     for (int column = std::max(u - 1, 0); column <= std::min(u + 1, metal.width() - 1); ++column)
@@ -196,11 +196,11 @@ double field_weight(const VirtualDetector& detector, const Vector2d& raw) {
   return std::clamp(inside + 0.5, 0.0, 1.0);
 }
 
-Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
-                         unsigned threads, const CtBody* ct) {
+image::Image<float> render_view(const Scene& scene, const VirtualDetector& detector,
+                                const geometry::View& view, unsigned threads, const CtBody* ct) {
   const RayTracer tracer(scene, detector, view, ct);
-  Image<float> image(detector.width, detector.height);
-  Image<float> metal(detector.width, detector.height);
+  image::Image<float> image(detector.width, detector.height);
+  image::Image<float> metal(detector.width, detector.height);
   const auto rows = static_cast<std::size_t>(detector.height);
   parallel_for(rows, threads, [&](std::size_t row) {
     const int v = static_cast<int>(row);

@@ -26,8 +26,8 @@ struct VirtualDetector {
 /// (no resampling); pixels at the edge of metal average 3 x 3 rays. `view`: ideal pixels, world = the scene's
 /// frame, not mirrored. `ct`, if any, is also in the beam; the source must be outside it. The result does not
 /// depend on `threads` (0: all cores).
-Image<float> render_view(const Scene& scene, const VirtualDetector& detector, const View& view,
-                         unsigned threads = 0, const CtBody* ct = nullptr);
+image::Image<float> render_view(const Scene& scene, const VirtualDetector& detector,
+                                const geometry::View& view, unsigned threads = 0, const CtBody* ct = nullptr);
 
 /// 1 inside the field, 0 outside, a one-pixel ramp at its edge; 1 everywhere if there is no round field.
 double field_weight(const VirtualDetector& detector, const Eigen::Vector2d& raw);

@@ -29,7 +29,7 @@ VirtualDetector small_detector() {
   return detector;
 }
 
-View straight_view(const VirtualDetector& detector) {
+geometry::View straight_view(const VirtualDetector& detector) {
   const double f_px = f_mm / detector.pixel_mm;
   return {{f_px, f_px, 63.3, 47.6}, {Eigen::Matrix3d::Identity(), {0, 0, depth_mm}}};
 }
@@ -39,20 +39,20 @@ Body grey(Solid solid, double per_mm, bool metal = false) {
   return {"grey", {std::move(solid)}, Attenuation::Constant(per_mm), metal};
 }
 
-double path(const Image<float>& image, int u, int v, double per_mm) {
+double path(const image::Image<float>& image, int u, int v, double per_mm) {
   return -std::log(image(u, v)) / per_mm;
 }
 
 TEST(RenderView, EmptySceneIsTheOpenBeam) {
   const VirtualDetector detector = small_detector();
-  const Image<float> image = render_view({}, detector, straight_view(detector), 1);
+  const image::Image<float> image = render_view({}, detector, straight_view(detector), 1);
   for (float pixel : image.pixels()) EXPECT_FLOAT_EQ(pixel, 1);
 }
 
 TEST(RenderView, BallChordFollowsTheClosedFormFromCentreToEdge) {
   const VirtualDetector detector = small_detector();
-  const View view = straight_view(detector);
-  const Image<float> image = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
+  const geometry::View view = straight_view(detector);
+  const image::Image<float> image = render_view({grey(sphere({0, 0, 0}, 5), 0.02)}, detector, view, 1);
   for (int u = 0; u < detector.width; ++u) {
     const Vector3d ray((u - view.intrinsics.u0) / view.intrinsics.fx,
                        (48 - view.intrinsics.v0) / view.intrinsics.fy, 1);
@@ -63,9 +63,10 @@ TEST(RenderView, BallChordFollowsTheClosedFormFromCentreToEdge) {
 
 TEST(RenderView, AbsorbedMassOfABallIsItsVolume) {
   const VirtualDetector detector = small_detector();
-  const View view = straight_view(detector);
+  const geometry::View view = straight_view(detector);
   constexpr double radius = 4;
-  const Image<float> image = render_view({grey(sphere({0, 0, 0}, radius), 0.05, true)}, detector, view, 1);
+  const image::Image<float> image =
+      render_view({grey(sphere({0, 0, 0}, radius), 0.05, true)}, detector, view, 1);
   double sum = 0;
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) sum += path(image, u, v, 0.05);
@@ -76,11 +77,11 @@ TEST(RenderView, AbsorbedMassOfABallIsItsVolume) {
 
 TEST(RenderView, SteelBallCentroidIsTheCentreOfItsProjectedEllipse) {
   VirtualDetector detector = small_detector();
-  View view = straight_view(detector);
+  geometry::View view = straight_view(detector);
   view.intrinsics.u0 = -400;  // the ball is 5 degrees off the axis
   constexpr double radius = 2;
   const Vector3d centre((63.4 + 400) / view.intrinsics.fx * depth_mm, 0.31, 0);
-  const Image<float> image = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
+  const image::Image<float> image = render_view({grey(sphere(centre, radius), 3, true)}, detector, view, 1);
   // The outline is the conic K (c c' - (c.c - r^2) I) K'; its centre follows from the last column of its
   // dual.
   const Vector3d c = view.camera_from_world * centre;
@@ -105,9 +106,9 @@ TEST(RenderView, DistortionMovesTheBallByItsInverse) {
   detector.distortion.radius_px = 64;
   detector.distortion.k1 = -0.03;
   detector.distortion.shift_px = {4, -3};
-  const View view = straight_view(detector);
+  const geometry::View view = straight_view(detector);
   const Vector3d centre(2.1, -1.3, 0);
-  const Image<float> image = render_view({grey(sphere(centre, 1), 3, true)}, detector, view, 1);
+  const image::Image<float> image = render_view({grey(sphere(centre, 1), 3, true)}, detector, view, 1);
   Vector2d sum(0, 0);
   double weight = 0;
   for (int v = 0; v < detector.height; ++v)
@@ -121,7 +122,7 @@ TEST(RenderView, DistortionMovesTheBallByItsInverse) {
 TEST(RenderView, NestedShellIsTheDifferenceOfItsTwoChords) {
   const VirtualDetector detector = small_detector();
   const Scene shell = {grey(sphere({0, 0, 0}, 6), 0.05), grey(sphere({0, 0, 0}, 5), -0.05)};
-  const View view = straight_view(detector);
+  const geometry::View view = straight_view(detector);
   EXPECT_NEAR(transmission(shell, view.source_in_world(), {0, 0, 1}), std::exp(-0.05 * 2), 1e-12);
   EXPECT_NEAR(render_view(shell, detector, view, 1)(63, 48), std::exp(-0.05 * 2), 1e-4);
 }
@@ -130,7 +131,7 @@ TEST(RenderView, RoundFieldIsBlackOutsideAndUnchangedInside) {
   VirtualDetector detector = small_detector();
   detector.distortion.centre_px = {64, 48};
   detector.field_radius_px = 40;
-  const Image<float> image = render_view({}, detector, straight_view(detector), 1);
+  const image::Image<float> image = render_view({}, detector, straight_view(detector), 1);
   EXPECT_EQ(image(64 + 42, 48), 0);
   EXPECT_EQ(image(0, 0), 0);
   EXPECT_EQ(image(64 + 38, 48), 1);
@@ -140,7 +141,8 @@ TEST(RenderView, RoundFieldIsBlackOutsideAndUnchangedInside) {
 }
 
 /// Reference: every ray through every body.
-Image<float> render_by_brute_force(const Scene& scene, const VirtualDetector& detector, const View& view) {
+image::Image<float> render_by_brute_force(const Scene& scene, const VirtualDetector& detector,
+                                          const geometry::View& view) {
   const Vector3d source = view.source_in_world();
   const auto ray = [&](double u, double v) -> Vector3d {
     const Vector2d ideal = detector.distortion.ideal_from_raw({u, v});
@@ -156,10 +158,10 @@ Image<float> render_by_brute_force(const Scene& scene, const VirtualDetector& de
       if (body.metal) path += union_length(body.solids, source, ray(u, v));
     return path;
   };
-  Image<float> paths(detector.width, detector.height);
+  image::Image<float> paths(detector.width, detector.height);
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) paths(u, v) = static_cast<float>(metal(u, v));
-  Image<float> image(detector.width, detector.height);
+  image::Image<float> image(detector.width, detector.height);
   for (int v = 0; v < detector.height; ++v)
     for (int u = 0; u < detector.width; ++u) {
       bool edge = false;
@@ -180,15 +182,15 @@ TEST(RenderView, SceneAgreesWithBruteForceRayCasting) {
   for (const Preset preset : {Preset::ii_9in, Preset::flat_panel}) {
     options.preset = preset;
     const TrueView true_view = take_stand(options, 15, {}).back();
-    Calibrator calibrator = udcsc();
+    phantom::Calibrator calibrator = phantom::udcsc();
     calibrator.targets = check_targets(calibrator);
     Scene scene = calibrator_body(calibrator);
-    const RigidTransform aside{Eigen::Matrix3d::Identity(), {12, 5, 20}};
+    const geometry::RigidTransform aside{Eigen::Matrix3d::Identity(), {12, 5, 20}};
     for (const Body& body : knee_body()) scene.push_back(moved(body, aside));
-    for (const Body& dot : plate_body(plate48(), true_view.camera_from_plate, true_view.view))
+    for (const Body& dot : plate_body(phantom::plate48(), true_view.camera_from_plate, true_view.view))
       scene.push_back(dot);
-    const Image<float> image = render_view(scene, true_view.detector, true_view.view, 2);
-    const Image<float> truth = render_by_brute_force(scene, true_view.detector, true_view.view);
+    const image::Image<float> image = render_view(scene, true_view.detector, true_view.view, 2);
+    const image::Image<float> truth = render_by_brute_force(scene, true_view.detector, true_view.view);
     for (int v = 0; v < image.height(); ++v)
       for (int u = 0; u < image.width(); ++u) ASSERT_NEAR(image(u, v), truth(u, v), 1e-6) << u << ' ' << v;
   }
@@ -198,9 +200,9 @@ TEST(RenderView, ResultIsIndependentOfTheNumberOfThreads) {
   VirtualDetector detector = small_detector();
   const Scene scene = {steel("ball", {sphere({1, 2, 3}, 2)}),
                        grey(cylinder({-20, 3, 1}, {20, -4, 9}, 6), 0.03)};
-  const View view = straight_view(detector);
-  const Image<float> one = render_view(scene, detector, view, 1);
-  const Image<float> two = render_view(scene, detector, view, 2);
+  const geometry::View view = straight_view(detector);
+  const image::Image<float> one = render_view(scene, detector, view, 1);
+  const image::Image<float> two = render_view(scene, detector, view, 2);
   EXPECT_TRUE(std::equal(one.pixels().begin(), one.pixels().end(), two.pixels().begin()));
 }
 

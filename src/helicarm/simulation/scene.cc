@@ -9,7 +9,7 @@ Body steel(std::string name, std::vector<Solid> solids) {
   return {std::move(name), std::move(solids), material::steel, true};
 }
 
-Body moved(Body body, const RigidTransform& a_from_b) {
+Body moved(Body body, const geometry::RigidTransform& a_from_b) {
   for (Solid& solid : body.solids) solid = moved(solid, a_from_b);
   return body;
 }

@@ -37,7 +37,7 @@ struct Body {
 using Scene = std::vector<Body>;
 
 Body steel(std::string name, std::vector<Solid> solids);
-Body moved(Body body, const RigidTransform& a_from_b);
+Body moved(Body body, const geometry::RigidTransform& a_from_b);
 
 /// Signal behind the scene along a ray, relative to the open beam.
 double transmission(const Scene& scene, const Eigen::Vector3d& source, const Eigen::Vector3d& direction);

@@ -77,7 +77,7 @@ Expected<void> check_views(const SimulationOptions& options) {
   return {};
 }
 
-Expected<void> check(const SimulationOptions& options, const Calibrator& calibrator) {
+Expected<void> check(const SimulationOptions& options, const phantom::Calibrator& calibrator) {
   if (options.size != 512 && options.size != 1024)
     return fail(Reason::bad_value, fmt::format("size: {}, must be 512 or 1024", options.size));
   if (options.bits < 8 || options.bits > 16 || options.bits % 2 != 0)
@@ -89,7 +89,7 @@ Expected<void> check(const SimulationOptions& options, const Calibrator& calibra
   if (options.ct && !options.knee) return fail(Reason::usage, "CT: --no-knee cannot be combined with --ct");
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
-                     [&](const CalibratorBall& ball) { return ball.label == lost; }))
+                     [&](const phantom::CalibratorBall& ball) { return ball.label == lost; }))
       return fail(Reason::bad_value,
                   fmt::format("lost ball \"{}\" is not a ball of {}", lost, calibrator.name));
   return {};
@@ -106,15 +106,16 @@ Click click(const TruePoint& point, RandomStream& random) {
 void expose(SimulatedView& view, const Scene& scene, const SimulationOptions& options, std::uint32_t number,
             const CtBody* ct = nullptr) {
   const TrueView& true_view = view.true_view;
-  const Image<float> signal = render_view(scene, true_view.detector, true_view.view, options.threads, ct);
+  const image::Image<float> signal =
+      render_view(scene, true_view.detector, true_view.view, options.threads, ct);
   view.pixels =
       detector_response(signal, true_view.imaging, options.seed, stream::noise + 2 * number, options.threads);
   if (true_view.mirrored) view.pixels = mirrored(view.pixels);
 }
 
-void add_plate_dots(SimulatedView& view, const Plate& plate, const Scene& scene) {
+void add_plate_dots(SimulatedView& view, const phantom::Plate& plate, const Scene& scene) {
   const TrueView& true_view = view.true_view;
-  const RigidTransform world_from_plate =
+  const geometry::RigidTransform world_from_plate =
       true_view.view.camera_from_world.inverse() * true_view.camera_from_plate;
   for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
     const Vector2d& dot = plate.dots_mm[i];
@@ -136,10 +137,10 @@ SimulatedView take_view(const SimulatedCase& simulated_case, const Scene& patien
   SimulatedView view;
   view.true_view = true_view;
   expose(view, scene, options, number, ct);
-  for (const CalibratorBall& ball : simulated_case.calibrator.balls)
+  for (const phantom::CalibratorBall& ball : simulated_case.calibrator.balls)
     view.balls.push_back(
         true_point(ball.label, ball.centre_in_calibrator, ball.diameter_mm, scene, true_view));
-  for (const CalibratorTarget& target : simulated_case.calibrator.targets)
+  for (const phantom::CalibratorTarget& target : simulated_case.calibrator.targets)
     view.targets.push_back(
         true_point(target.name, target.point_in_calibrator, target.diameter_mm, scene, true_view));
   if (simulated_case.plate) add_plate_dots(view, *simulated_case.plate, scene);
@@ -158,7 +159,7 @@ SimulatedCase simulate_grid(SimulationOptions options) {
   options.knee = false;
   SimulatedCase simulated_case;
   simulated_case.options = options;
-  simulated_case.plate = plate48();
+  simulated_case.plate = phantom::plate48();
   const WireGrid grid;
   for (const TrueView& true_view :
        take_grid_stand(options, *simulated_case.plate->height_above_receiver_mm)) {
@@ -180,7 +181,7 @@ SimulatedCase simulate_grid(SimulationOptions options) {
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   SimulatedCase simulated_case;
   simulated_case.options = options;
-  simulated_case.calibrator = udcsc();
+  simulated_case.calibrator = phantom::udcsc();
   if (const auto checked = check(options, simulated_case.calibrator); !checked)
     return tl::unexpected<Failure>(checked.error());
   if (options.kind == CaseKind::grid) {
@@ -189,13 +190,13 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   }
   const bool tunnels = options.kind == CaseKind::tunnels;
   if (!tunnels) simulated_case.calibrator.targets = check_targets(simulated_case.calibrator);
-  if (model_of(options.c_arm_preset()).intensifier) simulated_case.plate = plate48();
+  if (model_of(options.c_arm_preset()).intensifier) simulated_case.plate = phantom::plate48();
 
   RandomStream random(options.seed, stream::patient);
-  const RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
-  RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
+  const geometry::RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
+  geometry::RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
   patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
-  const RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
+  const geometry::RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
   if (options.knee) simulated_case.calibrator_from_knee = calibrator_from_knee;
 
   const double plate_height = simulated_case.plate ? *simulated_case.plate->height_above_receiver_mm : 0;
@@ -229,10 +230,10 @@ Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   return simulated_case;
 }
 
-XrayImage exposure_of(const SimulatedView& view) {
-  XrayImage xray_image;
+xray::XrayImage exposure_of(const SimulatedView& view) {
+  xray::XrayImage xray_image;
   xray_image.name = view.true_view.name;
-  xray_image.pixels = Image<float>(view.pixels.width(), view.pixels.height());
+  xray_image.pixels = image::Image<float>(view.pixels.width(), view.pixels.height());
   std::ranges::copy(view.pixels.pixels(), xray_image.pixels.pixels().begin());
   xray_image.highest = static_cast<float>((1 << view.true_view.imaging.bits) - 1);
   xray_image.acquisition.pixel_mm = Eigen::Vector2d::Constant(view.true_view.pixel_mm());

@@ -26,7 +26,7 @@ struct Click {
 /// One stored image with its ground truth.
 struct SimulatedView {
   TrueView true_view;
-  Image<std::uint16_t> pixels;
+  image::Image<std::uint16_t> pixels;
   std::vector<TruePoint> balls;
   std::vector<TruePoint> targets;
   std::vector<TruePoint> tunnel_points;
@@ -37,12 +37,13 @@ struct SimulatedView {
 
 struct SimulatedCase {
   SimulationOptions options;
-  Calibrator calibrator;  ///< without balls in kind grid
-  std::optional<Plate> plate;
+  phantom::Calibrator calibrator;  ///< without balls in kind grid
+  std::optional<phantom::Plate> plate;
   std::vector<SimulatedView> views;
   std::optional<NavigationTruth> navigation;
-  std::optional<RigidTransform> calibrator_from_knee;  ///< pose of knee_body; nothing without a knee
-  std::optional<RigidTransform> calibrator_from_ct;    ///< pose of the CT's patient frame (L, P, S)
+  std::optional<geometry::RigidTransform>
+      calibrator_from_knee;                                    ///< pose of knee_body; nothing without a knee
+  std::optional<geometry::RigidTransform> calibrator_from_ct;  ///< pose of the CT's patient frame (L, P, S)
 };
 
 /// A whole case from its options; reproducible from the seed. Refuses (bad_value) an unknown size, depth or
@@ -50,6 +51,6 @@ struct SimulatedCase {
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options);
 
 /// The image as the reader would return it, without a file.
-XrayImage exposure_of(const SimulatedView& view);
+xray::XrayImage exposure_of(const SimulatedView& view);
 
 }  // namespace helicarm::simulation

@@ -24,12 +24,12 @@ SimulationOptions small(CaseKind kind) {
   return options;
 }
 
-bool same(const Image<std::uint16_t>& a, const Image<std::uint16_t>& b) {
+bool same(const image::Image<std::uint16_t>& a, const image::Image<std::uint16_t>& b) {
   return std::equal(a.pixels().begin(), a.pixels().end(), b.pixels().begin(), b.pixels().end());
 }
 
 /// Centroid of the pixels darker than half-way between the centre and the rim of a round window.
-Vector2d dark_centroid(const Image<std::uint16_t>& image, const Vector2d& near, int half) {
+Vector2d dark_centroid(const image::Image<std::uint16_t>& image, const Vector2d& near, int half) {
   const int u0 = static_cast<int>(std::lround(near.x()));
   const int v0 = static_cast<int>(std::lround(near.y()));
   const double threshold = 0.5 * (image(u0, v0) + image(u0 + half, v0 + half));
@@ -81,9 +81,9 @@ TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePaper) {
   options.preset = Preset::paper_sim;
   const SimulatedCase simulated = *simulate_case(options);
   EXPECT_FALSE(simulated.plate);
-  const View& ap = simulated.views[0].true_view.view;
-  const View& lateral = simulated.views[1].true_view.view;
-  for (const View& view : {ap, lateral}) {
+  const geometry::View& ap = simulated.views[0].true_view.view;
+  const geometry::View& lateral = simulated.views[1].true_view.view;
+  for (const geometry::View& view : {ap, lateral}) {
     EXPECT_NEAR(view.intrinsics.fx, 3000, 1e-9);  // 900 mm over 0.3 mm
     EXPECT_EQ(view.intrinsics.u0, 256);
   }
@@ -187,7 +187,7 @@ TEST(SimulateCase, TunnelPointsAgreeInEveryFrame) {
     EXPECT_LT((truth.tracker_from.at("tool") * point.in_tool - in_tracker).norm(), 1e-9);
   }
   for (const auto& [frame, pose] : truth.tracker_from) {
-    const RigidTransform error = pose.inverse() * truth.read.at(frame);
+    const geometry::RigidTransform error = pose.inverse() * truth.read.at(frame);
     EXPECT_GT(error.translation.norm(), 0);
     EXPECT_LT(error.translation.norm(), 0.12 * 5);
   }
@@ -204,7 +204,7 @@ TEST(SimulateCase, ReadingsScatterByTheStatedSigmaOverManySeeds) {
   for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     const NavigationTruth truth = set_up_navigation(seed, {});
     for (const auto& [frame, pose] : truth.tracker_from) {
-      const RigidTransform& read = truth.read.at(frame);
+      const geometry::RigidTransform& read = truth.read.at(frame);
       const double shift = (read.translation - pose.translation).norm() / truth.sigma_mm;
       const double turn =
           Eigen::AngleAxisd(read.rotation * pose.rotation.transpose()).angle() * 180 / EIGEN_PI;

@@ -128,7 +128,7 @@ Solid box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_sides, cons
   return placed(Solid::Kind::box, rotation * half_sides.asDiagonal(), centre);
 }
 
-Solid moved(const Solid& solid, const RigidTransform& a_from_b) {
+Solid moved(const Solid& solid, const geometry::RigidTransform& a_from_b) {
   return placed(solid.kind, a_from_b.rotation * solid.world_from_unit.linear(),
                 a_from_b * solid.world_from_unit.translation(), solid.taper);
 }

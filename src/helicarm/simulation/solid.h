@@ -46,7 +46,7 @@ Solid flat_frustum(const Eigen::Vector3d& from, const Eigen::Vector3d& to, doubl
 Solid box(const Eigen::Vector3d& centre, const Eigen::Vector3d& half_sides,
           const Eigen::Matrix3d& rotation = Eigen::Matrix3d::Identity());
 
-Solid moved(const Solid& solid, const RigidTransform& a_from_b);
+Solid moved(const Solid& solid, const geometry::RigidTransform& a_from_b);
 
 /// mm, negative inside; exact zero at the surface, elsewhere to first order in the distance.
 double signed_distance(const Solid& solid, const Eigen::Vector3d& point);

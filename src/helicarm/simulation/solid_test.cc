@@ -76,8 +76,8 @@ TEST(Solid, EveryKindAgreesWithSampling) {
 }
 
 TEST(Solid, InvariantToACommonMotionOfSolidAndRay) {
-  const RigidTransform move{Eigen::AngleAxisd(1.1, Vector3d(2, -1, 1).normalized()).toRotationMatrix(),
-                            {5, 6, -7}};
+  const geometry::RigidTransform move{
+      Eigen::AngleAxisd(1.1, Vector3d(2, -1, 1).normalized()).toRotationMatrix(), {5, 6, -7}};
   const Solid cone = frustum({0, 0, 0}, {0, 10, 80}, 6, 3);
   const Vector3d source(-200, 20, 3);
   const Vector3d direction(1, -0.07, 0.1);

@@ -18,8 +18,9 @@ using Eigen::Vector3d;
 const NominalCamera nominal;
 constexpr double lattice_px = 110;  // 25 mm at the receiver
 
-View random_view(const Calibrator& calibrator, std::optional<bool> mirrored, RandomStream& random) {
-  View view;
+geometry::View random_view(const phantom::Calibrator& calibrator, std::optional<bool> mirrored,
+                           RandomStream& random) {
+  geometry::View view;
   const bool flip = mirrored.value_or(random.uniform() < 0.5);
   const double f = nominal.focal_px * random.uniform(0.99, 1.01);
   const Vector2d principal = nominal.principal_px + in_disc(random, 55);
@@ -35,8 +36,8 @@ View random_view(const Calibrator& calibrator, std::optional<bool> mirrored, Ran
 
 }  // namespace
 
-SyntheticView synthetic_detections(const Calibrator& calibrator, const SyntheticDetectionOptions& options,
-                                   RandomStream& random) {
+SyntheticView synthetic_detections(const phantom::Calibrator& calibrator,
+                                   const SyntheticDetectionOptions& options, RandomStream& random) {
   SyntheticView image;
   image.view = random_view(calibrator, options.mirrored, random);
   image.radius_bias = random.uniform(-0.02, 0.02);

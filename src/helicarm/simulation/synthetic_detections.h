@@ -35,7 +35,7 @@ struct SyntheticDetectionOptions {
 
 /// A calibrator seen from any direction by a C-arm with only nominal values known. No pixels are rendered.
 struct SyntheticView {
-  View view;  ///< world = calibrator; a mirrored image has fx < 0
+  geometry::View view;  ///< world = calibrator; a mirrored image has fx < 0
   std::vector<SyntheticDetection> detections;
   int visible = 0;  ///< balls with a detection of their own
   double radius_bias = 0;
@@ -52,7 +52,7 @@ struct NominalCamera {
 
 /// The calibrator's centre is 550 to 920 mm from the source, up to 20 mm from the central ray. Radii have
 /// noise of 2 % and a common bias of up to 2 %.
-SyntheticView synthetic_detections(const Calibrator& calibrator, const SyntheticDetectionOptions& options,
-                                   RandomStream& random);
+SyntheticView synthetic_detections(const phantom::Calibrator& calibrator,
+                                   const SyntheticDetectionOptions& options, RandomStream& random);
 
 }  // namespace helicarm::simulation

@@ -20,7 +20,7 @@ bool in_volume(const TrackerModel& model, const Vector3d& place) {
 }
 
 bool is_turned_to_the_camera(const TrackerModel& model, const MarkerFacet& facet,
-                             const RigidTransform& tracker_from_body) {
+                             const geometry::RigidTransform& tracker_from_body) {
   const Vector3d normal = tracker_from_body.rotation * facet.normal_in_body;
   const double least = std::cos(model.facing_deg * radian);
   for (const Vector3d& marker : facet.markers_in_body) {
@@ -31,7 +31,7 @@ bool is_turned_to_the_camera(const TrackerModel& model, const MarkerFacet& facet
 }
 
 std::vector<const MarkerFacet*> facets_seen(const TrackerModel& model, const TrackedBody& body,
-                                            const RigidTransform& tracker_from_body) {
+                                            const geometry::RigidTransform& tracker_from_body) {
   std::vector<const MarkerFacet*> seen;
   for (const MarkerFacet& facet : body.facets)
     if (is_turned_to_the_camera(model, facet, tracker_from_body)) seen.push_back(&facet);
@@ -47,7 +47,8 @@ Eigen::MatrixXd pose_from_marker_errors(const std::vector<const MarkerFacet*>& f
     for (const Vector3d& marker : facet->markers_in_body) arms.push_back(rotation * marker);
   Eigen::MatrixXd a(3 * arms.size(), 6);
   for (std::size_t i = 0; i < arms.size(); ++i)
-    a.middleRows<3>(3 * static_cast<Eigen::Index>(i)) << -cross_matrix(arms[i]), Matrix3d::Identity();
+    a.middleRows<3>(3 * static_cast<Eigen::Index>(i)) << -geometry::cross_matrix(arms[i]),
+        Matrix3d::Identity();
   return (a.transpose() * a).ldlt().solve(a.transpose());
 }
 
@@ -87,8 +88,9 @@ TrackerSample track_sample(const TrackerModel& model, const TrackedBody& body, c
   Eigen::VectorXd errors(from_markers.cols());
   for (Eigen::Index i = 0; i < errors.size(); ++i) errors[i] = model.marker_sigma_mm[i % 3] * random.normal();
   const Vector6d error = from_markers * errors;
-  RigidTransform pose{rotation_from_vector(error.head<3>()) * read.truth.rotation,
-                      read.truth.translation + error.tail<3>() + drift(model, time_s, seed, stream + 1)};
+  geometry::RigidTransform pose{
+      geometry::rotation_from_vector(error.head<3>()) * read.truth.rotation,
+      read.truth.translation + error.tail<3>() + drift(model, time_s, seed, stream + 1)};
   if (read.outlier) pose = pose * random_motion(random, model.outlier_deg, model.outlier_mm);
   read.tracker_from_body = pose;
   return read;
@@ -109,7 +111,7 @@ std::vector<double> steady_times(double rate_hz, std::size_t count, double start
 }
 
 std::optional<Matrix6d> pose_covariance(const TrackerModel& model, const TrackedBody& body,
-                                        const RigidTransform& tracker_from_body, int samples) {
+                                        const geometry::RigidTransform& tracker_from_body, int samples) {
   const auto facets = facets_seen(model, body, tracker_from_body);
   if (facets.empty()) return {};
   const Eigen::MatrixXd from_markers = pose_from_marker_errors(facets, tracker_from_body.rotation);
@@ -119,20 +121,21 @@ std::optional<Matrix6d> pose_covariance(const TrackerModel& model, const Tracked
   return covariance;
 }
 
-std::optional<RigidTransform> mean_pose(std::span<const TrackerSample> samples) {
-  std::optional<RigidTransform> first;
+std::optional<geometry::RigidTransform> mean_pose(std::span<const TrackerSample> samples) {
+  std::optional<geometry::RigidTransform> first;
   Vector3d turn = Vector3d::Zero();
   Vector3d place = Vector3d::Zero();
   int count = 0;
   for (const TrackerSample& sample : samples) {
     if (!sample.valid()) continue;
     if (!first) first = sample.tracker_from_body;
-    turn += vector_from_rotation(sample.tracker_from_body->rotation * first->rotation.transpose());
+    turn += geometry::vector_from_rotation(sample.tracker_from_body->rotation * first->rotation.transpose());
     place += sample.tracker_from_body->translation;
     ++count;
   }
   if (!first) return {};
-  return RigidTransform{rotation_from_vector(turn / count) * first->rotation, place / count};
+  return geometry::RigidTransform{geometry::rotation_from_vector(turn / count) * first->rotation,
+                                  place / count};
 }
 
 }  // namespace helicarm::simulation

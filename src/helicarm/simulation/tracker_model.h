@@ -38,16 +38,16 @@ struct TrackerModel {
 struct TrackerSample {
   double stamp_s;    ///< time stamp by the tracker
   double exposed_s;  ///< true time of measurement
-  std::optional<RigidTransform> tracker_from_body;
-  RigidTransform truth;  ///< tracker_from_body at `exposed_s`
-  int facets = 0;        ///< visible facets
+  std::optional<geometry::RigidTransform> tracker_from_body;
+  geometry::RigidTransform truth;  ///< tracker_from_body at `exposed_s`
+  int facets = 0;                  ///< visible facets
   bool outlier = false;
 
   bool valid() const { return tracker_from_body.has_value(); }
 };
 
 /// tracker_from_body at a time (s).
-using TrackedPath = std::function<RigidTransform(double)>;
+using TrackedPath = std::function<geometry::RigidTransform(double)>;
 
 /// Sample number `sample` of a stream at `time_s`. Keyed by (seed, stream, sample), so each can be generated
 /// alone. Uses `stream` and the next.
@@ -65,9 +65,9 @@ std::vector<double> steady_times(double rate_hz, std::size_t count, double start
 /// visible: rotation (rad), then translation (mm) about the body's origin, along the tracker's axes. Nothing
 /// if no facet is visible.
 std::optional<Matrix6d> pose_covariance(const TrackerModel& model, const TrackedBody& body,
-                                        const RigidTransform& tracker_from_body, int samples = 1);
+                                        const geometry::RigidTransform& tracker_from_body, int samples = 1);
 
 /// Mean pose of the valid samples of a body at rest; nothing if there is none.
-std::optional<RigidTransform> mean_pose(std::span<const TrackerSample> samples);
+std::optional<geometry::RigidTransform> mean_pose(std::span<const TrackerSample> samples);
 
 }  // namespace helicarm::simulation

@@ -19,18 +19,19 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr std::uint64_t seed = 5;
 
 /// The array's normal towards the camera, slightly tilted.
-RigidTransform facing_pose() {
+geometry::RigidTransform facing_pose() {
   const Eigen::Matrix3d back = Vector3d(1, -1, -1).asDiagonal();
-  return {rotation_from_vector({0.2, -0.3, 0.4}) * back, {60, -40, 900}};
+  return {geometry::rotation_from_vector({0.2, -0.3, 0.4}) * back, {60, -40, 900}};
 }
 
-TrackedPath at_rest(const RigidTransform& pose) {
+TrackedPath at_rest(const geometry::RigidTransform& pose) {
   return [pose](double) { return pose; };
 }
 
 Vector6d error_of(const TrackerSample& sample) {
   Vector6d error;
-  error << vector_from_rotation(sample.tracker_from_body->rotation * sample.truth.rotation.transpose()),
+  error << geometry::vector_from_rotation(sample.tracker_from_body->rotation *
+                                          sample.truth.rotation.transpose()),
       sample.tracker_from_body->translation - sample.truth.translation;
   return error;
 }
@@ -42,8 +43,8 @@ std::size_t valid_among(const std::vector<TrackerSample>& samples) {
 TEST(TrackerModel, SamplesScatterByTheCovariance) {
   constexpr std::size_t count = 20000;
   for (const TrackedBody& body : {marker_array(), calibrator_markers()}) {
-    RigidTransform pose = facing_pose();
-    if (body.facets.size() > 1) pose.rotation = pose.rotation * rotation_from_vector({1.2, 0, 0});
+    geometry::RigidTransform pose = facing_pose();
+    if (body.facets.size() > 1) pose.rotation = pose.rotation * geometry::rotation_from_vector({1.2, 0, 0});
     const TrackerModel model;
     const auto samples = track(model, body, at_rest(pose), steady_times(60, count), seed, 7);
     Matrix6d sum = Matrix6d::Zero();
@@ -80,7 +81,7 @@ TEST(TrackerModel, MeanOfAWindowScattersByItsCovariance) {
 TEST(TrackerModel, BodyTurnedAwayIsNotVisible) {
   const TrackerModel model;
   const auto spun = [](double angle) {
-    return RigidTransform{rotation_from_vector({0, angle, 0}), {0, 0, 900}};
+    return geometry::RigidTransform{geometry::rotation_from_vector({0, angle, 0}), {0, 0, 900}};
   };
   for (double angle_deg = 0; angle_deg < 360; angle_deg += 10) {
     const TrackerSample sample =
@@ -97,9 +98,9 @@ TEST(TrackerModel, BodyTurnedAwayIsNotVisible) {
 }
 
 TEST(TrackerModel, CalibratorShowsOneOrTwoFacetsAroundItsAxisAndNoneFromItsEnds) {
-  const Eigen::Matrix3d upright = rotation_from_vector({EIGEN_PI / 2, 0, 0});
+  const Eigen::Matrix3d upright = geometry::rotation_from_vector({EIGEN_PI / 2, 0, 0});
   for (double angle = 0; angle < 6.28; angle += 0.1) {
-    const RigidTransform pose{upright * rotation_from_vector({0, 0, angle}), {0, 0, 900}};
+    const geometry::RigidTransform pose{upright * geometry::rotation_from_vector({0, 0, angle}), {0, 0, 900}};
     const int facets = track_sample({}, calibrator_markers(), at_rest(pose), 0, seed, 7, 0).facets;
     EXPECT_GE(facets, 1) << angle;
     EXPECT_LE(facets, 2) << angle;
@@ -109,7 +110,7 @@ TEST(TrackerModel, CalibratorShowsOneOrTwoFacetsAroundItsAxisAndNoneFromItsEnds)
 
 TEST(TrackerModel, NothingIsVisibleOutsideTheVolume) {
   for (const Vector3d& place : {Vector3d(0, 0, 400), Vector3d(0, 0, 2600), Vector3d(800, 0, 900)}) {
-    RigidTransform pose = facing_pose();
+    geometry::RigidTransform pose = facing_pose();
     pose.translation = place;
     EXPECT_FALSE(track_sample({}, marker_array(), at_rest(pose), 0, seed, 7, 0).valid());
   }
@@ -139,7 +140,7 @@ TEST(TrackerModel, StampsAreLateAndJitterWhileThePoseIsOfTheTrueTime) {
   model.stamp_delay_s = 0.03;
   model.stamp_jitter_s = 0.002;
   const TrackedPath moving = [](double t) {
-    return RigidTransform{facing_pose().rotation, {100 * t, 0, 900}};
+    return geometry::RigidTransform{facing_pose().rotation, {100 * t, 0, 900}};
   };
   constexpr std::size_t count = 5000;
   const auto times = steady_times(20, count);

@@ -62,7 +62,7 @@ Json imaging_json(const Imaging& imaging) {
 
 Json view_json(const SimulatedView& view, const char* world) {
   const TrueView& true_view = view.true_view;
-  const View stored = true_view.stored_view();
+  const geometry::View stored = true_view.stored_view();
   Json json = {{"name", true_view.name},
                {"image_size", {true_view.detector.width, true_view.detector.height}},
                {"mirrored", true_view.mirrored},
@@ -87,7 +87,7 @@ Json view_json(const SimulatedView& view, const char* world) {
 
 /// Distances (ideal pixels) of the tunnel's true ends from the tool line's image.
 Json line_errors_px(const ToolLine& line, const NavigationTruth& truth, const TrueView& true_view) {
-  const View view = true_view.stored_view();
+  const geometry::View view = true_view.stored_view();
   const auto flat = [&](const Eigen::Vector3d& point) {
     const Eigen::Vector2d pixel = view.project(point);
     return Eigen::Vector3d(pixel.x(), pixel.y(), 0);
@@ -169,12 +169,12 @@ Json truth_json(const SimulatedCase& simulated) {
   for (Fault fault : simulated.options.faults) json["faults"].push_back(word(fault));
   for (const SimulatedView& view : simulated.views)
     json["views"].push_back(view_json(view, grid ? "grid" : "calibrator"));
-  for (const CalibratorTarget& target : simulated.calibrator.targets)
+  for (const phantom::CalibratorTarget& target : simulated.calibrator.targets)
     json["targets_in_calibrator"][target.name] = vector_json(target.point_in_calibrator);
   if (simulated.calibrator_from_ct) {
-    const Volume& volume = simulated.options.ct->volume;
+    const volume::Volume& volume = simulated.options.ct->volume;
     json["ct"] = {{"file", simulated.options.ct->name},
-                  {"digest", volume_key(volume)},
+                  {"digest", volume::volume_key(volume)},
                   {"size", volume.size},
                   {"patient_from_voxel", matrix_json(volume.patient_from_voxel.matrix())},
                   {"calibrator_from_patient", matrix_json(simulated.calibrator_from_ct->matrix())}};

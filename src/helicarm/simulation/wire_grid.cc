@@ -53,8 +53,8 @@ std::vector<TrueView> take_grid_stand(const SimulationOptions& options, double p
       arm.view.intrinsics.matrix().inverse() * Vector3d(middle.x(), middle.y(), 1);
   const auto camera_from_grid = [&](double distance_mm) {
     const Vector3d place = (arm.f_mm - distance_mm) * through_middle;
-    return RigidTransform{Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(),
-                          place + Vector3d(right, down, 0)};
+    return geometry::RigidTransform{Eigen::AngleAxisd(turn, Vector3d::UnitZ()).toRotationMatrix(),
+                                    place + Vector3d(right, down, 0)};
   };
   std::vector<TrueView> true_views;
   const auto take = [&](std::string name, double distance_mm) {

@@ -19,11 +19,12 @@ constexpr const char* calibrator_file = "calibrator.json";
 constexpr const char* case_file = "case.json";
 
 /// From the pixels: a case is written identically each time, and different images have different UIDs.
-std::string uid(const Image<std::uint16_t>& pixels, std::uint64_t item) {
+std::string uid(const image::Image<std::uint16_t>& pixels, std::uint64_t item) {
   const auto values = pixels.pixels();
-  const std::string content = digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
+  const std::string content =
+      xray::digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
   RandomStream random(std::stoull(content.substr(0, 16), nullptr, 16), stream::uids, item);
-  return make_uid(random);
+  return xray::make_uid(random);
 }
 
 Json poses_json(const NavigationTruth& truth, std::initializer_list<const char*> frames) {
@@ -76,10 +77,10 @@ void remove_leftovers(const std::filesystem::path& folder) {
 
 }  // namespace
 
-DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
+xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) {
   const SimulatedView& view = simulated.views[number];
   const TrueView& true_view = view.true_view;
-  DerivedImage image;
+  xray::DerivedImage image;
   image.pixels = view.pixels;
   image.bits_stored = simulated.options.bits;
   image.acquisition.pixel_mm = Eigen::Vector2d::Constant(true_view.detector.pixel_mm);
@@ -135,10 +136,10 @@ Expected<void> write_case(const std::filesystem::path& folder, const SimulatedCa
     value_or_throw(write_json(folder / truth_file, truth_json(simulated)));
     for (std::size_t i = 0; i < simulated.views.size(); ++i)
       value_or_throw(
-          write_dicom(folder / (simulated.views[i].true_view.name + ".dcm"), dicom_of(simulated, i)));
-    if (simulated.plate) value_or_throw(write_json(folder / plate_file, to_json(*simulated.plate)));
+          xray::write_dicom(folder / (simulated.views[i].true_view.name + ".dcm"), dicom_of(simulated, i)));
+    if (simulated.plate) value_or_throw(write_json(folder / plate_file, phantom::to_json(*simulated.plate)));
     if (simulated.options.kind == CaseKind::grid) return;
-    value_or_throw(write_json(folder / calibrator_file, to_json(simulated.calibrator)));
+    value_or_throw(write_json(folder / calibrator_file, phantom::to_json(simulated.calibrator)));
     value_or_throw(write_json(folder / case_file, case_json(simulated)));
   });
 }

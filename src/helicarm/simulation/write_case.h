@@ -13,7 +13,7 @@ namespace helicarm::simulation {
 Json case_json(const SimulatedCase& simulated);
 
 /// The DICOM image of one view, with UIDs derived from its pixels.
-DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t view);
+xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t view);
 
 /// Refuses (cannot_write) a folder with files other than an earlier simulation.
 Expected<void> check_case_folder(const std::filesystem::path& folder);

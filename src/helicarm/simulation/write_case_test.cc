@@ -43,7 +43,7 @@ TEST_F(WriteCase, DicomRoundTripKeepsPixelsAndTags) {
     ASSERT_TRUE(write_case(folder_, simulated_case));
     for (const SimulatedView& view : simulated_case.views) {
       const auto xray_image =
-          read_xray_image(folder_ / (view.true_view.name + ".dcm"), view.true_view.name, {});
+          xray::read_xray_image(folder_ / (view.true_view.name + ".dcm"), view.true_view.name, {});
       ASSERT_TRUE(xray_image) << xray_image.error().message;
       EXPECT_TRUE(std::equal(view.pixels.pixels().begin(), view.pixels.pixels().end(),
                              xray_image->pixels.pixels().begin(), xray_image->pixels.pixels().end()));
@@ -56,9 +56,9 @@ TEST_F(WriteCase, DicomRoundTripKeepsPixelsAndTags) {
 }
 
 TEST_F(WriteCase, DifferentImagesHaveDifferentUidsForAnySeed) {
-  const DerivedImage one = dicom_of(simulated(CaseKind::accuracy, 12), 0);
-  const DerivedImage same = dicom_of(simulated(CaseKind::accuracy, 12), 0);
-  const DerivedImage other = dicom_of(simulated(CaseKind::tunnels, 12), 0);
+  const xray::DerivedImage one = dicom_of(simulated(CaseKind::accuracy, 12), 0);
+  const xray::DerivedImage same = dicom_of(simulated(CaseKind::accuracy, 12), 0);
+  const xray::DerivedImage other = dicom_of(simulated(CaseKind::tunnels, 12), 0);
   EXPECT_EQ(one.instance_uid, same.instance_uid);
   EXPECT_EQ(one.study_uid, same.study_uid);
   EXPECT_NE(one.instance_uid, other.instance_uid);
@@ -69,11 +69,11 @@ TEST_F(WriteCase, DifferentImagesHaveDifferentUidsForAnySeed) {
 TEST_F(WriteCase, FilesAgreeWithTheSimulation) {
   const SimulatedCase simulated_case = simulated(CaseKind::accuracy, 12);
   ASSERT_TRUE(write_case(folder_, simulated_case));
-  const auto calibrator = read_calibrator(folder_ / "calibrator.json");
+  const auto calibrator = phantom::read_calibrator(folder_ / "calibrator.json");
   ASSERT_TRUE(calibrator) << calibrator.error().message;
   EXPECT_EQ(calibrator->balls.size(), 12u);
   EXPECT_EQ(calibrator->targets.size(), 5u);
-  const auto plate = read_plate(folder_ / "plate.json");
+  const auto plate = phantom::read_plate(folder_ / "plate.json");
   ASSERT_TRUE(plate) << plate.error().message;
   EXPECT_EQ(plate->dots_mm.size(), 48u);
 }

@@ -11,7 +11,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/image/opencv.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using Eigen::Vector2d;
@@ -30,14 +30,14 @@ constexpr double a_third =
 constexpr double bone_depth_mm = 770, bone_mm = 6;
 constexpr double rod_half_px = 36;  // of a wire or bone: inside the square, longer than the fit's window
 
-Vector3d point_at(const View& view, const Vector2d& pixel, double depth) {
-  const Intrinsics& k = view.intrinsics;
+Vector3d point_at(const geometry::View& view, const Vector2d& pixel, double depth) {
+  const geometry::Intrinsics& k = view.intrinsics;
   return {(pixel.x() - k.u0) / k.fx * depth, (pixel.y() - k.v0) / k.fy * depth, depth};
 }
 
 /// A straight rod across the square, its axis `offset_px` from the ball in the image.
-simulation::Solid rod(const View& view, const Vector2d& ball, const Vector2d& towards, double offset_px,
-                      double depth, double diameter) {
+simulation::Solid rod(const geometry::View& view, const Vector2d& ball, const Vector2d& towards,
+                      double offset_px, double depth, double diameter) {
   const Vector2d along(-towards.y(), towards.x());
   const Vector2d middle = ball + offset_px * towards;
   return simulation::cylinder(point_at(view, middle - rod_half_px * along, depth),
@@ -80,9 +80,9 @@ struct Sphere {
 };
 
 /// One square with its balls only.
-Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<const Sphere> balls,
-                       double focus_sigma_px) {
-  View view = scene.view;
+image::Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<const Sphere> balls,
+                              double focus_sigma_px) {
+  geometry::View view = scene.view;
   view.intrinsics.u0 -= tile.left;
   view.intrinsics.v0 -= tile.top;
   simulation::VirtualDetector detector = scene.detector;
@@ -90,9 +90,9 @@ Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<c
   simulation::Scene bodies{scene.muscle};
   for (const Sphere& ball : balls)
     bodies.push_back(simulation::steel("ball", {simulation::sphere(ball.centre, ball.radius)}));
-  Image<float> signal = simulation::render_view(bodies, detector, view, 1);
+  image::Image<float> signal = simulation::render_view(bodies, detector, view, 1);
   if (focus_sigma_px > 0) {
-    cv::Mat mat = as_mat(signal);
+    cv::Mat mat = image::as_mat(signal);
     cv::GaussianBlur(mat, mat, {}, focus_sigma_px, focus_sigma_px, cv::BORDER_REPLICATE);
   }
   return signal;
@@ -102,18 +102,18 @@ Image<float> signal_of(const BallScene& scene, const BallTile& tile, std::span<c
 
 double BallScene::radius_px() const { return view.intrinsics.fx * diameter_mm / 2 / depth_mm; }
 
-Image<float> BallScene::signal() const {
+image::Image<float> BallScene::signal() const {
   // Each square is rendered alone, so that a ray crosses few bodies.
-  Image<float> image = simulation::render_view({muscle}, detector, view, 1);
+  image::Image<float> image = simulation::render_view({muscle}, detector, view, 1);
   for (const BallTile& tile : tiles) {
-    View shifted = view;
+    geometry::View shifted = view;
     shifted.intrinsics.u0 -= tile.left;
     shifted.intrinsics.v0 -= tile.top;
     simulation::VirtualDetector square = detector;
     square.width = square.height = side_px;
     simulation::Scene bodies = tile.bodies;
     bodies.push_back(muscle);
-    const Image<float> part = simulation::render_view(bodies, square, shifted, 1);
+    const image::Image<float> part = simulation::render_view(bodies, square, shifted, 1);
     for (int v = 0; v < side_px; ++v)
       for (int u = 0; u < side_px; ++u) image(tile.left + u, tile.top + v) = part(u, v);
   }
@@ -167,7 +167,7 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
   // By the ball's position on the receiver and its radius, both in px.
   std::vector<Eigen::ArrayXXd> slopes;
   const auto image = [&] {
-    const Image<float> signal = signal_of(scene, tile, balls, imaging.focus_sigma_px);
+    const image::Image<float> signal = signal_of(scene, tile, balls, imaging.focus_sigma_px);
     return Eigen::ArrayXXd(light.quanta * Pixels(signal.pixels().data()).cast<double>());
   };
   const Eigen::ArrayXXd direct = image();
@@ -242,4 +242,4 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
   return std::sqrt(0.5 * (bound(0, 0) + bound(1, 1)));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -12,7 +12,7 @@
 #include "helicarm/simulation/render_view.h"
 #include "helicarm/simulation/scene.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// What overlaps or adjoins a ball.
 enum class Companion { none, ball, plate_dot, wire_in_the_middle, wire_beside, bone };
@@ -30,13 +30,13 @@ struct BallTile {
 struct BallScene {
   static constexpr int side_px = 96;  ///< of a ball's square
   double diameter_mm;
-  View view;
+  geometry::View view;
   simulation::VirtualDetector detector;
   simulation::Body muscle;
   std::vector<BallTile> tiles;
 
   double radius_px() const;
-  Image<float> signal() const;
+  image::Image<float> signal() const;
 };
 
 /// Whether a square's ball has no companion; these balls give the common appearance.
@@ -52,4 +52,4 @@ BallScene ball_scene(double diameter_mm, Companion companion, int squares, std::
 double centre_bound_px(const BallScene& scene, const BallTile& tile, const simulation::Light& light,
                        const simulation::Imaging& imaging, double window_px);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

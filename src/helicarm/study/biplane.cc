@@ -11,7 +11,7 @@
 #include "helicarm/study/records.h"
 #include "helicarm/study/statistics.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t experiments_of_block = 64;
@@ -53,7 +53,8 @@ struct Gathered {
 
 std::vector<Eigen::Vector3d> points_of_udcsc() {
   std::vector<Eigen::Vector3d> points;
-  for (const CalibratorBall& ball : udcsc().balls) points.push_back(ball.centre_in_calibrator);
+  for (const phantom::CalibratorBall& ball : phantom::udcsc().balls)
+    points.push_back(ball.centre_in_calibrator);
   return points;
 }
 
@@ -67,7 +68,7 @@ class BiplaneTrials {
  public:
   explicit BiplaneTrials(const BiplaneOptions& options) : options_(options) {
     views_ = paper_views(WorldOrigin::centre);
-    for (View& view : views_)
+    for (geometry::View& view : views_)
       view.camera_from_world.translation.z() +=
           options.cone_mm - 800;  // paper_views puts the centre at 800 mm
     for (std::size_t i = 0; i < 2; ++i) plates_[i] = plates_in_world(views_[i]);
@@ -92,7 +93,7 @@ class BiplaneTrials {
     std::vector<SimdPixel> pixels[2];
   };
 
-  std::vector<Eigen::Vector3d> plates_in_world(const View& view) const {
+  std::vector<Eigen::Vector3d> plates_in_world(const geometry::View& view) const {
     std::vector<Eigen::Vector3d> balls;
     const int n = options_.balls_a_side;
     for (const double depth : {options_.near_plate_mm, options_.far_plate_mm})
@@ -180,7 +181,7 @@ class BiplaneTrials {
   }
 
   BiplaneOptions options_;
-  std::array<View, 2> views_;
+  std::array<geometry::View, 2> views_;
   std::array<std::vector<Eigen::Vector3d>, 2> plates_;
   std::vector<Eigen::Vector3d> cone_, on_cone_;
 };
@@ -233,4 +234,4 @@ Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, c
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

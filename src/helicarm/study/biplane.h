@@ -11,7 +11,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Table 1: the cone on the knee compared with two plates of balls on the receiver, which rotate with the
 /// C-arm and whose pose a tracker measures. The paper states none of these lengths; the defaults are those of
@@ -52,4 +52,4 @@ Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, c
 /// biplane.csv, biplane.json, biplane.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/study/biplane.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 std::string biplane_summary(const std::vector<BiplaneRow>& rows) {
@@ -39,15 +39,17 @@ std::string biplane_summary(const std::vector<BiplaneRow>& rows) {
 }
 
 std::string biplane_svg(const std::vector<BiplaneRow>& rows, const BiplaneOptions& options) {
-  Chart chart{"Table 1: UDCSC and biplane", "Points", "Error, mm: mean, largest and least of ten tests"};
+  report::Chart chart{"Table 1: UDCSC and biplane", "Points",
+                      "Error, mm: mean, largest and least of ten tests"};
   chart.x_names = {"FRE", "TRE on biplane", "TRE at the centre", "TRE on UDCSC"};
   chart.y_from_zero = true;
   chart.note = fmt::format("medians of {} simulated experiments and published values", options.groups);
   const std::array places{"fre", "on_biplane", "centre", "on_udcsc"};
   for (const char* calibrator : {"udcsc", "biplane"})
     for (const bool print : {false, true}) {
-      ChartSeries series{fmt::format("{}, {}", calibrator == std::string_view("udcsc") ? "UDCSC" : "biplane",
-                                     print ? "published" : "here")};
+      report::ChartSeries series{fmt::format("{}, {}",
+                                             calibrator == std::string_view("udcsc") ? "UDCSC" : "biplane",
+                                             print ? "published" : "here")};
       series.dashed = print;
       for (const BiplaneRow& row : rows) {
         if (row.calibrator != calibrator || !row.printed) continue;
@@ -58,7 +60,7 @@ std::string biplane_svg(const std::vector<BiplaneRow>& rows, const BiplaneOption
       }
       chart.series.push_back(std::move(series));
     }
-  return chart_svg(std::array{chart});
+  return report::chart_svg(std::array{chart});
 }
 
 }  // namespace
@@ -93,4 +95,4 @@ StudyFiles files_of(const std::vector<BiplaneRow>& rows, const BiplaneOptions& o
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -16,7 +16,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double unmeasured = std::numeric_limits<double>::quiet_NaN();
@@ -25,20 +25,20 @@ std::uint32_t seed_of_case(const CalibrationStudyOptions& options, std::size_t t
   return RandomStream(options.seed, calibration_stream, test).bits();
 }
 
-CalibrationTest measured(const Case& given, Method method) {
+CalibrationTest measured(const pipeline::Case& given, rectification::Method method) {
   CalibrationTest test{1, 0, unmeasured, unmeasured, unmeasured, unmeasured, {}};
   test.targets.fill(unmeasured);
-  RunOptions options;
+  pipeline::RunOptions options;
   options.method = method;
   options.threads = 1;
-  const Result result = value_or_throw(run_case(given, options));
+  const pipeline::Result result = value_or_throw(pipeline::run_case(given, options));
   if (result.failure) return test;
   test.refused = 0;
-  const Statistics& fre = result.accuracy.fre_mm;
+  const localization::Statistics& fre = result.accuracy.fre_mm;
   test.balls = fre.n;
   if (fre.n > 0)
     test.fre_mean = fre.mean, test.fre_max = fre.max, test.fre_min = fre.min, test.fre_rms = fre.rms;
-  for (const TargetError& target : result.accuracy.targets)
+  for (const localization::TargetError& target : result.accuracy.targets)
     for (std::size_t i = 0; i < test.targets.size(); ++i)
       if (target.name == fmt::format("T{}", i + 1)) test.targets[i] = target.error_mm;
   return test;
@@ -53,8 +53,9 @@ void run_calibration_test(const CalibrationStudyOptions& options, std::size_t nu
   std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);  // incomplete case of a killed run
   value_or_throw(simulation::write_case(folder, value_or_throw(simulation::simulate_case(simulated))));
-  const Case given = value_or_throw(read_case(folder));
-  for (const Method method : {Method::paper, Method::best}) put_record(measured(given, method), out);
+  const pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+  for (const rectification::Method method : {rectification::Method::paper, rectification::Method::best})
+    put_record(measured(given, method), out);
   std::filesystem::remove_all(folder, ignored);
 }
 
@@ -101,13 +102,13 @@ std::array<TestRow, 3> rows_of(const std::vector<CalibrationTests>& tests) {
   return rows;
 }
 
-Chart chart_of(const std::vector<CalibrationTests>& tests, CalibrationTest CalibrationTests::*method,
-               const char* title) {
-  Chart chart{title, "Test", "Target error, mm"};
+report::Chart chart_of(const std::vector<CalibrationTests>& tests, CalibrationTest CalibrationTests::*method,
+                       const char* title) {
+  report::Chart chart{title, "Test", "Target error, mm"};
   chart.y_from_zero = true;
   chart.note = "T1 in the centre; published means: 0.30 mm there, 0.41 mm over all";
   for (std::size_t target = 0; target < 5; ++target) {
-    ChartSeries series{fmt::format("T{}", target + 1)};
+    report::ChartSeries series{fmt::format("T{}", target + 1)};
     for (std::size_t i = 0; i < tests.size(); ++i)
       series.points.push_back({double(i + 1), (tests[i].*method).targets[target]});
     chart.series.push_back(std::move(series));
@@ -176,9 +177,9 @@ StudyFiles files_of(const std::vector<CalibrationTests>& tests, const Calibratio
                      {"refused", {{"paper", refused_paper}, {"best", refused_best}}},
                      {"summary", files.summary},
                      {"rows", std::move(table)}});
-  files.svg = chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) paper method"),
-                                   chart_of(tests, &CalibrationTests::best, "(b) best method")});
+  files.svg = report::chart_svg(std::array{chart_of(tests, &CalibrationTests::paper, "(a) paper method"),
+                                           chart_of(tests, &CalibrationTests::best, "(b) best method")});
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -10,7 +10,7 @@
 #include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Table 1's columns of UDCSC and Fig. 14 from images: tests of 3.2 with simulated scenes (intensifier,
 /// plate, knee, calibrator with five check targets), each measured by the published method and by the best
@@ -42,4 +42,4 @@ Expected<std::vector<CalibrationTests>> study_calibration(const CalibrationStudy
 /// calibration.csv, calibration.json, calibration.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<CalibrationTests>& tests, const CalibrationStudyOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -10,7 +10,7 @@
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/simulation/simulate_case.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using Eigen::Vector2d;
@@ -22,7 +22,7 @@ constexpr int bounds_per_image = 4;
 constexpr std::size_t images_with_bounds = 6;
 constexpr double grey_of_the_open = 0.75;  // brightest part of the field as a share of white
 
-simulation::Imaging imaging_of(const CentreSituation& s, const Image<float>& signal) {
+simulation::Imaging imaging_of(const CentreSituation& s, const image::Image<float>& signal) {
   simulation::Imaging imaging;
   imaging.scatter_fraction = s.scatter;
   imaging.quanta_per_pixel = s.quanta;
@@ -36,7 +36,7 @@ simulation::Imaging imaging_of(const CentreSituation& s, const Image<float>& sig
 }
 
 /// Brightens each square until the given share of the ball's background is clipped.
-void clip(XrayImage& xray_image, const BallScene& scene, double share) {
+void clip(xray::XrayImage& xray_image, const BallScene& scene, double share) {
   const double radius = scene.radius_px();
   for (const BallTile& tile : scene.tiles) {
     const Vector2d middle = scene.view.project(tile.ball);
@@ -56,30 +56,31 @@ void clip(XrayImage& xray_image, const BallScene& scene, double share) {
   }
 }
 
-const Dot* nearest(const std::vector<Dot>& dots, const Vector2d& place, double radius) {
-  const Dot* best = nullptr;
+const detection::Dot* nearest(const std::vector<detection::Dot>& dots, const Vector2d& place, double radius) {
+  const detection::Dot* best = nullptr;
   double least = 0.5 * radius;
-  for (const Dot& dot : dots)
+  for (const detection::Dot& dot : dots)
     if (const double distance = (dot.centre_px - place).norm();
         distance < least && dot.radius_px > 0.7 * radius)
       best = &dot, least = distance;
   return best;
 }
 
-XrayImage xray_image_of(const Image<std::uint16_t>& grey, const simulation::Imaging& imaging) {
-  XrayImage xray_image;
-  xray_image.pixels = Image<float>(grey.width(), grey.height());
+xray::XrayImage xray_image_of(const image::Image<std::uint16_t>& grey, const simulation::Imaging& imaging) {
+  xray::XrayImage xray_image;
+  xray_image.pixels = image::Image<float>(grey.width(), grey.height());
   std::ranges::copy(grey.pixels(), xray_image.pixels.pixels().begin());
   xray_image.highest = float((1 << imaging.bits) - 1);
   xray_image.acquisition.logarithmic = imaging.logarithmic;
   return xray_image;
 }
 
-std::vector<Dot> dots_alone(const BallScene& scene, const std::vector<Dot>& found) {
-  std::vector<Dot> alone;
+std::vector<detection::Dot> dots_alone(const BallScene& scene, const std::vector<detection::Dot>& found) {
+  std::vector<detection::Dot> alone;
   for (std::size_t i = 0; i < scene.tiles.size(); ++i)
     if (is_alone(i))
-      if (const Dot* dot = nearest(found, scene.view.project(scene.tiles[i].ball), scene.radius_px()))
+      if (const detection::Dot* dot =
+              nearest(found, scene.view.project(scene.tiles[i].ball), scene.radius_px()))
         alone.push_back(*dot);
   return alone;
 }
@@ -88,17 +89,17 @@ std::vector<Dot> dots_alone(const BallScene& scene, const std::vector<Dot>& foun
 /// the balls that stand alone.
 class TileFit {
  public:
-  TileFit(const CentreSituation& situation, const BallScene& scene, const XrayImage& xray_image)
+  TileFit(const CentreSituation& situation, const BallScene& scene, const xray::XrayImage& xray_image)
       : situation_(situation),
         scene_(scene),
         xray_image_(xray_image),
-        found_(find_dots(xray_image, {})),
+        found_(detection::find_dots(xray_image, {})),
         alone_(dots_alone(scene, found_)),
-        appearance_(estimate_appearance(xray_image, noise_correlation(xray_image), alone_)) {
-    appearance_.profile =
-        BallProfile(situation.blur_factor * appearance_.profile.blur(), appearance_.profile.absorbance());
+        appearance_(detection::estimate_appearance(xray_image, detection::noise_correlation(xray_image), alone_)) {
+    appearance_.profile = detection::BallProfile(situation.blur_factor * appearance_.profile.blur(),
+                                                 appearance_.profile.absorbance());
     appearance_.options.free_radius = !situation.held_radius;
-    for (const Dot& dot : alone_) contrasts_.push_back(dot.contrast);
+    for (const detection::Dot& dot : alone_) contrasts_.push_back(dot.contrast);
     std::ranges::sort(contrasts_);
   }
 
@@ -106,28 +107,30 @@ class TileFit {
     return appearance_.options.margin_share * scene_.radius_px() + appearance_.options.margin_px;
   }
 
-  std::optional<Dot> operator()(const BallTile& tile, RandomStream random) const {
+  std::optional<detection::Dot> operator()(const BallTile& tile, RandomStream random) const {
     const double radius = scene_.radius_px();
-    std::vector<Dot> neighbours = found_;
+    std::vector<detection::Dot> neighbours = found_;
     if (situation_.places_known) {
       neighbours.clear();
       for (const simulation::Body& body : tile.bodies) neighbours.push_back(predicted(body, random));
     }
-    const Dot expected = predicted(tile.bodies.front(), random);
-    const Dot* seen =
+    const detection::Dot expected = predicted(tile.bodies.front(), random);
+    const detection::Dot* seen =
         situation_.places_known ? nullptr : nearest(found_, scene_.view.project(tile.ball), radius);
-    Dot start = seen ? *seen : expected;
+    detection::Dot start = seen ? *seen : expected;
     if (situation_.held_radius) start.radius_px = *situation_.held_radius * radius;
-    const std::vector<Dot> fitted = refit_dots(xray_image_, {start}, appearance_, neighbours);
+    const std::vector<detection::Dot> fitted =
+        detection::refit_dots(xray_image_, {start}, appearance_, neighbours);
     if (fitted.empty()) return std::nullopt;
-    const bool plausible = seen || (!contrasts_.empty() && is_plausible(fitted.front(), expected,
-                                                                        contrasts_[contrasts_.size() / 2]));
+    const bool plausible =
+        seen || (!contrasts_.empty() &&
+                 fiducials::is_plausible(fitted.front(), expected, contrasts_[contrasts_.size() / 2]));
     return plausible ? std::optional(fitted.front()) : std::nullopt;
   }
 
  private:
-  Dot predicted(const simulation::Body& body, RandomStream& random) const {
-    Dot dot;
+  detection::Dot predicted(const simulation::Body& body, RandomStream& random) const {
+    detection::Dot dot;
     dot.centre_px = scene_.view.project(body.solids.front().world_from_unit.translation()) +
                     pose_px * Vector2d(random.normal(), random.normal());
     dot.radius_px = scene_.radius_px();
@@ -136,10 +139,10 @@ class TileFit {
 
   const CentreSituation& situation_;
   const BallScene& scene_;
-  const XrayImage& xray_image_;
-  std::vector<Dot> found_;
-  std::vector<Dot> alone_;
-  DotAppearance appearance_;
+  const xray::XrayImage& xray_image_;
+  std::vector<detection::Dot> found_;
+  std::vector<detection::Dot> alone_;
+  detection::DotAppearance appearance_;
   std::vector<double> contrasts_;
 };
 
@@ -168,30 +171,33 @@ void CentreSums::add(const Vector2d& error, double sigma, const Vector2d& toward
 
 CentreSums try_image(const CentreSituation& s, int squares, std::uint64_t seed, std::size_t image) {
   const BallScene scene = ball_scene(s.diameter_mm, s.companion, squares, seed, image);
-  const Image<float> signal = scene.signal();
+  const image::Image<float> signal = scene.signal();
   const simulation::Imaging imaging = imaging_of(s, signal);
-  const Image<std::uint16_t> grey =
+  const image::Image<std::uint16_t> grey =
       simulation::detector_response(signal, imaging, seed, noise_stream + 2 * std::uint32_t(image), 1);
-  XrayImage xray_image = xray_image_of(grey, imaging);
+  xray::XrayImage xray_image = xray_image_of(grey, imaging);
   if (s.clipped > 0) clip(xray_image, scene, s.clipped);
   const TileFit tile_fit(s, scene, xray_image);
 
-  const DistortionMap no_distortion = identity_map(grey.width(), grey.height(), scene.detector.pixel_mm);
+  const rectification::DistortionMap no_distortion =
+      rectification::identity_map(grey.width(), grey.height(), scene.detector.pixel_mm);
   CentreSums sums;
   for (std::size_t i = 0; i < scene.tiles.size(); ++i) {
     if (is_alone(i)) continue;
     const BallTile& tile = scene.tiles[i];
     const Vector2d truth = scene.view.project(tile.ball);
     ++sums.balls;
-    const std::optional<Dot> fitted = tile_fit(tile, RandomStream(seed, pose_stream, 100 * image + i));
+    const std::optional<detection::Dot> fitted =
+        tile_fit(tile, RandomStream(seed, pose_stream, 100 * image + i));
     if (!fitted) {
       ++sums.refused;
       continue;
     }
-    const Dot& dot = *fitted;
-    sums.add(
-        dot.centre_px - blob_offset(no_distortion, scene.view, truth, tile.ball.z(), s.diameter_mm) - truth,
-        dot.error_px(), tile.towards);
+    const detection::Dot& dot = *fitted;
+    sums.add(dot.centre_px -
+                 fiducials::blob_offset(no_distortion, scene.view, truth, tile.ball.z(), s.diameter_mm) -
+                 truth,
+             dot.error_px(), tile.towards);
     sums.radii += dot.radius_px / scene.radius_px() - 1;
   }
   const bool has_bound =
@@ -211,18 +217,19 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
   const simulation::SimulatedCase simulated_case = value_or_throw(simulation::simulate_case(options));
   std::array<CentreSums, 2> sums;
   for (const simulation::SimulatedView& view : simulated_case.views) {
-    XrayImage xray_image = xray_image_of(view.pixels, view.true_view.imaging);
+    xray::XrayImage xray_image = xray_image_of(view.pixels, view.true_view.imaging);
     xray_image.acquisition.pixel_mm = Vector2d::Constant(view.true_view.pixel_mm());
     xray_image.acquisition.source_detector_mm = view.true_view.nominal_f_mm;
-    const Rectification plain = value_or_throw(with_map(xray_image, flat_panel_map(xray_image), {}));
-    const auto found = label_fiducials(xray_image, plain, detect_candidates(xray_image, plain),
-                                       simulated_case.calibrator, {});
+    const rectification::Rectification plain =
+        value_or_throw(rectification::with_map(xray_image, rectification::flat_panel_map(xray_image), {}));
+    const auto found = fiducials::label_fiducials(
+        xray_image, plain, fiducials::detect_candidates(xray_image, plain), simulated_case.calibrator, {});
     for (std::size_t k = 0; k < view.balls.size(); ++k) {
       const simulation::TruePoint& truth = view.balls[k];
       if (truth.visibility == simulation::Visibility::outside) continue;
       CentreSums& of = sums[truth.visibility == simulation::Visibility::hidden];
       ++of.balls;
-      if (found && found->fiducials[k].status == FiducialStatus::used)
+      if (found && found->fiducials[k].status == fiducials::FiducialStatus::used)
         of.add(found->fiducials[k].uv_raw - truth.raw, found->fiducials[k].sigma_px, Vector2d::Zero());
       else
         ++of.refused;
@@ -231,4 +238,4 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
   return sums;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -8,7 +8,7 @@
 
 #include "helicarm/study/ball_scene.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Changes of a situation to the image or to the assumptions of the fit.
 struct CentreSituation {
@@ -41,4 +41,4 @@ CentreSums try_image(const CentreSituation& situation, int squares, std::uint64_
 /// balls that other metal touches.
 std::array<CentreSums, 2> try_case(std::uint64_t seed);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -11,7 +11,7 @@
 #include "helicarm/study/centre_trial.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double not_computed = std::numeric_limits<double>::quiet_NaN();
@@ -127,4 +127,4 @@ Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, con
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

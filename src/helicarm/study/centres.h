@@ -9,7 +9,7 @@
 #include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 struct CentreOptions {
   std::size_t groups = 1000;  ///< balls of each situation, rounded up to whole images
@@ -43,4 +43,4 @@ Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, con
 /// centres.csv, centres.json, centres.svg and one line for each situation.
 StudyFiles files_of(const std::vector<CentreRow>& rows, const CentreOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/report/chart.h"
 #include "helicarm/study/centres.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 Json centres_json(const std::vector<CentreRow>& rows, const CentreOptions& options) {
@@ -58,9 +58,9 @@ std::string centres_table(const std::vector<CentreRow>& rows) {
 }
 
 /// A marker for each situation, from the top; values above `most` are drawn at the edge.
-ChartSeries marks_of(const char* name, const std::vector<CentreRow>& rows, double most,
-                     const std::function<double(const CentreRow&)>& value) {
-  ChartSeries series{name, {}, true};
+report::ChartSeries marks_of(const char* name, const std::vector<CentreRow>& rows, double most,
+                             const std::function<double(const CentreRow&)>& value) {
+  report::ChartSeries series{name, {}, true};
   for (const CentreRow& row : rows) {
     const double x = value(row);
     series.points.push_back({std::isfinite(x) ? std::min(x, most) : x, double(series.points.size())});
@@ -68,20 +68,20 @@ ChartSeries marks_of(const char* name, const std::vector<CentreRow>& rows, doubl
   return series;
 }
 
-ChartSeries line_at(const char* name, double x, std::size_t rows) {
-  ChartSeries series{name, {{x, -0.5}, {x, double(rows) - 0.5}}};
+report::ChartSeries line_at(const char* name, double x, std::size_t rows) {
+  report::ChartSeries series{name, {{x, -0.5}, {x, double(rows) - 0.5}}};
   series.dashed = true;
   return series;
 }
 
 std::string centres_svg(const std::vector<CentreRow>& rows) {
   constexpr double most = 4;
-  Chart ratio{"(a) error over the statistical limit", "rms over the Cramer-Rao bound", ""};
+  report::Chart ratio{"(a) error over the statistical limit", "rms over the Cramer-Rao bound", ""};
   for (const CentreRow& row : rows) {
     const std::string name = row.group + (row.situation == row.group ? "" : ": " + row.situation);
     ratio.y_names.push_back(name);
   }
-  Chart coverage{"(b) coverage", "truth inside the 95 % ellipse, % of balls", ""};
+  report::Chart coverage{"(b) coverage", "truth inside the 95 % ellipse, % of balls", ""};
   coverage.y_names.resize(rows.size());
   ratio.series = {marks_of("error", rows, most, [](const CentreRow& row) { return row.ratio(); }),
                   marks_of("predicted by the fit", rows, most,
@@ -90,7 +90,7 @@ std::string centres_svg(const std::vector<CentreRow>& rows) {
   ratio.note = fmt::format("markers at {:g}: that value or more; no marker: no bound computed", most);
   coverage.series = {marks_of("", rows, 100, [](const CentreRow& row) { return 100 * row.coverage; }),
                      line_at("95 %", 95, rows.size())};
-  return chart_svg(std::array{ratio, coverage});
+  return report::chart_svg(std::array{ratio, coverage});
 }
 
 }  // namespace
@@ -99,4 +99,4 @@ StudyFiles files_of(const std::vector<CentreRow>& rows, const CentreOptions& opt
   return {centres_csv(rows), centres_json(rows, options), centres_svg(rows), centres_table(rows)};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

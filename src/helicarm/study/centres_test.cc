@@ -7,7 +7,7 @@
 
 #include "helicarm/study/ball_scene.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 double bound_of(Companion companion, double quanta) {
@@ -60,4 +60,4 @@ TEST(StudyCentres, MeasuresWholeViews) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

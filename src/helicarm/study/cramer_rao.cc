@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using Eigen::Vector2d;
@@ -17,7 +17,7 @@ using Numbers = Eigen::Vector<double, numbers>;
 const Numbers steps =
     (Numbers() << 10, 10, 1, 1, 10, Vector3d::Constant(1e-3), Vector3d::Constant(1)).finished();
 
-View changed(View view, int number, double step) {
+geometry::View changed(geometry::View view, int number, double step) {
   const Numbers change = step * Numbers::Unit(number);
   view.intrinsics.fx += change(0);
   view.intrinsics.fy += change(1);
@@ -25,7 +25,7 @@ View changed(View view, int number, double step) {
   view.intrinsics.v0 += change(3);
   view.intrinsics.skew += change(4);
   view.camera_from_world.rotation =
-      rotation_from_vector(change.segment<3>(5)) * view.camera_from_world.rotation;
+      geometry::rotation_from_vector(change.segment<3>(5)) * view.camera_from_world.rotation;
   view.camera_from_world.translation += change.tail<3>();
   return view;
 }
@@ -36,14 +36,14 @@ Vector2d slope(const Function& at, double step) {
   return (8 * (at(step) - at(-step)) - (at(2 * step) - at(-2 * step))) / (12 * step);
 }
 
-Eigen::Matrix<double, 2, numbers> by_numbers(const View& view, const Vector3d& point) {
+Eigen::Matrix<double, 2, numbers> by_numbers(const geometry::View& view, const Vector3d& point) {
   Eigen::Matrix<double, 2, numbers> jacobian;
   for (int k = 0; k < numbers; ++k)
     jacobian.col(k) = slope([&](double step) { return changed(view, k, step).project(point); }, steps(k));
   return jacobian;
 }
 
-Eigen::Matrix<double, 2, 3> by_point(const View& view, const Vector3d& point) {
+Eigen::Matrix<double, 2, 3> by_point(const geometry::View& view, const Vector3d& point) {
   Eigen::Matrix<double, 2, 3> jacobian;
   for (int k = 0; k < 3; ++k)
     jacobian.col(k) = slope([&](double step) { return view.project(point + step * Vector3d::Unit(k)); }, 1);
@@ -63,15 +63,15 @@ void accept(Eigen::MatrixXd& information, const std::vector<Numbers>& combinatio
 
 }  // namespace
 
-Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Vector3d> balls,
+Eigen::Matrix3d least_covariance(std::span<const geometry::View> views, std::span<const Vector3d> balls,
                                  const Vector3d& point, double ball_sigma_px, double point_sigma_px,
                                  const PriorInformation& prior) {
   const auto n = Eigen::Index(views.size());
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(numbers * n + 3, numbers * n + 3);
   std::vector<Numbers> focal, u0, v0, aspect, skew;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const View& view = views[std::size_t(i)];
-    const Intrinsics& k = view.intrinsics;
+    const geometry::View& view = views[std::size_t(i)];
+    const geometry::Intrinsics& k = view.intrinsics;
     Eigen::Matrix<double, numbers, numbers> own = Eigen::Matrix<double, numbers, numbers>::Zero();
     for (const Vector3d& ball : balls) {
       const auto jacobian = by_numbers(view, ball);
@@ -108,4 +108,4 @@ Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Ve
   return (root.asDiagonal() * inverse * root.asDiagonal()).bottomRightCorner<3, 3>();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

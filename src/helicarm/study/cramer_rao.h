@@ -8,7 +8,7 @@
 
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Prior of one view's intrinsics and of the views jointly; zero: no prior. `focal` and `principal` are the
 /// covariances of all views' deviations (px^2); empty: no prior.
@@ -23,8 +23,8 @@ struct PriorInformation {
 /// balls at known positions with `ball_sigma_px` of normal noise per axis and point pixels with
 /// `point_sigma_px` (Cramer 1946, Rao 1945; with priors: van Trees 1968). Uses only the pinhole camera,
 /// independently of the estimators: the derivatives are differences of `View::project`.
-Eigen::Matrix3d least_covariance(std::span<const View> views, std::span<const Eigen::Vector3d> balls,
-                                 const Eigen::Vector3d& point, double ball_sigma_px, double point_sigma_px,
-                                 const PriorInformation& prior);
+Eigen::Matrix3d least_covariance(std::span<const geometry::View> views,
+                                 std::span<const Eigen::Vector3d> balls, const Eigen::Vector3d& point,
+                                 double ball_sigma_px, double point_sigma_px, const PriorInformation& prior);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -14,7 +14,7 @@
 #include "helicarm/phantom/rules.h"
 #include "helicarm/study/statistics.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t sets_of_block = 64;
@@ -31,7 +31,7 @@ Eigen::Vector3d place_on(DesignSurface surface, double share, double around) {
   const double angle = 2 * std::numbers::pi * around, z = along * cone_height_mm;
   switch (surface) {
     case DesignSurface::helix:
-      return ConicalHelix().point(along * ConicalHelix().t_end);
+      return phantom::ConicalHelix().point(along * phantom::ConicalHelix().t_end);
     case DesignSurface::cone: {
       const double radius = cone_base_mm + along * (cone_top_mm - cone_base_mm);
       return {radius * std::cos(angle), radius * std::sin(angle), z};
@@ -52,15 +52,15 @@ std::vector<Eigen::Vector3d> places_of(DesignSurface surface, const Shares& shar
 }
 
 /// Labels from the base upwards; not P1 to P12, which have rules by label.
-Calibrator calibrator_of(std::string name, std::vector<Eigen::Vector3d> places) {
+phantom::Calibrator calibrator_of(std::string name, std::vector<Eigen::Vector3d> places) {
   std::ranges::sort(places, {}, [](const Eigen::Vector3d& p) { return p.z(); });
-  Calibrator calibrator{std::move(name), {}, {}};
+  phantom::Calibrator calibrator{std::move(name), {}, {}};
   for (const auto& place : places)
     calibrator.balls.push_back({fmt::format("B{}", calibrator.balls.size() + 1), place, design_ball_mm});
   return calibrator;
 }
 
-bool well_apart(const Calibrator& calibrator) {
+bool well_apart(const phantom::Calibrator& calibrator) {
   for (std::size_t i = 0; i < calibrator.balls.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
       if ((calibrator.balls[i].centre_in_calibrator - calibrator.balls[j].centre_in_calibrator).norm() <
@@ -69,10 +69,10 @@ bool well_apart(const Calibrator& calibrator) {
   return true;
 }
 
-bool keeps_rules(const Calibrator& calibrator) {
+bool keeps_rules(const phantom::Calibrator& calibrator) {
   return well_apart(calibrator) &&
-         std::ranges::all_of(check_rules(calibrator),
-                             [](const RuleFinding& finding) { return finding.passed(); });
+         std::ranges::all_of(phantom::check_rules(calibrator),
+                             [](const phantom::RuleFinding& finding) { return finding.passed(); });
 }
 
 /// Predicts TRE from simulated noise: all sets share the same draws, so that two sets differ only by their
@@ -112,7 +112,7 @@ class Judge {
 
  private:
   double sigma_;
-  std::array<View, 2> views_ = paper_views(WorldOrigin::centre);
+  std::array<geometry::View, 2> views_ = paper_views(WorldOrigin::centre);
   SimdViews lane_views_{views_};
   std::vector<Eigen::Vector3d> targets_;
   SimdTargets lane_targets_;
@@ -215,9 +215,9 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
   if (kept->empty()) return answer;
 
   const Judge reporter(options, design_stream + 3, report_draws);
-  const auto judged = [&](Calibrator calibrator) {
+  const auto judged = [&](phantom::Calibrator calibrator) {
     std::vector<Eigen::Vector3d> places;
-    for (const CalibratorBall& ball : calibrator.balls) places.push_back(ball.centre_in_calibrator);
+    for (const phantom::CalibratorBall& ball : calibrator.balls) places.push_back(ball.centre_in_calibrator);
     const bool kept_rules = keeps_rules(calibrator);
     return DesignedSet{std::move(calibrator), reporter.tre_mm(places), kept_rules};
   };
@@ -230,7 +230,7 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
             options.balls, name_of(options.surface)));
   answer.design =
       judged(calibrator_of("design", places_of(options.surface, Shares(found.begin() + 1, found.end()))));
-  answer.udcsc = judged(udcsc());
+  answer.udcsc = judged(phantom::udcsc());
   const std::span<const double> tre = std::span(kept->front()).first(options.groups);
   answer.median_random_mm = column_statistics(tre).median;
   std::vector<std::size_t> order(tre.size());
@@ -241,11 +241,11 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
   };
   answer.best_random = judged(random_set(order[0]));
   for (std::size_t i = 0; i < std::min(tried_random_sets, order.size()); ++i)
-    if (const Calibrator set = random_set(order[i]); keeps_rules(set)) {
+    if (const phantom::Calibrator set = random_set(order[i]); keeps_rules(set)) {
       answer.best_random_ruled = judged(set);
       break;
     }
   return answer;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

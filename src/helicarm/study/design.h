@@ -12,7 +12,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Surface for the balls of a designed calibrator: the spiral of Eq. 9, its cone, or a dome (half an
 /// ellipsoid) of the same base and height.
@@ -37,7 +37,7 @@ struct DesignOptions {
 inline constexpr std::size_t tried_random_sets = 500;  // best random sets checked against the rules
 
 struct DesignedSet {
-  Calibrator calibrator;
+  phantom::Calibrator calibrator;
   double tre_mm = 0;  ///< rms over noise and the cone's targets with exact pixels, from separate draws
   bool keeps_rules = false;
 };
@@ -57,4 +57,4 @@ Expected<DesignAnswer> study_design(const DesignOptions& options, const EngineOp
 /// design.csv, design.json (with the calibrator as a file for `phantom` and cases), design.svg and a summary.
 StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -6,16 +6,16 @@
 #include "helicarm/report/chart.h"
 #include "helicarm/study/design.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 Json json_of_set(const DesignedSet& set) {
   return {{"tre_mm", set.tre_mm}, {"keeps_rules", set.keeps_rules}, {"balls", set.calibrator.balls.size()}};
 }
 
-ChartSeries drawn_set(const char* name, const Calibrator& calibrator, int up) {
-  ChartSeries series{name, {}, true};
-  for (const CalibratorBall& ball : calibrator.balls)
+report::ChartSeries drawn_set(const char* name, const phantom::Calibrator& calibrator, int up) {
+  report::ChartSeries series{name, {}, true};
+  for (const phantom::CalibratorBall& ball : calibrator.balls)
     series.points.push_back({ball.centre_in_calibrator.x(), ball.centre_in_calibrator(up)});
   return series;
 }
@@ -25,7 +25,7 @@ ChartSeries drawn_set(const char* name, const Calibrator& calibrator, int up) {
 StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
   StudyFiles files;
   files.csv = "label,x_mm,y_mm,z_mm\n";
-  for (const CalibratorBall& ball : answer.design.calibrator.balls) {
+  for (const phantom::CalibratorBall& ball : answer.design.calibrator.balls) {
     const Eigen::Vector3d& p = ball.centre_in_calibrator;
     files.csv += fmt::format("{},{},{},{}\n", ball.label, p.x(), p.y(), p.z());
   }
@@ -52,18 +52,19 @@ StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
        {"best_random", json_of_set(answer.best_random)},
        {"best_random_that_keeps_rules", ruled ? json_of_set(answer.best_random_ruled) : Json(nullptr)},
        {"median_random_mm", answer.median_random_mm},
-       {"calibrator", to_json(answer.design.calibrator)}});
-  std::vector<Chart> charts;
+       {"calibrator", phantom::to_json(answer.design.calibrator)}});
+  std::vector<report::Chart> charts;
   for (const int up : {1, 2}) {
-    Chart chart{up == 1 ? "(a) from above" : "(b) from the side", "X, mm", up == 1 ? "Y, mm" : "Z, mm"};
+    report::Chart chart{up == 1 ? "(a) from above" : "(b) from the side", "X, mm",
+                        up == 1 ? "Y, mm" : "Z, mm"};
     chart.series = {drawn_set("design", answer.design.calibrator, up),
                     drawn_set("udcsc", answer.udcsc.calibrator, up)};
     chart.note = fmt::format("TRE in the cone: {:.3f} mm by design, {:.3f} mm with udcsc",
                              answer.design.tre_mm, answer.udcsc.tre_mm);
     charts.push_back(std::move(chart));
   }
-  files.svg = chart_svg(charts);
+  files.svg = report::chart_svg(charts);
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

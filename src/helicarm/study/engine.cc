@@ -11,7 +11,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/study/journal.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t blocks_per_turn = 4;  // per thread, between two exchanges of the ranks
@@ -162,4 +162,4 @@ Expected<std::vector<std::vector<double>>> run_study(const std::vector<StudySett
   return guarded([&] { return Run(settings, identity, options, ranks).answers(); });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/study/ranks.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// One setting of a study: trials in blocks of fixed size. A block's values must depend only on its number,
 /// so that threads, ranks and restarts do not change them.
@@ -40,4 +40,4 @@ Expected<std::vector<std::vector<double>>> run_study(const std::vector<StudySett
                                                      const std::string& identity,
                                                      const EngineOptions& options, const Ranks& ranks);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -10,7 +10,7 @@
 
 #include "helicarm/study/journal.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 namespace fs = std::filesystem;
@@ -142,4 +142,4 @@ TEST_F(Engine, JournalIgnoresForeignBytes) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

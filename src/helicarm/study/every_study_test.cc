@@ -8,7 +8,7 @@
 #include "helicarm/study/journal.h"
 #include "helicarm/study/small_studies.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 void PrintTo(const SmallStudy& study, std::ostream* out) { *out << study.name; }
 
@@ -70,4 +70,4 @@ INSTANTIATE_TEST_SUITE_P(All, EveryStudy, ::testing::ValuesIn(small_studies()),
                          [](const auto& given) { return given.param.name; });
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

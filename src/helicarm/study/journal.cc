@@ -13,7 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/system_message.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::uintmax_t most_journal_bytes = std::uintmax_t{1} << 36;
@@ -111,4 +111,4 @@ Expected<void> Journal::append(std::size_t block, std::span<const double> values
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

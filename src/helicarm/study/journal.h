@@ -9,7 +9,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// State of an interrupted study.
 struct JournalContent {
@@ -43,4 +43,4 @@ class Journal {
   int file_ = -1;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -10,7 +10,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/fiducials/label.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using simulation::SyntheticDetection;
@@ -29,31 +29,33 @@ struct Trial {
   double ms = 0;
 };
 
-LabellingPrior nominal_prior() {
+fiducials::LabellingPrior nominal_prior() {
   const simulation::NominalCamera camera;
   return {.focal_px = camera.focal_px,
           .principal_px = camera.principal_px,
           .field_radius_px = camera.field_radius_px};
 }
 
-Expected<Labelling> label(const Calibrator& calibrator, const std::vector<SyntheticDetection>& detections) {
-  std::vector<BallCandidate> candidates;
+Expected<fiducials::Labelling> label(const phantom::Calibrator& calibrator,
+                                     const std::vector<SyntheticDetection>& detections) {
+  std::vector<fiducials::BallCandidate> candidates;
   for (const SyntheticDetection& disc : detections)
     candidates.push_back({disc.uv, disc.sigma_px, disc.radius_px, disc.radius_sigma_px});
-  return label_balls(calibrator, candidates, nominal_prior());
+  return fiducials::label_balls(calibrator, candidates, nominal_prior());
 }
 
 /// An outlier may imitate an occluded ball unless a fit to the true ones excludes it by 4 sigma.
-Verdict judge(const Labelling& labelling, const SyntheticView& image, const Calibrator& calibrator) {
+Verdict judge(const fiducials::Labelling& labelling, const SyntheticView& image,
+              const phantom::Calibrator& calibrator) {
   if (labelling.mirrored != image.mirrored()) return Verdict::wrong;
-  std::vector<WeightedCorrespondence> seen;
+  std::vector<fiducials::WeightedCorrespondence> seen;
   for (const SyntheticDetection& disc : image.detections)
     if (disc.ball >= 0)
       seen.push_back({calibrator.balls[disc.ball].centre_in_calibrator, disc.uv, disc.sigma_px});
-  const LabellingPrior prior = nominal_prior();
-  const PoseFit known =
-      fit_pose(image.view, seen,
-               {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px}, 20);
+  const fiducials::LabellingPrior prior = nominal_prior();
+  const fiducials::PoseFit known = fiducials::fit_pose(
+      image.view, seen, {*prior.focal_px, prior.focal_sigma, prior.principal_px, prior.principal_sigma_px},
+      20);
   Verdict verdict = Verdict::right;
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     if (labelling.candidate_of_ball[k] < 0) continue;
@@ -62,15 +64,15 @@ Verdict judge(const Labelling& labelling, const SyntheticView& image, const Cali
     const Eigen::Vector3d& centre = calibrator.balls[k].centre_in_calibrator;
     const Eigen::Vector2d off = disc.uv - known.view.project(centre);
     const Eigen::Matrix2d noise = disc.sigma_px * disc.sigma_px * Eigen::Matrix2d::Identity();
-    if (!(off.dot((noise + prediction_covariance(known, centre)).inverse() * off) <= 4 * 4))
+    if (!(off.dot((noise + fiducials::prediction_covariance(known, centre)).inverse() * off) <= 4 * 4))
       return Verdict::wrong;
     verdict = Verdict::imitated;
   }
   return verdict;
 }
 
-double degrees_off_axis(const Calibrator& calibrator, const View& view) {
-  const Eigen::Vector3d ray = middle_of(calibrator) - view.source_in_world();
+double degrees_off_axis(const phantom::Calibrator& calibrator, const geometry::View& view) {
+  const Eigen::Vector3d ray = phantom::middle_of(calibrator) - view.source_in_world();
   return std::acos(std::abs(ray.normalized().z())) * 180 / std::numbers::pi;
 }
 
@@ -80,7 +82,7 @@ double thread_ms() {
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-Trial try_view(const Calibrator& calibrator, const LabellingStudy& study, std::uint64_t number) {
+Trial try_view(const phantom::Calibrator& calibrator, const LabellingStudy& study, std::uint64_t number) {
   RandomStream random(study.seed, views_stream, number);
   const int hidden = static_cast<int>(random.index(study.most_hidden + 1));
   const int outliers = static_cast<int>(random.index(study.most_false + 1));
@@ -113,7 +115,7 @@ void count(LabellingCount& into, const Trial& trial) {
 
 }  // namespace
 
-LabellingTally study_labelling(const Calibrator& calibrator, const LabellingStudy& study) {
+LabellingTally study_labelling(const phantom::Calibrator& calibrator, const LabellingStudy& study) {
   std::vector<Trial> trials(study.views);
   parallel_for(trials.size(), study.threads,
                [&](std::size_t i) { trials[i] = try_view(calibrator, study, i); });
@@ -134,4 +136,4 @@ LabellingTally study_labelling(const Calibrator& calibrator, const LabellingStud
   return tally;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/simulation/synthetic_detections.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Random views of a calibrator, each with occluded balls and outliers. Each view can be replayed alone.
 struct LabellingStudy {
@@ -47,6 +47,6 @@ struct LabellingTally {
 };
 
 /// The counts do not depend on the number of threads.
-LabellingTally study_labelling(const Calibrator& calibrator, const LabellingStudy& study);
+LabellingTally study_labelling(const phantom::Calibrator& calibrator, const LabellingStudy& study);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

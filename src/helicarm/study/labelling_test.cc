@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using simulation::OutlierKind;
@@ -20,7 +20,7 @@ void expect_same(const LabellingCount& a, const LabellingCount& b) {
 }
 
 TEST(StudyLabelling, EveryViewOffTheAxisIsLabelledAndNoneWrongly) {
-  const auto tally = study_labelling(udcsc(), {.views = 100});
+  const auto tally = study_labelling(phantom::udcsc(), {.views = 100});
   EXPECT_EQ(tally.all.views, 100);
   EXPECT_EQ(tally.all.wrong, 0);
   EXPECT_GT(tally.spread.views, 40);
@@ -29,22 +29,22 @@ TEST(StudyLabelling, EveryViewOffTheAxisIsLabelledAndNoneWrongly) {
 
 TEST(StudyLabelling, OutliersThatImitateBallsNeverCauseWrongLabels) {
   for (const auto kind : {OutlierKind::imitating, OutlierKind::lattice}) {
-    const auto tally = study_labelling(udcsc(), {.views = 40, .seed = 2, .outliers = kind});
+    const auto tally = study_labelling(phantom::udcsc(), {.views = 40, .seed = 2, .outliers = kind});
     EXPECT_EQ(tally.all.wrong, 0);
     EXPECT_GE(tally.spread.solved, tally.spread.views - 1);
   }
 }
 
 TEST(StudyLabelling, ThreadsDoNotChangeTheCounts) {
-  const auto one = study_labelling(udcsc(), {.views = 20, .seed = 3, .threads = 1});
-  const auto three = study_labelling(udcsc(), {.views = 20, .seed = 3, .threads = 3});
+  const auto one = study_labelling(phantom::udcsc(), {.views = 20, .seed = 3, .threads = 1});
+  const auto three = study_labelling(phantom::udcsc(), {.views = 20, .seed = 3, .threads = 3});
   expect_same(one.all, three.all);
   expect_same(one.spread, three.spread);
   for (std::size_t i = 0; i < one.by_visible.size(); ++i) expect_same(one.by_visible[i], three.by_visible[i]);
 }
 
 TEST(StudyLabelling, NoViewsGiveNoCounts) {
-  const auto tally = study_labelling(udcsc(), {.views = 0});
+  const auto tally = study_labelling(phantom::udcsc(), {.views = 0});
   EXPECT_EQ(tally.all.views, 0);
   EXPECT_EQ(tally.median_ms, 0);
 }
@@ -56,7 +56,7 @@ TEST(StudyLabelling, DISABLED_TenThousandViews) {
     for (const auto kind : {OutlierKind::uniform, OutlierKind::imitating, OutlierKind::lattice})
       runs.push_back({seed, kind});
   for (const auto& [seed, kind] : runs) {
-    const auto tally = study_labelling(udcsc(), {.seed = seed, .outliers = kind});
+    const auto tally = study_labelling(phantom::udcsc(), {.seed = seed, .outliers = kind});
     fmt::print("seed {}, outliers of kind {}\n", seed, static_cast<int>(kind));
     const auto print = [](const std::string& what, const LabellingCount& count) {
       if (count.views == 0) return;
@@ -75,4 +75,4 @@ TEST(StudyLabelling, DISABLED_TenThousandViews) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

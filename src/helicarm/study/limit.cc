@@ -10,7 +10,7 @@
 #include "helicarm/study/limit_trial.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 /// Statistics of a setting's trials for one place.
@@ -91,4 +91,4 @@ Expected<std::vector<LimitRow>> study_limit(const LimitOptions& options, const E
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

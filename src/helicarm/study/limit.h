@@ -9,7 +9,7 @@
 #include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 struct LimitOptions {
   std::size_t groups = 1000;  ///< trials of each setting
@@ -41,4 +41,4 @@ Expected<std::vector<LimitRow>> study_limit(const LimitOptions& options, const E
 /// limit.csv, limit.json, limit.svg (12 balls, exact pixels) and one line for each model.
 StudyFiles files_of(const std::vector<LimitRow>& rows, const LimitOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

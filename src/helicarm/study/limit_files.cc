@@ -8,7 +8,7 @@
 #include "helicarm/report/chart.h"
 #include "helicarm/study/limit.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr int charted_balls = 12;
@@ -62,10 +62,10 @@ Json limit_json(const std::vector<LimitRow>& rows, const LimitOptions& options) 
 
 /// Curves of one model over the noise, one for each place.
 template <class Value>
-Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Value value) {
-  Chart chart{model, "noise of ball centres, px per axis", {}};
+report::Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Value value) {
+  report::Chart chart{model, "noise of ball centres, px per axis", {}};
   for (const std::string& place : names_of(rows, &LimitRow::place)) {
-    ChartSeries series{place};
+    report::ChartSeries series{place};
     for (const LimitRow& row : rows)
       if (row.model == model && row.place == place && row.balls == charted_balls && row.point_exact) {
         series.points.push_back({double(series.points.size()), value(row)});
@@ -77,20 +77,20 @@ Chart chart_of(const std::vector<LimitRow>& rows, const std::string& model, Valu
 }
 
 /// Common range of all charts in a row, in tenths of `unit`.
-void share_range(std::span<Chart> charts, double unit) {
+void share_range(std::span<report::Chart> charts, double unit) {
   Extent extent;
-  for (const Chart& chart : charts) {
+  for (const report::Chart& chart : charts) {
     extent.include(chart.band->low), extent.include(chart.band->high);
-    for (const ChartSeries& series : chart.series)
+    for (const report::ChartSeries& series : chart.series)
       for (const auto& point : series.points) extent.include(point[1]);
   }
-  for (Chart& chart : charts)
+  for (report::Chart& chart : charts)
     chart.y_range = {std::floor(extent.low / unit) * unit, std::ceil(extent.high / unit) * unit};
 }
 
 std::string limit_svg(const std::vector<LimitRow>& rows) {
   const std::vector<std::string> names = names_of(rows, &LimitRow::model);
-  std::vector<Chart> charts;
+  std::vector<report::Chart> charts;
   for (const std::string& model : names) {
     charts.push_back(chart_of(rows, model, [](const LimitRow& row) { return row.efficiency(); }));
     charts.back().y_label = "rms error over Cramer-Rao bound";
@@ -105,7 +105,7 @@ std::string limit_svg(const std::vector<LimitRow>& rows) {
   const std::span all(charts);
   share_range(all.first(names.size()), 0.1);
   share_range(all.last(names.size()), 5);
-  return chart_svg(charts, names.size());
+  return report::chart_svg(charts, names.size());
 }
 
 std::string limit_summary(const std::vector<LimitRow>& rows) {
@@ -138,4 +138,4 @@ StudyFiles files_of(const std::vector<LimitRow>& rows, const LimitOptions& optio
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

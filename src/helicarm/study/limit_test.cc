@@ -10,14 +10,14 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/study/cramer_rao.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using Eigen::Vector3d;
 
-const std::vector<View> views{
-    {{6000, 6000, 512, 512, 0}, {rotation_from_euler(0, 0, 0), {0, 0, 800}}},
-    {{6000, 6000, 512, 512, 0}, {rotation_from_euler(std::numbers::pi / 2, 0, 0), {0, 0, 800}}}};
+const std::vector<geometry::View> views{
+    {{6000, 6000, 512, 512, 0}, {geometry::rotation_from_euler(0, 0, 0), {0, 0, 800}}},
+    {{6000, 6000, 512, 512, 0}, {geometry::rotation_from_euler(std::numbers::pi / 2, 0, 0), {0, 0, 800}}}};
 
 std::vector<Vector3d> balls() {
   std::vector<Vector3d> places;
@@ -87,4 +87,4 @@ TEST(StudyLimit, SummaryHasOneLineForEachModel) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -18,7 +18,7 @@
 #include "helicarm/study/cramer_rao.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 using Eigen::Vector3d;
@@ -37,47 +37,49 @@ constexpr int entries_of_history = 12;
 const Vector3d centre(0, 0, 40);  // of the places
 
 /// The experiment's C-arms: an unknown one of its make, and one with small sag.
-const CArmPrior make = unknown_c_arm();
-const CArmPrior stiff{IntrinsicsVariation{10, 0.3}, IntrinsicsVariation{7, 0.5}};
+const calibration::CArmPrior make = pipeline::unknown_c_arm();
+const calibration::CArmPrior stiff{calibration::IntrinsicsVariation{10, 0.3},
+                                   calibration::IntrinsicsVariation{7, 0.5}};
 
 std::vector<Vector3d> balls_on_helix(int n) {
   std::vector<Vector3d> balls;
   for (int k = 0; k < n; ++k)
-    balls.push_back(ConicalHelix().point(std::numbers::pi * (1.0 / 6 + 5.5 * k / (n - 1))));
+    balls.push_back(phantom::ConicalHelix().point(std::numbers::pi * (1.0 / 6 + 5.5 * k / (n - 1))));
   return balls;
 }
 
 /// Deviations of focal length and principal point from nominal, mm.
-Vector3d variation(const CArmPrior& c_arm, double IntrinsicsVariation::*part, RandomStream& random) {
+Vector3d variation(const calibration::CArmPrior& c_arm, double calibration::IntrinsicsVariation::*part,
+                   RandomStream& random) {
   return {*c_arm.focal.*part * random.normal(), *c_arm.principal.*part * random.normal(),
           *c_arm.principal.*part * random.normal()};
 }
 
-View view_with(const Vector3d& variation_mm, double aspect, double angle) {
+geometry::View view_with(const Vector3d& variation_mm, double aspect, double angle) {
   const double f = px_per_mm * (focal_mm + variation_mm.x());
-  const Eigen::Matrix3d rotation = rotation_from_euler(angle, 0, 0);
+  const Eigen::Matrix3d rotation = geometry::rotation_from_euler(angle, 0, 0);
   return {{2 * f * aspect / (1 + aspect), 2 * f / (1 + aspect), middle_px + px_per_mm * variation_mm.y(),
            middle_px + px_per_mm * variation_mm.z(), 0},
           {rotation, Vector3d(0, 0, 800) - rotation * centre}};
 }
 
-std::array<View, 2> views_of(const CArmPrior& c_arm, const Vector3d& common_mm, double aspect_spread,
-                             RandomStream& random) {
-  std::array<View, 2> views;
+std::array<geometry::View, 2> views_of(const calibration::CArmPrior& c_arm, const Vector3d& common_mm,
+                                       double aspect_spread, RandomStream& random) {
+  std::array<geometry::View, 2> views;
   for (std::size_t i = 0; i < 2; ++i) {
     const double aspect = 1 + aspect_spread * random.normal();
-    views[i] = view_with(common_mm + variation(c_arm, &IntrinsicsVariation::of_view, random), aspect,
-                         double(i) * std::numbers::pi / 2);
+    views[i] = view_with(common_mm + variation(c_arm, &calibration::IntrinsicsVariation::of_view, random),
+                         aspect, double(i) * std::numbers::pi / 2);
   }
   return views;
 }
 
-ViewFiducials pictured(const char* name, const View& view, const std::vector<Vector3d>& balls, double sigma,
-                       RandomStream& random) {
-  ViewFiducials seen{name, {}};
+calibration::ViewFiducials pictured(const char* name, const geometry::View& view,
+                                    const std::vector<Vector3d>& balls, double sigma, RandomStream& random) {
+  calibration::ViewFiducials seen{name, {}};
   for (const Vector3d& ball : balls) {
-    Fiducial fiducial{fmt::format("P{}", seen.fiducials.size() + 1), ball};
-    fiducial.status = FiducialStatus::used;
+    fiducials::Fiducial fiducial{fmt::format("P{}", seen.fiducials.size() + 1), ball};
+    fiducial.status = fiducials::FiducialStatus::used;
     fiducial.sigma_px = sigma;
     fiducial.uv = view.project(ball) + sigma * Eigen::Vector2d(random.normal(), random.normal());
     seen.fiducials.push_back(fiducial);
@@ -89,68 +91,75 @@ ViewFiducials pictured(const char* name, const View& view, const std::vector<Vec
 /// A C-arm and its history of earlier acquisitions.
 struct KnownCArm {
   Vector3d mean_variation_mm;
-  LearnedIntrinsics knowledge;
+  calibration::LearnedIntrinsics knowledge;
 };
 
 KnownCArm c_arm_with_history(const LimitSetting& setting, const std::vector<Vector3d>& balls,
                              RandomStream random) {
   KnownCArm known;
-  known.mean_variation_mm = variation(stiff, &IntrinsicsVariation::common, random);
-  std::vector<HistoryEntry> true_views;
+  known.mean_variation_mm = variation(stiff, &calibration::IntrinsicsVariation::common, random);
+  std::vector<calibration::HistoryEntry> true_views;
   while (int(true_views.size()) < entries_of_history)
-    for (const View& view : views_of(stiff, known.mean_variation_mm, aspect_sigma, random)) {
-      ViewFiducials seen = pictured("", view, balls, setting.sigma_px, random);
-      seen.prior.aspect = NormalPrior{1, aspect_sigma};
-      if (const auto true_view = history_entry_of(seen, "", {make})) true_views.push_back(*true_view);
+    for (const geometry::View& view : views_of(stiff, known.mean_variation_mm, aspect_sigma, random)) {
+      calibration::ViewFiducials seen = pictured("", view, balls, setting.sigma_px, random);
+      seen.prior.aspect = calibration::NormalPrior{1, aspect_sigma};
+      if (const auto true_view = calibration::history_entry_of(seen, "", {make}))
+        true_views.push_back(*true_view);
     }
-  known.knowledge = learn_intrinsics(true_views, {focal_mm, 0, 0}, make);
+  known.knowledge = calibration::learn_intrinsics(true_views, {focal_mm, 0, 0}, make);
   return known;
 }
 
 /// The priors given to the estimator and to the bound.
 struct PriorKnowledge {
-  CArmPrior c_arm;
-  std::optional<NormalPrior> aspect;
-  std::optional<NormalPrior> skew = NormalPrior{0, pinned};
+  calibration::CArmPrior c_arm;
+  std::optional<calibration::NormalPrior> aspect;
+  std::optional<calibration::NormalPrior> skew = calibration::NormalPrior{0, pinned};
   PriorInformation bound;
 };
 
 PriorKnowledge told_of(LimitModel model) {
-  const auto variations = [](const IntrinsicsVariation& d) {
+  const auto variations = [](const calibration::IntrinsicsVariation& d) {
     return Eigen::MatrixXd(px_per_mm * px_per_mm *
                            (Eigen::Matrix2d::Constant(d.common * d.common) +
                             Eigen::Matrix2d(d.of_view * d.of_view * Eigen::Matrix2d::Identity())));
   };
-  const auto with = [&](const CArmPrior& c_arm, double aspect) {
+  const auto with = [&](const calibration::CArmPrior& c_arm, double aspect) {
     return PriorKnowledge{c_arm,
-                          NormalPrior{1, aspect},
-                          NormalPrior{0, pinned},
+                          calibration::NormalPrior{1, aspect},
+                          calibration::NormalPrior{0, pinned},
                           {variations(*c_arm.focal), variations(*c_arm.principal), aspect, pinned}};
   };
   switch (model) {
     case LimitModel::free:
       return {{}, {}, {}, {}};
     case LimitModel::square:
-      return {{}, NormalPrior{1, pinned}, NormalPrior{0, pinned}, {{}, {}, pinned, pinned}};
+      return {{},
+              calibration::NormalPrior{1, pinned},
+              calibration::NormalPrior{0, pinned},
+              {{}, {}, pinned, pinned}};
     case LimitModel::prior:
       return with(make, aspect_sigma);
     case LimitModel::c_arm:  // bound for a C-arm with known mean and sag
-      return with({IntrinsicsVariation{known_mm, stiff.focal->of_view},
-                   IntrinsicsVariation{known_mm, stiff.principal->of_view}},
+      return with({calibration::IntrinsicsVariation{known_mm, stiff.focal->of_view},
+                   calibration::IntrinsicsVariation{known_mm, stiff.principal->of_view}},
                   aspect_sigma);
     case LimitModel::known:
-      return with({IntrinsicsVariation{known_mm, known_mm}, IntrinsicsVariation{known_mm, known_mm}}, pinned);
+      return with({calibration::IntrinsicsVariation{known_mm, known_mm},
+                   calibration::IntrinsicsVariation{known_mm, known_mm}},
+                  pinned);
   }
   return {};
 }
 
-std::optional<LocatedPoint> located(const std::array<Eigen::Vector2d, 2>& pixels, double sigma,
-                                    const Expected<CalibrationResult>& calibration) {
+std::optional<localization::LocatedPoint> located(
+    const std::array<Eigen::Vector2d, 2>& pixels, double sigma,
+    const Expected<calibration::CalibrationResult>& calibration) {
   if (!calibration) return std::nullopt;
-  std::vector<PointObservation> images;
+  std::vector<localization::PointObservation> images;
   for (std::size_t i = 0; i < 2; ++i)
     images.push_back({i, pixels[i], sigma * sigma * Eigen::Matrix2d::Identity()});
-  const auto point = locate("", PointSource::target, images, *calibration);
+  const auto point = localization::locate("", localization::PointSource::target, images, *calibration);
   return point ? std::optional(*point) : std::nullopt;
 }
 
@@ -159,25 +168,26 @@ LimitOutcomes try_once(const LimitSetting& setting, const std::vector<Vector3d>&
   RandomStream random(seed, setting.stream, trial);
   const PriorKnowledge prior_knowledge = told_of(setting.model);
   const bool drawn = setting.model == LimitModel::prior || setting.model == LimitModel::c_arm;
-  const CArmPrior& arm = c_arm ? stiff : make;
+  const calibration::CArmPrior& arm = c_arm ? stiff : make;
   const Vector3d common = c_arm ? c_arm->mean_variation_mm
                           : setting.model == LimitModel::prior
-                              ? variation(arm, &IntrinsicsVariation::common, random)
+                              ? variation(arm, &calibration::IntrinsicsVariation::common, random)
                               : Vector3d::Zero();
-  const std::array<View, 2> views = drawn ? views_of(arm, common, aspect_sigma, random)
-                                          : std::array{view_with(Vector3d::Zero(), 1, 0),
-                                                       view_with(Vector3d::Zero(), 1, std::numbers::pi / 2)};
-  std::vector<ViewFiducials> seen;
+  const std::array<geometry::View, 2> views =
+      drawn ? views_of(arm, common, aspect_sigma, random)
+            : std::array{view_with(Vector3d::Zero(), 1, 0),
+                         view_with(Vector3d::Zero(), 1, std::numbers::pi / 2)};
+  std::vector<calibration::ViewFiducials> seen;
   for (std::size_t i = 0; i < 2; ++i) {
     seen.push_back(pictured(i == 0 ? "AP" : "LAT", views[i], balls, setting.sigma_px, random));
     seen[i].prior.aspect = prior_knowledge.aspect;
     seen[i].prior.skew = prior_knowledge.skew;
-    if (c_arm) seen[i].prior = learned_prior(seen[i].prior, c_arm->knowledge, false);
+    if (c_arm) seen[i].prior = calibration::learned_prior(seen[i].prior, c_arm->knowledge, false);
   }
-  CalibrationOptions options;
+  calibration::CalibrationOptions options;
   options.common.c_arm = c_arm ? c_arm->knowledge.prior : prior_knowledge.c_arm;
-  const auto calibration = calibrate(seen, options);
-  const auto dlt = calibrate_paper(seen, options);
+  const auto calibration = calibration::calibrate(seen, options);
+  const auto dlt = calibration::calibrate_paper(seen, options);
 
   LimitOutcomes outcomes;
   for (std::size_t k = 0; k < rows_of_limit_setting; ++k) {
@@ -215,4 +225,4 @@ void run_limit_trials(const LimitSetting& setting, const LimitOptions& options, 
     put_record(try_once(setting, balls, c_arm ? &*c_arm : nullptr, options.seed, trial), out);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

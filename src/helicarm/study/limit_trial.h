@@ -9,7 +9,7 @@
 
 #include "helicarm/study/limit.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Knowledge of the intrinsics.
 enum class LimitModel { free, square, prior, c_arm, known };
@@ -48,4 +48,4 @@ inline constexpr std::size_t limit_trials_of_block = 50;
 void run_limit_trials(const LimitSetting& setting, const LimitOptions& options, std::size_t block,
                       std::span<double> out);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

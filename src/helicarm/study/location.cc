@@ -9,7 +9,7 @@
 
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t draws_of_block = 128;
@@ -19,7 +19,7 @@ constexpr std::uint32_t of_point = 2;  // blocks of words, one per view
 struct LocationTrials {
   const LocationOptions& options;
   const LocationMap& map;
-  std::array<View, 2> views = paper_views(options.origin);
+  std::array<geometry::View, 2> views = paper_views(options.origin);
   SimdViews lane_views{views};
 
   struct Sums {
@@ -79,8 +79,8 @@ std::vector<Eigen::Vector3d> balls_of(const LocationOptions& options) {
   return balls;
 }
 
-SeenIn seen_in(const std::array<View, 2>& views, const Eigen::Vector3d& place) {
-  const auto holds = [&](const View& view) {
+SeenIn seen_in(const std::array<geometry::View, 2>& views, const Eigen::Vector3d& place) {
+  const auto holds = [&](const geometry::View& view) {
     const Eigen::Array2d pixel = view.project(place);
     return view.depth(place) > 0 && (pixel >= -0.5).all() && (pixel < image_px - 0.5).all();
   };
@@ -88,7 +88,7 @@ SeenIn seen_in(const std::array<View, 2>& views, const Eigen::Vector3d& place) {
 }
 
 LocationMap empty_map(const LocationOptions& options) {
-  const std::array<View, 2> views = paper_views(options.origin);
+  const std::array<geometry::View, 2> views = paper_views(options.origin);
   LocationMap map;
   map.balls = balls_of(options);
   map.centre = Eigen::Vector3d::Zero();
@@ -150,4 +150,4 @@ Expected<LocationMap> study_location(const LocationOptions& options, const Engin
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

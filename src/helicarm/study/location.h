@@ -10,7 +10,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Fig. 7: TRE of targets on the planes through the balls' centre along XOY and XOZ.
 struct LocationOptions {
@@ -56,4 +56,4 @@ Expected<LocationMap> study_location(const LocationOptions& options, const Engin
 /// location.csv, location.json, location.svg and the comparison with the paper.
 StudyFiles files_of(const LocationMap& map, const LocationOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/study/location.h"
 #include "helicarm/study/statistics.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 std::string_view name_of_plane(TargetPlane plane) { return plane == TargetPlane::xoy ? "xoy" : "xoz"; }
@@ -41,11 +41,11 @@ double rise_of(const LocationMap& map, bool seen_only) {
   return spearman(distance, tre);
 }
 
-ChartField field_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
+report::ChartField field_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
   const std::size_t cells = map.points.size() / 2;
   const std::size_t first = plane == TargetPlane::xoy ? 0 : cells;
   const double reach = options.step_mm * (map.side - 1) / 2;
-  ChartField field{-reach, -reach, options.step_mm, map.side, map.side, {}, {}};
+  report::ChartField field{-reach, -reach, options.step_mm, map.side, map.side, {}, {}};
   field.hatchings = {{"outside the AP image", {}}, {"outside the lateral image", {}}};
   double most = 0;
   for (std::size_t i = 0; i < cells; ++i) {
@@ -62,13 +62,13 @@ ChartField field_of(const LocationMap& map, const LocationOptions& options, Targ
   return field;
 }
 
-Chart chart_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
+report::Chart chart_of(const LocationMap& map, const LocationOptions& options, TargetPlane plane) {
   const bool flat = plane == TargetPlane::xoy;
-  Chart chart{flat ? "(a) TRE on the plane along XOY" : "(b) TRE on the plane along XOZ",
-              "X from the balls' centre, mm",
-              flat ? "Y from the balls' centre, mm" : "Z from the balls' centre, mm"};
+  report::Chart chart{flat ? "(a) TRE on the plane along XOY" : "(b) TRE on the plane along XOZ",
+                      "X from the balls' centre, mm",
+                      flat ? "Y from the balls' centre, mm" : "Z from the balls' centre, mm"};
   chart.field = field_of(map, options, plane);
-  ChartSeries none, balls{"balls, projected", {}, true};
+  report::ChartSeries none, balls{"balls, projected", {}, true};
   for (const Eigen::Vector3d& ball : map.balls) {
     const Eigen::Vector3d out = ball - map.centre;
     balls.points.push_back({out.x(), flat ? out.y() : out.z()});
@@ -127,9 +127,9 @@ StudyFiles files_of(const LocationMap& map, const LocationOptions& options) {
                      {"spearman_with_distance", rise},
                      {"spearman_with_distance_seen", rise_seen},
                      {"by_distance", std::move(by_distance)}});
-  files.svg = chart_svg(
+  files.svg = report::chart_svg(
       std::array{chart_of(map, options, TargetPlane::xoy), chart_of(map, options, TargetPlane::xoz)});
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t groups_per_block = 256;
@@ -126,7 +126,7 @@ class NumberTrials {
   }
 
   NumberOptions options_;
-  std::array<View, 2> views_;
+  std::array<geometry::View, 2> views_;
   SimdViews lane_views_;
   PlacedTargets placed_;
   SimdTargets targets_;
@@ -212,4 +212,4 @@ Expected<std::vector<NumberRow>> study_number(const NumberOptions& options, cons
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

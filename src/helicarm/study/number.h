@@ -11,7 +11,7 @@
 #include "helicarm/study/statistics.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Pixels that are back-projected for FRE and TRE: those of the calibration (balls only), new ones with
 /// independent noise, or exact ones.
@@ -53,4 +53,4 @@ Expected<std::vector<NumberRow>> study_number(const NumberOptions& options, cons
 /// number.csv, number.json, number.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<NumberRow>& rows, const NumberOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/report/chart.h"
 #include "helicarm/study/number.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 // Fig. 5a, values read from the figure.
@@ -166,21 +166,25 @@ std::string place_of(GroupError error) {
   return error == GroupError::tre_cone ? "TRE in the cone" : "TRE at the cone's centre";
 }
 
-ChartSeries series_of(const NumberCurve& curve, std::string name) {
-  ChartSeries series{std::move(name)};
+report::ChartSeries series_of(const NumberCurve& curve, std::string name) {
+  report::ChartSeries series{std::move(name)};
   for (const NumberRow* row : curve.rows)
     series.points.push_back({double(row->balls), row->of_groups.median});
   return series;
 }
 
 std::string number_svg(const std::vector<NumberCurve>& curves, const NumberOptions& options) {
-  if (curves.empty()) return chart_svg({});
+  if (curves.empty()) return report::chart_svg({});
   const SigmaReading sigma = curves.front().sigma;
   const std::string balls = "Number of fiducial points";
   const std::string note =
       fmt::format("medians of {} random groups; sigma as {}", options.groups, name_of(sigma));
-  Chart fre{"(a) FRE", balls, "FRE, mm", {}, ChartBand{"published range", printed_fre_low, printed_fre_high}};
-  Chart tre{"(b) TRE", balls, "TRE, mm"};
+  report::Chart fre{"(a) FRE",
+                    balls,
+                    "FRE, mm",
+                    {},
+                    report::ChartBand{"published range", printed_fre_low, printed_fre_high}};
+  report::Chart tre{"(b) TRE", balls, "TRE, mm"};
   fre.note = tre.note = note;
   fre.y_from_zero = tre.y_from_zero = true;
   for (const NumberCurve& curve : curves) {
@@ -203,7 +207,7 @@ std::string number_svg(const std::vector<NumberCurve>& curves, const NumberOptio
                     "sigma as " + words_of(name_of(nearest->sigma)), words_of(name_of(nearest->reading)))));
     fre.series.back().dashed = true;
   }
-  return chart_svg(std::array{fre, tre});
+  return report::chart_svg(std::array{fre, tre});
 }
 
 }  // namespace
@@ -215,4 +219,4 @@ StudyFiles files_of(const std::vector<NumberRow>& rows, const NumberOptions& opt
           summary};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

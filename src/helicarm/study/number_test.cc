@@ -15,7 +15,7 @@
 #include "helicarm/study/location.h"
 #include "helicarm/study/uniformity_study.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 const Ranks by_itself;
@@ -218,7 +218,7 @@ TEST(StudyDesign, HasLessTreThanUdcscAndRandomSetsUnderTheRules) {
   EXPECT_LT(answer.design.tre_mm, answer.median_random_mm);
   const StudyFiles files = files_of(answer, options);
   EXPECT_EQ(files.csv, files_of(study_design(options, three, by_itself).value(), options).csv);
-  EXPECT_TRUE(calibrator_from_json(files.json["calibrator"], "design"));
+  EXPECT_TRUE(phantom::calibrator_from_json(files.json["calibrator"], "design"));
   options.balls = 5;
   EXPECT_EQ(study_design(options, one, by_itself).error().reason, Reason::bad_value);
 }
@@ -259,4 +259,4 @@ TEST(StudyCalibration, RefusedTestsAreCountedAndLeftOut) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

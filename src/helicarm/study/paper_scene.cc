@@ -8,7 +8,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom/conical_helix.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 // 19 points within sqrt(2) steps: 6 at one step, 12 at sqrt(2). The mean squared radius of a sphere's points
@@ -55,12 +55,12 @@ Eigen::Vector3d origin_in_calibrator(WorldOrigin origin) {
   return origin == WorldOrigin::base ? Eigen::Vector3d::Zero() : middle_of_cone();
 }
 
-std::array<View, 2> paper_views(WorldOrigin origin) {
+std::array<geometry::View, 2> paper_views(WorldOrigin origin) {
   constexpr double f_px = 900 / 0.15;
   const auto view = [&](double alpha) {
-    const Eigen::Matrix3d rotation = rotation_from_euler(alpha, 0, 0);
-    return View{{f_px, f_px, 512, 512, 0},
-                {rotation, Eigen::Vector3d(0, 0, 800) - rotation * origin_in_calibrator(origin)}};
+    const Eigen::Matrix3d rotation = geometry::rotation_from_euler(alpha, 0, 0);
+    return geometry::View{{f_px, f_px, 512, 512, 0},
+                          {rotation, Eigen::Vector3d(0, 0, 800) - rotation * origin_in_calibrator(origin)}};
   };
   return {view(0), view(std::numbers::pi / 2)};
 }
@@ -82,9 +82,9 @@ std::vector<Eigen::Vector3d> targets_in_cone() {
 
 Eigen::Vector3d middle_of_cone() { return {0, 0, cone_height_mm / 2}; }
 
-SimdViews::SimdViews(const std::array<View, 2>& views) {
+SimdViews::SimdViews(const std::array<geometry::View, 2>& views) {
   for (std::size_t i = 0; i < 2; ++i) {
-    const Projection projection = views[i].projection();
+    const geometry::Projection projection = views[i].projection();
     for (Eigen::Index row = 0; row < 3; ++row)
       for (Eigen::Index column = 0; column < 4; ++column) p_[i][row][column] = projection(row, column);
   }
@@ -100,7 +100,7 @@ SimdPixel SimdViews::project(std::size_t view, const SimdPoint& point) const {
 }
 
 SimdPoint on_spiral(Simd share) {
-  constexpr ConicalHelix spiral;
+  constexpr phantom::ConicalHelix spiral;
   const SineCosine direction = sine_cosine_of_turns(share * (spiral.t_end / (2 * std::numbers::pi)));
   const Simd radius = spiral.rr * exponential(share * (-spiral.t_end / spiral.pp));
   return {radius * direction.cosine, radius * direction.sine, share * (spiral.h * spiral.t_end)};
@@ -141,7 +141,8 @@ void add_noise(const SimdPixels& exact, double sigma, const SimdPixels& noise, s
     }
 }
 
-SimdTargets::SimdTargets(std::span<const Eigen::Vector3d> points, const std::array<View, 2>& views) {
+SimdTargets::SimdTargets(std::span<const Eigen::Vector3d> points,
+                         const std::array<geometry::View, 2>& views) {
   if (points.size() > SimdBalls::most) throw std::invalid_argument("SimdTargets: more than 64");
   const SimdViews lane_views(views);
   for (const Eigen::Vector3d& point : points) {
@@ -177,4 +178,4 @@ Simd SimdTargets::mean_square(std::size_t begin, std::size_t end, const SimdProj
   return sum / double(end - begin);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -13,7 +13,7 @@
 #include "helicarm/study/simd_geometry.h"
 #include "helicarm/study/simd_random.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Origin of the world frame of 2.3.3's poses: on the cone's axis, at its base as published, or at half
 /// height, so that both images contain the whole cone.
@@ -44,7 +44,7 @@ inline constexpr double printed_fle = 2.34;
 inline constexpr double image_px = 1024;  // per side
 
 /// The AP and lateral views of 2.3.3: f 900 mm, 0.15 mm pixels, 512, 800 mm. World: the calibrator frame.
-std::array<View, 2> paper_views(WorldOrigin origin);
+std::array<geometry::View, 2> paper_views(WorldOrigin origin);
 
 /// The poses' origin, mm.
 Eigen::Vector3d origin_in_calibrator(WorldOrigin origin);
@@ -58,7 +58,7 @@ Eigen::Vector3d middle_of_cone();
 /// Views in SIMD form.
 class SimdViews {
  public:
-  explicit SimdViews(const std::array<View, 2>& views);
+  explicit SimdViews(const std::array<geometry::View, 2>& views);
   SimdPixel project(std::size_t view, const SimdPoint& point) const;
 
  private:
@@ -95,7 +95,7 @@ void add_noise(const SimdPixels& exact, double sigma_px, const SimdPixels& noise
 /// At most 64 points known to all lanes, with their exact pixels.
 class SimdTargets {
  public:
-  SimdTargets(std::span<const Eigen::Vector3d> points, const std::array<View, 2>& views);
+  SimdTargets(std::span<const Eigen::Vector3d> points, const std::array<geometry::View, 2>& views);
 
   std::size_t size() const { return points_.size(); }
   /// Mean distance (Eq. 12) between the points triangulated by calibrated views and the true targets begin ..
@@ -110,4 +110,4 @@ class SimdTargets {
   SimdPixels exact_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::study

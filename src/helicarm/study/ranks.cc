@@ -11,7 +11,7 @@
 #include <mpi.h>
 #endif
 
-namespace helicarm {
+namespace helicarm::study {
 
 #ifdef HELICARM_MPI
 
@@ -75,4 +75,4 @@ std::vector<double> Ranks::from_leader(std::vector<double> values) const { retur
 
 #endif
 
-}  // namespace helicarm
+}  // namespace helicarm::study

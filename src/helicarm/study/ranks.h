@@ -3,7 +3,7 @@
 
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// The processes that share a study's work: MPI ranks, or one process without MPI or mpirun. Create it once
 /// per program. A rank that ends by an exception does not finalize MPI: mpirun then ends all ranks.
@@ -31,4 +31,4 @@ class Ranks {
   int exceptions_;  ///< in flight at construction
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// A record is a struct of doubles only: the form in which blocks return their results to the engine.
 template <class Record>
@@ -45,4 +45,4 @@ std::vector<Record> records_of(std::span<const double> from, std::size_t count) 
   return records;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/study/rectification_study.h"
 #include "helicarm/study/statistics.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
@@ -86,13 +86,14 @@ class Results {
 };
 
 /// Fig. 9: observed and ideal grid.
-Chart figure_9(const Intensifier& first, double distance_mm) {
-  Chart chart{fmt::format("Fig. 9: test grid, {:g} mm from the receiver", distance_mm), "u, px", "v, px"};
+report::Chart figure_9(const Intensifier& first, double distance_mm) {
+  report::Chart chart{fmt::format("Fig. 9: test grid, {:g} mm from the receiver", distance_mm), "u, px",
+                      "v, px"};
   chart.note = "raw image of the first intensifier; ideal positions from the nine central crosses (Eq. 14)";
   chart.image = true;
   constexpr std::size_t side = 9;
-  ChartSeries raw{"raw", {}, false, true};
-  ChartSeries ideal{"ideal"};
+  report::ChartSeries raw{"raw", {}, false, true};
+  report::ChartSeries ideal{"ideal"};
   for (const bool rows : {true, false})
     for (std::size_t line = 0; line < side; ++line) {
       for (std::size_t k = 0; k < side; ++k) {
@@ -107,9 +108,9 @@ Chart figure_9(const Intensifier& first, double distance_mm) {
   return chart;
 }
 
-Chart figure_10(const Intensifier& first, double distance_mm) {
-  Chart chart{fmt::format("Fig. 10: error of each cross, {:g} mm from the receiver", distance_mm),
-              "Cross, row by row", "Error, px"};
+report::Chart figure_10(const Intensifier& first, double distance_mm) {
+  report::Chart chart{fmt::format("Fig. 10: error of each cross, {:g} mm from the receiver", distance_mm),
+                      "Cross, row by row", "Error, px"};
   chart.note = "the first intensifier";
   chart.y_from_zero = true;
   for (const GridCurve& curve : curves) chart.series.push_back({curve.name});
@@ -123,14 +124,14 @@ Chart figure_10(const Intensifier& first, double distance_mm) {
   return chart;
 }
 
-Chart figure_11(const Results& results, const RectificationStudyOptions& options, bool max) {
-  Chart chart{max ? "Fig. 11: largest error" : "Fig. 11: mean error", "Test grid from the receiver, mm",
-              "Error, px"};
+report::Chart figure_11(const Results& results, const RectificationStudyOptions& options, bool max) {
+  report::Chart chart{max ? "Fig. 11: largest error" : "Fig. 11: mean error",
+                      "Test grid from the receiver, mm", "Error, px"};
   chart.note = fmt::format("means over {} intensifiers; bars: minimum and maximum", options.groups);
   chart.y_from_zero = true;
   constexpr double aside_mm = 1.2;  // offset, so that the bars do not overlap
   for (std::size_t c = 0; c < curves.size(); ++c) {
-    ChartSeries series{curves[c].name};
+    report::ChartSeries series{curves[c].name};
     series.joined = true;
     for (std::size_t k = 0; k < options.distances_mm.size(); ++k) {
       const Spread spread = results.at(k, &GridImage::nine, max ? curves[c].max : curves[c].mean);
@@ -259,10 +260,10 @@ StudyFiles files_of(const std::vector<Intensifier>& intensifiers, const Rectific
                      {"first_intensifier",
                       {{"distance_mm", options.figure_distance_mm}, {"crosses", std::move(crosses)}}}});
   const Intensifier& first = intensifiers.front();
-  files.svg = chart_svg(std::array{figure_9(first, options.figure_distance_mm),
-                                   figure_10(first, options.figure_distance_mm),
-                                   figure_11(results, options, false), figure_11(results, options, true)});
+  files.svg = report::chart_svg(
+      std::array{figure_9(first, options.figure_distance_mm), figure_10(first, options.figure_distance_mm),
+                 figure_11(results, options, false), figure_11(results, options, true)});
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

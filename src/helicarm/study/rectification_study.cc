@@ -15,7 +15,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/records.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double no_figure = std::numeric_limits<double>::quiet_NaN();
@@ -31,28 +31,29 @@ std::uint32_t seed_of_intensifier(const RectificationStudyOptions& options, std:
 }
 
 struct Maps {
-  DistortionMap paper, best;
+  rectification::DistortionMap paper, best;
 };
 
 /// Crosses within both maps, so that all errors are of the same ones.
-std::vector<Dot> within_both(std::vector<Dot> crosses, const Maps& maps) {
-  std::erase_if(crosses, [&](const Dot& cross) {
+std::vector<detection::Dot> within_both(std::vector<detection::Dot> crosses, const Maps& maps) {
+  std::erase_if(crosses, [&](const detection::Dot& cross) {
     return !maps.paper.rectified_from_raw(cross.centre_px) || !maps.best.rectified_from_raw(cross.centre_px);
   });
   return crosses;
 }
 
 struct Measured {
-  TestGrid paper, best;
+  rectification::TestGrid paper, best;
   GridErrors errors() const {
     return {paper.raw.mean_px,      paper.raw.max_px,       paper.rectified.mean_px,
             paper.rectified.max_px, best.rectified.mean_px, best.rectified.max_px};
   }
 };
 
-std::optional<Measured> measured_by(const std::vector<Dot>& crosses, const Maps& maps, GridFit fit) {
-  auto paper = measure_test_grid(crosses, maps.paper, fit);
-  auto best = measure_test_grid(crosses, maps.best, fit);
+std::optional<Measured> measured_by(const std::vector<detection::Dot>& crosses, const Maps& maps,
+                                    rectification::GridFit fit) {
+  auto paper = rectification::measure_test_grid(crosses, maps.paper, fit);
+  auto best = rectification::measure_test_grid(crosses, maps.best, fit);
   if (!paper || !best) return {};
   return Measured{*std::move(paper), *std::move(best)};
 }
@@ -71,17 +72,17 @@ GridImage measure_image(const simulation::SimulatedView& view, const std::option
   GridImage image = all_missing<GridImage>();
   image.crosses = 0;
   if (!maps) return image;
-  const auto crosses = within_both(find_grid(exposure_of(view)), *maps);
+  const auto crosses = within_both(rectification::find_grid(exposure_of(view)), *maps);
   double squares = 0;
-  for (const Dot& cross : crosses)
+  for (const detection::Dot& cross : crosses)
     if (const auto at = true_cross(view, cross.centre_px))
       squares += (view.crosses[*at].raw - cross.centre_px).squaredNorm(), ++image.crosses;
   if (image.crosses > 0) image.finder_rms = std::sqrt(squares / image.crosses);
-  if (const auto all = measured_by(crosses, *maps, GridFit::all)) image.all = all->errors();
-  const auto nine = measured_by(crosses, *maps, GridFit::nine);
+  if (const auto all = measured_by(crosses, *maps, rectification::GridFit::all)) image.all = all->errors();
+  const auto nine = measured_by(crosses, *maps, rectification::GridFit::nine);
   if (!nine) return image;
   image.nine = nine->errors();
-  const TestGrid& paper = nine->paper;
+  const rectification::TestGrid& paper = nine->paper;
   for (std::size_t k = 0; k < paper.raw_px.size() && !kept.empty(); ++k)
     if (const auto at = true_cross(view, paper.raw_px[k]))
       kept[*at] = {paper.raw_px[k].x(),
@@ -95,9 +96,9 @@ GridImage measure_image(const simulation::SimulatedView& view, const std::option
 }
 
 std::optional<Maps> maps_of(const simulation::SimulatedCase& given) {
-  const XrayImage plate = exposure_of(given.views.front());
-  auto paper = rectify(plate, *given.plate, {Method::paper, {}});
-  auto best = rectify(plate, *given.plate, {Method::best, {}});
+  const xray::XrayImage plate = exposure_of(given.views.front());
+  auto paper = rectification::rectify(plate, *given.plate, {rectification::Method::paper, {}});
+  auto best = rectification::rectify(plate, *given.plate, {rectification::Method::best, {}});
   if (!paper || !best) return {};
   return Maps{std::move(paper->map), std::move(best->map)};
 }
@@ -156,4 +157,4 @@ Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyO
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// The paper's 3.1 (Figs. 9 to 11) from images: each intensifier images the plate, which gives the maps, and
 /// then the test grid of wires at several distances from the receiver.
@@ -56,4 +56,4 @@ Expected<std::vector<Intensifier>> study_rectification(const RectificationStudyO
 /// rectification.csv, rectification.json, rectification.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<Intensifier>& intensifiers, const RectificationStudyOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 RectificationStudyOptions small() {
@@ -62,4 +62,4 @@ TEST(RectificationStudy, InvalidOptionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

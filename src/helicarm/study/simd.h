@@ -11,7 +11,7 @@
 #include <immintrin.h>
 #endif
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Four trials in the lanes of a vector: the result of a lane never depends on the other three, nor on how
 /// trials are assigned to lanes. The functions below are polynomials instead of the system's library: the
@@ -104,4 +104,4 @@ inline SineCosine sine_cosine_of_turns(Simd turns) {
           Simd(SimdWords(swapped ? sine : cosine) ^ cosine_sign)};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

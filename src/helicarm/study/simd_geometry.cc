@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 // Powers of two near the spread of a knee phantom and of its image, so that the columns of Eq. 7 have similar
@@ -169,4 +169,4 @@ SimdProjection SimdBalls::calibrate(std::span<const SimdPixel> pixels) const {
   return projection;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

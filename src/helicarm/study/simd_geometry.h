@@ -5,7 +5,7 @@
 
 #include "helicarm/study/simd.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 struct SimdPoint {
   Simd x, y, z;  ///< mm
@@ -116,4 +116,4 @@ inline Simd ray_distance(const SimdProjection& view, const SimdPixel& pixel, con
                      (uu * vv - uv * uv));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

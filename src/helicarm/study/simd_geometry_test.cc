@@ -10,11 +10,11 @@
 #include "helicarm/geometry/triangulation.h"
 #include "helicarm/study/paper_scene.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
-Projection projection_of(const SimdProjection& simd_of, int lane) {
-  Projection p;
+geometry::Projection projection_of(const SimdProjection& simd_of, int lane) {
+  geometry::Projection p;
   for (int i = 0; i < 4; ++i) {
     p(0, i) = simd_of.u[i][lane];
     p(1, i) = simd_of.v[i][lane];
@@ -23,7 +23,7 @@ Projection projection_of(const SimdProjection& simd_of, int lane) {
   return p;
 }
 
-Eigen::Vector2d pixel_of(const Projection& p, const Eigen::Vector3d& x) {
+Eigen::Vector2d pixel_of(const geometry::Projection& p, const Eigen::Vector3d& x) {
   return (p * x.homogeneous()).hnormalized();
 }
 
@@ -49,8 +49,8 @@ struct Scene {
   Eigen::Vector3d ball(std::size_t i, int lane) const {
     return {balls[i].x[lane], balls[i].y[lane], balls[i].z[lane]};
   }
-  std::vector<PointPair> pairs(std::size_t view, int lane) const {
-    std::vector<PointPair> all;
+  std::vector<geometry::PointPair> pairs(std::size_t view, int lane) const {
+    std::vector<geometry::PointPair> all;
     for (std::size_t i = 0; i < balls.size(); ++i)
       all.push_back({ball(i, lane), {pixels[view][i].u[lane], pixels[view][i].v[lane]}});
     return all;
@@ -67,13 +67,13 @@ TEST(SimdBalls, AgreeWithTheScalarLeastSquaresSolution) {
         const SimdProjection four = model.calibrate(scene.pixels[view]);
         for (int lane = 0; lane < simd_width; ++lane) {
           const auto pairs = scene.pairs(view, lane);
-          const double condition = dlt_condition(pairs).value_or(1e9);
+          const double condition = geometry::dlt_condition(pairs).value_or(1e9);
           if (condition > 1e4) continue;
           const double tolerance_px = 1e-8 * condition;
-          const Projection one = projection_from_factors(solve_dlt(pairs));
-          const Projection fast = projection_of(four, lane);
+          const geometry::Projection one = geometry::projection_from_factors(geometry::solve_dlt(pairs));
+          const geometry::Projection fast = projection_of(four, lane);
           EXPECT_LT((pixel_of(one, far) - pixel_of(fast, far)).norm(), tolerance_px) << count << ' ' << trial;
-          for (const PointPair& pair : pairs)
+          for (const geometry::PointPair& pair : pairs)
             EXPECT_LT((pixel_of(one, pair.point_in_world) - pixel_of(fast, pair.point_in_world)).norm(),
                       tolerance_px);
         }
@@ -86,7 +86,7 @@ TEST(SimdBalls, RecoverTheViewFromExactPixels) {
   const auto views = paper_views(WorldOrigin::base);
   for (std::size_t view = 0; view < 2; ++view) {
     const SimdProjection four = SimdBalls(scene.balls).calibrate(scene.pixels[view]);
-    const Projection truth = views[view].projection() / views[view].projection()(2, 3);
+    const geometry::Projection truth = views[view].projection() / views[view].projection()(2, 3);
     for (int lane = 0; lane < simd_width; ++lane)
       EXPECT_LT((projection_of(four, lane) - truth).norm(), 1e-8 * truth.norm());
   }
@@ -114,15 +114,15 @@ TEST(SimdIntersect, AgreesWithTheScalarSolution) {
     for (int lane = 0; lane < simd_width; ++lane) {
       const std::array projections{projection_of(views[0], lane), projection_of(views[1], lane)};
       const std::array pixels{scene.pairs(0, lane)[i].pixel, scene.pairs(1, lane)[i].pixel};
-      const Eigen::Vector3d one = *intersect_linear(projections, pixels);
+      const Eigen::Vector3d one = *geometry::intersect_linear(projections, pixels);
       EXPECT_LT((one - Eigen::Vector3d(point.x[lane], point.y[lane], point.z[lane])).norm(), 1e-9);
     }
   }
 }
 
 TEST(SimdRay, DistanceAgreesWithTheScalarRay) {
-  const View view = paper_views(WorldOrigin::base)[1];
-  const Projection p = view.projection() / view.projection()(2, 3);
+  const geometry::View view = paper_views(WorldOrigin::base)[1];
+  const geometry::Projection p = view.projection() / view.projection()(2, 3);
   SimdProjection four;
   for (int i = 0; i < 4; ++i) {
     four.u[i] = simd(p(0, i));
@@ -150,7 +150,7 @@ TEST(PaperScene, SimdProjectionAgreesWithTheViews) {
 TEST(PaperScene, WithTheCentreAsOriginBothImagesContainTheCone) {
   const Eigen::Vector3d top(0, 0, cone_height_mm);
   EXPECT_GT(paper_views(WorldOrigin::base)[1].project(top).y(), 1024);
-  for (const View& view : paper_views(WorldOrigin::centre)) {
+  for (const geometry::View& view : paper_views(WorldOrigin::centre)) {
     const Eigen::Vector2d pixel = view.project(top);
     EXPECT_LT((pixel - Eigen::Vector2d(512, 512)).lpNorm<Eigen::Infinity>(), 512);
   }
@@ -187,4 +187,4 @@ TEST(SigmaReadings, GiveTheStandardDeviationPerAxis) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

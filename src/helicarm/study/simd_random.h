@@ -6,7 +6,7 @@
 
 #include "helicarm/study/simd.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Four of core's RandomStreams in SIMD lanes, for the trials first .. first + 3: the same words (Philox
 /// 4x32-10), but each block of four is addressed by its number, so that an omitted draw does not shift
@@ -78,4 +78,4 @@ class SimdRandom {
   SimdWords stream_, trial_low_, trial_high_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -9,7 +9,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/study/simd_random.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double few_units = 4 * std::numeric_limits<double>::epsilon();
@@ -86,4 +86,4 @@ TEST(SimdRandom, NormalsHaveNormalMoments) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

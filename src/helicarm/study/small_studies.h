@@ -14,7 +14,7 @@
 #include "helicarm/study/rectification_study.h"
 #include "helicarm/study/uniformity_study.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// For tests: the smallest study with several blocks in each setting.
 struct SmallStudy {
@@ -57,4 +57,4 @@ inline std::vector<SmallStudy> small_studies() {
                            CentreOptions{.only = {"scatter over direct"}, .squares = 3})};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

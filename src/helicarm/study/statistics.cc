@@ -11,7 +11,7 @@
 #include <numeric>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr double trimmed_share = 0.01;
@@ -157,4 +157,4 @@ double spearman(std::span<const double> a, std::span<const double> b) {
   return pearson(ranks_of(a), ranks_of(b));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

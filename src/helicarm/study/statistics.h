@@ -3,7 +3,7 @@
 
 #include <span>
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Statistics of one column of a study's trials. Non-finite values are counted and left out; without any
 /// finite value all others are NaN.
@@ -26,4 +26,4 @@ double pearson(std::span<const double> a, std::span<const double> b);
 /// Spearman's rank correlation: Pearson's of the ranks, ties share their mean rank.
 double spearman(std::span<const double> a, std::span<const double> b);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -11,7 +11,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 std::vector<double> heavy_tailed(std::size_t count) {
@@ -90,4 +90,4 @@ TEST(Correlation, SpearmanUsesOnlyTheOrderAndSharesTies) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::study {
 
 std::string csv_cells(std::span<const double> values) {
   std::string text;
@@ -13,4 +13,4 @@ std::string csv_cells(std::span<const double> values) {
   return text;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

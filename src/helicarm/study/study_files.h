@@ -7,7 +7,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/study/paper_scene.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Output of a study, with its comparison with the paper.
 struct StudyFiles {
@@ -36,4 +36,4 @@ Json study_json(const char* study, const Options& options) {
   return json;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

@@ -11,7 +11,7 @@
 #include "helicarm/study/records.h"
 #include "helicarm/study/statistics.h"
 
-namespace helicarm {
+namespace helicarm::study {
 namespace {
 
 constexpr std::size_t groups_of_turn = 32;  // per block; E(A) is slow
@@ -34,7 +34,7 @@ constexpr std::array<const char*, figures_of_group> figure_names{"uniformity",
 
 struct UniformityTrials {
   UniformityOptions options;
-  std::array<View, 2> views = paper_views(options.origin);
+  std::array<geometry::View, 2> views = paper_views(options.origin);
   SimdViews lane_views{views};
   std::array<SimdTargets, 3> places{SimdTargets(targets_in_ball(options.origin), views),
                                     SimdTargets(targets_in_cone(), views),
@@ -69,11 +69,11 @@ struct UniformityTrials {
         sum[3 + place] += bare;
       }
     }
-    const SurgicalSpace space{origin_in_calibrator(options.origin), space_radius_mm};
+    const phantom::SurgicalSpace space{origin_in_calibrator(options.origin), space_radius_mm};
     for (int lane = 0; lane < simd_width; ++lane, out += figures_of_group) {
       std::vector<Eigen::Vector3d> points;
       for (const SimdPoint& ball : balls) points.emplace_back(ball.x[lane], ball.y[lane], ball.z[lane]);
-      out[0] = uniformity(points, space);
+      out[0] = phantom::uniformity(points, space);
       for (std::size_t i = 0; i < 6; ++i) {
         out[1 + i] = first[i][lane];
         out[7 + i] = sum[i][lane] / options.draws;
@@ -155,12 +155,13 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
                      {"summary", files.summary},
                      {"correlations", std::move(correlations)}});
 
-  std::vector<Chart> charts;
+  std::vector<report::Chart> charts;
   for (const std::size_t figure : {std::size_t{1}, std::size_t{7}}) {
     std::vector<double> tre = figure_of(groups, figure);
-    Chart chart{figure == 1 ? "(a) one noise draw" : fmt::format("(b) mean of {} noise draws", options.draws),
-                "Uniformity E(A)", "TRE of targets in the sphere of 100 mm, mm"};
-    ChartSeries dots{"", {}, true};
+    report::Chart chart{
+        figure == 1 ? "(a) one noise draw" : fmt::format("(b) mean of {} noise draws", options.draws),
+        "Uniformity E(A)", "TRE of targets in the sphere of 100 mm, mm"};
+    report::ChartSeries dots{"", {}, true};
     for (std::size_t i = 0; i < groups.size(); ++i) dots.points.push_back({evenness[i], tre[i]});
     chart.series.push_back(std::move(dots));
     chart.note = fmt::format("Pearson {:.3f}, Spearman {:.3f} (published: Pearson {})",
@@ -169,8 +170,8 @@ StudyFiles files_of(const std::vector<UniformityGroup>& groups, const Uniformity
     chart.y_most = column_statistics(tre).p99;
     charts.push_back(std::move(chart));
   }
-  files.svg = chart_svg(charts);
+  files.svg = report::chart_svg(charts);
   return files;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::study

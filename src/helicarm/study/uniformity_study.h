@@ -9,7 +9,7 @@
 #include "helicarm/study/paper_scene.h"
 #include "helicarm/study/study_files.h"
 
-namespace helicarm {
+namespace helicarm::study {
 
 /// Fig. 6: uniformity E(A) of random balls (Eq. 13) compared with their TRE.
 struct UniformityOptions {
@@ -40,4 +40,4 @@ Expected<std::vector<UniformityGroup>> study_uniformity(const UniformityOptions&
 /// uniformity.csv, uniformity.json, uniformity.svg and the comparison with the paper.
 StudyFiles files_of(const std::vector<UniformityGroup>& groups, const UniformityOptions& options);
 
-}  // namespace helicarm
+}  // namespace helicarm::study

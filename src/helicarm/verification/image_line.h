@@ -5,7 +5,7 @@
 
 #include "helicarm/verification/verify.h"
 
-namespace helicarm {
+namespace helicarm::verification {
 
 /// A line in a rectified image.
 struct ImageLine {
@@ -14,6 +14,6 @@ struct ImageLine {
 };
 
 /// Projection of the tool's line into a calibrated view (Eq. 6); nothing if it lies behind the source.
-std::optional<ImageLine> line_in_xray(const View& view, const ToolLine& line);
+std::optional<ImageLine> line_in_xray(const geometry::View& view, const ToolLine& line);
 
-}  // namespace helicarm
+}  // namespace helicarm::verification

@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::verification {
 namespace {
 
 constexpr double least_depth_mm = 1;
@@ -27,7 +27,7 @@ Eigen::Vector2d foot_on_line(const Eigen::Vector2d& point, const Eigen::Vector2d
   return a + along * along.dot(point - a);
 }
 
-Expected<LineError> distance_to_line(const std::vector<View>& views, const PlannedPoint& point,
+Expected<LineError> distance_to_line(const std::vector<geometry::View>& views, const PlannedPoint& point,
                                      const ToolLine& line) {
   LineError error;
   error.distance_mm = distance_in_space(point.point_in_calibrator, line);
@@ -36,7 +36,7 @@ Expected<LineError> distance_to_line(const std::vector<View>& views, const Plann
   for (std::size_t i = 0; i < views.size(); ++i) {
     error.per_view_px.emplace_back();
     if (!point.uv[i]) continue;
-    const View& view = views[i];
+    const geometry::View& view = views[i];
     if (view.depth(line.p1_in_calibrator) < least_depth_mm ||
         view.depth(line.p2_in_calibrator) < least_depth_mm)
       return fail(Reason::behind_source,
@@ -56,4 +56,4 @@ Expected<LineError> distance_to_line(const std::vector<View>& views, const Plann
   return error;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::verification

@@ -10,7 +10,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 
-namespace helicarm {
+namespace helicarm::verification {
 
 /// Two points of the instrument's axis (3.3) in the calibrator's frame, mm.
 struct ToolLine {
@@ -47,7 +47,7 @@ Eigen::Vector2d foot_on_line(const Eigen::Vector2d& point, const Eigen::Vector2d
 
 /// Eq. 17 for one point. A view along the line is left out. Refuses `behind_source` if an end of the line
 /// cannot be projected.
-Expected<LineError> distance_to_line(const std::vector<View>& views, const PlannedPoint& point,
+Expected<LineError> distance_to_line(const std::vector<geometry::View>& views, const PlannedPoint& point,
                                      const ToolLine& line);
 
-}  // namespace helicarm
+}  // namespace helicarm::verification

@@ -3,14 +3,14 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::verification {
 namespace {
 
 /// Views along +z from 800 mm: 5 px are 1 mm at the origin.
-View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
+geometry::View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
 
 /// Views along +x.
-View lateral() {
+geometry::View lateral() {
   Eigen::Matrix3d camera_from_world;
   camera_from_world << 0, 1, 0, 0, 0, 1, 1, 0, 0;
   return {{-4000, 4000, 512, 512, 0}, {camera_from_world, {0, 0, 800}}};
@@ -74,4 +74,4 @@ TEST(DistanceToLine, LineBehindTheSourceIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::verification

@@ -15,8 +15,8 @@ using simulation::TrackedBody;
 
 /// The base stands beside the knee at the height of the table's edge, x towards the patient, z up (the knee's
 /// anterior side): both tunnels' axes are within the arm's reach.
-const RigidTransform calibrator_from_base{(Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(),
-                                          {60, 520, -160}};
+const geometry::RigidTransform calibrator_from_base{
+    (Eigen::Matrix3d() << 0, 1, 0, -1, 0, 0, 0, 0, 1).finished(), {60, 520, -160}};
 
 /// Rotates z onto the direction.
 Eigen::Matrix3d facing(const Vector3d& direction) {
@@ -40,14 +40,14 @@ SimulatedScene::SimulatedScene(simulation::SimulatedCase simulated_case)
   tracker_from_base_ = tracker_from_.at("calibrator") * calibrator_from_base;
 }
 
-RigidTransform SimulatedScene::tracker_from(const std::string& body) const {
+geometry::RigidTransform SimulatedScene::tracker_from(const std::string& body) const {
   const std::lock_guard lock(mutex_);
   return tracker_from_.at(body);
 }
 
-RigidTransform SimulatedScene::tracker_from_marker(const std::string& bone) const {
+geometry::RigidTransform SimulatedScene::tracker_from_marker(const std::string& bone) const {
   const std::lock_guard lock(mutex_);
-  RigidTransform pose = tracker_from_.at(bone);
+  geometry::RigidTransform pose = tracker_from_.at(bone);
   if (const auto bumped = marker_in_bone_.find(bone); bumped != marker_in_bone_.end())
     pose.translation = pose * bumped->second;
   return pose;
@@ -58,7 +58,7 @@ void SimulatedScene::bump_marker(const std::string& bone, const Vector3d& shift_
   marker_in_bone_.try_emplace(bone, Vector3d::Zero()).first->second += shift_mm;
 }
 
-RigidTransform SimulatedScene::tracker_from_pointer() const {
+geometry::RigidTransform SimulatedScene::tracker_from_pointer() const {
   const std::string bone = [&] {
     const std::lock_guard lock(mutex_);
     return touched_;
@@ -72,19 +72,19 @@ void SimulatedScene::touch(const std::string& bone) {
   touched_ = bone;
 }
 
-void SimulatedScene::move_bone(const std::string& bone, const RigidTransform& motion_in_tracker) {
+void SimulatedScene::move_bone(const std::string& bone, const geometry::RigidTransform& motion_in_tracker) {
   const std::lock_guard lock(mutex_);
-  RigidTransform& pose = tracker_from_.at(bone);
+  geometry::RigidTransform& pose = tracker_from_.at(bone);
   pose = {motion_in_tracker.rotation * pose.rotation, pose.translation + motion_in_tracker.translation};
 }
 
 void SimulatedScene::turn_bone(const std::string& bone, const Vector3d& about, const Eigen::Matrix3d& turn) {
   const std::lock_guard lock(mutex_);
-  RigidTransform& pose = tracker_from_.at(bone);
+  geometry::RigidTransform& pose = tracker_from_.at(bone);
   pose = {turn * pose.rotation, about + turn * (pose.translation - about)};
 }
 
-RigidTransform SimulatedScene::tracker_from_base() const {
+geometry::RigidTransform SimulatedScene::tracker_from_base() const {
   const std::lock_guard lock(mutex_);
   return tracker_from_base_;
 }
@@ -101,9 +101,9 @@ Vector3d SimulatedScene::point_in_tracker(const std::string& name) const {
   return tracker_from(point->bone) * point->in_bone;
 }
 
-RobotTool SimulatedScene::tool() const { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
+robot::RobotTool SimulatedScene::tool() const { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
 
-RigidTransform SimulatedScene::flange_from_marker() const {
+geometry::RigidTransform SimulatedScene::flange_from_marker() const {
   // Manually clamped to the drill's side.
   return {Eigen::AngleAxisd(0.35, Vector3d(0.2, 0.9, -0.4).normalized()).toRotationMatrix(), {12, 70, 40}};
 }
@@ -127,7 +127,7 @@ std::vector<TrackedFacet> calibrator_facets() {
     Vector3d middle = Vector3d::Zero();
     for (const Vector3d& marker : facet.markers_in_body)
       middle += marker / double(facet.markers_in_body.size());
-    const RigidTransform calibrator_from_facet{facing(facet.normal_in_body), middle};
+    const geometry::RigidTransform calibrator_from_facet{facing(facet.normal_in_body), middle};
     MarkerFacet own{Vector3d::UnitZ(), {}};
     for (const Vector3d& marker : facet.markers_in_body)
       own.markers_in_body.push_back(calibrator_from_facet.inverse() * marker);

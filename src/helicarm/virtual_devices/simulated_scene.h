@@ -24,13 +24,13 @@ class SimulatedScene {
   const simulation::SimulatedCase& simulated_case() const { return simulated_case_; }
 
   /// "calibrator", "femur" or "tibia".
-  RigidTransform tracker_from(const std::string& body) const;
+  geometry::RigidTransform tracker_from(const std::string& body) const;
   /// Pose of the bone's marker: the bone's own frame until `bump_marker`.
-  RigidTransform tracker_from_marker(const std::string& bone) const;
+  geometry::RigidTransform tracker_from_marker(const std::string& bone) const;
   /// Shifts a bone's marker relative to the bone (bone's axes).
   void bump_marker(const std::string& bone, const Eigen::Vector3d& shift_mm);
   /// Moves a bone with its marker, about the marker (tracker's axes).
-  void move_bone(const std::string& bone, const RigidTransform& motion_in_tracker);
+  void move_bone(const std::string& bone, const geometry::RigidTransform& motion_in_tracker);
 
   /// Rotates about this point (tracker's frame).
   void turn_bone(const std::string& bone, const Eigen::Vector3d& about, const Eigen::Matrix3d& turn);
@@ -39,24 +39,24 @@ class SimulatedScene {
   Eigen::Vector3d point_in_tracker(const std::string& name) const;
 
   /// A pointer with its tip on a tunnel's outer end in this bone; it moves with the bone.
-  RigidTransform tracker_from_pointer() const;
+  geometry::RigidTransform tracker_from_pointer() const;
   void touch(const std::string& bone);
 
-  RigidTransform tracker_from_base() const;
+  geometry::RigidTransform tracker_from_base() const;
   /// Moves the robot's base, e.g. after a push against its table (tracker's axes).
   void move_base(const Eigen::Vector3d& shift_mm);
   /// The drill: tip and axis (z).
-  RobotTool tool() const;
+  robot::RobotTool tool() const;
   /// The robot's marker: a ring of facets, some of which face the tracker in any pose.
-  RigidTransform flange_from_marker() const;
+  geometry::RigidTransform flange_from_marker() const;
 
  private:
   explicit SimulatedScene(simulation::SimulatedCase simulated_case);
 
   simulation::SimulatedCase simulated_case_;
-  RigidTransform tracker_from_base_;
+  geometry::RigidTransform tracker_from_base_;
   mutable std::mutex mutex_;
-  std::map<std::string, RigidTransform> tracker_from_;
+  std::map<std::string, geometry::RigidTransform> tracker_from_;
   std::map<std::string, Eigen::Vector3d> marker_in_bone_;  ///< of bumped markers
   std::string touched_ = "femur";
 };
@@ -70,7 +70,7 @@ simulation::TrackedBody tool_markers();
 /// The calibrator's facets as separate bodies; origin at the centre of a facet's markers, z outward.
 struct TrackedFacet {
   std::string name;  ///< calibrator/1 .. calibrator/4
-  RigidTransform calibrator_from_facet;
+  geometry::RigidTransform calibrator_from_facet;
   simulation::TrackedBody body;
 };
 std::vector<TrackedFacet> calibrator_facets();

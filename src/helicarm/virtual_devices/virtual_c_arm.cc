@@ -29,7 +29,7 @@ constexpr double clock_ahead_s = 31.7;
 constexpr std::chrono::seconds held_back_for{4};
 constexpr double leg_moves_mm = 6;
 
-AcquisitionTime c_arm_now() {
+xray::AcquisitionTime c_arm_now() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return {std::chrono::duration<double>(now).count() + clock_ahead_s, 1e-6, {}};
 }
@@ -89,7 +89,7 @@ Expected<void> shoot(SimulatedScene& simulated_scene, const std::string& view, c
       throw BadInput(Reason::bad_value, fmt::format("view: there is no {}", view));
     std::size_t number = std::size_t(true_view - views.begin());
     if (fault == CArmFault::same_image) number = (number + 1) % views.size();
-    DerivedImage image = simulation::dicom_of(simulated_scene.simulated_case(), number);
+    xray::DerivedImage image = simulation::dicom_of(simulated_scene.simulated_case(), number);
     image.instance_uid.clear();  // each acquisition has its own
     if (fault == CArmFault::other_patient) {
       image.study_uid.clear();
@@ -103,7 +103,7 @@ Expected<void> shoot(SimulatedScene& simulated_scene, const std::string& view, c
     }
     const TemporaryFolder folder;
     const fs::path file = folder.path() / "shot.dcm";
-    value_or_throw(write_dicom(file, image));
+    value_or_throw(xray::write_dicom(file, image));
     if (fault != CArmFault::held_back) return send(file, receiver, fault);
     move_leg(simulated_scene, leg_moves_mm);
     std::this_thread::sleep_for(held_back_for);

@@ -10,8 +10,8 @@ namespace helicarm::virtual_devices {
 namespace {
 
 /// Real arms differ from the nominal model by their factory calibration.
-RobotModel arm_as_built() {
-  RobotModel arm = ur5();
+robot::RobotModel arm_as_built() {
+  robot::RobotModel arm = robot::ur5();
   arm.d1 += 0.4;
   arm.a2 -= 0.3;
   arm.a3 += 0.2;
@@ -36,14 +36,14 @@ Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevi
     virtual_or->simulated_scene_ = value_or_throw(SimulatedScene::set_up(options.seed, options.image_size));
     SimulatedScene& simulated_scene = *virtual_or->simulated_scene_;
 
-    VirtualUrOptions robot;
+    robot::VirtualUrOptions robot;
     robot.arm = arm_as_built();
     robot.tool = simulated_scene.tool();
     robot.rtde_port = options.rtde_port;
     robot.dashboard_port = options.dashboard_port;
     robot.script_port = options.script_port;
     robot.on_notice = [notice = options.on_notice](const std::string& line) { notice("robot: " + line); };
-    virtual_or->robot_ = value_or_throw(VirtualUr::start(robot));
+    virtual_or->robot_ = value_or_throw(robot::VirtualUr::start(robot));
 
     std::vector<FollowedBody> bodies;
     for (const char* bone : {"femur", "tibia"})
@@ -73,7 +73,7 @@ Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevi
   });
 }
 
-RigidTransform VirtualDevices::tracker_from_tip() {
+geometry::RigidTransform VirtualDevices::tracker_from_tip() {
   return simulated_scene_->tracker_from_base() * robot_->truth().base_from_tip;
 }
 
@@ -92,7 +92,7 @@ Expected<void> VirtualDevices::set_fault(const std::string& name, bool on) {
     tracker_->set(static_cast<TrackerFault>(of_tracker - tracker_fault_words.begin()), on);
     return {};
   }
-  const auto fault = robot_fault(name);
+  const auto fault = robot::robot_fault(name);
   if (!fault) return unknown(virtual_fault_names());
   robot_->set(*fault, on);
   return {};
@@ -110,7 +110,7 @@ std::string VirtualDevices::power_on() {
 }
 
 std::string virtual_fault_names() {
-  return fmt::format("hide:BODY, {}, {}", fmt::join(tracker_fault_words, ", "), robot_fault_names());
+  return fmt::format("hide:BODY, {}, {}", fmt::join(tracker_fault_words, ", "), robot::robot_fault_names());
 }
 
 }  // namespace helicarm::virtual_devices

@@ -32,10 +32,10 @@ class VirtualDevices {
 
   SimulatedScene& simulated_scene() { return *simulated_scene_; }
   VirtualTracker& tracker() { return *tracker_; }
-  VirtualUr& robot() { return *robot_; }
+  robot::VirtualUr& robot() { return *robot_; }
 
   /// True pose of the tool's tip; z is its axis.
-  RigidTransform tracker_from_tip();
+  geometry::RigidTransform tracker_from_tip();
 
   /// Switches a fault on or off by name, one of `virtual_fault_names`. An unknown one is bad_value.
   Expected<void> set_fault(const std::string& name, bool on);
@@ -51,7 +51,7 @@ class VirtualDevices {
   VirtualDevices() = default;
 
   std::unique_ptr<SimulatedScene> simulated_scene_;
-  std::unique_ptr<VirtualUr> robot_;
+  std::unique_ptr<robot::VirtualUr> robot_;
   std::unique_ptr<VirtualTracker> tracker_;
 };
 

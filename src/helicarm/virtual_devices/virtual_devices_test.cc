@@ -38,16 +38,17 @@ std::unique_ptr<VirtualDevices> VirtualDevicesTest::virtual_or_;
 class Follower {
  public:
   explicit Follower(VirtualDevices& virtual_or) {
-    IgtlClientOptions options;
+    tracker::IgtlClientOptions options;
     options.port = virtual_or.tracker().port();
     options.ask_for_tracking = true;
-    client_ = IgtlClient::start(options, [this](const IgtlMessage& message, double arrival_s) {
-                board_.take(message, arrival_s);
-              }).value();
+    client_ =
+        tracker::IgtlClient::start(options, [this](const tracker::IgtlMessage& message, double arrival_s) {
+          board_.take(message, arrival_s);
+        }).value();
   }
-  std::optional<RigidTransform> wait_for(const std::string& tool, std::uint64_t poses) {
+  std::optional<geometry::RigidTransform> wait_for(const std::string& tool, std::uint64_t poses) {
     for (int i = 0; i < 1000; ++i) {
-      for (const ToolState& state : board_.tools(monotonic_seconds()))
+      for (const tracker::ToolState& state : board_.tools(tracker::monotonic_seconds()))
         if (state.name == tool && state.accepted >= poses) return state.tracker_from_tool;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -55,14 +56,14 @@ class Follower {
   }
 
   bool has_tool(const std::string& tool) const {
-    for (const ToolState& state : board_.tools(monotonic_seconds()))
+    for (const tracker::ToolState& state : board_.tools(tracker::monotonic_seconds()))
       if (state.name == tool) return true;
     return false;
   }
 
  private:
-  PoseBoard board_;
-  std::unique_ptr<IgtlClient> client_;
+  tracker::PoseBoard board_;
+  std::unique_ptr<tracker::IgtlClient> client_;
 };
 
 TEST_F(VirtualDevicesTest, TrackerReportsBonePosesWithinItsNoise) {
@@ -79,8 +80,8 @@ TEST_F(VirtualDevicesTest, TrackerReportsTheTrueToolPose) {
   Follower follower(*virtual_or_);
   const auto seen = follower.wait_for(tool_marker, 5);
   ASSERT_TRUE(seen);
-  const RigidTransform tip = *seen * virtual_or_->simulated_scene().flange_from_marker().inverse() *
-                             virtual_or_->simulated_scene().tool().flange_from_tcp;
+  const geometry::RigidTransform tip = *seen * virtual_or_->simulated_scene().flange_from_marker().inverse() *
+                                       virtual_or_->simulated_scene().tool().flange_from_tcp;
   EXPECT_LT((tip.translation - virtual_or_->tracker_from_tip().translation).norm(), 3);
 }
 
@@ -91,7 +92,7 @@ TEST_F(VirtualDevicesTest, OneFacetOfTheCalibratorIsVisibleAndReportsItsPose) {
   for (const TrackedFacet& facet : calibrator_facets()) {
     if (!follower.has_tool(facet.name)) continue;
     ++seen;
-    const RigidTransform calibrator =
+    const geometry::RigidTransform calibrator =
         *follower.wait_for(facet.name, 1) * facet.calibrator_from_facet.inverse();
     EXPECT_LT((calibrator.translation - virtual_or_->simulated_scene().tracker_from("calibrator").translation)
                   .norm(),
@@ -126,10 +127,10 @@ TEST_F(VirtualDevicesTest, UnknownFaultAndViewAreRefused) {
 class Acquisitions : public VirtualDevicesTest {
  protected:
   void SetUp() override {
-    inbox_ = Inbox::open(folder_).value();
-    ReceiverOptions options;
+    inbox_ = receiver::Inbox::open(folder_).value();
+    receiver::ReceiverOptions options;
     options.port = 0;
-    receiver_ = DicomReceiver::open(options, *inbox_).value();
+    receiver_ = receiver::DicomReceiver::open(options, *inbox_).value();
   }
   void TearDown() override {
     receiver_.reset();
@@ -141,8 +142,8 @@ class Acquisitions : public VirtualDevicesTest {
 
   TemporaryFolder temporary_;
   std::filesystem::path folder_ = temporary_.path();
-  std::unique_ptr<Inbox> inbox_;
-  std::unique_ptr<DicomReceiver> receiver_;
+  std::unique_ptr<receiver::Inbox> inbox_;
+  std::unique_ptr<receiver::DicomReceiver> receiver_;
 };
 
 TEST_F(Acquisitions, ImageOfAnotherProgramArrives) {

@@ -17,17 +17,17 @@ constexpr double hour_s = 3600;
 
 std::uint64_t stamp_now(double offset_s) {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return stamp_from_seconds(std::chrono::duration<double>(now).count() + offset_s);
+  return tracker::stamp_from_seconds(std::chrono::duration<double>(now).count() + offset_s);
 }
 
 std::string other_bone(const std::string& name) {
   return name == "femur" ? "tibia" : name == "tibia" ? "femur" : name;
 }
 
-void swap_with_calibrator(std::vector<IgtlTool>& tools) {
-  const auto femur = std::ranges::find(tools, "femur", &IgtlTool::name);
-  const auto facet =
-      std::ranges::find_if(tools, [](const IgtlTool& tool) { return tool.name.starts_with("calibrator/"); });
+void swap_with_calibrator(std::vector<tracker::IgtlTool>& tools) {
+  const auto femur = std::ranges::find(tools, "femur", &tracker::IgtlTool::name);
+  const auto facet = std::ranges::find_if(
+      tools, [](const tracker::IgtlTool& tool) { return tool.name.starts_with("calibrator/"); });
   if (femur != tools.end() && facet != tools.end()) std::swap(femur->name, facet->name);
 }
 
@@ -35,13 +35,13 @@ void swap_with_calibrator(std::vector<IgtlTool>& tools) {
 
 Expected<std::unique_ptr<VirtualTracker>> VirtualTracker::start(const VirtualTrackerOptions& options,
                                                                 std::vector<FollowedBody> bodies) {
-  auto server = IgtlServer::start(options.server);
+  auto server = tracker::IgtlServer::start(options.server);
   if (!server) return tl::unexpected<Failure>(server.error());
   return std::unique_ptr<VirtualTracker>(new VirtualTracker(options, std::move(bodies), *std::move(server)));
 }
 
 VirtualTracker::VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
-                               std::unique_ptr<IgtlServer> server)
+                               std::unique_ptr<tracker::IgtlServer> server)
     : options_(options),
       bodies_(std::move(bodies)),
       server_(std::move(server)),
@@ -94,10 +94,10 @@ void VirtualTracker::notify(std::uint64_t number) {
   const auto has = [&](TrackerFault fault) { return faults.contains(fault); };
   if (has(TrackerFault::silent)) return;
   if (!has(TrackerFault::frozen)) {
-    IgtlTracking tracking;
+    tracker::IgtlTracking tracking;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const FollowedBody& followed = bodies_[i];
-      const RigidTransform truth = followed.tracker_from_body();
+      const geometry::RigidTransform truth = followed.tracker_from_body();
       const simulation::TrackerSample sample = simulation::track_sample(
           options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
           options_.seed, samples_stream + 2 * std::uint32_t(i), number);
@@ -108,7 +108,8 @@ void VirtualTracker::notify(std::uint64_t number) {
         tracking.tools.push_back({followed.name, 2, Eigen::Matrix4d::Identity()});
     }
     if (has(TrackerFault::not_finite))
-      for (IgtlTool& tool : tracking.tools) tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
+      for (tracker::IgtlTool& tool : tracking.tools)
+        tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
     if (has(TrackerFault::swapped_calibrator)) swap_with_calibrator(tracking.tools);
     last_.device = "virtual";
     last_.content = std::move(tracking);

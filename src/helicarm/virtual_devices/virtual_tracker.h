@@ -20,11 +20,11 @@ namespace helicarm::virtual_devices {
 struct FollowedBody {
   std::string name;
   simulation::TrackedBody body;
-  std::function<RigidTransform()> tracker_from_body;
+  std::function<geometry::RigidTransform()> tracker_from_body;
 };
 
 struct VirtualTrackerOptions {
-  IgtlServerOptions server = {.port = 18944};
+  tracker::IgtlServerOptions server = {.port = 18944};
   simulation::TrackerModel model = simulation::virtual_tracker();
   double rate_hz = 30;
   std::uint64_t seed = 1;
@@ -57,17 +57,17 @@ class VirtualTracker {
 
  private:
   VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
-                 std::unique_ptr<IgtlServer> server);
+                 std::unique_ptr<tracker::IgtlServer> server);
   void run(const std::stop_token& stop);
   void notify(std::uint64_t number);
 
   VirtualTrackerOptions options_;
   std::vector<FollowedBody> bodies_;
-  std::unique_ptr<IgtlServer> server_;
+  std::unique_ptr<tracker::IgtlServer> server_;
   std::mutex mutex_;
   std::set<std::string> hidden_;
   std::set<TrackerFault> faults_;
-  IgtlMessage last_;
+  tracker::IgtlMessage last_;
   std::jthread thread_;
 };
 

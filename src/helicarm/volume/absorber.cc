@@ -12,7 +12,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/volume/march.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -226,4 +226,4 @@ void Absorber::integrate(const Vector3d& source, std::span<const Vector3d> direc
     if (bundles[static_cast<std::size_t>(axis)].count > 0) finish(axis);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -8,7 +8,7 @@
 
 #include "helicarm/volume/volume.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 
 /// Maps a voxel value: `at_zero` + `slope` * value within [`low`, `high`]; 0 below `least`.
 struct Ramp {
@@ -57,4 +57,4 @@ class Absorber {
   mutable std::once_flag turn_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -12,7 +12,7 @@
 #include "helicarm/simulation/random_pose.h"
 #include "helicarm/volume/drr.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -69,8 +69,8 @@ std::vector<float> integrals(const Absorber& absorber, const Vector3d& source,
   return sums;
 }
 
-View view_from(const Vector3d& source, const Vector3d& aim, int width) {
-  View view;
+geometry::View view_from(const Vector3d& source, const Vector3d& aim, int width) {
+  geometry::View view;
   view.intrinsics = {4.0 * width, 4.0 * width, 0.5 * (width - 1), 0.5 * (width - 1), 0};
   const Vector3d z = (aim - source).normalized();
   const Vector3d x = z.unitOrthogonal();
@@ -137,8 +137,8 @@ TEST(Absorber, BallGivesItsChordLengthsWithinVoxels) {
 
 TEST(Absorber, PermutedAndFlippedVoxelsGiveTheSameVolume) {
   const Volume volume = noise_volume();
-  const View view = view_from({300, 120, -90}, {0, 0, 0}, 48);
-  const Image<float> expected = *drr(Absorber(volume, {}), view, 48, 48);
+  const geometry::View view = view_from({300, 120, -90}, {0, 0, 0}, 48);
+  const image::Image<float> expected = *drr(Absorber(volume, {}), view, 48, 48);
   std::array<int, 3> order = {0, 1, 2};
   do {
     for (int flips = 0; flips < 8; ++flips) {
@@ -161,7 +161,7 @@ TEST(Absorber, PermutedAndFlippedVoxelsGiveTheSameVolume) {
                 volume.voxels[index(volume.size, from.x(), from.y(), from.z())];
           }
       other.patient_from_voxel.matrix() = volume.patient_from_voxel.matrix() * old_from_new;
-      const Image<float> got = *drr(Absorber(other, {}), view, 48, 48);
+      const image::Image<float> got = *drr(Absorber(other, {}), view, 48, 48);
       for (std::size_t i = 0; i < got.pixels().size(); ++i)
         ASSERT_NEAR(got.pixels()[i], expected.pixels()[i], 0.05) << flips;
     }
@@ -173,7 +173,7 @@ TEST(Absorber, EmptyMarginsChangeNothing) {
   Volume bare = volume_of(
       {9, 7, 14}, [&](int x, int y, int z) { return volume.voxels[index(volume.size, x + 2, y, z)]; });
   bare.patient_from_voxel = volume.patient_from_voxel * Eigen::Translation3d(2, 0, 0);
-  const View view = view_from({-20, 200, 31}, {0, 0, 0}, 32);
+  const geometry::View view = view_from({-20, 200, 31}, {0, 0, 0}, 32);
   EXPECT_THAT(drr(Absorber(volume, {}), view, 32, 32)->pixels(),
               testing::ElementsAreArray(drr(Absorber(bare, {}), view, 32, 32)->pixels()));
 }
@@ -188,9 +188,9 @@ TEST(Absorber, EmptyVolumeAndSingleVoxel) {
 
 TEST(Drr, ResultIsIndependentOfTheNumberOfThreads) {
   const Absorber absorber(noise_volume(), {});
-  const View view = view_from({150, 140, 20}, {1, 0, 2}, 200);
-  const Image<float> one = *drr(absorber, view, 200, 130, 1);
-  const Image<float> five = *drr(Absorber(noise_volume(), {}, 3), view, 200, 130, 5);
+  const geometry::View view = view_from({150, 140, 20}, {1, 0, 2}, 200);
+  const image::Image<float> one = *drr(absorber, view, 200, 130, 1);
+  const image::Image<float> five = *drr(Absorber(noise_volume(), {}, 3), view, 200, 130, 5);
   EXPECT_TRUE(std::ranges::equal(one.pixels(), five.pixels()));
 }
 
@@ -200,4 +200,4 @@ TEST(Drr, SourceInsideIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -9,10 +9,10 @@
 
 #include "helicarm/core/parallel.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 
-Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width, int height,
-                           unsigned threads) {
+Expected<image::Image<float>> drr(const Absorber& absorber, const geometry::View& view, int width, int height,
+                                  unsigned threads) {
   const Eigen::Vector3d source = view.source_in_world();
   if (absorber.contains(source))
     return fail(Reason::bad_value,
@@ -20,7 +20,7 @@ Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width
                             source.y(), source.z()));
   const Eigen::Matrix3d world_from_pixel =
       view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse();
-  Image<float> integrals(width, height);
+  image::Image<float> integrals(width, height);
   // A tile's rays share the voxels in the L2 cache.
   constexpr int tile = 64;
   const int across = (width + tile - 1) / tile;
@@ -40,4 +40,4 @@ Expected<Image<float>> drr(const Absorber& absorber, const View& view, int width
   return integrals;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

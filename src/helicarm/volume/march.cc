@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #endif
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Floats = float __attribute__((vector_size(4 * march_simd)));
@@ -115,4 +115,4 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   std::memcpy(sums, &sum, sizeof sum);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace helicarm {
+namespace helicarm::volume {
 
 #ifdef __AVX2__
 inline constexpr int march_simd = 8;
@@ -36,4 +36,4 @@ struct MarchBlock {
 /// voxel.
 void march(const MarchBlock& block, const MarchRays& rays, int first, int last, float* sums);
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

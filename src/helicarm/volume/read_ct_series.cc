@@ -13,7 +13,7 @@
 #include "helicarm/xray/dicom_frame.h"
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -35,27 +35,28 @@ struct Slice {
   Vector3d normal() const { return axes.col(0).cross(axes.col(1)).normalized(); }
 };
 
-std::vector<double> needed(const DicomElements& elements, DicomTag tag, std::size_t count, double low,
-                           double high) {
+std::vector<double> needed(const xray::DicomElements& elements, xray::DicomTag tag, std::size_t count,
+                           double low, double high) {
   const auto numbers = elements.numbers(tag, count, low, high);
   if (!numbers) elements.refuse(Reason::bad_value, tag, "is missing");
   return *numbers;
 }
 
-Slice slice_of(const DicomOutline& outline) {
-  const DicomElements& elements = outline.elements;
+Slice slice_of(const xray::DicomOutline& outline) {
+  const xray::DicomElements& elements = outline.elements;
   Slice slice;
   slice.columns = outline.columns;
   slice.rows = outline.rows;
-  const auto corner = needed(elements, tags::image_position, 3, -most_coordinate_mm, most_coordinate_mm);
-  const auto turn = needed(elements, tags::image_orientation, 6, -1.001, 1.001);
-  const auto spacing = needed(elements, tags::pixel_spacing, 2, 1e-3, 100);
+  const auto corner =
+      needed(elements, xray::tags::image_position, 3, -most_coordinate_mm, most_coordinate_mm);
+  const auto turn = needed(elements, xray::tags::image_orientation, 6, -1.001, 1.001);
+  const auto spacing = needed(elements, xray::tags::pixel_spacing, 2, 1e-3, 100);
   slice.corner = Vector3d::Map(corner.data());
   slice.axes.col(0) = Vector3d::Map(turn.data()) * spacing[1];
   slice.axes.col(1) = Vector3d::Map(turn.data() + 3) * spacing[0];
   const auto directions = Eigen::Map<const Eigen::Matrix<double, 3, 2>>(turn.data());
   if (!(directions.transpose() * directions).isIdentity(1e-3))
-    elements.refuse(Reason::bad_value, tags::image_orientation,
+    elements.refuse(Reason::bad_value, xray::tags::image_orientation,
                     "is not a pair of perpendicular unit vectors");
   return slice;
 }
@@ -70,13 +71,14 @@ std::map<std::string, std::vector<Slice>> find_series(const std::filesystem::pat
   for (const auto& path : paths) {
     const auto bytes = read_file(path, most_slice_bytes);
     if (!bytes || bytes->size() < 132 || bytes->compare(128, 4, "DICM") != 0) continue;
-    const DicomElements elements = value_or_throw(walk_dicom(*bytes, path.string()));
-    if (elements.text(tags::sop_class) != ct_class) continue;
-    if (elements.text(tags::image_type).find("LOCALIZER") != std::string_view::npos) continue;
-    const DicomOutline outline = value_or_throw(check_dicom(*bytes, path.string(), DicomKind::ct));
+    const xray::DicomElements elements = value_or_throw(xray::walk_dicom(*bytes, path.string()));
+    if (elements.text(xray::tags::sop_class) != xray::ct_class) continue;
+    if (elements.text(xray::tags::image_type).find("LOCALIZER") != std::string_view::npos) continue;
+    const xray::DicomOutline outline =
+        value_or_throw(xray::check_dicom(*bytes, path.string(), xray::DicomKind::ct));
     Slice slice = slice_of(outline);
     slice.path = path;
-    series[std::string(elements.text(tags::series))].push_back(std::move(slice));
+    series[std::string(elements.text(xray::tags::series))].push_back(std::move(slice));
   }
   return series;
 }
@@ -125,14 +127,14 @@ Vector3d even_step(const std::vector<Slice>& slices, const std::string& origin) 
 void decode_slice(const Slice& slice, float* voxels) {
   const std::string origin = slice.path.string();
   const std::string bytes = value_or_throw(read_file(slice.path, most_slice_bytes));
-  const DicomOutline outline = value_or_throw(check_dicom(bytes, origin, DicomKind::ct));
+  const xray::DicomOutline outline = value_or_throw(xray::check_dicom(bytes, origin, xray::DicomKind::ct));
   if (outline.columns != slice.columns || outline.rows != slice.rows)
     throw BadInput(Reason::bad_size, origin + ": changed while it was read");
   const double slope =
-      outline.elements.numbers(tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
+      outline.elements.numbers(xray::tags::rescale_slope, 1, -1e6, 1e6).value_or(std::vector{1.0})[0];
   const double shift =
-      outline.elements.numbers(tags::rescale_intercept, 1, -1e6, 1e6).value_or(std::vector{0.0})[0];
-  const Image<float> pixels = value_or_throw(decode_frame(outline, 0));
+      outline.elements.numbers(xray::tags::rescale_intercept, 1, -1e6, 1e6).value_or(std::vector{0.0})[0];
+  const image::Image<float> pixels = value_or_throw(xray::decode_frame(outline, 0));
   for (const float pixel : pixels.pixels())
     *voxels++ = static_cast<float>(slope * static_cast<double>(pixel) + shift);
 }
@@ -175,4 +177,4 @@ Volume read_ct_series(const std::filesystem::path& folder) {
   return volume;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -8,7 +8,7 @@
 #include "helicarm/volume/read_volume.h"
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 namespace fs = std::filesystem;
@@ -19,15 +19,15 @@ class CtSeries : public testing::Test {
   CtSeries() { fs::create_directories(folder_); }
   ~CtSeries() override { fs::remove_all(folder_); }
 
-  static DicomBuilder slice(double z, const std::string& series = "2.25.7") {
-    DicomBuilder builder;
+  static xray::DicomBuilder slice(double z, const std::string& series = "2.25.7") {
+    xray::DicomBuilder builder;
     builder.text(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.2").text(0x00080060, "CS", "CT");
     builder.text(0x0020000E, "UI", series).text(0x00200032, "DS", fmt::format("-3\\4\\{}", z));
     builder.text(0x00200037, "DS", "1\\0\\0\\0\\1\\0").text(0x00280030, "DS", "0.5\\0.25");
     builder.text(0x00281052, "DS", "-1000").text(0x00281053, "DS", "2");
     return builder;
   }
-  void put(const DicomBuilder& builder) {
+  void put(const xray::DicomBuilder& builder) {
     ASSERT_TRUE(write_file(folder_ / fmt::format("{:03}", count_++), builder.bytes()));
   }
   Expected<Volume> read() const { return read_volume(folder_); }
@@ -78,7 +78,7 @@ TEST_F(CtSeries, InvalidSlicesAreRefused) {
   EXPECT_EQ(read().error().reason, Reason::not_an_image);
   put(slice(0));
   EXPECT_EQ(read().error().reason, Reason::bad_size);
-  const auto with = [&](const DicomBuilder& odd) {
+  const auto with = [&](const xray::DicomBuilder& odd) {
     put(odd);
     const auto volume = read();
     fs::remove(folder_ / fmt::format("{:03}", --count_));
@@ -91,10 +91,10 @@ TEST_F(CtSeries, InvalidSlicesAreRefused) {
   EXPECT_EQ(with(slice(1).text(0x00281053, "DS", "nan")), Reason::bad_value);
   EXPECT_EQ(with(slice(1).word(0x00280011, 4)), Reason::bad_size);
   EXPECT_EQ(with(slice(1).word(0x00280010, 600)), Reason::truncated);
-  DicomBuilder cut = slice(1);
+  xray::DicomBuilder cut = slice(1);
   ASSERT_TRUE(write_file(folder_ / "zzz", cut.bytes().substr(0, cut.bytes().size() - 9)));
   EXPECT_EQ(read().error().reason, Reason::truncated);
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -7,7 +7,7 @@
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_elements.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -21,10 +21,11 @@ class MetaHeader {
       const std::string_view line = take_line(rest);
       const std::size_t equals = line.find('=');
       if (equals == std::string_view::npos)
-        throw BadInput(Reason::bad_value, fmt::format("{}: the line {} has no \"=\"", origin_, quote(line)));
+        throw BadInput(Reason::bad_value,
+                       fmt::format("{}: the line {} has no \"=\"", origin_, xray::quote(line)));
       const std::string key(trim(line.substr(0, equals)));
       if (!values_.emplace(key, trim(line.substr(equals + 1))).second)
-        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, quote(key)));
+        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, xray::quote(key)));
     }
   }
 
@@ -41,7 +42,7 @@ class MetaHeader {
     if (value == "True" || value == "true" || value == "1") return true;
     if (value == "False" || value == "false" || value == "0") return false;
     throw BadInput(Reason::bad_value,
-                   fmt::format("{} is {}, must be True or False", field(key), quote(value)));
+                   fmt::format("{} is {}, must be True or False", field(key), xray::quote(value)));
   }
 
   /// Values of the first key that is present; empty if none is.
@@ -67,7 +68,7 @@ VoxelFormat format_of(const MetaHeader& header) {
   if (found == kinds.end())
     throw BadInput(Reason::unsupported,
                    fmt::format("{} is {}, must be MET_CHAR to MET_DOUBLE", header.field("ElementType"),
-                               quote(header.text("ElementType"))));
+                               xray::quote(header.text("ElementType"))));
   return {found->second,
           header.flag("BinaryDataByteOrderMSB", false) || header.flag("ElementByteOrderMSB", false)};
 }
@@ -81,7 +82,7 @@ Eigen::Matrix3d directions_from_letters(const std::string& letters, const std::s
     const std::size_t letter = letters.size() == 3 ? from.find(letters[axis]) : std::string_view::npos;
     if (letter == std::string_view::npos)
       throw BadInput(Reason::bad_value,
-                     fmt::format("{} is {}, must be three of R L A P I S", field, quote(letters)));
+                     fmt::format("{} is {}, must be three of R L A P I S", field, xray::quote(letters)));
     directions(static_cast<int>(letter % 3), static_cast<int>(axis)) = letter < 3 ? 1 : -1;
   }
   return directions;
@@ -119,8 +120,8 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
   std::string_view rest = bytes;
   const MetaHeader header(rest, origin);
   if (header.text("NDims") != "3")
-    throw BadInput(Reason::unsupported,
-                   fmt::format("{} is {}, must be 3", header.field("NDims"), quote(header.text("NDims"))));
+    throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be 3", header.field("NDims"),
+                                                    xray::quote(header.text("NDims"))));
   if (header.text("ElementNumberOfChannels", "1") != "1")
     throw BadInput(Reason::unsupported, header.field("ElementNumberOfChannels") + " must be 1");
   if (!header.flag("BinaryData", true))
@@ -152,4 +153,4 @@ Volume read_metaimage(const std::filesystem::path& path, std::string_view bytes)
   return volume;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

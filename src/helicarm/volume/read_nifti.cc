@@ -9,7 +9,7 @@
 
 #include "helicarm/volume/voxels.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -151,4 +151,4 @@ Volume read_nifti(const std::filesystem::path& path, std::string_view bytes) {
   return volume;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -8,7 +8,7 @@
 #include "helicarm/volume/voxels.h"
 #include "helicarm/xray/dicom_elements.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 using Eigen::Vector3d;
@@ -36,16 +36,16 @@ class NrrdHeader {
       const std::size_t colon = line.find(": ");
       if (colon == std::string_view::npos)
         throw BadInput(Reason::bad_value,
-                       fmt::format("{}: the line {} is not a field", origin_, quote(line)));
+                       fmt::format("{}: the line {} is not a field", origin_, xray::quote(line)));
       std::string name(line.substr(0, colon));
       if (name == "datafile") name = "data file";
       if (name == "byteskip") name = "byte skip";
       if (std::ranges::find(ignored, name) != ignored.end()) continue;
       if (std::ranges::find(interpreted, name) == interpreted.end())
         throw BadInput(name == "line skip" ? Reason::unsupported : Reason::unknown_key,
-                       fmt::format("{}: the field {} is unknown", origin_, quote(name)));
+                       fmt::format("{}: the field {} is unknown", origin_, xray::quote(name)));
       if (!values_.emplace(name, trim(line.substr(colon + 2))).second)
-        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, quote(name)));
+        throw BadInput(Reason::bad_value, fmt::format("{}: {} is given twice", origin_, xray::quote(name)));
     }
     detached_end_ = true;
   }
@@ -107,13 +107,13 @@ VoxelFormat format_of(const NrrdHeader& header) {
   const auto found = kinds.find(header.text("type"));
   if (found == kinds.end())
     throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be int8 to double", header.field("type"),
-                                                    quote(header.text("type"))));
+                                                    xray::quote(header.text("type"))));
   VoxelFormat format{found->second, false};
   const std::string endian = header.text("endian");
   if (endian != "little" && endian != "big" &&
       (!endian.empty() || (format.bytes() > 1 && header.text("encoding") != "ascii")))
-    throw BadInput(Reason::bad_value,
-                   fmt::format("{} is {}, must be little or big", header.field("endian"), quote(endian)));
+    throw BadInput(Reason::bad_value, fmt::format("{} is {}, must be little or big", header.field("endian"),
+                                                  xray::quote(endian)));
   format.big_endian = endian == "big";
   return format;
 }
@@ -126,7 +126,7 @@ Vector3d lps_from(const NrrdHeader& header) {
   if (space == "left-anterior-superior" || space == "LAS") return {1, -1, 1};
   throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be left-posterior-superior, "
                                                   "right-anterior-superior or left-anterior-superior",
-                                                  header.field("space"), quote(space)));
+                                                  header.field("space"), xray::quote(space)));
 }
 
 Eigen::Affine3d place_of(const NrrdHeader& header) {
@@ -158,7 +158,7 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
   const NrrdHeader header(rest, origin);
   if (header.text("dimension") != "3")
     throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be 3", header.field("dimension"),
-                                                    quote(header.text("dimension"))));
+                                                    xray::quote(header.text("dimension"))));
   const auto size = header.numbers("sizes", 3);
   if (size.empty()) throw BadInput(Reason::bad_value, header.field("sizes") + " is missing");
 
@@ -191,7 +191,7 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
     return volume.voxels = text_voxels(rest, count, origin), volume;
   else if (encoding != "raw")
     throw BadInput(Reason::unsupported, fmt::format("{} is {}, must be raw, gzip or ascii",
-                                                    header.field("encoding"), quote(encoding)));
+                                                    header.field("encoding"), xray::quote(encoding)));
   if (const auto skip = header.numbers("byte skip", 1); !skip.empty() && skip[0] != 0) {
     const std::size_t needed = count * format.bytes();
     const double start =
@@ -205,4 +205,4 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
   return volume;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

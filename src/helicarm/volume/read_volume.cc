@@ -8,7 +8,7 @@
 
 #include "helicarm/volume/voxels.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 bool is_metaimage(std::string_view bytes) {
@@ -46,4 +46,4 @@ Expected<Volume> read_volume(const std::filesystem::path& path) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -5,7 +5,7 @@
 
 #include "helicarm/volume/volume.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 
 /// Reads MetaImage (.mha, .mhd), NRRD (.nrrd, .nhdr), NIfTI-1 (.nii, .nii.gz), detected by content, or a
 /// folder with the slices of a DICOM CT series. Every length in a file is checked before use. Failures name
@@ -13,4 +13,4 @@ namespace helicarm {
 /// not_finite, unknown_key, path_outside.
 Expected<Volume> read_volume(const std::filesystem::path& path);
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -13,7 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/volume/voxels.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 namespace fs = std::filesystem;
@@ -297,4 +297,4 @@ TEST(Inflate, SizeBeyondThirtyTwoBitsIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -8,7 +8,7 @@
 
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 // Micro-CT voxels are some micrometres; 100 mm between voxels cannot be a scan of a knee.
@@ -53,10 +53,10 @@ Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::
 std::string volume_key(const Volume& volume) {
   const Eigen::Matrix4d place = volume.patient_from_voxel.matrix();
   const auto bytes = [](const auto* data, std::size_t size) {
-    return digest({reinterpret_cast<const char*>(data), size});
+    return xray::digest({reinterpret_cast<const char*>(data), size});
   };
-  return digest(bytes(volume.size.data(), sizeof(int) * 3) + bytes(place.data(), sizeof place) +
-                bytes(volume.voxels.data(), volume.voxels.size() * sizeof(float)));
+  return xray::digest(bytes(volume.size.data(), sizeof(int) * 3) + bytes(place.data(), sizeof place) +
+                      bytes(volume.voxels.data(), volume.voxels.size() * sizeof(float)));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -10,7 +10,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 
 /// Limits for every volume file: side length, and bytes of the voxels in memory.
 inline constexpr int max_volume_side = 16384;
@@ -40,4 +40,4 @@ Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::
 /// Fingerprint of size, geometry and voxels, 32 hexadecimal digits.
 std::string volume_key(const Volume& volume);
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

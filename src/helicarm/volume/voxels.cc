@@ -14,7 +14,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/xray/dicom_elements.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 namespace {
 
 template <class Stored>
@@ -140,14 +140,15 @@ std::vector<double> read_numbers(std::string_view text, std::size_t count, const
     double number = 0;
     const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
     if (error != std::errc{} || stop != word.data() + word.size())
-      throw BadInput(Reason::bad_value, fmt::format("{}: {} is not a number", origin, quote(word)));
+      throw BadInput(Reason::bad_value, fmt::format("{}: {} is not a number", origin, xray::quote(word)));
     if (!std::isfinite(number))
-      throw BadInput(Reason::not_finite, fmt::format("{}: {} is not finite", origin, quote(word)));
+      throw BadInput(Reason::not_finite, fmt::format("{}: {} is not finite", origin, xray::quote(word)));
     numbers.push_back(number);
     at = text.find_first_not_of(between, end);
   }
   if (numbers.size() != count)
-    throw BadInput(Reason::bad_value, fmt::format("{}: {} must be {} number(s)", origin, quote(text), count));
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: {} must be {} number(s)", origin, xray::quote(text), count));
   return numbers;
 }
 
@@ -174,4 +175,4 @@ std::string_view take_line(std::string_view& rest) {
   return line.ends_with('\r') ? line.substr(0, line.size() - 1) : line;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

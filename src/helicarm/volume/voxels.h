@@ -8,7 +8,7 @@
 
 #include "helicarm/volume/volume.h"
 
-namespace helicarm {
+namespace helicarm::volume {
 
 /// Voxel type and byte order in a file.
 struct VoxelFormat {
@@ -48,4 +48,4 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes);
 Volume read_nifti(const std::filesystem::path& path, std::string_view bytes);
 Volume read_ct_series(const std::filesystem::path& folder);
 
-}  // namespace helicarm
+}  // namespace helicarm::volume

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Little-endian 32-bit number; the caller has checked that its four bytes exist.
 inline std::uint32_t number_at(std::string_view bytes, std::size_t at) {
@@ -15,4 +15,4 @@ inline std::uint32_t number_at(std::string_view bytes, std::size_t at) {
   return value;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

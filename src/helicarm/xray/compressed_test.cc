@@ -19,7 +19,7 @@
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/read_dicom.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr int width = 40, height = 30;
@@ -222,4 +222,4 @@ TEST_F(Compressed, MutationsNeverCrash) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/digest.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 std::string key_of(std::string_view text) { return text.empty() ? std::string{} : digest(text); }
@@ -104,4 +104,4 @@ Expected<Polarity> read_polarity(const DicomOutline& outline) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -6,7 +6,7 @@
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Limits within which a value from a file is accepted.
 inline constexpr double min_pixel_mm = 0.01, max_pixel_mm = 2;
@@ -35,4 +35,4 @@ struct Polarity {
 /// (metal displayed white) is correct for a radiograph but also a common writer error: inconsistent.
 Expected<Polarity> read_polarity(const DicomOutline& outline);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// For tests: builds a DICOM file byte by byte so that any element can be invalid. Starts as a valid 8 x 6 XA
 /// image of 12 bits with the values 100, 101, ...
@@ -104,4 +104,4 @@ class DicomBuilder {
   std::string tail_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -9,7 +9,7 @@
 
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr int max_side = 16384;
@@ -120,4 +120,4 @@ Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& or
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -6,7 +6,7 @@
 
 #include "helicarm/xray/dicom_elements.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// A DICOM X-ray with valid structure, sizes and pixel module; its views point into the bytes.
 struct DicomOutline {
@@ -38,4 +38,4 @@ inline constexpr std::string_view ct_class = "1.2.840.10008.5.1.4.1.1.2";
 Expected<DicomOutline> check_dicom(std::string_view bytes, const std::string& origin,
                                    DicomKind kind = DicomKind::xray);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

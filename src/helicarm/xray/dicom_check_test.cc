@@ -6,7 +6,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 using namespace std::literals;
@@ -190,4 +190,4 @@ TEST(DicomCheck, MessagesEscapeFileContent) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -9,7 +9,7 @@
 
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 std::string_view trimmed(std::string_view text) {
@@ -81,4 +81,4 @@ std::optional<std::uint16_t> DicomElements::word(DicomTag tag, std::string_view 
   return static_cast<std::uint16_t>(bytes[0] | bytes[1] << 8);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -10,7 +10,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 struct DicomTag {
   std::uint32_t number;  ///< group << 16 | element
@@ -53,4 +53,4 @@ std::string quote(std::string_view value);
 /// transfer syntax). `origin` begins each message.
 Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

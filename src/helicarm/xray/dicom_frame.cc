@@ -8,7 +8,7 @@
 #include "helicarm/xray/jpeg.h"
 #include "helicarm/xray/rle.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 std::string joined(const std::vector<std::string_view>& fragments, std::size_t first, std::size_t last) {
@@ -52,8 +52,8 @@ std::string decompressed(const DicomOutline& outline, int frame) {
 }
 
 template <class Word>
-Image<float> stored_values(const DicomOutline& outline, std::string_view bytes) {
-  Image<float> image(outline.columns, outline.rows);
+image::Image<float> stored_values(const DicomOutline& outline, std::string_view bytes) {
+  image::Image<float> image(outline.columns, outline.rows);
   const int mask = (1 << outline.bits_stored) - 1;
   const int sign = outline.is_signed ? 1 << (outline.bits_stored - 1) : 0;
   const char* from = bytes.data();
@@ -68,7 +68,7 @@ Image<float> stored_values(const DicomOutline& outline, std::string_view bytes) 
 
 }  // namespace
 
-Expected<Image<float>> decode_frame(const DicomOutline& outline, int frame) {
+Expected<image::Image<float>> decode_frame(const DicomOutline& outline, int frame) {
   return guarded([&] {
     const bool wide = outline.bits_allocated == 16;
     std::string buffer;
@@ -84,4 +84,4 @@ Expected<Image<float>> decode_frame(const DicomOutline& outline, int frame) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -4,11 +4,11 @@
 #include "helicarm/image/image.h"
 #include "helicarm/xray/dicom_check.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Stored values of one frame (0-based, less than `outline.frames`); bits above Bits Stored are dropped.
 /// Pixels are as stored, neither flipped nor rotated. Refuses: truncated, bad_value (damaged compressed
 /// data).
-Expected<Image<float>> decode_frame(const DicomOutline& outline, int frame);
+Expected<image::Image<float>> decode_frame(const DicomOutline& outline, int frame);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -3,7 +3,7 @@
 
 #include "helicarm/xray/dicom_elements.h"
 
-namespace helicarm::tags {
+namespace helicarm::xray::tags {
 
 inline constexpr DicomTag meta_length{0x00020000, "File Meta Information Group Length"};
 inline constexpr DicomTag transfer_syntax{0x00020010, "Transfer Syntax UID"};
@@ -49,4 +49,4 @@ inline constexpr DicomTag lossy_compression{0x00282110, "Lossy Image Compression
 inline constexpr DicomTag lut_shape{0x20500020, "Presentation LUT Shape"};
 inline constexpr DicomTag pixel_data{0x7FE00010, "Pixel Data"};
 
-}  // namespace helicarm::tags
+}  // namespace helicarm::xray::tags

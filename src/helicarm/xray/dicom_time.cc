@@ -9,7 +9,7 @@
 
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 /// `count` digits at `from`; nothing if one is not a digit.
@@ -107,4 +107,4 @@ std::string dicom_date_time(double seconds_since_1970) {
                      time.seconds().count(), time.subseconds().count());
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 #include "helicarm/xray/dicom_elements.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Acquisition time: Acquisition DateTime, else Acquisition Date and Time, else Content Date and Time;
 /// Timezone Offset From UTC applies where the time has no offset. A value without a complete date and time to
@@ -17,4 +17,4 @@ std::optional<AcquisitionTime> acquisition_time(const DicomElements& elements);
 /// In the format of Acquisition DateTime (UTC, microseconds).
 std::string dicom_date_time(double seconds_since_1970);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -5,7 +5,7 @@
 
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr std::uint32_t acquisition_date_time = 0x0008002A, acquisition_date = 0x00080022,
@@ -64,4 +64,4 @@ TEST(DicomTime, WrittenTimeRoundTrips) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

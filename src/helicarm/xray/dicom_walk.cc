@@ -6,7 +6,7 @@
 #include "helicarm/xray/dicom_elements.h"
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr int max_depth = 64;
@@ -241,4 +241,4 @@ Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& or
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// 128-bit fingerprint as 32 hexadecimal digits, to compare texts or images; not cryptographic. Four
 /// independent multiplicative streams for memory-speed throughput.
@@ -38,4 +38,4 @@ inline std::string digest(std::string_view bytes) {
   return fmt::format("{:016x}{:016x}", finish(state[0], state[1]), finish(state[2], state[3] + state[0]));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -8,7 +8,7 @@
 #include <dcmtk/dcmjpeg/djdijg8.h>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 /// DCMTK's decoder with its log suppressed; DCMTK reports damage only as warnings.
@@ -105,4 +105,4 @@ Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, in
   return wide;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

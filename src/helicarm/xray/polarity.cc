@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr int samples_across = 256;
@@ -15,7 +15,7 @@ constexpr std::size_t majority = 4;  // least ratio to the number of samples of 
 
 }  // namespace
 
-std::optional<bool> metal_looks_bright(const Image<float>& image) {
+std::optional<bool> metal_looks_bright(const image::Image<float>& image) {
   const int side = std::min(image.width(), image.height());
   const int ring = std::max(3, side / 64);
   const int step = std::max(1, side / samples_across);
@@ -54,4 +54,4 @@ std::optional<bool> metal_looks_bright(const Image<float>& image) {
   return std::nullopt;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -9,7 +9,7 @@
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/polarity.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 Expected<int> choose_frame(const std::string& origin, int frames, std::optional<int> frame) {
   if (!frame && frames > 1)
@@ -34,7 +34,7 @@ void make_metal_dark(XrayImage& xray_image, const std::string& origin) {
       {Reason::tag_disagrees, fmt::format("{}: metal is bright; the grey values were inverted", origin)});
 }
 
-float highest_grey(const Image<float>& pixels) {
+float highest_grey(const image::Image<float>& pixels) {
   std::uint32_t used = 0;
   for (const float grey : pixels.pixels()) used |= static_cast<std::uint32_t>(grey);
   if (used == 0) return 65535;
@@ -43,7 +43,7 @@ float highest_grey(const Image<float>& pixels) {
   return static_cast<float>((1u << highest_bit) - (1u << lowest_bit));
 }
 
-std::string image_key(const Image<float>& pixels) {
+std::string image_key(const image::Image<float>& pixels) {
   const auto values = pixels.pixels();
   return digest(fmt::format("{} {} {}", pixels.width(), pixels.height(),
                             digest({reinterpret_cast<const char*>(values.data()), values.size_bytes()})));
@@ -73,4 +73,4 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// One frame (1-based; optional if the file has one) of a DICOM X-ray in memory. The whole file is checked
 /// before decoding; refusals: see `check_dicom`, `read_acquisition` and `read_polarity`.
@@ -25,9 +25,9 @@ void make_metal_dark(XrayImage& xray_image, const std::string& origin);
 
 /// Highest grey value that the source of a 16-bit image could have stored: a source of fewer bits fills
 /// either the low bits of each value or the high ones (then the low ones are zero everywhere). At least 255.
-float highest_grey(const Image<float>& pixels);
+float highest_grey(const image::Image<float>& pixels);
 
 /// Digest of an image's size and values.
-std::string image_key(const Image<float>& pixels);
+std::string image_key(const image::Image<float>& pixels);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/polarity.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 Expected<XrayImage> read(const DicomBuilder& builder, std::optional<int> frame = {}) {
@@ -181,14 +181,14 @@ TEST(ReadDicom, ImageDecidesWhereTheTagsDisagree) {
 
 TEST(ReadDicom, NoiseAndEdgesDoNotDecidePolarity) {
   RandomStream random(3, 1);
-  Image<float> noise(300, 300), edge(300, 300);
+  image::Image<float> noise(300, 300), edge(300, 300);
   for (float& p : noise.pixels()) p = static_cast<float>(random.normal());
   for (int v = 0; v < 300; ++v)
     for (int u = 0; u < 300; ++u)
       edge(u, v) = (u - 150) * (u - 150) + (v - 150) * (v - 150) < 120 * 120 ? 1.0f : 0.0f;
   EXPECT_FALSE(metal_looks_bright(noise).has_value());
   EXPECT_FALSE(metal_looks_bright(edge).has_value());
-  EXPECT_FALSE(metal_looks_bright(Image<float>(2, 2)).has_value());
+  EXPECT_FALSE(metal_looks_bright(image::Image<float>(2, 2)).has_value());
 }
 
 TEST(ReadDicom, KeysDistinguishPatientsStudiesAndImages) {
@@ -213,4 +213,4 @@ TEST(ReadDicom, ControlCharactersInThePatientNameAreHarmless) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

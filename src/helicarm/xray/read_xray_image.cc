@@ -10,7 +10,7 @@
 #include "helicarm/xray/dicom_acquisition.h"
 #include "helicarm/xray/read_dicom.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace fs = std::filesystem;
 
 namespace {
@@ -29,11 +29,11 @@ Acquisition read_sidecar(const fs::path& path) {
   return acquisition;
 }
 
-XrayImage xray_image_of_png(const GreyImage& grey_image, const fs::path& path) {
+XrayImage xray_image_of_png(const image::GreyImage& grey_image, const fs::path& path) {
   XrayImage xray_image;
   const auto sidecar = sidecar_of(path);
   if (sidecar) xray_image.acquisition = read_sidecar(*sidecar);
-  xray_image.pixels = Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
+  xray_image.pixels = image::Image<float>(grey_image.pixels.width(), grey_image.pixels.height());
   std::ranges::copy(grey_image.pixels.pixels(), xray_image.pixels.pixels().begin());
   xray_image.highest = grey_image.bits == 8 ? 255 : highest_grey(xray_image.pixels);
   const std::string origin = path.filename().string();
@@ -53,14 +53,14 @@ XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   const std::string origin = path.filename().string();
   if (bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0)
     return value_or_throw(read_dicom(bytes, origin, frame));
-  if (is_png(bytes)) {
+  if (image::is_png(bytes)) {
     value_or_throw(choose_frame(origin, 1, frame));
-    return xray_image_of_png(value_or_throw(decode_png(bytes, origin)), path);
+    return xray_image_of_png(value_or_throw(image::decode_png(bytes, origin)), path);
   }
-  if (is_tiff(bytes)) {
-    const int pages = value_or_throw(count_tiff_pages(bytes, origin));
+  if (image::is_tiff(bytes)) {
+    const int pages = value_or_throw(image::count_tiff_pages(bytes, origin));
     const int page = value_or_throw(choose_frame(origin, pages, frame));
-    return xray_image_of_png(value_or_throw(decode_tiff(bytes, page, origin)), path);
+    return xray_image_of_png(value_or_throw(image::decode_tiff(bytes, page, origin)), path);
   }
   throw BadInput(Reason::not_an_image,
                  fmt::format("{}: {}, neither DICOM with a preamble nor PNG nor TIFF", origin,
@@ -92,4 +92,4 @@ Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& vie
   return xray_image;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Reads a DICOM, PNG or TIFF X-ray image; the format is detected by content. `frame` is 1-based and needed
 /// only if the file has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) with `pixel_mm`
@@ -21,4 +21,4 @@ Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std
 /// The sidecar beside a PNG or TIFF, where there is one.
 std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -11,7 +11,7 @@
 #include "helicarm/xray/dicom_builder.h"
 #include "helicarm/xray/write_dicom.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 namespace fs = std::filesystem;
 
@@ -35,8 +35,8 @@ class ReadXrayImage : public ::testing::Test {
   fs::path folder_;
 };
 
-Image<std::uint16_t> ramp() {
-  Image<std::uint16_t> image(9, 7);
+image::Image<std::uint16_t> ramp() {
+  image::Image<std::uint16_t> image(9, 7);
   std::uint16_t value = 0;
   for (std::uint16_t& pixel : image.pixels()) pixel = value = static_cast<std::uint16_t>(value + 1001);
   return image;
@@ -44,7 +44,7 @@ Image<std::uint16_t> ramp() {
 
 TEST_F(ReadXrayImage, FormatIsDetectedByContentNotName) {
   write("a.png", DicomBuilder().bytes());
-  write("b.dcm", encode_png(ramp()));
+  write("b.dcm", image::encode_png(ramp()));
   write("b.json", R"({"pixel_mm": 0.25, "source_detector_mm": null})");
   EXPECT_EQ(read("a.png")->pixels.width(), 8);
   const auto grey_image = read("b.dcm");
@@ -67,7 +67,7 @@ TEST_F(ReadXrayImage, FileThatIsNotAnImageIsRefused) {
 }
 
 TEST_F(ReadXrayImage, WithoutASidecarAcquisitionParametersAreAbsent) {
-  write("a.png", encode_png(ramp()));
+  write("a.png", image::encode_png(ramp()));
   const auto bare = read("a.png");
   ASSERT_TRUE(bare) << bare.error().message;
   EXPECT_FALSE(bare->acquisition.pixel_mm);
@@ -79,10 +79,10 @@ TEST_F(ReadXrayImage, WithoutASidecarAcquisitionParametersAreAbsent) {
 
 TEST_F(ReadXrayImage, GreyRangeIsThatOfTheSourceNotTheContainer) {
   const auto highest = [&](int first, int factor) {
-    Image<std::uint16_t> image(64, 64);
+    image::Image<std::uint16_t> image(64, 64);
     int value = first;
     for (std::uint16_t& pixel : image.pixels()) pixel = static_cast<std::uint16_t>(factor * value--);
-    write("a.png", encode_png(image));
+    write("a.png", image::encode_png(image));
     return read("a.png")->highest;
   };
   EXPECT_EQ(highest(4095, 1), 4095);
@@ -92,7 +92,7 @@ TEST_F(ReadXrayImage, GreyRangeIsThatOfTheSourceNotTheContainer) {
 }
 
 TEST_F(ReadXrayImage, SidecarMustBeValid) {
-  write("a.png", encode_png(ramp()));
+  write("a.png", image::encode_png(ramp()));
   write("a.json", R"({"pixel_mm": -1, "source_detector_mm": null})");
   EXPECT_EQ(reason("a.png"), "bad_value");
   write("a.json", R"({"pixel_mm": NaN})");
@@ -132,7 +132,7 @@ TEST_F(ReadXrayImage, ManyThreadsReadTheSame) {
   DerivedImage image{.pixels = ramp(), .acquisition = {}};
   image.rle = true;
   ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
-  write("b.png", encode_png(ramp()));
+  write("b.png", image::encode_png(ramp()));
   write("b.json", R"({"pixel_mm": null, "source_detector_mm": null})");
   const std::string expected = read("a.dcm")->acquisition.instance_key;
   std::vector<std::string> keys(64);
@@ -146,4 +146,4 @@ TEST_F(ReadXrayImage, ManyThreadsReadTheSame) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -7,7 +7,7 @@
 
 #include "helicarm/xray/bytes.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr std::size_t header_bytes = 64;
@@ -52,4 +52,4 @@ Expected<std::string> decode_rle(std::string_view frame, std::size_t pixels, int
   return out;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -6,11 +6,11 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// Decodes one frame of DICOM RLE (PS3.5 annex G) into little-endian words of `word_bytes` (1 or 2). Refuses:
 /// truncated, bad_value.
 Expected<std::string> decode_rle(std::string_view frame, std::size_t pixels, int word_bytes,
                                  const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

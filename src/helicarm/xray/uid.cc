@@ -8,7 +8,7 @@
 
 #include <sys/random.h>
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 using Words = std::array<std::uint32_t, 4>;  // most significant first
@@ -45,4 +45,4 @@ std::string make_uid(RandomStream& random) {
   return uid_of(words);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -5,7 +5,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// New DICOM UID, 2.25.<128-bit random UUID in decimal> (PS3.5 B.2), from the system's entropy; independent
 /// of host names.
@@ -14,4 +14,4 @@ std::string make_uid();
 /// Reproducible variant.
 std::string make_uid(RandomStream& random);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

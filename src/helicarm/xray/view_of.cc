@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 constexpr double in_degrees = 180 / std::numbers::pi;
@@ -51,4 +51,4 @@ std::optional<double> degrees_apart(const Acquisition& a, const Acquisition& b) 
   return in_degrees * std::acos(std::min(1.0, std::abs(one->dot(*other))));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -6,7 +6,7 @@
 
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// The missing view that an image belongs to: `wanted`, unless its positioner angle clearly indicates
 /// another. "AP" and "PA" are frontal, names that begin with "LAT" lateral.
@@ -16,4 +16,4 @@ std::string view_of(const Acquisition& shown, const std::string& wanted, std::sp
 /// count as not stated: many C-arms write the same ones into every image.
 std::optional<double> degrees_apart(const Acquisition& a, const Acquisition& b);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

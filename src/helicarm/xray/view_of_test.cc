@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 
 const std::vector<std::string> views{"AP", "LAT"};
@@ -43,4 +43,4 @@ TEST(DegreesApart, EqualOrAbsentAnglesGiveNoAngle) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

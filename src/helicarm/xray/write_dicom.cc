@@ -17,7 +17,7 @@
 #include "helicarm/xray/dicom_time.h"
 #include "helicarm/xray/uid.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace fs = std::filesystem;
 
 namespace {
@@ -109,7 +109,7 @@ void put_pixels(DcmDataset& dataset, const DerivedImage& image) {
 }
 
 void check(const fs::path& path, const DerivedImage& image) {
-  const auto side = static_cast<int>(max_image_side);
+  const auto side = static_cast<int>(image::max_image_side);
   if (image.pixels.empty() || image.pixels.width() > side || image.pixels.height() > side)
     throw BadInput(Reason::bad_size, fmt::format("{}: {} x {} pixels, must be 1 to {} a side", path.string(),
                                                  image.pixels.width(), image.pixels.height(), side));
@@ -143,4 +143,4 @@ Expected<void> write_dicom(const fs::path& path, const DerivedImage& image) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -9,11 +9,11 @@
 #include "helicarm/image/image.h"
 #include "helicarm/xray/xray_image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// An image to be written as DICOM. Contains no patient data except the fields below.
 struct DerivedImage {
-  Image<std::uint16_t> pixels;
+  image::Image<std::uint16_t> pixels;
   int bits_stored = 16;  ///< 8 .. 16; up to 8 bits are written as one byte per pixel
   Acquisition
       acquisition;      ///< spacing, source distance, angles, time, flip, logarithmic; keys are not written
@@ -31,4 +31,4 @@ struct DerivedImage {
 /// 16384), bad_value (a pixel over 2^bits_stored - 1), cannot_write.
 Expected<void> write_dicom(const std::filesystem::path& path, const DerivedImage& image);
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -8,7 +8,7 @@
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/uid.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 namespace {
 namespace fs = std::filesystem;
 
@@ -22,7 +22,7 @@ class WriteDicom : public ::testing::Test {
 };
 
 DerivedImage grey_image(int bits) {
-  DerivedImage image{.pixels = Image<std::uint16_t>(33, 21), .bits_stored = bits, .acquisition = {}};
+  DerivedImage image{.pixels = image::Image<std::uint16_t>(33, 21), .bits_stored = bits, .acquisition = {}};
   unsigned value = 0;
   for (std::uint16_t& pixel : image.pixels.pixels())
     pixel = static_cast<std::uint16_t>((value += 77) & ((1u << bits) - 1));
@@ -84,4 +84,4 @@ TEST(Uid, IsARandomUuidInDecimal) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::xray

@@ -11,7 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/image/image.h"
 
-namespace helicarm {
+namespace helicarm::xray {
 
 /// By the C-arm's own clock, which may differ from other clocks.
 struct AcquisitionTime {
@@ -44,11 +44,11 @@ struct Acquisition {
 /// usually dark.
 struct XrayImage {
   std::string name;  ///< of the view, e.g. "AP"
-  Image<float> pixels;
+  image::Image<float> pixels;
   float lowest = 0;  ///< smallest and largest value that the file can store
   float highest = 4095;
   Acquisition acquisition;
   std::vector<Warning> warnings;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::xray

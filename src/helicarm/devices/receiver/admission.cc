@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 unsigned Admission::count(bool associated_only, const std::string* address) const {
   return static_cast<unsigned>(std::ranges::count_if(peers_, [&](const auto& entry) {
@@ -73,4 +73,4 @@ void Admission::leave(Id id) {
   peers_.erase(id);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

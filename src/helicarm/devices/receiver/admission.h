@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// Connection limits. One address may be one C-arm or many behind a router: hence two limits.
 struct AdmissionLimits {
@@ -58,4 +58,4 @@ class Admission {
   Id next_ = 0;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

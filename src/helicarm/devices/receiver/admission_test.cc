@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 class AdmissionOfPeers : public testing::Test {
@@ -130,4 +130,4 @@ TEST_F(AdmissionOfPeers, FloodOfSilentConnectionsLeavesAssociationsAlone) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -8,7 +8,7 @@
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/dicom_tags.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 using dicom::AbortReason, dicom::Operation, dicom::PduType, dicom::Status;
@@ -160,15 +160,15 @@ std::pair<Status, std::string> Association::store(const dicom::ContextAnswer& co
     return std::pair{status, std::string(code(failure.reason)) + ": " + failure.message};
   };
   const std::string origin = "image from " + title_;
-  if (!is_xray_class(command_->sop_class) || command_->sop_class != context.abstract_syntax)
+  if (!xray::is_xray_class(command_->sop_class) || command_->sop_class != context.abstract_syntax)
     return refuse(Status::sop_class_unknown,
                   {Reason::unsupported, origin + ": SOP class was not negotiated"});
   const std::string file =
       dicom_file(command_->sop_class, command_->sop_instance, context.transfer_syntax, bytes_);
-  const auto elements = walk_dicom(file, origin);
+  const auto elements = xray::walk_dicom(file, origin);
   if (!elements) return refuse(Status::cannot_understand, elements.error());
-  if (elements->text(tags::sop_instance) != command_->sop_instance ||
-      elements->text(tags::sop_class) != command_->sop_class)
+  if (elements->text(xray::tags::sop_instance) != command_->sop_instance ||
+      elements->text(xray::tags::sop_class) != command_->sop_class)
     return refuse(Status::data_set_does_not_match,
                   {Reason::bad_value, origin + ": UIDs of data set and command differ"});
   const auto arrival = shared_.inbox.store(file, origin);
@@ -194,4 +194,4 @@ void Association::take_memory(std::size_t bytes) {
 
 void Association::release_memory() { shared_.counters.bytes_on_the_way -= std::exchange(memory_taken_, 0); }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -14,7 +14,7 @@
 #include "helicarm/devices/receiver/dimse.h"
 #include "helicarm/devices/receiver/receiver.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// State shared by all associations.
 struct ReceiverShared {
@@ -87,4 +87,4 @@ class Association {
   std::size_t memory_taken_ = 0;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

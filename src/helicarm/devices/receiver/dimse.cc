@@ -8,7 +8,7 @@
 #include "helicarm/core/text.h"
 #include "helicarm/devices/receiver/pdu.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 namespace {
 
 enum Element : std::uint16_t {
@@ -99,4 +99,4 @@ std::string write_response(const Command& command, Status answer, std::string_vi
   return element(group_length, little_endian(static_cast<std::uint32_t>(rest.size()), 4)) + rest;
 }
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

@@ -8,7 +8,7 @@
 #include "helicarm/core/failure.h"
 
 /// DICOM messages (PS3.7): the two that the receiver supports.
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 
 enum class Operation : std::uint16_t { store = 0x0001, echo = 0x0030, cancel = 0x0FFF };
 
@@ -38,4 +38,4 @@ Expected<Command> read_command(std::string_view bytes);
 /// Response to a command; `comment` (at most 64 characters are sent) states why it was refused.
 std::string write_response(const Command& command, Status status, std::string_view comment = {});
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

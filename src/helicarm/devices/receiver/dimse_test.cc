@@ -6,7 +6,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/devices/receiver/peer.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 namespace {
 
 TEST(Command, StoreReportsClassInstanceAndFollowingData) {
@@ -59,4 +59,4 @@ TEST(Response, RepeatsTheMessageIdAndContainsTheStatus) {
 }
 
 }  // namespace
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

@@ -16,7 +16,7 @@
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/read_dicom.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace fs = std::filesystem;
 
 namespace {
@@ -35,7 +35,7 @@ void remove_parts(const fs::path& folder) {
 
 /// Checks the structure of every frame and decodes the first.
 void check_image(std::string_view file, const std::string& origin) {
-  value_or_throw(read_dicom(file, origin, 1));
+  value_or_throw(xray::read_dicom(file, origin, 1));
 }
 
 std::string meta_element(std::uint16_t number, std::string_view vr, std::string value) {
@@ -82,10 +82,10 @@ void Inbox::check_folder(const std::string& origin) const {
 Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin) {
   return guarded([&] {
     check_image(file, origin);
-    const std::string uid(value_or_throw(walk_dicom(file, origin)).text(tags::sop_instance));
+    const std::string uid(value_or_throw(xray::walk_dicom(file, origin)).text(xray::tags::sop_instance));
     if (!dicom::is_uid(uid))
       throw BadInput(Reason::bad_value, fmt::format("{}: SOP Instance UID is not valid", origin));
-    Arrival arrival{{}, digest(file), false, {}};
+    Arrival arrival{{}, xray::digest(file), false, {}};
     const std::lock_guard naming(naming_);
     check_folder(origin);
     for (int version = 1; version <= most_versions; ++version) {
@@ -126,4 +126,4 @@ std::string dicom_file(std::string_view sop_class, std::string_view sop_instance
   return file;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -10,7 +10,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// A stored image.
 struct Arrival {
@@ -52,4 +52,4 @@ class Inbox {
 std::string dicom_file(std::string_view sop_class, std::string_view sop_instance,
                        std::string_view transfer_syntax, std::string_view data_set);
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

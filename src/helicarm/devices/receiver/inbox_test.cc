@@ -9,7 +9,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 namespace fs = std::filesystem;
@@ -22,7 +22,7 @@ class InboxOnDisk : public testing::Test {
 };
 
 TEST_F(InboxOnDisk, ImageIsStoredUnchanged) {
-  const std::string file = DicomBuilder().bytes();
+  const std::string file = xray::DicomBuilder().bytes();
   const Arrival arrival = inbox_->store(file, "test").value();
   EXPECT_EQ(arrival.path, folder_ / "2.25.17.dcm");
   EXPECT_EQ(read_file(arrival.path, 1 << 20).value(), file);
@@ -30,39 +30,39 @@ TEST_F(InboxOnDisk, ImageIsStoredUnchanged) {
 }
 
 TEST_F(InboxOnDisk, SameImageAgainIsTheSameArrival) {
-  inbox_->store(DicomBuilder().bytes(), "test").value();
-  const Arrival again = inbox_->store(DicomBuilder().bytes(), "test").value();
+  inbox_->store(xray::DicomBuilder().bytes(), "test").value();
+  const Arrival again = inbox_->store(xray::DicomBuilder().bytes(), "test").value();
   EXPECT_TRUE(again.repeated);
   EXPECT_TRUE(again.warnings.empty());
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17~2.dcm"));
 }
 
 TEST_F(InboxOnDisk, OtherBytesUnderOneUidAreBothKeptWithAWarning) {
-  inbox_->store(DicomBuilder().bytes(), "test").value();
-  const std::string other = DicomBuilder().text(0x00181110, "DS", "990").bytes();
+  inbox_->store(xray::DicomBuilder().bytes(), "test").value();
+  const std::string other = xray::DicomBuilder().text(0x00181110, "DS", "990").bytes();
   const Arrival arrival = inbox_->store(other, "test").value();
   EXPECT_EQ(arrival.path, folder_ / "2.25.17~2.dcm");
   ASSERT_EQ(arrival.warnings.size(), 1u);
   EXPECT_EQ(arrival.warnings[0].reason, Reason::uid_reused);
   EXPECT_TRUE(inbox_->store(other, "test").value().repeated);
-  EXPECT_EQ(read_file(folder_ / "2.25.17.dcm", 1 << 20).value(), DicomBuilder().bytes());
+  EXPECT_EQ(read_file(folder_ / "2.25.17.dcm", 1 << 20).value(), xray::DicomBuilder().bytes());
 }
 
 TEST_F(InboxOnDisk, UnreadableImageIsRefusedAndLeavesNothing) {
   EXPECT_EQ(inbox_->store("hello", "test").error().reason, Reason::not_an_image);
-  EXPECT_FALSE(inbox_->store(DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
-  EXPECT_FALSE(inbox_->store(DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
+  EXPECT_FALSE(inbox_->store(xray::DicomBuilder().word(0x00280010, 65535).bytes(), "test"));
+  EXPECT_FALSE(inbox_->store(xray::DicomBuilder().text(0x00181164, "DS", "0\\0").bytes(), "test"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 1);  // only the lock file
 }
 
 TEST_F(InboxOnDisk, InvalidUidIsRefused) {
-  EXPECT_EQ(inbox_->store(DicomBuilder().text(0x00080018, "UI", "..").bytes(), "test").error().reason,
+  EXPECT_EQ(inbox_->store(xray::DicomBuilder().text(0x00080018, "UI", "..").bytes(), "test").error().reason,
             Reason::bad_value);
 }
 
 TEST_F(InboxOnDisk, NoMessageContainsThePatientName) {
-  const auto refused =
-      inbox_->store(DicomBuilder().text(0x00100010, "PN", "CANARY^NAME").word(0x00280010, 0).bytes(), "test");
+  const auto refused = inbox_->store(
+      xray::DicomBuilder().text(0x00100010, "PN", "CANARY^NAME").word(0x00280010, 0).bytes(), "test");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message.find("CANARY"), std::string::npos);
 }
@@ -77,7 +77,7 @@ TEST_F(InboxOnDisk, SecondProgramIsRefused) {
 
 TEST_F(InboxOnDisk, FolderDeletedInOperationIsAnErrorAndNotRecreated) {
   fs::remove_all(folder_);
-  const auto refused = inbox_->store(DicomBuilder().bytes(), "test");
+  const auto refused = inbox_->store(xray::DicomBuilder().bytes(), "test");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().reason, Reason::cannot_write);
   EXPECT_FALSE(fs::exists(folder_));
@@ -86,13 +86,13 @@ TEST_F(InboxOnDisk, FolderDeletedInOperationIsAnErrorAndNotRecreated) {
 TEST_F(InboxOnDisk, FolderReplacedInOperationIsAnErrorAndStaysEmpty) {
   fs::remove_all(folder_);
   fs::create_directory(folder_);
-  EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
+  EXPECT_EQ(inbox_->store(xray::DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 
 TEST_F(InboxOnDisk, LockDeletedInOperationIsAnError) {
   fs::remove(folder_ / ".lock");
-  EXPECT_EQ(inbox_->store(DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
+  EXPECT_EQ(inbox_->store(xray::DicomBuilder().bytes(), "test").error().reason, Reason::cannot_write);
 }
 
 TEST_F(InboxOnDisk, IncompleteImagesOfAKilledProgramAreRemoved) {
@@ -107,4 +107,4 @@ TEST(Inbox, FolderThatCannotBeCreatedIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -6,7 +6,7 @@
 
 #include "helicarm/xray/dicom_check.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 namespace {
 
 constexpr std::string_view dicom_application = "1.2.840.10008.3.1.1.1";
@@ -29,7 +29,7 @@ constexpr std::uint32_t least_pdu_bytes = 512;
 ContextAnswer answer(const PresentationContext& context) {
   ContextAnswer answer{context.id, ContextResult::accepted, context.abstract_syntax,
                        context.transfer_syntaxes.front()};
-  if (context.abstract_syntax != verification && !is_xray_class(context.abstract_syntax)) {
+  if (context.abstract_syntax != verification && !xray::is_xray_class(context.abstract_syntax)) {
     answer.result = ContextResult::abstract_syntax_unknown;
     return answer;
   }
@@ -59,4 +59,4 @@ tl::expected<std::vector<ContextAnswer>, Rejection> negotiate(const AssociationR
   return answers;
 }
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

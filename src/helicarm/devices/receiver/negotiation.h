@@ -8,7 +8,7 @@
 
 #include "helicarm/devices/receiver/pdu.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 
 struct NegotiationOptions {
   std::string title = "HELICARM";          ///< own AE title: other called titles are rejected
@@ -21,4 +21,4 @@ struct NegotiationOptions {
 tl::expected<std::vector<ContextAnswer>, Rejection> negotiate(const AssociationRequest& request,
                                                               const NegotiationOptions& options);
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

@@ -7,7 +7,7 @@
 
 #include "helicarm/core/big_endian.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 namespace {
 
 constexpr std::size_t most_contexts = 128;
@@ -211,4 +211,4 @@ Expected<std::vector<Fragment>> read_fragments(std::string_view body) {
   });
 }
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

@@ -9,7 +9,7 @@
 #include "helicarm/core/failure.h"
 
 /// Protocol data units of the DICOM upper layer (PS3.8, 9.3); every length is checked.
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 
 enum class PduType : std::uint8_t {
   associate_request = 1,
@@ -101,4 +101,4 @@ bool is_uid(std::string_view text);
 /// 1 to 16 printable characters without a backslash, not all blank.
 bool is_title(std::string_view text);
 
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

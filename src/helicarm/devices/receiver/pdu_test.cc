@@ -8,7 +8,7 @@
 #include "helicarm/devices/receiver/negotiation.h"
 #include "helicarm/devices/receiver/peer.h"
 
-namespace helicarm::dicom {
+namespace helicarm::receiver::dicom {
 namespace {
 
 TEST(AssociationRequest, ReportsTitlesContextsAndLargestPdu) {
@@ -147,4 +147,4 @@ TEST(Negotiation, RejectsWithTheCodeOfTheCause) {
 }
 
 }  // namespace
-}  // namespace helicarm::dicom
+}  // namespace helicarm::receiver::dicom

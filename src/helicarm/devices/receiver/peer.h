@@ -12,7 +12,7 @@
 #include "helicarm/core/big_endian.h"
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 inline constexpr const char* xa_class = "1.2.840.10008.5.1.4.1.1.12.1";
 inline constexpr const char* verification_class = "1.2.840.10008.1.1";
@@ -83,26 +83,26 @@ inline std::string fragment(int context, int control, const std::string& bytes) 
 
 inline std::string command_element(int number, std::string value) {
   if (value.size() % 2 != 0) value += '\0';
-  return DicomBuilder::number(0, 2) + DicomBuilder::number(number, 2) +
-         DicomBuilder::number(static_cast<int>(value.size()), 4) + value;
+  return xray::DicomBuilder::number(0, 2) + xray::DicomBuilder::number(number, 2) +
+         xray::DicomBuilder::number(static_cast<int>(value.size()), 4) + value;
 }
 
 inline std::string command(int field, const std::string& sop_class, const std::string& sop_instance = "") {
   const bool data = !sop_instance.empty();
-  return command_element(0x0002, sop_class) + command_element(0x0100, DicomBuilder::number(field, 2)) +
-         command_element(0x0110, DicomBuilder::number(7, 2)) +
-         command_element(0x0800, DicomBuilder::number(data ? 0 : 0x0101, 2)) +
+  return command_element(0x0002, sop_class) + command_element(0x0100, xray::DicomBuilder::number(field, 2)) +
+         command_element(0x0110, xray::DicomBuilder::number(7, 2)) +
+         command_element(0x0800, xray::DicomBuilder::number(data ? 0 : 0x0101, 2)) +
          (data ? command_element(0x1000, sop_instance) : "");
 }
 
 /// Data set of a file made by the builder.
-inline std::string data_set(const DicomBuilder& builder) {
+inline std::string data_set(const xray::DicomBuilder& builder) {
   const std::string file = builder.bytes();
   const std::size_t meta_size = static_cast<unsigned char>(file[140]);
   return file.substr(144 + meta_size);
 }
 
-inline std::string store(const DicomBuilder& builder, const std::string& sop_instance = "2.25.17",
+inline std::string store(const xray::DicomBuilder& builder, const std::string& sop_instance = "2.25.17",
                          const std::string& sop_class = xa_class) {
   return pdu(4, fragment(3, 3, command(1, sop_class, sop_instance))) +
          pdu(4, fragment(3, 2, data_set(builder)));
@@ -152,4 +152,4 @@ class RawClient {
   asio::ip::tcp::socket socket_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -12,7 +12,7 @@
 
 #include "helicarm/devices/receiver/serve.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 using asio::ip::tcp;
@@ -112,4 +112,4 @@ Expected<std::unique_ptr<DicomReceiver>> DicomReceiver::open(const ReceiverOptio
 std::uint16_t DicomReceiver::port() const { return engine_->acceptor.local_endpoint().port(); }
 const ReceiverCounters& DicomReceiver::counters() const { return engine_->shared.counters; }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

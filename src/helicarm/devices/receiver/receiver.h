@@ -12,7 +12,7 @@
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/receiver/negotiation.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// PEM files. Peers must present a certificate signed by one of `authorities`.
 struct TlsFiles {
@@ -84,4 +84,4 @@ class DicomReceiver {
   std::unique_ptr<Engine> engine_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -5,18 +5,18 @@
 
 #include "helicarm/devices/receiver/receiver_fixture.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 using ReceiverCrowd = ReceiverAtWork;
 
 std::string half_an_image(const std::string& patient = "CANARY^NAME") {
-  const std::string set = peer::data_set(DicomBuilder().text(0x00100010, "PN", patient));
+  const std::string set = peer::data_set(xray::DicomBuilder().text(0x00100010, "PN", patient));
   return peer::pdu(data, peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17"))) +
          peer::pdu(data, peer::fragment(3, 0, set.substr(0, set.size() / 2)));
 }
 std::string other_half(const std::string& patient = "CANARY^NAME") {
-  const std::string set = peer::data_set(DicomBuilder().text(0x00100010, "PN", patient));
+  const std::string set = peer::data_set(xray::DicomBuilder().text(0x00100010, "PN", patient));
   return peer::pdu(data, peer::fragment(3, 2, set.substr(set.size() / 2)));
 }
 
@@ -26,7 +26,7 @@ TEST_F(ReceiverCrowd, FiveHundredSilentConnectionsBlockNoPeer) {
   std::vector<RawClient> crowd;
   for (int i = 0; i < 500; ++i) crowd.push_back(client());
   RawClient c_arm = associated();
-  c_arm.send(peer::store(DicomBuilder()));
+  c_arm.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(c_arm.receive_status(), 0);
   EXPECT_TRUE(eventually([&] { return receiver_->counters().evicted >= 400; }));
 }
@@ -41,7 +41,7 @@ TEST_F(ReceiverCrowd, AssociationsThatOnlyEchoAreReplacedForAnImage) {
     EXPECT_EQ(echoing->receive_status(), 0);
   }
   RawClient c_arm = associated();
-  c_arm.send(peer::store(DicomBuilder()));
+  c_arm.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(c_arm.receive_status(), 0);
   EXPECT_EQ(first.receive_type(), closed);
   second.send(peer::echo());
@@ -163,4 +163,4 @@ TEST_F(ReceiverCrowd, FloodOfConnectionsDoesNotFillTheLog) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -6,7 +6,7 @@
 #include "helicarm/core/field.h"
 #include "helicarm/devices/receiver/receiver.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// User options of the receiver besides its address and names.
 inline constexpr std::array<Field<ReceiverOptions>, 6> receiver_fields{
@@ -42,4 +42,4 @@ inline constexpr std::array<Field<ReceiverOptions>, 6> receiver_fields{
                                              .range = {0.1, 3600},
                                              .help = "Longest time for receiving one image"})};
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -13,7 +13,7 @@
 #include "helicarm/devices/receiver/peer.h"
 #include "helicarm/devices/receiver/receiver.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// For tests: PDU types of a receiver's answers.
 inline constexpr int accepted = 2, rejected = 3, data = 4, released = 6, aborted = 7, closed = 0;
@@ -94,4 +94,4 @@ class ReceiverAtWork : public testing::Test {
   std::vector<Failure> lines_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -12,7 +12,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/devices/receiver/receiver_fixture.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 namespace fs = std::filesystem;
@@ -31,16 +31,17 @@ TEST_F(Receiver, AnswersEchoAndReleases) {
 
 TEST_F(Receiver, ImageIsOnDiskWhenItIsAcknowledged) {
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0);
   const std::string file = read_file(folder_ / "2.25.17.dcm", 1 << 20).value();
-  EXPECT_TRUE(file.ends_with(peer::data_set(DicomBuilder())));
+  EXPECT_TRUE(file.ends_with(peer::data_set(xray::DicomBuilder())));
   EXPECT_EQ(receiver_->counters().stored, 1u);
 }
 
 TEST_F(Receiver, ImageInManySmallFragmentsIsTheSame) {
   RawClient client = associated();
-  const std::string command = peer::command(1, xa_class, "2.25.17"), set = peer::data_set(DicomBuilder());
+  const std::string command = peer::command(1, xa_class, "2.25.17"),
+                    set = peer::data_set(xray::DicomBuilder());
   for (const char c : command.substr(0, command.size() - 1))
     client.send(peer::pdu(data, peer::fragment(3, 1, {c})));
   client.send(peer::pdu(data, peer::fragment(3, 3, {command.back()})));
@@ -53,7 +54,7 @@ TEST_F(Receiver, ImageInManySmallFragmentsIsTheSame) {
 TEST_F(Receiver, RetransmissionIsAcknowledgedAndStoredOnce) {
   RawClient client = associated();
   for (int i = 0; i < 2; ++i) {
-    client.send(peer::store(DicomBuilder()));
+    client.send(peer::store(xray::DicomBuilder()));
     EXPECT_EQ(client.receive_status(), 0);
   }
   EXPECT_EQ(receiver_->counters().repeated, 1u);
@@ -67,9 +68,9 @@ TEST_F(Receiver, CallsTheHookForEachImage) {
                                    [&](const Failure& f) { failures.push_back(f); }})
                   .value();
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   client.receive_status();
-  client.send(peer::store(DicomBuilder().word(0x00280010, 0)));
+  client.send(peer::store(xray::DicomBuilder().word(0x00280010, 0)));
   client.receive_status();
   ASSERT_EQ(arrivals.size(), 1u);
   ASSERT_EQ(failures.size(), 1u);
@@ -78,21 +79,21 @@ TEST_F(Receiver, CallsTheHookForEachImage) {
 
 TEST_F(Receiver, BadImageIsRefusedWithAStatusAndTheAssociationContinues) {
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder().word(0x00280010, 65535)));
+  client.send(peer::store(xray::DicomBuilder().word(0x00280010, 65535)));
   EXPECT_EQ(client.receive_status(), 0xC000);
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0);
 }
 
 TEST_F(Receiver, DifferingUidsOfCommandAndDataAreRefused) {
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder(), "2.25.18"));
+  client.send(peer::store(xray::DicomBuilder(), "2.25.18"));
   EXPECT_EQ(client.receive_status(), 0xA900);
 }
 
 TEST_F(Receiver, ClassThatWasNotNegotiatedIsRefused) {
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder(), "2.25.17", "1.2.840.10008.5.1.4.1.1.2"));
+  client.send(peer::store(xray::DicomBuilder(), "2.25.17", "1.2.840.10008.5.1.4.1.1.2"));
   EXPECT_EQ(client.receive_status(), 0x0122);
 }
 
@@ -110,17 +111,17 @@ TEST_F(Receiver, FullDiskIsOutOfResources) {
   const rlimit full{100, usual.rlim_max};
   RawClient client = associated();
   ::setrlimit(RLIMIT_FSIZE, &full);
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0xA700);
   ::setrlimit(RLIMIT_FSIZE, &usual);
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0);
 }
 
 TEST_F(Receiver, InboxDeletedInOperationIsAnErrorAndNotRecreated) {
   RawClient client = associated();
   fs::remove_all(folder_);
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_status(), 0xA700);
   EXPECT_FALSE(fs::exists(folder_));
   EXPECT_EQ(line_with("deleted or replaced").reason, Reason::cannot_write);
@@ -159,7 +160,7 @@ TEST_F(Receiver, ProtocolViolationsAbortTheAssociation) {
 TEST_F(Receiver, AbortDuringAnImageLeavesNothing) {
   RawClient client = associated();
   client.send(peer::pdu(data, peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17"))));
-  client.send(peer::pdu(data, peer::fragment(3, 0, peer::data_set(DicomBuilder()).substr(0, 100))));
+  client.send(peer::pdu(data, peer::fragment(3, 0, peer::data_set(xray::DicomBuilder()).substr(0, 100))));
   client.send(peer::pdu(aborted, std::string(4, '\0')));
   EXPECT_EQ(client.receive_type(), closed);
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
@@ -169,7 +170,7 @@ TEST_F(Receiver, ImageAboveTheLimitAbortsTheAssociation) {
   options_.most_object_bytes = 100;
   open();
   RawClient client = associated();
-  client.send(peer::store(DicomBuilder()));
+  client.send(peer::store(xray::DicomBuilder()));
   EXPECT_EQ(client.receive_type(), aborted);
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17.dcm"));
 }
@@ -205,7 +206,7 @@ TEST_F(Receiver, PeerThatSendsByteByByteIsDisconnected) {
   const auto begun = std::chrono::steady_clock::now();
   for (int i = 0; i < 25; ++i) {
     request.send(peer::Request().bytes().substr(static_cast<std::size_t>(i), 1));
-    image.send(peer::store(DicomBuilder()).substr(static_cast<std::size_t>(i), 1));
+    image.send(peer::store(xray::DicomBuilder()).substr(static_cast<std::size_t>(i), 1));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   EXPECT_EQ(request.receive_type(), closed);
@@ -285,4 +286,4 @@ TEST_F(Receiver, ClosesImmediatelyWithPeersConnected) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -8,7 +8,7 @@
 
 #include "helicarm/devices/receiver/receiver_fixture.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 namespace fs = std::filesystem;
@@ -94,4 +94,4 @@ TEST_F(ReceiverTls, ConnectionWithoutTlsIsRefusedAndReported) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

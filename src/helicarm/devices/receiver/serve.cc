@@ -16,7 +16,7 @@
 #include <asio/write.hpp>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 using asio::awaitable;
@@ -252,4 +252,4 @@ void serve(tcp::socket socket, asio::ssl::context* tls, ReceiverShared& shared) 
     asio::co_spawn(executor, run_session(std::move(socket), shared, deadline, address, *id), asio::detached);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -3,7 +3,7 @@
 
 #include "helicarm/core/files.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace fs = std::filesystem;
 
 namespace {
@@ -63,4 +63,4 @@ void WatchedFolder::watch(const std::stop_token& stop) {
   }
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -12,7 +12,7 @@
 
 #include "helicarm/devices/receiver/receiver.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 
 /// Files of a folder that did not change between two polls. Polling works on network shares too.
 class FolderScan {
@@ -55,4 +55,4 @@ class WatchedFolder {
   std::jthread thread_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::receiver

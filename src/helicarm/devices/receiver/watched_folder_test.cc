@@ -10,7 +10,7 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/xray/dicom_builder.h"
 
-namespace helicarm {
+namespace helicarm::receiver {
 namespace {
 
 namespace fs = std::filesystem;
@@ -72,7 +72,7 @@ TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
   const WatchedFolder watched(folder_ / "share", *inbox,
                               {[&](const Arrival& a) { arrived.set_value(a); }, [](const Failure&) {}},
                               std::chrono::milliseconds(5));
-  put("share/knee", DicomBuilder().bytes());
+  put("share/knee", xray::DicomBuilder().bytes());
   EXPECT_EQ(arrived.get_future().get().path, folder_ / "inbox" / "2.25.17.dcm");
   EXPECT_TRUE(fs::exists(folder_ / "share/knee"));
 }
@@ -80,8 +80,8 @@ TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
 TEST_F(FolderOnDisk, AtMostTheRequestedNumberOfImagesIsTaken) {
   const auto inbox = Inbox::open(folder_ / "inbox").value();
   fs::create_directory(folder_ / "share");
-  put("share/one", DicomBuilder().bytes());
-  put("share/two", DicomBuilder().text(0x00080018, "UI", "2.25.18").bytes());
+  put("share/one", xray::DicomBuilder().bytes());
+  put("share/two", xray::DicomBuilder().text(0x00080018, "UI", "2.25.18").bytes());
   std::promise<void> arrived;
   {
     const WatchedFolder watched(folder_ / "share", *inbox,
@@ -97,4 +97,4 @@ TEST_F(FolderOnDisk, AtMostTheRequestedNumberOfImagesIsTaken) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::receiver

@@ -7,7 +7,7 @@
 
 #include "helicarm/devices/robot/straight_path.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
@@ -23,8 +23,8 @@ void require_within(double value, double low, double high, const std::string& wh
                    fmt::format("{} is {:g}, must be {:g} to {:g}", what, value, low, high));
 }
 
-void require_rigid(const RigidTransform& transform, const std::string& what) {
-  value_or_throw(rigid_transform_from(transform.matrix(), what));
+void require_rigid(const geometry::RigidTransform& transform, const std::string& what) {
+  value_or_throw(geometry::rigid_transform_from(transform.matrix(), what));
 }
 
 void check_numbers(const RobotOrder& order, const RobotLimits& limits) {
@@ -90,7 +90,7 @@ void check_pose(const RobotOrder& order, const RobotModel& model, const Joints& 
 Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, const Waypoint& to,
             const RobotLimits& limits) {
   const StraightPath path(base_from_flange(model, joints) * order.tool.flange_from_tcp, to.base_from_tcp);
-  const RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
+  const geometry::RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
   const int steps =
       1 + static_cast<int>(std::min(1e5, std::max(path.shift_mm() / step_mm, path.turn() / step_rad)));
   // The speed within a step does not exceed the segment's nominal speed.
@@ -120,7 +120,7 @@ Joints walk(const RobotOrder& order, const RobotModel& model, Joints joints, con
 Joints walk_all(const RobotOrder& order, Joints joints, const RobotLimits& limits) {
   check_numbers(order, limits);
   const RobotModel model = value_or_throw(robot_model(order.model));
-  const RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
+  const geometry::RigidTransform tcp_from_flange = order.tool.flange_from_tcp.inverse();
   for (const Waypoint& waypoint : order.waypoints)
     value_or_throw(nearest_inverse(model, waypoint.base_from_tcp * tcp_from_flange, joints));
   check_pose(order, model, joints, limits);
@@ -137,8 +137,8 @@ void require_near(double value, double limit, const std::string& what) {
          {{"difference", value}, {"limit", limit}}});
 }
 
-double angle_deg(const RigidTransform& a, const RigidTransform& b) {
-  return vector_from_rotation(a.rotation.transpose() * b.rotation).norm() / degree;
+double angle_deg(const geometry::RigidTransform& a, const geometry::RigidTransform& b) {
+  return geometry::vector_from_rotation(a.rotation.transpose() * b.rotation).norm() / degree;
 }
 
 }  // namespace
@@ -165,7 +165,7 @@ Expected<void> check_order(const RobotOrder& order, const RobotState& present, c
   return guarded([&] {
     if (const auto stopped = why_stopped(present)) throw BadInput(*stopped);
     const RobotModel model = value_or_throw(robot_model(order.model));
-    const RigidTransform& offset = order.tool.flange_from_tcp;
+    const geometry::RigidTransform& offset = order.tool.flange_from_tcp;
     require_near((present.flange_from_tcp.translation - offset.translation).norm(), limits.tool_mm,
                  "TCP of robot and order, mm");
     require_near(angle_deg(present.flange_from_tcp, offset), limits.tool_deg,
@@ -184,7 +184,7 @@ Expected<void> check_order(const RobotOrder& order, const RobotState& present, c
 double duration_s(const RobotOrder& order) {
   const auto model = robot_model(order.model);
   if (!model) return 0;
-  RigidTransform from = base_from_flange(*model, order.start) * order.tool.flange_from_tcp;
+  geometry::RigidTransform from = base_from_flange(*model, order.start) * order.tool.flange_from_tcp;
   double total = 0;
   for (const Waypoint& waypoint : order.waypoints) {
     total += duration_s(StraightPath(from, waypoint.base_from_tcp).length_mm(), waypoint.speed_mm_s,
@@ -195,8 +195,8 @@ double duration_s(const RobotOrder& order) {
 }
 
 double kinematic_mismatch_mm(const RobotModel& model, const RobotState& state) {
-  const RigidTransform expected = base_from_flange(model, state.joints) * state.flange_from_tcp;
+  const geometry::RigidTransform expected = base_from_flange(model, state.joints) * state.flange_from_tcp;
   return (state.base_from_tcp.translation - expected.translation).norm();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -4,7 +4,7 @@
 #include "helicarm/devices/robot/robot_order.h"
 #include "helicarm/devices/robot/robot_state.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Limits of an order. An order beyond them is refused, never clipped.
 struct RobotLimits {
@@ -44,4 +44,4 @@ double duration_s(const RobotOrder& order);
 /// or of a wrong model.
 double kinematic_mismatch_mm(const RobotModel& model, const RobotState& state);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

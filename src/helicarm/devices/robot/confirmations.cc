@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 
 std::string Confirmations::confirm(const RobotOrder& order, Clock::time_point now) {
   thread_local std::random_device random;
@@ -31,4 +31,4 @@ Expected<void> Confirmations::redeem(const std::string& token, const RobotOrder&
 
 void Confirmations::forget_all() { entries_.clear(); }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -7,7 +7,7 @@
 
 #include "helicarm/devices/robot/robot_order.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Tokens that confirm one order, once, for a limited time. A token is bound to every digit of its order.
 class Confirmations {
@@ -35,4 +35,4 @@ class Confirmations {
   std::map<std::string, Entry> entries_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

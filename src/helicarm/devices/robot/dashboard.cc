@@ -9,7 +9,7 @@
 #include "helicarm/core/text.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 struct Exchange {
@@ -84,4 +84,4 @@ Expected<std::string> ask_dashboard(const std::string& address, std::uint16_t po
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

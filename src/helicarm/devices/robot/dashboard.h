@@ -8,7 +8,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// All commands ever sent to a robot's dashboard: constants without user text.
 enum class DashboardCommand {
@@ -36,4 +36,4 @@ Expected<std::optional<std::string>> take_dashboard_line(std::string& received);
 /// The answer's line unchanged, or `bad_value` if it does not match the command.
 Expected<std::string> checked_answer(DashboardCommand command, std::string answer);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

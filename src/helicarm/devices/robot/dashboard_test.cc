@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 TEST(Dashboard, LinesAreTakenOneByOneWithoutControlCharacters) {
@@ -27,4 +27,4 @@ TEST(Dashboard, AnswerToAnotherCommandIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

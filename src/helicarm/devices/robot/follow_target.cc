@@ -7,7 +7,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 tl::unexpected<Failure> refuse(Reason reason, const std::string& why, const std::vector<Miss>& misses) {
@@ -29,12 +29,14 @@ Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const 
   for (;;) {
     const auto seen = measure();
     if (!seen) return tl::unexpected<Failure>(seen.error());
-    const RigidTransform tcp_from_target = seen->tracker_from_tcp.inverse() * seen->tracker_from_target;
+    const geometry::RigidTransform tcp_from_target =
+        seen->tracker_from_tcp.inverse() * seen->tracker_from_target;
     if (!tcp_from_target.matrix().allFinite() || !seen->covariance.allFinite())
       return fail(Reason::not_finite, "the tracker's measurement of the tool is not finite");
-    misses.push_back({tcp_from_target.translation.norm(),
-                      vector_from_rotation(tcp_from_target.rotation).norm() * 180 / std::numbers::pi,
-                      std::sqrt(std::max(0.0, seen->covariance.topLeftCorner<3, 3>().trace()))});
+    misses.push_back(
+        {tcp_from_target.translation.norm(),
+         geometry::vector_from_rotation(tcp_from_target.rotation).norm() * 180 / std::numbers::pi,
+         std::sqrt(std::max(0.0, seen->covariance.topLeftCorner<3, 3>().trace()))});
     const Miss& now = misses.back();
     if (2 * now.sigma_mm > corrections.tolerance_mm)
       return refuse(Reason::uncertain, "the tracker's uncertainty exceeds the tolerance", misses);
@@ -50,4 +52,4 @@ Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const 
   }
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -6,12 +6,12 @@
 
 #include "helicarm/devices/robot/robot_order.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Tracker measurement of the tool and its target at one moment.
 struct ToolMeasurement {
-  RigidTransform tracker_from_tcp;
-  RigidTransform tracker_from_target;
+  geometry::RigidTransform tracker_from_tcp;
+  geometry::RigidTransform tracker_from_target;
   /// Covariance of the target's pose relative to the tool: translation (mm), then rotation (rad).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
@@ -25,7 +25,7 @@ struct Miss {
 
 using Measure = std::function<Expected<ToolMeasurement>()>;
 /// Moves the tool to a pose given relative to its present one.
-using MoveTool = std::function<Expected<void>(const RigidTransform& tcp_from_new)>;
+using MoveTool = std::function<Expected<void>(const geometry::RigidTransform& tcp_from_new)>;
 
 /// Measures and corrects until the tool is within the tolerance; returns every error, the last one within it.
 /// Does not need the tracker's pose. Refuses before moving: `uncertain` if 2 sigma of the position exceed the
@@ -34,4 +34,4 @@ using MoveTool = std::function<Expected<void>(const RigidTransform& tcp_from_new
 Expected<std::vector<Miss>> follow_target(const Corrections& corrections, const Measure& measure,
                                           const MoveTool& move);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

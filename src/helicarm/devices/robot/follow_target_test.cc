@@ -5,7 +5,7 @@
 
 #include "helicarm/core/random.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 /// A tool that moves only part of the commanded distance, measured by a noisy tracker.
@@ -13,7 +13,7 @@ struct Scene {
   double part = 1;
   double noise_mm = 0;
   double sigma_mm = 0;
-  RigidTransform tool = {Eigen::Matrix3d::Identity(), {1, -1, 1.5}};
+  geometry::RigidTransform tool = {Eigen::Matrix3d::Identity(), {1, -1, 1.5}};
   int moves = 0;
   RandomStream random{5, 0};
 
@@ -27,7 +27,7 @@ struct Scene {
           seen.covariance.topLeftCorner<3, 3>().diagonal().setConstant(sigma_mm * sigma_mm);
           return seen;
         },
-        [&](const RigidTransform& step) -> Expected<void> {
+        [&](const geometry::RigidTransform& step) -> Expected<void> {
           tool.translation += part * step.translation;
           ++moves;
           return {};
@@ -80,4 +80,4 @@ TEST(FollowTarget, TrackerTooNoisyForTheToleranceIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

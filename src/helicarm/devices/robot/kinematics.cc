@@ -8,7 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -22,9 +22,9 @@ Joints joint_limits() {
 
 /// Rotation about z by `angle`, translations along z by `d` and along the new x by `a`, rotation about it by
 /// a twist of given cosine and sine.
-RigidTransform link(double angle, double d, double a, double cos_twist, double sin_twist) {
+geometry::RigidTransform link(double angle, double d, double a, double cos_twist, double sin_twist) {
   const double c = std::cos(angle), s = std::sin(angle);
-  RigidTransform step;
+  geometry::RigidTransform step;
   step.rotation << c, -s * cos_twist, s * sin_twist, s, c * cos_twist, -c * sin_twist, 0, sin_twist,
       cos_twist;
   step.translation << a * c, a * s, d;
@@ -43,7 +43,7 @@ std::optional<double> nearest_turn(double angle, double near, double limit) {
 }
 
 /// The last five joints for a given base joint: two wrist and two elbow configurations.
-void append_solutions(const RobotModel& model, const RigidTransform& base_from_flange, double base,
+void append_solutions(const RobotModel& model, const geometry::RigidTransform& base_from_flange, double base,
                       std::vector<Joints>& solutions) {
   const Eigen::Vector3d across(std::sin(base), -std::cos(base), 0);  // axis of joints 2, 3 and 4
   const Eigen::Vector3d across_in_flange = base_from_flange.rotation.transpose() * across;
@@ -52,7 +52,7 @@ void append_solutions(const RobotModel& model, const RigidTransform& base_from_f
     const double wrist2 = std::atan2(way * sine, across_in_flange.z());
     const double wrist3 =
         sine < 1e-12 ? 0 : std::atan2(-way * across_in_flange.y(), way * across_in_flange.x());
-    const RigidTransform frame1_from_frame4 =
+    const geometry::RigidTransform frame1_from_frame4 =
         link(base, model.d1, 0, 0, 1).inverse() * base_from_flange *
         (link(wrist2, model.d5, 0, 0, -1) * link(wrist3, model.d6, 0, 1, 0)).inverse();
     const double x = frame1_from_frame4.translation.x(), y = frame1_from_frame4.translation.y();
@@ -86,8 +86,8 @@ Expected<RobotModel> robot_model(const std::string& name) {
   return fail(Reason::bad_value, "robot: must be \"UR5\" or \"UR5e\"");
 }
 
-std::array<RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints) {
-  std::array<RigidTransform, 6> frames;
+std::array<geometry::RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints) {
+  std::array<geometry::RigidTransform, 6> frames;
   frames[0] = link(joints[0], model.d1, 0, 0, 1);
   frames[1] = frames[0] * link(joints[1], 0, model.a2, 1, 0);
   frames[2] = frames[1] * link(joints[2], 0, model.a3, 1, 0);
@@ -97,7 +97,7 @@ std::array<RigidTransform, 6> joint_frames(const RobotModel& model, const Joints
   return frames;
 }
 
-RigidTransform base_from_flange(const RobotModel& model, const Joints& joints) {
+geometry::RigidTransform base_from_flange(const RobotModel& model, const Joints& joints) {
   return joint_frames(model, joints).back();
 }
 
@@ -106,7 +106,7 @@ Eigen::Matrix<double, 6, 6> jacobian(const RobotModel& model, const Joints& join
   const auto frames = joint_frames(model, joints);
   const Eigen::Vector3d point = frames.back() * point_in_flange;
   Eigen::Matrix<double, 6, 6> columns;
-  RigidTransform before;
+  geometry::RigidTransform before;
   for (int i = 0; i < 6; ++i) {
     const Eigen::Vector3d axis = before.rotation.col(2);
     columns.block<3, 1>(0, i) = axis.cross(point - before.translation);
@@ -124,7 +124,7 @@ double least_singular_value(const RobotModel& model, const Joints& joints) {
   return std::sqrt(std::max(0.0, solver.eigenvalues().minCoeff()));
 }
 
-std::vector<Joints> inverse(const RobotModel& model, const RigidTransform& base_from_flange) {
+std::vector<Joints> inverse(const RobotModel& model, const geometry::RigidTransform& base_from_flange) {
   std::vector<Joints> solutions;
   if (!base_from_flange.translation.allFinite() || !base_from_flange.rotation.allFinite()) return solutions;
   const Eigen::Vector3d wrist = base_from_flange.translation - model.d6 * base_from_flange.rotation.col(2);
@@ -136,7 +136,7 @@ std::vector<Joints> inverse(const RobotModel& model, const RigidTransform& base_
   return solutions;
 }
 
-Expected<Joints> nearest_inverse(const RobotModel& model, const RigidTransform& base_from_flange,
+Expected<Joints> nearest_inverse(const RobotModel& model, const geometry::RigidTransform& base_from_flange,
                                  const Joints& near) {
   std::optional<Joints> best;
   for (Joints joints : inverse(model, base_from_flange)) {
@@ -158,4 +158,4 @@ Expected<Joints> nearest_inverse(const RobotModel& model, const RigidTransform& 
       {{"distance_mm", place.norm()}});
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

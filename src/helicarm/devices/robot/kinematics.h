@@ -10,7 +10,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// One value per joint, base to wrist 3: rad, rad/s or rad/s^2.
 using Joints = Eigen::Matrix<double, 6, 1>;
@@ -33,8 +33,8 @@ RobotModel ur5e();
 Expected<RobotModel> robot_model(const std::string& name);
 
 /// base_from_frame of the frames 1 to 6; the last is the flange.
-std::array<RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints);
-RigidTransform base_from_flange(const RobotModel& model, const Joints& joints);
+std::array<geometry::RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints);
+geometry::RigidTransform base_from_flange(const RobotModel& model, const Joints& joints);
 
 /// d (velocity of a point fixed to the flange, mm/s; angular velocity, rad/s) / d joints, in the base.
 Eigen::Matrix<double, 6, 6> jacobian(const RobotModel& model, const Joints& joints,
@@ -45,11 +45,11 @@ double least_singular_value(const RobotModel& model, const Joints& joints);
 
 /// All solutions (up to 8) for this flange pose, each joint in (-pi, pi]; empty out of reach. In a wrist
 /// singularity wrist 3 is 0.
-std::vector<Joints> inverse(const RobotModel& model, const RigidTransform& base_from_flange);
+std::vector<Joints> inverse(const RobotModel& model, const geometry::RigidTransform& base_from_flange);
 
 /// The solution of `inverse`, each joint shifted by whole turns within its limits, with the smallest maximum
 /// joint motion from `near`. Refuses `out_of_reach`.
-Expected<Joints> nearest_inverse(const RobotModel& model, const RigidTransform& base_from_flange,
+Expected<Joints> nearest_inverse(const RobotModel& model, const geometry::RigidTransform& base_from_flange,
                                  const Joints& near);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -8,7 +8,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr double pi = std::numbers::pi;
@@ -20,7 +20,8 @@ Joints random_joints(RandomStream& random) {
 }
 
 /// Reference: product of four elementary motions per joint, for any twists.
-RigidTransform plain_product(const std::array<std::array<double, 3>, 6>& d_a_twist, const Joints& joints) {
+geometry::RigidTransform plain_product(const std::array<std::array<double, 3>, 6>& d_a_twist,
+                                       const Joints& joints) {
   Eigen::Affine3d product = Eigen::Affine3d::Identity();
   for (int i = 0; i < 6; ++i) {
     product.rotate(Eigen::AngleAxisd(joints[i], Eigen::Vector3d::UnitZ()));
@@ -30,7 +31,7 @@ RigidTransform plain_product(const std::array<std::array<double, 3>, 6>& d_a_twi
   return {product.linear(), product.translation()};
 }
 
-double difference(const RigidTransform& a, const RigidTransform& b) {
+double difference(const geometry::RigidTransform& a, const geometry::RigidTransform& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
 }
 
@@ -50,7 +51,7 @@ TEST(Kinematics, ForwardAgreesWithTheElementaryProduct) {
 }
 
 TEST(Kinematics, StretchedArmReachesAlongMinusX) {
-  const RigidTransform flange = base_from_flange(ur5e(), Joints::Zero());
+  const geometry::RigidTransform flange = base_from_flange(ur5e(), Joints::Zero());
   EXPECT_TRUE(flange.translation.isApprox(Eigen::Vector3d(-817.2, -133.3 - 99.6, 162.5 - 99.7), 1e-12));
 }
 
@@ -60,7 +61,7 @@ TEST(Kinematics, EveryInverseReachesThePoseAndOneIsTheOriginal) {
   for (const RobotModel& model : {ur5(), ur5e()})
     for (int trial = 0; trial < 2000; ++trial) {
       const Joints joints = random_joints(random);
-      const RigidTransform pose = base_from_flange(model, joints);
+      const geometry::RigidTransform pose = base_from_flange(model, joints);
       const auto solutions = inverse(model, pose);
       for (const Joints& solution : solutions)
         EXPECT_LT(difference(base_from_flange(model, solution), pose), 1e-9);
@@ -84,9 +85,10 @@ TEST(Kinematics, JacobianAgreesWithDifferences) {
       constexpr double h = 1e-6;
       Joints low = joints, high = joints;
       low[i] -= h, high[i] += h;
-      const RigidTransform a = base_from_flange(ur5(), low), b = base_from_flange(ur5(), high);
+      const geometry::RigidTransform a = base_from_flange(ur5(), low), b = base_from_flange(ur5(), high);
       EXPECT_LT((columns.col(i).head<3>() - (b * tip - a * tip) / (2 * h)).norm(), 1e-5);
-      const Eigen::Vector3d turn = vector_from_rotation(b.rotation * a.rotation.transpose()) / (2 * h);
+      const Eigen::Vector3d turn =
+          geometry::vector_from_rotation(b.rotation * a.rotation.transpose()) / (2 * h);
       EXPECT_LT((columns.col(i).tail<3>() - turn).norm(), 1e-8);
     }
   }
@@ -104,7 +106,7 @@ TEST(Kinematics, NearestUsesWholeTurnsWithinTheLimits) {
 }
 
 TEST(Kinematics, PositionOutOfReachHasNoInverse) {
-  RigidTransform far;
+  geometry::RigidTransform far;
   far.translation = {1200, 0, 200};
   EXPECT_TRUE(inverse(ur5(), far).empty());
   EXPECT_EQ(nearest_inverse(ur5(), far, Joints::Zero()).error().reason, Reason::out_of_reach);
@@ -126,4 +128,4 @@ TEST(Kinematics, SingularPosesAreDetected) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

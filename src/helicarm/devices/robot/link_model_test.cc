@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/link_model_test.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/virtual_controller.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using Stops = LinkStateMachine::Stops;
@@ -469,7 +470,7 @@ TEST(LinkModel, EveryBrokenRuleOfTheScriptIsDetected) {
 /// The model's script and the real one agree in every period for any register values.
 TEST(LinkModel, ScriptModelAgreesWithTheScript) {
   RobotOrder order{"down", ur5().name, drill(), resting_joints(), {}, {}, {}};
-  RigidTransform aside = resting_state().base_from_tcp;
+  geometry::RigidTransform aside = resting_state().base_from_tcp;
   aside.translation.y() += 2;
   order.waypoints = {{aside, 50, 1200}};
   const OrderNumber number{3, 4};
@@ -511,4 +512,4 @@ TEST(LinkModel, ScriptModelAgreesWithTheScript) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -7,7 +7,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/devices/robot/link_state_machine.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Simulated time in steps; a UR5 has periods of 8 ms.
 inline constexpr int step_ms = 4, steps_per_period = 2;  // a UR5 has periods of 8 ms
@@ -123,4 +123,4 @@ class Channel {
   std::vector<Entry> waiting_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using enum LinkPhase;
@@ -188,4 +188,4 @@ Expected<bool> LinkStateMachine::judge(Time now) const {
   return false;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

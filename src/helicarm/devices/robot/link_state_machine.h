@@ -9,7 +9,7 @@
 #include "helicarm/devices/robot/order_registers.h"
 #include "helicarm/devices/robot/robot_state.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 enum class LinkPhase {
   disconnected,  ///< the robot's position is unknown
@@ -122,4 +122,4 @@ class LinkStateMachine {
   double begun_s_ = 0, foreseen_s_ = 0;  ///< on the robot's clock
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Identifies one order: a random session, and a count in it that starts at a random value and never repeats.
 /// A script still held by a controller, from this or another program, therefore has a different number.
@@ -38,4 +38,4 @@ struct ScriptReport {
   std::int32_t tick = 0;  ///< periods since it was loaded
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

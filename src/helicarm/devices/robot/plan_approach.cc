@@ -4,7 +4,7 @@
 #include <numbers>
 #include <optional>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 /// Shortest rotation of the z axis of `from` onto `axis`.
@@ -55,4 +55,4 @@ Expected<RobotOrder> plan_approach(const std::string& name, const RobotModel& mo
   return *best;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,7 +3,7 @@
 
 #include "helicarm/devices/robot/check_order.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// A planned tunnel in the robot's base frame: start and end, mm.
 struct TunnelAxis {
@@ -31,4 +31,4 @@ Expected<RobotOrder> plan_approach(const std::string& name, const RobotModel& mo
                                    const Joints& present, const TunnelAxis& axis,
                                    const ApproachOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -10,7 +10,7 @@
 #include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/straight_path.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using Milliseconds = std::chrono::milliseconds;
@@ -189,8 +189,8 @@ Expected<RobotState> RobotLink::supervise(Stops since, const Watch& watch) {
   }
 }
 
-Expected<void> RobotLink::correct(const RobotOrder& order, Stops since, const RigidTransform& tcp_from_new,
-                                  const Watch& watch) {
+Expected<void> RobotLink::correct(const RobotOrder& order, Stops since,
+                                  const geometry::RigidTransform& tcp_from_new, const Watch& watch) {
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
   RobotOrder small = order;
@@ -221,9 +221,10 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
   const auto by_robot = [&]() -> Expected<ToolMeasurement> {
     return ToolMeasurement{ended->base_from_tcp, order.waypoints.back().base_from_tcp};
   };
-  auto misses = follow_target(
-      order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),
-      [&](const RigidTransform& tcp_from_new) { return correct(order, *since, tcp_from_new, watched); });
+  auto misses = follow_target(order.corrections, order.corrections.most > 0 ? measure : Measure(by_robot),
+                              [&](const geometry::RigidTransform& tcp_from_new) {
+                                return correct(order, *since, tcp_from_new, watched);
+                              });
   if (!misses) {
     const std::lock_guard lock(guard_);
     machine_.stop_order(*since, misses.error());
@@ -232,4 +233,4 @@ Expected<std::vector<Miss>> RobotLink::execute(const RobotOrder& order, const st
   return misses;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

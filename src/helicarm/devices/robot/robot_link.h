@@ -15,7 +15,7 @@
 #include "helicarm/devices/robot/timed_socket.h"
 #include "helicarm/devices/robot/tool_track.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 struct RobotConfig {
   RobotModel model = ur5();
@@ -84,7 +84,7 @@ class RobotLink {
   Expected<RobotState> run(const RobotOrder& order, Stops since, const Watch& watch);
   Expected<void> send(const RobotOrder& order, Stops since);
   Expected<RobotState> supervise(Stops since, const Watch& watch);
-  Expected<void> correct(const RobotOrder& order, Stops since, const RigidTransform& tcp_from_new,
+  Expected<void> correct(const RobotOrder& order, Stops since, const geometry::RigidTransform& tcp_from_new,
                          const Watch& watch);
   Expected<void> refuse_local_mode() const;
   void changed();
@@ -100,4 +100,4 @@ class RobotLink {
   RtdeClient client_;  ///< last: its thread uses all others
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -11,7 +11,7 @@
 #include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/virtual_ur.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using namespace std::chrono_literals;
@@ -342,9 +342,9 @@ TEST(RobotLink, LoopOverTheTrackerCorrectsAnArmThatIsNotNominal) {
   approach.corrections = {
       .most = 4, .longest_mm = 3, .widest_deg = 2, .tolerance_mm = 0.05, .tolerance_deg = 0.05};
   const RobotOrder order = planned(approach);
-  const RigidTransform target = order.waypoints.back().base_from_tcp;
+  const geometry::RigidTransform target = order.waypoints.back().base_from_tcp;
   // The tracker's pose is arbitrary and unknown to the robot.
-  const RigidTransform tracker_from_base{
+  const geometry::RigidTransform tracker_from_base{
       Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix(), {900, -300, 1500}};
   const auto misses = link.execute(order, link.confirm(order), [&]() -> Expected<ToolMeasurement> {
     return ToolMeasurement{tracker_from_base * robot->truth().base_from_tip, tracker_from_base * target};
@@ -386,4 +386,4 @@ TEST(RobotLink, FactoryCalibrationIsAWarning) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

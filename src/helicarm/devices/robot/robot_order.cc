@@ -9,7 +9,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr const char* order_format = "helicarm-order/1";
@@ -19,12 +19,13 @@ constexpr double in_degrees = 180 / std::numbers::pi;
 constexpr Range any{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
 
 /// Bit-exact: reading must not change what the user confirmed.
-RigidTransform pose_of(JsonReader& reader, const char* key) {
-  const Eigen::Matrix4d given = matrix_from(reader, key, any);
-  const RigidTransform corrected = value_or_throw(rigid_transform_from(given, reader.where() + ": " + key));
+geometry::RigidTransform pose_of(JsonReader& reader, const char* key) {
+  const Eigen::Matrix4d given = geometry::matrix_from(reader, key, any);
+  const geometry::RigidTransform corrected =
+      value_or_throw(geometry::rigid_transform_from(given, reader.where() + ": " + key));
   if (!((corrected.matrix() - given).cwiseAbs().maxCoeff() < 1e-9))
     reader.refuse(Reason::bad_value, key, "must be a rotation and a translation to nine digits");
-  return exact_pose(given);
+  return geometry::exact_pose(given);
 }
 
 RobotTool tool_of(JsonReader reader) {
@@ -51,7 +52,8 @@ Corrections corrections_of(JsonReader reader) {
 }  // namespace
 
 Json to_json(const KeepOut& keep_out) {
-  return {{"point_in_base", json_list(keep_out.point_in_base)}, {"normal", json_list(keep_out.normal)}};
+  return {{"point_in_base", geometry::json_list(keep_out.point_in_base)},
+          {"normal", geometry::json_list(keep_out.normal)}};
 }
 
 KeepOut keep_out_from(JsonReader& reader, Range range) {
@@ -66,7 +68,7 @@ KeepOut keep_out_from(JsonReader& reader, Range range) {
 Json to_json(const RobotOrder& order) {
   Json waypoints = Json::array(), keep_outs = Json::array();
   for (const Waypoint& waypoint : order.waypoints)
-    waypoints.push_back({{"base_from_tcp", json_rows(waypoint.base_from_tcp.matrix())},
+    waypoints.push_back({{"base_from_tcp", geometry::json_rows(waypoint.base_from_tcp.matrix())},
                          {"speed_mm_s", waypoint.speed_mm_s},
                          {"acceleration_mm_s2", waypoint.acceleration_mm_s2}});
   for (const KeepOut& keep_out : order.keep_outs) keep_outs.push_back(to_json(keep_out));
@@ -75,9 +77,9 @@ Json to_json(const RobotOrder& order) {
           {"name", order.name},
           {"model", order.model},
           {"tool",
-           {{"flange_from_tcp", json_rows(order.tool.flange_from_tcp.matrix())},
+           {{"flange_from_tcp", geometry::json_rows(order.tool.flange_from_tcp.matrix())},
             {"payload_kg", order.tool.payload_kg}}},
-          {"start_deg", json_list(order.start * in_degrees)},
+          {"start_deg", geometry::json_list(order.start * in_degrees)},
           {"waypoints", waypoints},
           {"keep_outs", keep_outs},
           {"corrections",
@@ -107,4 +109,4 @@ Expected<RobotOrder> robot_order_from(const Json& json, const std::string& origi
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

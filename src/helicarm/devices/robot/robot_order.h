@@ -7,17 +7,17 @@
 #include "helicarm/core/json.h"
 #include "helicarm/devices/robot/kinematics.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// The configured tool.
 struct RobotTool {
-  RigidTransform flange_from_tcp;  ///< origin at the tip, z along the tool, out of the tip
-  double payload_kg = 0;           ///< total at the flange
+  geometry::RigidTransform flange_from_tcp;  ///< origin at the tip, z along the tool, out of the tip
+  double payload_kg = 0;                     ///< total at the flange
 };
 
 /// The tip moves there in a straight line with a uniform rotation.
 struct Waypoint {
-  RigidTransform base_from_tcp;
+  geometry::RigidTransform base_from_tcp;
   double speed_mm_s = 0;
   double acceleration_mm_s2 = 0;
 };
@@ -57,4 +57,4 @@ Json to_json(const RobotOrder& order);
 /// Fails as JsonReader; a pose that is not rigid or a normal without unit length is bad_value.
 Expected<RobotOrder> robot_order_from(const Json& json, const std::string& origin);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -11,7 +11,7 @@
 #include "helicarm/devices/robot/plan_approach.h"
 #include "helicarm/devices/robot/robot_scene_test.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -205,4 +205,4 @@ TEST(Confirmations, TokenIsValidOnceForItsOrderAndALimitedTime) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

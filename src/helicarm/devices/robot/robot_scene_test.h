@@ -3,7 +3,7 @@
 
 #include "helicarm/devices/robot/plan_approach.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// For tests: a 150 mm drill on a UR5 above a knee.
 inline RobotTool drill() { return {{Eigen::Matrix3d::Identity(), {0, 0, 150}}, 1.2}; }
@@ -34,4 +34,4 @@ inline RobotOrder planned(const ApproachOptions& options = {}) {
   return plan_approach("femur", ur5(), drill(), resting_joints(), knee_tunnel(), options).value();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -8,7 +8,7 @@
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr double degrees = 180 / 3.14159265358979323846;
@@ -72,22 +72,22 @@ Json to_json(const RobotState& state) {
           {"safety_bits", state.safety_bits},
           {"program_runs", state.runtime == RuntimeState::playing},
           {"speed_scaling", state.speed_scaling},
-          {"joints_deg", json_list(state.joints * degrees)},
-          {"joint_speeds_deg_s", json_list(state.joint_speeds * degrees)},
-          {"base_from_tcp", json_rows(state.base_from_tcp.matrix())},
-          {"flange_from_tcp", json_rows(state.flange_from_tcp.matrix())},
+          {"joints_deg", geometry::json_list(state.joints * degrees)},
+          {"joint_speeds_deg_s", geometry::json_list(state.joint_speeds * degrees)},
+          {"base_from_tcp", geometry::json_rows(state.base_from_tcp.matrix())},
+          {"flange_from_tcp", geometry::json_rows(state.flange_from_tcp.matrix())},
           {"payload_kg", state.payload_kg}};
 }
 
-UrPose ur_pose(const RigidTransform& transform) {
+UrPose ur_pose(const geometry::RigidTransform& transform) {
   UrPose pose;
   pose.head<3>() = transform.translation / mm_per_m;
-  pose.tail<3>() = vector_from_rotation(transform.rotation);
+  pose.tail<3>() = geometry::vector_from_rotation(transform.rotation);
   return pose;
 }
 
-RigidTransform transform_from(const UrPose& pose) {
-  return {rotation_from_vector(pose.tail<3>()), pose.head<3>() * mm_per_m};
+geometry::RigidTransform transform_from(const UrPose& pose) {
+  return {geometry::rotation_from_vector(pose.tail<3>()), pose.head<3>() * mm_per_m};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

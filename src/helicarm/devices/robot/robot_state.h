@@ -10,7 +10,7 @@
 #include "helicarm/devices/robot/kinematics.h"
 #include "helicarm/devices/robot/order_registers.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 enum class RobotMode : std::int32_t {
   no_controller = -1,
@@ -49,8 +49,8 @@ struct RobotState {
   double time_s = 0;  ///< since the controller started
   Joints joints = Joints::Zero();
   Joints joint_speeds = Joints::Zero();
-  RigidTransform base_from_tcp;
-  RigidTransform flange_from_tcp;
+  geometry::RigidTransform base_from_tcp;
+  geometry::RigidTransform flange_from_tcp;
   double payload_kg = 0;
   RobotMode robot_mode = RobotMode::running;
   SafetyMode safety_mode = SafetyMode::normal;
@@ -72,7 +72,7 @@ Json to_json(const RobotState& state);
 /// The robot's pose format: metres and a rotation vector. All other lengths here are in mm.
 inline constexpr double mm_per_m = 1000;
 using UrPose = Eigen::Matrix<double, 6, 1>;
-UrPose ur_pose(const RigidTransform& transform);
-RigidTransform transform_from(const UrPose& pose);
+UrPose ur_pose(const geometry::RigidTransform& transform);
+geometry::RigidTransform transform_from(const UrPose& pose);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,6 +3,7 @@
 #include <future>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "helicarm/devices/robot/robot_link.h"
@@ -10,7 +11,7 @@
 #include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/virtual_ur.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using namespace std::chrono_literals;
@@ -74,7 +75,7 @@ struct StopDrill {
 
 RobotOrder order_with(double acceleration_mm_s2) {
   RobotOrder order{"aside", ur5().name, drill(), resting_joints(), {}, {}, {}};
-  RigidTransform aside = resting_state().base_from_tcp;
+  geometry::RigidTransform aside = resting_state().base_from_tcp;
   aside.translation.y() += 100;
   order.waypoints = {{aside, 250, acceleration_mm_s2}};
   return order;
@@ -272,4 +273,4 @@ TEST(StoppedOrder, ConcurrentCallsEndWithTheLastStop) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -6,7 +6,7 @@
 
 #include "helicarm/devices/robot/timed_socket.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -106,4 +106,4 @@ Expected<void> RtdeClient::serve(const std::stop_token& stop) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

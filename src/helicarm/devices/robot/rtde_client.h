@@ -8,7 +8,7 @@
 
 #include "helicarm/devices/robot/rtde_message.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 struct RtdeOptions {
   std::string address = "127.0.0.1";
@@ -43,4 +43,4 @@ class RtdeClient {
   std::jthread thread_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -8,7 +8,7 @@
 #include "helicarm/core/big_endian.h"
 #include "helicarm/core/text.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr std::size_t header_size = 3;
@@ -230,4 +230,4 @@ RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
   return {RtdeKind::data, content};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -10,7 +10,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/devices/robot/robot_state.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Kinds of message of the Real-Time Data Exchange, version 2 (Universal Robots, RTDE guide).
 enum class RtdeKind : std::uint8_t {
@@ -80,4 +80,4 @@ Expected<RobotState> read_state(const RtdeMessage& message, std::uint8_t recipe)
 RtdeMessage state_message(std::uint8_t recipe, const RobotState& state,
                           const std::vector<std::string>& names = state_names);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -7,7 +7,7 @@
 
 #include "helicarm/core/big_endian.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using namespace std::string_literals;
@@ -155,4 +155,4 @@ TEST(RobotState, EveryStopIsReported) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

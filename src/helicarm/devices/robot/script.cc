@@ -7,10 +7,10 @@
 
 #include "helicarm/devices/robot/robot_state.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
-std::string written(const RigidTransform& transform) {
+std::string written(const geometry::RigidTransform& transform) {
   const UrPose p = ur_pose(transform);
   return fmt::format("p[{:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}]", p[0], p[1], p[2], p[3], p[4], p[5]);
 }
@@ -89,4 +89,4 @@ end
       fmt::arg("tool", written(order.tool.flange_from_tcp)), fmt::arg("payload", order.tool.payload_kg));
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -6,7 +6,7 @@
 #include "helicarm/devices/robot/order_registers.h"
 #include "helicarm/devices/robot/robot_order.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// The script stops the robot when its latest beat is older than this, round trip included, so that a
 /// delaying channel stops it too. With 75 ms to brake from the highest allowed speed, and a period each for
@@ -21,4 +21,4 @@ inline constexpr double longest_wait_s = 1;
 /// only, no text of the order.
 std::string script_of(const RobotOrder& order, const RobotModel& model, OrderNumber number);
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

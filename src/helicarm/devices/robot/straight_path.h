@@ -6,15 +6,15 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Path of a movel: the tip in a straight line, the rotation in proportion.
 class StraightPath {
  public:
-  StraightPath(const RigidTransform& from, const RigidTransform& to)
+  StraightPath(const geometry::RigidTransform& from, const geometry::RigidTransform& to)
       : from_(from),
         shift_(to.translation - from.translation),
-        turn_(vector_from_rotation(from.rotation.transpose() * to.rotation)) {}
+        turn_(geometry::vector_from_rotation(from.rotation.transpose() * to.rotation)) {}
 
   double shift_mm() const { return shift_.norm(); }
   double turn() const { return turn_.norm(); }  ///< rad
@@ -23,12 +23,12 @@ class StraightPath {
   double length_mm() const { return std::max(shift_mm(), 200 * turn()); }
 
   /// `part` is 0 to 1.
-  RigidTransform at(double part) const {
-    return {from_.rotation * rotation_from_vector(part * turn_), from_.translation + part * shift_};
+  geometry::RigidTransform at(double part) const {
+    return {from_.rotation * geometry::rotation_from_vector(part * turn_), from_.translation + part * shift_};
   }
 
  private:
-  RigidTransform from_;
+  geometry::RigidTransform from_;
   Eigen::Vector3d shift_;
   Eigen::Vector3d turn_;
 };
@@ -40,4 +40,4 @@ inline double duration_s(double length_mm, double speed_mm_s, double acceleratio
   return length_mm / speed_mm_s + speed_mm_s / acceleration_mm_s2;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -7,7 +7,7 @@
 #include <asio.hpp>
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 
 struct TimedSocket::Parts {
   asio::io_context io;
@@ -72,4 +72,4 @@ Expected<std::string> TimedSocket::receive(Duration patience) {
   return std::string(buffer.data(), size);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -9,7 +9,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// A TCP connection with a timeout for every operation. All fail with `not_connected`.
 class TimedSocket {
@@ -32,4 +32,4 @@ class TimedSocket {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

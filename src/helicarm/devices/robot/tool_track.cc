@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 /// Longer than a pose's maximum age of 0.1 s, and enough states to include one without delay.
@@ -12,7 +12,7 @@ constexpr double clock_leap_s = 1;
 
 }  // namespace
 
-void ToolTrack::take(double robot_s, const RigidTransform& base_from_tcp, double arrival_s) {
+void ToolTrack::take(double robot_s, const geometry::RigidTransform& base_from_tcp, double arrival_s) {
   const std::lock_guard lock(mutex_);
   if (!entries_.empty() &&
       (robot_s < entries_.back().robot_s || robot_s > entries_.back().robot_s + clock_leap_s))
@@ -37,4 +37,4 @@ std::vector<TimedToolPose> ToolTrack::between(double from_s, double to_s) const 
   return poses;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

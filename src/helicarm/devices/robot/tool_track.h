@@ -8,12 +8,12 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Tool pose by the robot's own kinematics.
 struct TimedToolPose {
   double time_s = 0;  ///< on this machine's monotonic clock
-  RigidTransform base_from_tcp;
+  geometry::RigidTransform base_from_tcp;
 };
 
 /// The tool's poses of the last two seconds from the robot's states. The robot's clock is mapped to this
@@ -22,7 +22,7 @@ struct TimedToolPose {
 class ToolTrack {
  public:
   /// A robot clock that goes back, or jumps by over a second, begins a new track.
-  void take(double robot_s, const RigidTransform& base_from_tcp, double arrival_s);
+  void take(double robot_s, const geometry::RigidTransform& base_from_tcp, double arrival_s);
   /// The connection is lost: later states can have another clock.
   void forget();
   std::vector<TimedToolPose> between(double from_s, double to_s) const;
@@ -31,10 +31,10 @@ class ToolTrack {
   struct Entry {
     double robot_s;
     double delay_s;  ///< arrival minus the robot's clock
-    RigidTransform base_from_tcp;
+    geometry::RigidTransform base_from_tcp;
   };
   mutable std::mutex mutex_;
   std::deque<Entry> entries_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
-RigidTransform at(double x) { return {Eigen::Matrix3d::Identity(), {x, 0, 0}}; }
+geometry::RigidTransform at(double x) { return {Eigen::Matrix3d::Identity(), {x, 0, 0}}; }
 
 TEST(ToolTrack, DelayedStateIsDatedByTheRobotsClock) {
   ToolTrack track;
@@ -38,4 +38,4 @@ TEST(ToolTrack, KeepsTwoSecondsAndNothingAfterADisconnection) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

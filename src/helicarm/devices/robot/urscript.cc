@@ -9,7 +9,7 @@
 
 #include "helicarm/core/text.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr std::size_t longest_script = 65536;
@@ -384,4 +384,4 @@ Expected<bool> UrScript::step(UrScriptHost& host) {
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -9,7 +9,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// A value of the URScript subset: a number (one element; True is 1), a list or a pose.
 using UrValue = std::vector<double>;
@@ -66,4 +66,4 @@ class UrScript {
   std::map<std::string, UrValue> variables_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 /// Records calls; a motion lasts until `moving_` is reset.
@@ -95,4 +95,4 @@ TEST(UrScript, NumberThatOverflowsIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 
 void VirtualArm::follow(Path path, double length, double speed, double acceleration) {
   path_ = std::move(path);
@@ -14,11 +14,11 @@ void VirtualArm::follow(Path path, double length, double speed, double accelerat
   braking_rad_s2_.reset();
 }
 
-Expected<void> VirtualArm::move_linear(const RigidTransform& base_from_tcp,
-                                       const RigidTransform& flange_from_tcp, double speed_mm_s,
+Expected<void> VirtualArm::move_linear(const geometry::RigidTransform& base_from_tcp,
+                                       const geometry::RigidTransform& flange_from_tcp, double speed_mm_s,
                                        double acceleration_mm_s2) {
   const StraightPath path(base_from_flange(model_, joints_) * flange_from_tcp, base_from_tcp);
-  const RigidTransform tcp_from_flange = flange_from_tcp.inverse();
+  const geometry::RigidTransform tcp_from_flange = flange_from_tcp.inverse();
   if (const auto end = nearest_inverse(model_, base_from_tcp * tcp_from_flange, joints_); !end)
     return tl::unexpected<Failure>(end.error());
   follow(
@@ -79,4 +79,4 @@ Expected<void> VirtualArm::step(double period_s, double scaling) {
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -7,7 +7,7 @@
 #include "helicarm/devices/robot/kinematics.h"
 #include "helicarm/devices/robot/straight_path.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Joints of a virtual arm: they follow a path with a trapezoidal speed profile, or brake.
 class VirtualArm {
@@ -15,8 +15,9 @@ class VirtualArm {
   VirtualArm(const RobotModel& model, const Joints& joints) : model_(model), joints_(joints) {}
 
   /// Straight line of the tip; refuses as `nearest_inverse` if its end is out of reach.
-  Expected<void> move_linear(const RigidTransform& base_from_tcp, const RigidTransform& flange_from_tcp,
-                             double speed_mm_s, double acceleration_mm_s2);
+  Expected<void> move_linear(const geometry::RigidTransform& base_from_tcp,
+                             const geometry::RigidTransform& flange_from_tcp, double speed_mm_s,
+                             double acceleration_mm_s2);
   /// All joints in proportion; speeds are those of the joint with the longest motion.
   void move_joints(const Joints& target, double speed_rad_s, double acceleration_rad_s2);
   /// All joints come to rest at the same time.
@@ -44,4 +45,4 @@ class VirtualArm {
   std::optional<double> braking_rad_s2_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 constexpr std::array<std::string_view, 20> fault_names = {
@@ -284,4 +284,4 @@ RobotState VirtualController::state() const {
   return state;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

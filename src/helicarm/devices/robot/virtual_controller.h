@@ -13,7 +13,7 @@
 #include "helicarm/devices/robot/urscript.h"
 #include "helicarm/devices/robot/virtual_arm.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Faults of a virtual robot, by name.
 enum class RobotFault {
@@ -99,4 +99,4 @@ class VirtualController : public UrScriptHost {
   std::array<std::int32_t, 4> outputs_{};  ///< output registers 0 to 3
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

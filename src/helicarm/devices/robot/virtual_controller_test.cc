@@ -8,7 +8,7 @@
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/script.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 VirtualController robot(const RobotModel& model = ur5()) { return {model, drill(), resting_joints()}; }
@@ -48,7 +48,7 @@ TEST(Script, ContainsNumbersOnly) {
 TEST(VirtualController, OrderBringsTheTipToItsEndInTheExpectedTime) {
   for (const RobotModel& model : {ur5(), ur5e()}) {
     VirtualController controller = robot(model);
-    const RigidTransform here = controller.state().base_from_tcp;
+    const geometry::RigidTransform here = controller.state().base_from_tcp;
     const TunnelAxis axis{here * Eigen::Vector3d(10, 20, 90), here * Eigen::Vector3d(10, 22, 120)};
     const auto order = plan_approach("femur", model, drill(), resting_joints(), axis);
     ASSERT_TRUE(order) << order.error().message;
@@ -57,7 +57,7 @@ TEST(VirtualController, OrderBringsTheTipToItsEndInTheExpectedTime) {
     EXPECT_EQ(controller.script_error(), "");
     EXPECT_EQ(controller.state().script.stage, ScriptStage::done);
     EXPECT_EQ(controller.state().script.order, number);
-    const RigidTransform& end = order->waypoints.back().base_from_tcp;
+    const geometry::RigidTransform& end = order->waypoints.back().base_from_tcp;
     EXPECT_LT((controller.state().base_from_tcp.translation - end.translation).norm(), 1e-5);
     EXPECT_NEAR(took_s, duration_s(*order), 0.2);
   }
@@ -69,7 +69,7 @@ TEST(VirtualController, MissingHeartbeatStopsTheFastestOrderWithin200Millisecond
     for (int moment = 5; moment < 50; moment += 6) {
       VirtualController controller = robot(model);
       RobotOrder order{"fast", model.name, drill(), resting_joints(), {}, {}, {}};
-      RigidTransform aside = controller.state().base_from_tcp;
+      geometry::RigidTransform aside = controller.state().base_from_tcp;
       aside.translation.y() += 200;
       order.waypoints = {{aside, 250, 1200}};
       ASSERT_TRUE(check_order(order, controller.state()))
@@ -159,4 +159,4 @@ TEST(VirtualController, FaultsHaveNames) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

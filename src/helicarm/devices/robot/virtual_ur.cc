@@ -15,7 +15,7 @@
 #include "helicarm/devices/robot/rtde_message.h"
 #include "helicarm/devices/robot/virtual_ur_client.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using asio::ip::tcp;
@@ -375,4 +375,4 @@ VirtualTruth VirtualUr::truth() {
   return server_->there([&] { return server_->truth(); });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -9,7 +9,7 @@
 
 #include "helicarm/devices/robot/virtual_controller.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// Ports 0 use any free one.
 struct VirtualUrOptions {
@@ -40,8 +40,8 @@ struct VirtualUrCounters {
 
 /// Ground truth of the virtual robot.
 struct VirtualTruth {
-  RobotState state;              ///< the controller's
-  RigidTransform base_from_tip;  ///< of the true arm
+  RobotState state;                        ///< the controller's
+  geometry::RigidTransform base_from_tip;  ///< of the true arm
   bool moving = false;
   std::optional<double> rest_since_s;  ///< on the robot's clock
   std::string script_error;
@@ -81,4 +81,4 @@ class VirtualUr {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

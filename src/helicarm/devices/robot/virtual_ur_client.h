@@ -13,7 +13,7 @@
 
 #include "helicarm/devices/robot/rtde_message.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 
 /// A client of one of the virtual robot's ports, on its socket's thread.
 struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
@@ -73,4 +73,4 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
   std::function<void(const std::string& line)> on_disconnect;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -12,7 +12,7 @@
 #include "helicarm/devices/robot/rtde_message.h"
 #include "helicarm/devices/robot/virtual_ur.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using asio::ip::tcp;
@@ -144,4 +144,4 @@ TEST_F(VirtualUrCrowd, WithoutDescriptorsItWaitsAndRecovers) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -9,7 +9,7 @@
 #include "helicarm/devices/robot/script.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
-namespace helicarm {
+namespace helicarm::robot {
 namespace {
 
 using namespace std::chrono_literals;
@@ -145,4 +145,4 @@ TEST(Dashboard, AnswersAreMatchedWithTheirCommands) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::robot

@@ -4,7 +4,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// A point of the bone, touched with the pointer after fixing the marker and again at intervals.
 struct CheckPoint {
@@ -14,7 +14,8 @@ struct CheckPoint {
 
 /// Distance of the tip from the point's position by the bone's marker, mm. Refuses `residual_too_large` above
 /// the limit.
-inline Expected<double> check_point_off_mm(const CheckPoint& check, const RigidTransform& tracker_from_bone,
+inline Expected<double> check_point_off_mm(const CheckPoint& check,
+                                           const geometry::RigidTransform& tracker_from_bone,
                                            const Eigen::Vector3d& tip_in_tracker) {
   const double off = (tracker_from_bone * check.point_in_bone - tip_in_tracker).norm();
   if (off <= check.limit_mm) return off;
@@ -24,4 +25,4 @@ inline Expected<double> check_point_off_mm(const CheckPoint& check, const RigidT
               {{"off_mm", off}, {"limit_mm", check.limit_mm}});
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -5,11 +5,12 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 const CheckPoint check{{10, 20, 30}};
-const RigidTransform tracker_from_bone{rotation_from_vector({0.3, 1, -0.2}), {100, 0, 900}};
+const geometry::RigidTransform tracker_from_bone{geometry::rotation_from_vector({0.3, 1, -0.2}),
+                                                 {100, 0, 900}};
 
 TEST(CheckPoint, UnmovedMarkerIsWithinTheLimit) {
   const Eigen::Vector3d touched = tracker_from_bone * check.point_in_bone + Eigen::Vector3d(0.3, 0, 0);
@@ -18,8 +19,8 @@ TEST(CheckPoint, UnmovedMarkerIsWithinTheLimit) {
 
 TEST(CheckPoint, MovedMarkerIsRefused) {
   const Eigen::Vector3d touched = tracker_from_bone * check.point_in_bone;
-  const RigidTransform bumped =
-      tracker_from_bone * RigidTransform{rotation_from_vector({0, 0.05, 0}), {0, 0, 0}};
+  const geometry::RigidTransform bumped =
+      tracker_from_bone * geometry::RigidTransform{geometry::rotation_from_vector({0, 0.05, 0}), {0, 0, 0}};
   const auto off = check_point_off_mm(check, bumped, touched);
   ASSERT_FALSE(off);
   EXPECT_EQ(off.error().reason, Reason::residual_too_large);
@@ -27,4 +28,4 @@ TEST(CheckPoint, MovedMarkerIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

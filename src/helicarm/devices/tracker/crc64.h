@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 namespace crc64_detail {
 
@@ -47,4 +47,4 @@ inline std::uint64_t crc64(std::string_view bytes) {
   return crc;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

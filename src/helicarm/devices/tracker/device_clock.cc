@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// Keeps times distinct that a change of the smallest delay would make equal.
@@ -86,4 +86,4 @@ tl::expected<double, PoseFault> DeviceClock::local(double device_s, double arriv
   return tl::unexpected(offset > base_->offset ? PoseFault::late : PoseFault::time_jump);
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

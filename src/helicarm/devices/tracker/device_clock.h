@@ -6,7 +6,7 @@
 
 #include <tl/expected.hpp>
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Why a pose is rejected.
 enum class PoseFault {
@@ -62,4 +62,4 @@ class DeviceClock {
   std::optional<double> last_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -11,7 +11,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// For Gaussian errors in 3-D, 1 in 20,000 is beyond five median lengths (7.7 sigma per axis).
@@ -29,17 +29,17 @@ double median_of(std::vector<double> values) {
 }
 
 /// The sample pose with the smallest sum of distances to the others: a start robust to outliers.
-RigidTransform median_pose(const std::vector<RigidTransform>& poses) {
-  RigidTransform median;
+geometry::RigidTransform median_pose(const std::vector<geometry::RigidTransform>& poses) {
+  geometry::RigidTransform median;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
-    for (const RigidTransform& pose : poses) values.push_back(pose.translation[axis]);
+    for (const geometry::RigidTransform& pose : poses) values.push_back(pose.translation[axis]);
     median.translation[axis] = median_of(std::move(values));
   }
   double least = std::numeric_limits<double>::infinity();
-  for (const RigidTransform& pose : poses) {
+  for (const geometry::RigidTransform& pose : poses) {
     double sum = 0;
-    for (const RigidTransform& other : poses) sum += (pose.rotation - other.rotation).norm();
+    for (const geometry::RigidTransform& other : poses) sum += (pose.rotation - other.rotation).norm();
     if (sum < least) {
       least = sum;
       median.rotation = pose.rotation;
@@ -49,17 +49,18 @@ RigidTransform median_pose(const std::vector<RigidTransform>& poses) {
 }
 
 /// Position and rotation vector of a pose relative to another.
-Vector6 deviation(const RigidTransform& pose, const RigidTransform& from) {
+Vector6 deviation(const geometry::RigidTransform& pose, const geometry::RigidTransform& from) {
   Vector6 d;
   d.head<3>() = pose.translation - from.translation;
-  d.tail<3>() = vector_from_rotation(pose.rotation * from.rotation.transpose());
+  d.tail<3>() = geometry::vector_from_rotation(pose.rotation * from.rotation.transpose());
   return d;
 }
 
-std::vector<Vector6> near_ones(const std::vector<RigidTransform>& poses, const RigidTransform& median) {
+std::vector<Vector6> near_ones(const std::vector<geometry::RigidTransform>& poses,
+                               const geometry::RigidTransform& median) {
   std::vector<Vector6> deviations;
   std::vector<double> lengths, angles;
-  for (const RigidTransform& pose : poses) {
+  for (const geometry::RigidTransform& pose : poses) {
     deviations.push_back(deviation(pose, median));
     lengths.push_back(deviations.back().head<3>().norm());
     angles.push_back(deviations.back().tail<3>().norm());
@@ -91,7 +92,7 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
   if (samples.empty()) return fail(Reason::no_pose, "no pose received");
   constexpr double never = std::numeric_limits<double>::infinity();
   double before = never, after = never;
-  std::vector<RigidTransform> poses;
+  std::vector<geometry::RigidTransform> poses;
   for (const PoseSample& sample : samples) {
     const double later = sample.time_s - time_s;
     if (later <= 0) before = std::min(before, -later);
@@ -112,7 +113,7 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
                             options.min_samples),
                 figures);
 
-  const RigidTransform median = median_pose(poses);
+  const geometry::RigidTransform median = median_pose(poses);
   const std::vector<Vector6> kept = near_ones(poses, median);
   const double count = static_cast<double>(kept.size());
   Vector6 mean = Vector6::Zero();
@@ -138,10 +139,10 @@ Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double
         {{"spread_mm", result.spread_mm},
          {"spread_deg", result.spread_deg},
          {"outliers", static_cast<double>(result.outliers)}});
-  result.tracker_from_tool = {rotation_from_vector(mean.tail<3>()) * median.rotation,
+  result.tracker_from_tool = {geometry::rotation_from_vector(mean.tail<3>()) * median.rotation,
                               median.translation + mean.head<3>()};
   result.covariance = scatter_of(kept, mean) / count;
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -6,7 +6,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 struct ExposurePoseOptions {
   double window_s = 0.25;  ///< half width around the requested time: ten poses at 20 Hz
@@ -17,7 +17,7 @@ struct ExposurePoseOptions {
 };
 
 struct ExposurePose {
-  RigidTransform tracker_from_tool;
+  geometry::RigidTransform tracker_from_tool;
   /// of the mean, from the samples' scatter, assuming independent errors
   PoseCovariance covariance;
   int samples = 0;   ///< samples used
@@ -32,4 +32,4 @@ struct ExposurePose {
 Expected<ExposurePose> exposure_pose(std::span<const PoseSample> samples, double time_s,
                                      const ExposurePoseOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -9,10 +9,10 @@
 #include "helicarm/devices/tracker/pose_buffer.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
-const RigidTransform truth{rotation_from_vector({1, -0.4, 0.7}), {120, 40, 800}};
+const geometry::RigidTransform truth{geometry::rotation_from_vector({1, -0.4, 0.7}), {120, 40, 800}};
 
 Eigen::Vector3d noise(RandomStream& random, double sigma) {
   return sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
@@ -27,7 +27,7 @@ std::vector<PoseSample> at_rest(std::uint64_t trial = 0, double sigma_mm = 0.1, 
     samples.push_back({time,
                        0,
                        time,
-                       {rotation_from_vector(noise(random, sigma_rad)) * truth.rotation,
+                       {geometry::rotation_from_vector(noise(random, sigma_rad)) * truth.rotation,
                         truth.translation + noise(random, sigma_mm)}});
   }
   return samples;
@@ -54,7 +54,8 @@ TEST(ExposurePose, CovarianceAgreesWithTheError) {
     ASSERT_TRUE(pose);
     square_mm += (pose->tracker_from_tool.translation - truth.translation).squaredNorm();
     square_rad +=
-        vector_from_rotation(pose->tracker_from_tool.rotation * truth.rotation.transpose()).squaredNorm();
+        geometry::vector_from_rotation(pose->tracker_from_tool.rotation * truth.rotation.transpose())
+            .squaredNorm();
     said_mm += pose->covariance.topLeftCorner<3, 3>().trace();
     said_rad += pose->covariance.bottomRightCorner<3, 3>().trace();
   }
@@ -67,7 +68,7 @@ TEST(ExposurePose, OutliersHaveNoEffect) {
   for (const std::size_t i : {38u, 42u}) {
     samples[i].tracker_from_tool.translation.x() += 50;
     samples[i].tracker_from_tool.rotation =
-        rotation_from_vector({0, 1, 0}) * samples[i].tracker_from_tool.rotation;
+        geometry::rotation_from_vector({0, 1, 0}) * samples[i].tracker_from_tool.rotation;
   }
   const auto pose = exposure_pose(samples, 10);
   ASSERT_TRUE(pose);
@@ -139,4 +140,4 @@ TEST(PoseBuffer, KeepsTheNewestPoses) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

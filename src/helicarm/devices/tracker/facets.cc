@@ -10,7 +10,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// 99.9 % quantile of chi-square, Wilson and Hilferty's approximation.
@@ -22,8 +22,8 @@ double chi2_limit(double dof) {
 
 struct SeenFacet {
   std::string name;
-  RigidTransform calibrator_from_facet;
-  RigidTransform tracker_from_facet;
+  geometry::RigidTransform calibrator_from_facet;
+  geometry::RigidTransform tracker_from_facet;
   PoseCovariance information;
 };
 
@@ -50,27 +50,28 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
   constexpr int max_iterations = 10;
   constexpr double small_step = 1e-12;
   FusedPose fused;
-  RigidTransform& pose = fused.tracker_from_calibrator;
+  geometry::RigidTransform& pose = fused.tracker_from_calibrator;
   pose = seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse();
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     PoseCovariance information = PoseCovariance::Zero();
     Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
     fused.chi2 = 0;
     for (const SeenFacet& facet : seen) {
-      const RigidTransform predicted = pose * facet.calibrator_from_facet;
+      const geometry::RigidTransform predicted = pose * facet.calibrator_from_facet;
       Eigen::Matrix<double, 6, 1> residual;
       residual.head<3>() = facet.tracker_from_facet.translation - predicted.translation;
       residual.tail<3>() =
-          vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
+          geometry::vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
       PoseCovariance jacobian = PoseCovariance::Identity();
-      jacobian.topRightCorner<3, 3>() = -cross_matrix(predicted.translation - pose.translation);
+      jacobian.topRightCorner<3, 3>() = -geometry::cross_matrix(predicted.translation - pose.translation);
       information += jacobian.transpose() * facet.information * jacobian;
       gradient += jacobian.transpose() * facet.information * residual;
       fused.chi2 += residual.dot(facet.information * residual);
     }
     const Eigen::LLT<PoseCovariance> solver(information);
     const Eigen::Matrix<double, 6, 1> step = solver.solve(gradient);
-    pose = {rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
+    pose = {geometry::rotation_from_vector(step.tail<3>()) * pose.rotation,
+            pose.translation + step.head<3>()};
     fused.covariance = solver.solve(PoseCovariance::Identity());
     if (step.norm() < small_step) break;
   }
@@ -115,4 +116,4 @@ Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const F
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -8,17 +8,17 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// A tracked marker pattern on one side of the calibrator.
 struct Facet {
   std::string name;
-  RigidTransform calibrator_from_facet;
+  geometry::RigidTransform calibrator_from_facet;
 };
 
 struct FacetPose {
   std::string name;
-  RigidTransform tracker_from_facet;
+  geometry::RigidTransform tracker_from_facet;
   PoseCovariance covariance;
 };
 
@@ -28,7 +28,7 @@ struct FacetsOptions {
 };
 
 struct FusedPose {
-  RigidTransform tracker_from_calibrator;
+  geometry::RigidTransform tracker_from_calibrator;
   PoseCovariance covariance;  ///< about the calibrator's origin
   std::vector<std::string> used;
   std::vector<std::string> thrown_out;
@@ -42,4 +42,4 @@ struct FusedPose {
 Expected<FusedPose> fuse_facets(std::span<const Facet> facets, std::span<const FacetPose> seen,
                                 const FacetsOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

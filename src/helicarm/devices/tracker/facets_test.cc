@@ -9,20 +9,20 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double sigma_mm = 0.1;
 constexpr double sigma_rad = 0.002;
 constexpr FacetsOptions exact_body{0, 0};
-const RigidTransform truth{rotation_from_vector({0.4, -1, 0.3}), {50, -80, 900}};
+const geometry::RigidTransform truth{geometry::rotation_from_vector({0.4, -1, 0.3}), {50, -80, 900}};
 
 /// Four sides of a box 80 mm wide.
 std::vector<Facet> four_facets() {
   std::vector<Facet> facets;
   for (int i = 0; i < 4; ++i) {
-    const Eigen::Matrix3d turn = rotation_from_vector({0, 0, i * pi / 2});
+    const Eigen::Matrix3d turn = geometry::rotation_from_vector({0, 0, i * pi / 2});
     facets.push_back({"facet " + std::to_string(i), {turn, turn * Eigen::Vector3d(40, 0, 20)}});
   }
   return facets;
@@ -33,11 +33,12 @@ Eigen::Vector3d noise(RandomStream& random, double sigma) {
 }
 
 FacetPose seen(const Facet& facet, RandomStream& random, double scale = 1) {
-  const RigidTransform exact = truth * facet.calibrator_from_facet;
+  const geometry::RigidTransform exact = truth * facet.calibrator_from_facet;
   FacetPose pose{facet.name, exact, PoseCovariance::Zero()};
   pose.covariance.diagonal().head<3>().setConstant(sigma_mm * sigma_mm);
   pose.covariance.diagonal().tail<3>().setConstant(sigma_rad * sigma_rad);
-  pose.tracker_from_facet.rotation = rotation_from_vector(noise(random, scale * sigma_rad)) * exact.rotation;
+  pose.tracker_from_facet.rotation =
+      geometry::rotation_from_vector(noise(random, scale * sigma_rad)) * exact.rotation;
   pose.tracker_from_facet.translation += noise(random, scale * sigma_mm);
   return pose;
 }
@@ -45,7 +46,7 @@ FacetPose seen(const Facet& facet, RandomStream& random, double scale = 1) {
 Eigen::Matrix<double, 6, 1> error_of(const FusedPose& fused) {
   Eigen::Matrix<double, 6, 1> error;
   error << truth.translation - fused.tracker_from_calibrator.translation,
-      vector_from_rotation(truth.rotation * fused.tracker_from_calibrator.rotation.transpose());
+      geometry::vector_from_rotation(truth.rotation * fused.tracker_from_calibrator.rotation.transpose());
   return error;
 }
 
@@ -125,4 +126,4 @@ TEST(Facets, NoUnknownOrDuplicateFacetIsAccepted) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

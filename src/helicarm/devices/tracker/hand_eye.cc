@@ -12,7 +12,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 using Matrix12 = Eigen::Matrix<double, 12, 12>;
@@ -23,8 +23,8 @@ constexpr double deg_per_rad = 180 / std::numbers::pi;
 
 /// A of the flange, B of the marker: AX = XB.
 struct Motion {
-  RigidTransform a;
-  RigidTransform b;
+  geometry::RigidTransform a;
+  geometry::RigidTransform b;
 };
 
 /// Each pose relative to the next one and to the one half the list away.
@@ -42,23 +42,23 @@ std::vector<Motion> motions_of(std::span<const HandEyePair> pairs) {
 double second_turn_deg(const std::vector<Motion>& motions) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Motion& motion : motions) {
-    const Eigen::Vector3d turn = vector_from_rotation(motion.a.rotation);
+    const Eigen::Vector3d turn = geometry::vector_from_rotation(motion.a.rotation);
     spread += turn * turn.transpose() / static_cast<double>(motions.size());
   }
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[1]) * deg_per_rad;
 }
 
-RigidTransform start_of_x(const std::vector<Motion>& motions) {
+geometry::RigidTransform start_of_x(const std::vector<Motion>& motions) {
   // Near 180 degrees the direction of the rotation vector is ambiguous.
   constexpr double widest_turn = 170 / deg_per_rad;
   Eigen::Matrix3d together = Eigen::Matrix3d::Zero();
   for (const Motion& motion : motions) {
-    const Eigen::Vector3d alpha = vector_from_rotation(motion.a.rotation);
-    const Eigen::Vector3d beta = vector_from_rotation(motion.b.rotation);
+    const Eigen::Vector3d alpha = geometry::vector_from_rotation(motion.a.rotation);
+    const Eigen::Vector3d beta = geometry::vector_from_rotation(motion.b.rotation);
     if (alpha.norm() < widest_turn) together += alpha * beta.transpose();
   }
-  RigidTransform x;
-  x.rotation = nearest_rotation(together);
+  geometry::RigidTransform x;
+  x.rotation = geometry::nearest_rotation(together);
   const auto rows = static_cast<Eigen::Index>(3 * motions.size());
   Eigen::MatrixX3d left(rows, 3);
   Eigen::VectorXd right(rows);
@@ -71,22 +71,23 @@ RigidTransform start_of_x(const std::vector<Motion>& motions) {
   return x;
 }
 
-RigidTransform start_of_y(std::span<const HandEyePair> pairs, const RigidTransform& x) {
-  RigidTransform sum{Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()};
+geometry::RigidTransform start_of_y(std::span<const HandEyePair> pairs, const geometry::RigidTransform& x) {
+  geometry::RigidTransform sum{Eigen::Matrix3d::Zero(), Eigen::Vector3d::Zero()};
   for (const HandEyePair& pair : pairs) {
-    const RigidTransform one = pair.tracker_from_marker * (pair.base_from_flange * x).inverse();
+    const geometry::RigidTransform one = pair.tracker_from_marker * (pair.base_from_flange * x).inverse();
     sum.rotation += one.rotation;
     sum.translation += one.translation / static_cast<double>(pairs.size());
   }
-  return {nearest_rotation(sum.rotation), sum.translation};
+  return {geometry::nearest_rotation(sum.rotation), sum.translation};
 }
 
 Residual residual_of(const HandEyePair& pair, const HandEye& at) {
-  const RigidTransform predicted = at.tracker_from_base * pair.base_from_flange * at.flange_from_marker;
+  const geometry::RigidTransform predicted =
+      at.tracker_from_base * pair.base_from_flange * at.flange_from_marker;
   Residual residual;
   residual.head<3>() = pair.tracker_from_marker.translation - predicted.translation;
   residual.tail<3>() =
-      vector_from_rotation(pair.tracker_from_marker.rotation * predicted.rotation.transpose());
+      geometry::vector_from_rotation(pair.tracker_from_marker.rotation * predicted.rotation.transpose());
   return residual;
 }
 
@@ -100,13 +101,13 @@ Eigen::Matrix<double, 6, 12> jacobian_of(const HandEyePair& pair, const HandEye&
   jacobian.block<3, 3>(0, 0) = tracker_from_flange;
   jacobian.block<3, 3>(3, 3) = tracker_from_flange;
   jacobian.block<3, 3>(0, 6).setIdentity();
-  jacobian.block<3, 3>(0, 9) = -cross_matrix(lever);
+  jacobian.block<3, 3>(0, 9) = -geometry::cross_matrix(lever);
   jacobian.block<3, 3>(3, 9).setIdentity();
   return jacobian;
 }
 
-RigidTransform moved(const RigidTransform& pose, const Eigen::Ref<const Residual>& step) {
-  return {rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
+geometry::RigidTransform moved(const geometry::RigidTransform& pose, const Eigen::Ref<const Residual>& step) {
+  return {geometry::rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
 }
 
 void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double sigma_rad, HandEye& at) {
@@ -180,4 +181,4 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -6,12 +6,12 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Poses by robot and tracker at one moment, the robot at rest.
 struct HandEyePair {
-  RigidTransform base_from_flange;
-  RigidTransform tracker_from_marker;
+  geometry::RigidTransform base_from_flange;
+  geometry::RigidTransform tracker_from_marker;
 };
 
 struct HandEyeOptions {
@@ -25,8 +25,8 @@ struct HandEyeOptions {
 };
 
 struct HandEye {
-  RigidTransform flange_from_marker;  ///< X of AX = XB
-  RigidTransform tracker_from_base;
+  geometry::RigidTransform flange_from_marker;  ///< X of AX = XB
+  geometry::RigidTransform tracker_from_base;
   /// Of flange_from_marker (along the flange's axes), then tracker_from_base (along the tracker's axes), each
   /// as PoseCovariance.
   Eigen::Matrix<double, 12, 12> covariance;
@@ -41,4 +41,4 @@ struct HandEye {
 /// (`poses_too_alike`); `residual_too_large`.
 Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const HandEyeOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -10,12 +10,12 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr double radians = std::numbers::pi / 180;
-const RigidTransform true_x{rotation_from_vector({0.5, 2, -0.7}), {30, -12, 65}};
-const RigidTransform true_y{rotation_from_vector({-1.2, 0.4, 1.9}), {-300, 150, 1100}};
+const geometry::RigidTransform true_x{geometry::rotation_from_vector({0.5, 2, -0.7}), {30, -12, 65}};
+const geometry::RigidTransform true_y{geometry::rotation_from_vector({-1.2, 0.4, 1.9}), {-300, 150, 1100}};
 
 Eigen::Vector3d noise(RandomStream& random, double sigma) {
   return sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
@@ -27,9 +27,10 @@ std::vector<HandEyePair> measured(int count, double sigma_mm, double sigma_deg, 
   std::vector<HandEyePair> pairs;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d turn = radians * turn_deg.cwiseProduct(noise(random, 1));
-    const RigidTransform arm{rotation_from_vector(turn), Eigen::Vector3d(400, 100, 300) + noise(random, 80)};
-    RigidTransform marker = true_y * arm * true_x;
-    marker.rotation = rotation_from_vector(noise(random, sigma_deg * radians)) * marker.rotation;
+    const geometry::RigidTransform arm{geometry::rotation_from_vector(turn),
+                                       Eigen::Vector3d(400, 100, 300) + noise(random, 80)};
+    geometry::RigidTransform marker = true_y * arm * true_x;
+    marker.rotation = geometry::rotation_from_vector(noise(random, sigma_deg * radians)) * marker.rotation;
     marker.translation += noise(random, sigma_mm);
     pairs.push_back({arm, marker});
   }
@@ -39,9 +40,9 @@ std::vector<HandEyePair> measured(int count, double sigma_mm, double sigma_deg, 
 Eigen::Matrix<double, 12, 1> error_of(const HandEye& found) {
   Eigen::Matrix<double, 12, 1> error;
   error << true_x.translation - found.flange_from_marker.translation,
-      vector_from_rotation(true_x.rotation * found.flange_from_marker.rotation.transpose()),
+      geometry::vector_from_rotation(true_x.rotation * found.flange_from_marker.rotation.transpose()),
       true_y.translation - found.tracker_from_base.translation,
-      vector_from_rotation(true_y.rotation * found.tracker_from_base.rotation.transpose());
+      geometry::vector_from_rotation(true_y.rotation * found.tracker_from_base.rotation.transpose());
   return error;
 }
 
@@ -98,4 +99,4 @@ TEST(HandEye, WronglyPairedPosesAreRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

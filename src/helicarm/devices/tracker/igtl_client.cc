@@ -7,7 +7,7 @@
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 std::string_view code(LinkState state) {
   switch (state) {
@@ -154,4 +154,4 @@ void IgtlClient::stop() {
   if (impl_->thread.joinable()) impl_->thread.join();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -11,7 +11,7 @@
 #include "helicarm/devices/tracker/igtl_message.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 struct IgtlClientOptions {
   std::string address = "127.0.0.1";  ///< numeric
@@ -64,4 +64,4 @@ class IgtlClient {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -6,7 +6,7 @@
 
 #include "helicarm/devices/tracker/pose_board.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 Expected<asio::ip::tcp::endpoint> endpoint_of(const std::string& address, std::uint16_t port) {
   asio::error_code error;
@@ -128,4 +128,4 @@ Counters IgtlConnection::counters() const {
   return published_;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

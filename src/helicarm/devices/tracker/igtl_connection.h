@@ -14,7 +14,7 @@
 
 #include "helicarm/devices/tracker/igtl_stream.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Limits of a connection's buffers.
 struct ConnectionLimits {
@@ -79,4 +79,4 @@ class IgtlConnection : public std::enable_shared_from_this<IgtlConnection> {
   Counters published_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

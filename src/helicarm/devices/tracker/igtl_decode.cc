@@ -9,7 +9,7 @@
 #include "helicarm/devices/tracker/crc64.h"
 #include "helicarm/devices/tracker/igtl_message.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr std::size_t extended_header_size = 12;
@@ -263,4 +263,4 @@ Expected<IgtlMessage> decode(const IgtlHeader& header, std::string_view body) {
   return guarded([&] { return take_message(header, body); });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

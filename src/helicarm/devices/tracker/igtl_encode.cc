@@ -6,7 +6,7 @@
 #include "helicarm/devices/tracker/crc64.h"
 #include "helicarm/devices/tracker/igtl_message.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr std::uint16_t ascii = 3;  // MIB number of the metadata's encoding
@@ -123,4 +123,4 @@ std::string encode(const IgtlMessage& message) {
       .bytes();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

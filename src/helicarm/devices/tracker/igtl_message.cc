@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr double unit_tolerance = 1e-3;  // as for matrices
@@ -55,10 +55,10 @@ Eigen::Matrix4d matrix_from(const Eigen::Vector3d& position, const Eigen::Vector
     const double square = norm * norm;
     matrix.topLeftCorner<3, 3>() = scale / square *
                                    ((w * w - v.squaredNorm()) * Eigen::Matrix3d::Identity() +
-                                    2 * v * v.transpose() + 2 * w * cross_matrix(v));
+                                    2 * v * v.transpose() + 2 * w * geometry::cross_matrix(v));
   }
   matrix.topRightCorner<3, 1>() = position;
   return matrix;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -13,7 +13,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 // OpenIGTLink content, unchecked except for lengths: PoseGate decides whether a matrix is a pose. Lengths in
 // mm.
@@ -164,4 +164,4 @@ std::size_t scalar_bytes(std::uint8_t scalar_type);
 /// any other scales the rotation, so that PoseGate rejects it.
 Eigen::Matrix4d matrix_from(const Eigen::Vector3d& position, const Eigen::Vector4d& quaternion);
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -9,7 +9,7 @@
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// The library's sample TRANSFORM body (protocol 1), which is not a rotation.
@@ -194,7 +194,7 @@ TEST(IgtlMessage, MutationsAreDecodedOrRefusedWithoutOverread) {
 }
 
 TEST(IgtlMessage, QuaternionIsNormalisedWithinRounding) {
-  const Eigen::Matrix3d rotation = rotation_from_vector({0.3, -0.2, 1.0});
+  const Eigen::Matrix3d rotation = geometry::rotation_from_vector({0.3, -0.2, 1.0});
   const Eigen::Quaterniond q(rotation);
   for (const double scale : {1.0, 1.0009, -1.0})
     EXPECT_LT((matrix_from({1, 2, 3}, scale * q.coeffs()).topLeftCorner<3, 3>() - rotation).norm(), 1e-12);
@@ -212,4 +212,4 @@ TEST(IgtlMessage, TimeStampIsABinaryFractionOfSeconds) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -5,7 +5,7 @@
 
 #include "helicarm/devices/tracker/igtl_message.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// One message of each kind; the first is a TRANSFORM.
 inline std::vector<IgtlMessage> sample_messages() {
@@ -34,4 +34,4 @@ inline std::vector<IgtlMessage> sample_messages() {
           {"other", stamp, IgtlUnknown{"RTS_SOMETHIN", "abc"}}};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -13,7 +13,7 @@
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 std::shared_ptr<const std::string> encoded(const IgtlMessage& message) {
@@ -225,4 +225,4 @@ void IgtlServer::stop() {
   impl_->clients.clear();
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

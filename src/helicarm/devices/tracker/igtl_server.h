@@ -10,7 +10,7 @@
 #include "helicarm/devices/tracker/igtl_message.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 struct IgtlServerOptions {
   std::string address = "127.0.0.1";  ///< numeric; the protocol has neither authentication nor encryption
@@ -59,4 +59,4 @@ class IgtlServer {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

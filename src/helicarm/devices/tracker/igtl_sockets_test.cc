@@ -13,7 +13,7 @@
 #include "helicarm/devices/tracker/igtl_server.h"
 #include "helicarm/devices/tracker/pose_board.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 using asio::ip::tcp;
@@ -431,4 +431,4 @@ TEST(IgtlSockets, ClientIdleForLongestIsReplacedOnAFullServer) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

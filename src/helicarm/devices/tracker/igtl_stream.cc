@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr std::size_t usual_message = std::size_t{64} << 10;
@@ -66,4 +66,4 @@ Expected<void> IgtlStream::deliver(std::string_view body, const Sink& sink) {
   return {};
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -10,7 +10,7 @@
 #include "helicarm/devices/tracker/igtl_message.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Splits a connection's bytes into messages, independent of segmentation. A message that is invalid within
 /// its announced length is dropped and counted: "messages", "wrong_crc", "unsupported_version", "malformed";
@@ -47,4 +47,4 @@ class IgtlStream {
   Counters counters_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

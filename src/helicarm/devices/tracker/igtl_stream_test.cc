@@ -6,7 +6,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/devices/tracker/igtl_samples_test.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 std::string all_samples() {
@@ -113,4 +113,4 @@ TEST(IgtlStream, AnyBytesAreAcceptedOrRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

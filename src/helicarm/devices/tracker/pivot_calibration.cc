@@ -11,7 +11,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr int min_pivot_poses = 4;
@@ -21,9 +21,10 @@ constexpr double max_pivot_outlier_share = 0.25;
 
 /// Smallest rms rotation of a direction fixed in the tool, rad: it determines the tip's position along that
 /// direction.
-double least_turn(const std::vector<RigidTransform>& poses) {
+double least_turn(const std::vector<geometry::RigidTransform>& poses) {
   Eigen::Matrix3d mean = Eigen::Matrix3d::Zero();
-  for (const RigidTransform& pose : poses) mean += pose.rotation / static_cast<double>(poses.size());
+  for (const geometry::RigidTransform& pose : poses)
+    mean += pose.rotation / static_cast<double>(poses.size());
   const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() - mean.transpose() * mean;
   const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[0];
   return std::asin(std::sqrt(std::clamp(least, 0.0, 1.0)));
@@ -35,19 +36,19 @@ struct PivotFit {
   double square_sum = 0;
 };
 
-Eigen::Vector3d miss(const RigidTransform& pose, const PivotFit& fit) {
+Eigen::Vector3d miss(const geometry::RigidTransform& pose, const PivotFit& fit) {
   return pose * fit.tip_and_pivot.head<3>() - fit.tip_and_pivot.tail<3>();
 }
 
 /// The rotation noise moves the tip across its lever, which is known after a first iteration.
-PivotFit fit_pivot(const std::vector<RigidTransform>& poses, double sigma_mm, double sigma_rad) {
+PivotFit fit_pivot(const std::vector<geometry::RigidTransform>& poses, double sigma_mm, double sigma_rad) {
   constexpr int rounds = 3;
   PivotFit fit;
   for (int round = 0; round < rounds; ++round) {
     Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
-    for (const RigidTransform& pose : poses) {
-      const Eigen::Matrix3d lever = cross_matrix(pose.rotation * fit.tip_and_pivot.head<3>());
+    for (const geometry::RigidTransform& pose : poses) {
+      const Eigen::Matrix3d lever = geometry::cross_matrix(pose.rotation * fit.tip_and_pivot.head<3>());
       const Eigen::Matrix3d covariance = sigma_mm * sigma_mm * Eigen::Matrix3d::Identity() +
                                          sigma_rad * sigma_rad * lever * lever.transpose();
       Eigen::Matrix<double, 3, 6> jacobian;
@@ -61,17 +62,18 @@ PivotFit fit_pivot(const std::vector<RigidTransform>& poses, double sigma_mm, do
     fit.covariance = solver.solve(Eigen::Matrix<double, 6, 6>::Identity());
     if (sigma_rad == 0) break;
   }
-  for (const RigidTransform& pose : poses) fit.square_sum += miss(pose, fit).squaredNorm();
+  for (const geometry::RigidTransform& pose : poses) fit.square_sum += miss(pose, fit).squaredNorm();
   return fit;
 }
 
-std::vector<RigidTransform> without_outliers(const std::vector<RigidTransform>& poses, const PivotFit& fit) {
+std::vector<geometry::RigidTransform> without_outliers(const std::vector<geometry::RigidTransform>& poses,
+                                                       const PivotFit& fit) {
   std::vector<double> misses;
-  for (const RigidTransform& pose : poses) misses.push_back(miss(pose, fit).norm());
+  for (const geometry::RigidTransform& pose : poses) misses.push_back(miss(pose, fit).norm());
   std::vector<double> sorted = misses;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
   const double limit = pivot_outlier_medians * sorted[sorted.size() / 2] + 1e-6;
-  std::vector<RigidTransform> kept;
+  std::vector<geometry::RigidTransform> kept;
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (misses[i] <= limit) kept.push_back(poses[i]);
   return kept;
@@ -79,11 +81,11 @@ std::vector<RigidTransform> without_outliers(const std::vector<RigidTransform>& 
 
 }  // namespace
 
-Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> tracker_from_tool,
+Expected<PivotCalibration> calibrate_pivot(std::span<const geometry::RigidTransform> tracker_from_tool,
                                            const PivotOptions& options) {
   constexpr double degrees_per_rad = 180 / std::numbers::pi;
   constexpr int max_rounds = 5;
-  std::vector<RigidTransform> poses(tracker_from_tool.begin(), tracker_from_tool.end());
+  std::vector<geometry::RigidTransform> poses(tracker_from_tool.begin(), tracker_from_tool.end());
   const auto too_alike = [&](double turn_deg) {
     return fail(
         Reason::poses_too_alike,
@@ -127,4 +129,4 @@ Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> track
   return result;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -6,7 +6,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 struct PivotOptions {
   /// The tracker's noise per axis about the marker's origin; both 0: estimated from the residuals, as if all
@@ -30,7 +30,7 @@ struct PivotCalibration {
 /// Tip of a pointer pivoted about its resting tip: R p + t = q for all poses, by weighted least squares.
 /// Refuses with figures: fewer than four poses, or too little rotation (`poses_too_alike`); rms above the
 /// limit or more than a quarter outliers (`residual_too_large`: the tip slipped).
-Expected<PivotCalibration> calibrate_pivot(std::span<const RigidTransform> tracker_from_tool,
+Expected<PivotCalibration> calibrate_pivot(std::span<const geometry::RigidTransform> tracker_from_tool,
                                            const PivotOptions& options = {});
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

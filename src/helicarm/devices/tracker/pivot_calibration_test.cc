@@ -10,7 +10,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr double radians = std::numbers::pi / 180;
@@ -29,16 +29,17 @@ Eigen::Vector3d noise(RandomStream& random, double sigma) {
   return sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
 }
 
-std::vector<RigidTransform> turned(const Pointer& pointer, std::uint64_t trial = 0) {
+std::vector<geometry::RigidTransform> turned(const Pointer& pointer, std::uint64_t trial = 0) {
   RandomStream random(31, 0, trial);
-  std::vector<RigidTransform> poses;
+  std::vector<geometry::RigidTransform> poses;
   for (int i = 0; i < pointer.poses; ++i) {
     const Eigen::Vector3d tilt =
         pointer.tilt_deg * radians * Eigen::Vector3d(random.uniform(-1, 1), random.uniform(-1, 1), 0);
     const Eigen::Vector3d spin(0, 0, pointer.spin_deg * radians * random.uniform(-1, 1));
-    const Eigen::Matrix3d rotation = rotation_from_vector(tilt) * rotation_from_vector(spin);
+    const Eigen::Matrix3d rotation =
+        geometry::rotation_from_vector(tilt) * geometry::rotation_from_vector(spin);
     const Eigen::Vector3d place = pivot - rotation * tip;
-    poses.push_back({rotation_from_vector(noise(random, pointer.sigma_deg * radians)) * rotation,
+    poses.push_back({geometry::rotation_from_vector(noise(random, pointer.sigma_deg * radians)) * rotation,
                      place + noise(random, pointer.sigma_mm)});
   }
   return poses;
@@ -106,4 +107,4 @@ TEST(PivotCalibration, TooLittleRotationIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 bool is_visible(const IgtlMessage& message, const std::string& tool) {
@@ -152,4 +152,4 @@ std::uint64_t PoseBoard::names_refused() const {
   return names_refused_;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -12,7 +12,7 @@
 #include "helicarm/devices/tracker/pose_buffer.h"
 #include "helicarm/devices/tracker/pose_gate.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Seconds of this machine's monotonic clock, independent of wall clock changes.
 double monotonic_seconds();
@@ -27,10 +27,10 @@ struct PoseBoardOptions {
 struct ToolState {
   std::string name;
   std::uint64_t accepted = 0;
-  Counters rejected;                                     ///< by code of PoseFault
-  std::optional<double> age_s = {};                      ///< of the newest pose
-  double rate_hz = 0;                                    ///< over the last second
-  std::optional<RigidTransform> tracker_from_tool = {};  ///< newest, of any age
+  Counters rejected;                                               ///< by code of PoseFault
+  std::optional<double> age_s = {};                                ///< of the newest pose
+  double rate_hz = 0;                                              ///< over the last second
+  std::optional<geometry::RigidTransform> tracker_from_tool = {};  ///< newest, of any age
 };
 
 /// Poses by tool: written by one thread, read by any. A tool's name is the message's device (TRANSFORM,
@@ -80,4 +80,4 @@ class PoseBoard {
   std::uint64_t names_refused_ = 0;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -6,11 +6,11 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 Eigen::Matrix4d pose_at(double x, double turn = 0) {
-  return RigidTransform{rotation_from_vector({0.2, 0.1, turn}), {x, 0, 800}}.matrix();
+  return geometry::RigidTransform{geometry::rotation_from_vector({0.2, 0.1, turn}), {x, 0, 800}}.matrix();
 }
 
 /// A pose with small changes, like a tracker's.
@@ -133,4 +133,4 @@ TEST(PoseBoard, DeviceStatusIsKept) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 void PoseBuffer::push(const PoseSample& sample) {
   if (!samples_.empty() && sample.time_s <= latest()->time_s)
@@ -40,4 +40,4 @@ std::vector<PoseSample> PoseBuffer::between(double from_s, double to_s) const {
   return found;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -7,7 +7,7 @@
 
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// The newest poses of one tool, ordered by time.
 class PoseBuffer {
@@ -31,4 +31,4 @@ class PoseBuffer {
   std::vector<PoseSample> samples_;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

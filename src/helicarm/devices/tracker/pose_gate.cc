@@ -5,7 +5,7 @@
 
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr double rigid_tolerance = 1e-3;  // drivers of NDI and MicronTracker round to about 1e-4
@@ -15,7 +15,8 @@ double off_identity(const Eigen::Matrix3d& gram) { return (gram - Eigen::Matrix3
 
 }  // namespace
 
-tl::expected<RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix, double farthest_mm) {
+tl::expected<geometry::RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix,
+                                                             double farthest_mm) {
   if (!matrix.allFinite()) return tl::unexpected(PoseFault::not_finite);
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   const Eigen::Vector3d place = matrix.topRightCorner<3, 1>();
@@ -29,7 +30,7 @@ tl::expected<RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix
   if (off_identity(gram) > rigid_tolerance) return tl::unexpected(PoseFault::scaled);
   if (rotation.determinant() < 0) return tl::unexpected(PoseFault::mirrored);
   if (place.norm() > farthest_mm) return tl::unexpected(PoseFault::out_of_volume);
-  return RigidTransform{nearest_rotation(rotation), place};
+  return geometry::RigidTransform{geometry::nearest_rotation(rotation), place};
 }
 
 void PoseGate::reject(PoseFault fault) { ++rejected_[std::string(code(fault))]; }
@@ -61,16 +62,17 @@ bool PoseGate::frozen(const RawPose& raw) {
   return false;
 }
 
-bool PoseGate::within_reach(const RigidTransform& from, const RigidTransform& to, double dt) const {
-  const RigidTransform step = from.inverse() * to;
+bool PoseGate::within_reach(const geometry::RigidTransform& from, const geometry::RigidTransform& to,
+                            double dt) const {
+  const geometry::RigidTransform step = from.inverse() * to;
   return step.translation.norm() <= options_.jump_mm + options_.jump_mm_per_s * dt &&
-         vector_from_rotation(step.rotation).norm() * degrees <=
+         geometry::vector_from_rotation(step.rotation).norm() * degrees <=
              options_.jump_deg + options_.jump_deg_per_s * dt;
 }
 
 bool PoseGate::jumped(const PoseSample& sample) {
   if (!last_) return false;
-  const RigidTransform& pose = sample.tracker_from_tool;
+  const geometry::RigidTransform& pose = sample.tracker_from_tool;
   // Time without poses at the old position does not bring the new one within the limit.
   const double dt = sample.time_s - (rival_ ? rival_ : last_)->time_s;
   if (within_reach(last_->tracker_from_tool, pose, dt)) {
@@ -88,4 +90,4 @@ bool PoseGate::jumped(const PoseSample& sample) {
   return false;
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -9,7 +9,7 @@
 #include "helicarm/devices/tracker/device_clock.h"
 #include "helicarm/devices/tracker/pose_sample.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 struct PoseGateOptions {
   double farthest_mm = 3000;  ///< range of optical trackers: 2.4 to 3 m
@@ -52,7 +52,8 @@ class PoseGate {
 
  private:
   tl::expected<PoseSample, PoseFault> judge(const RawPose& raw);
-  bool within_reach(const RigidTransform& from, const RigidTransform& to, double dt) const;
+  bool within_reach(const geometry::RigidTransform& from, const geometry::RigidTransform& to,
+                    double dt) const;
   bool frozen(const RawPose& raw);
   bool jumped(const PoseSample& sample);
 
@@ -67,6 +68,7 @@ class PoseGate {
 };
 
 /// The rigid motion of a matrix, or its fault.
-tl::expected<RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix, double farthest_mm);
+tl::expected<geometry::RigidTransform, PoseFault> rigid_pose(const Eigen::Matrix4d& matrix,
+                                                             double farthest_mm);
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -8,7 +8,7 @@
 #include "helicarm/core/random.h"
 #include "helicarm/geometry/rotation.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// A marker at rest, measured at 50 Hz with the jitter of a tracker.
@@ -18,8 +18,8 @@ class Scene {
     const auto noise = [&]() -> Eigen::Vector3d {
       return 0.05 * Eigen::Vector3d(random_.normal(), random_.normal(), random_.normal());
     };
-    return RigidTransform{rotation_from_vector(Eigen::Vector3d(0.3, 0.2, 1) + 1e-3 * noise()),
-                          place + noise()}
+    return geometry::RigidTransform{
+        geometry::rotation_from_vector(Eigen::Vector3d(0.3, 0.2, 1) + 1e-3 * noise()), place + noise()}
         .matrix();
   }
   /// Passes the next pose, stamped by the device.
@@ -98,7 +98,7 @@ TEST(PoseGate, SingleOutlierIsRejected) {
   scene.rejected_of(10);
   Eigen::Matrix4d off = scene.jittered(), turned = scene.jittered();
   off(0, 3) += 50;
-  turned.topLeftCorner<3, 3>() *= rotation_from_vector({0.3, 0, 0});
+  turned.topLeftCorner<3, 3>() *= geometry::rotation_from_vector({0.3, 0, 0});
   EXPECT_EQ(scene.next(off), "jump");
   EXPECT_EQ(scene.next(), "passed");
   EXPECT_EQ(scene.next(turned), "jump");
@@ -207,4 +207,4 @@ TEST(DeviceClock, TimesIncreaseWhenTheDelayShrinks) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -9,7 +9,7 @@
 
 #include "helicarm/geometry/rigid_transform.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// Number of events by name.
 using Counters = std::map<std::string, std::uint64_t, std::less<>>;
@@ -24,7 +24,7 @@ struct PoseSample {
   double time_s = 0;    ///< of the measurement; never after its arrival
   double device_s = 0;  ///< time stamp; 0 if the device sends none
   double arrival_s = 0;
-  RigidTransform tracker_from_tool;
+  geometry::RigidTransform tracker_from_tool;
 };
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

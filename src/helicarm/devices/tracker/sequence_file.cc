@@ -12,7 +12,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/core/text.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 constexpr std::uintmax_t max_sequence_bytes = std::uintmax_t{512} << 20;  // an hour of five tools at 60 Hz
@@ -169,4 +169,4 @@ Expected<void> write_sequence(const std::filesystem::path& path, const std::vect
   });
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

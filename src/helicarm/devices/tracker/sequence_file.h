@@ -10,7 +10,7 @@
 
 #include "helicarm/core/failure.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// One tool at one moment, as recorded: possibly not a pose.
 struct RecordedPose {
@@ -31,4 +31,4 @@ Expected<std::vector<SequenceFrame>> read_sequence(const std::filesystem::path& 
 /// Fails with `cannot_write`, `bad_value` for an invalid name.
 Expected<void> write_sequence(const std::filesystem::path& path, const std::vector<SequenceFrame>& frames);
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -8,7 +8,7 @@
 
 #include "helicarm/core/files.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 class SequenceFile : public testing::Test {
@@ -101,4 +101,4 @@ TEST_F(SequenceFile, InvalidNameIsRefused) {
 }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker

@@ -8,7 +8,7 @@
 
 #include "helicarm/devices/tracker/pose_board.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 /// Pause between the last frame and the first of the next repetition, and for a file of one frame: 20 Hz.
@@ -102,4 +102,4 @@ void replay(std::span<const SequenceFrame> frames, bool as_tracking,
     }
 }
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

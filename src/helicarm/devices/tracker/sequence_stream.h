@@ -10,7 +10,7 @@
 #include "helicarm/devices/tracker/pose_sample.h"
 #include "helicarm/devices/tracker/sequence_file.h"
 
-namespace helicarm {
+namespace helicarm::tracker {
 
 /// The poses of a message as received, at the device's time or else at the arrival's; empty if it has none.
 /// Characters not allowed in a name become "_".
@@ -36,7 +36,7 @@ class SequenceRecorder {
 };
 
 struct GatedPoses {
-  std::vector<RigidTransform> tracker_from_tool;
+  std::vector<geometry::RigidTransform> tracker_from_tool;
   Counters rejected;  ///< by code of PoseFault
 };
 
@@ -48,4 +48,4 @@ GatedPoses gated_poses(std::span<const SequenceFrame> frames, const std::string&
 void replay(std::span<const SequenceFrame> frames, bool as_tracking,
             const std::function<void(const IgtlMessage&)>& send, std::stop_token stop);
 
-}  // namespace helicarm
+}  // namespace helicarm::tracker

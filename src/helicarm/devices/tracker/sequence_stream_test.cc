@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace helicarm {
+namespace helicarm::tracker {
 namespace {
 
 SequenceFrame frame_at(double time_s) {
@@ -83,4 +83,4 @@ TEST(SequenceStream, HiddenAndMissingPosesAreRejected) {
 TEST(SequenceStream, NothingToReplayEndsImmediately) { replay({}, false, {}, {}); }
 
 }  // namespace
-}  // namespace helicarm
+}  // namespace helicarm::tracker
