@@ -8,13 +8,12 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/least_squares.h"
+
 namespace helicarm::calibration {
 namespace {
 
-constexpr int most_iterations = 1000;
-constexpr double least_gain = 1e-10;  // of chi2, before one last full step
-constexpr double least_damping = 1e-12;
-constexpr double most_damping = 1e12;
+constexpr geometry::LeastSquaresOptions iteration{.max_iterations = 1000, .min_gain = 1e-10};
 
 Eigen::Index ball_count(const std::vector<ViewProblem>& problems) {
   std::size_t count = 0;
@@ -90,11 +89,13 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
   return std::isfinite(at.chi2);
 }
 
-void move(const Refinement& from, const Eigen::VectorXd& step, Refinement& to) {
+Refinement moved_by(const Refinement& from, const Eigen::VectorXd& step) {
+  Refinement to;
   for (std::size_t i = 0; i < from.views.size(); ++i)
     to.views.push_back(
         moved(from.views[i], step.segment<view_parameters>(view_parameters * Eigen::Index(i))));
   to.variations = from.variations + step.tail(from.variations.size());
+  return to;
 }
 
 tl::unexpected<Failure> unconstrained(const Refinement& at, const std::string& why) {
@@ -127,28 +128,19 @@ Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const Comm
     own += 2 * map_modes(problem);
   }
   at.variations = Eigen::VectorXd::Zero(own);
-  if (!evaluate(problems, common, at))
+  const auto linearise = [&](Refinement& state) -> std::optional<geometry::NormalEquations<Eigen::Dynamic>> {
+    if (!evaluate(problems, common, state)) return std::nullopt;
+    return geometry::NormalEquations<Eigen::Dynamic>{state.jacobian.transpose() * state.jacobian,
+                                                     -state.jacobian.transpose() * state.residuals,
+                                                     state.chi2};
+  };
+  auto fit = geometry::fit_least_squares<Eigen::Dynamic>(at, linearise, moved_by, iteration);
+  if (!fit)
     return unconstrained(
         at, "in the starting views a fiducial lies behind the source, or a source distance is negative");
-  double damping = 1e-3;
-  bool done = false;
-  for (int i = 0; i < most_iterations && !done; ++i) {
-    const Eigen::MatrixXd normal = at.jacobian.transpose() * at.jacobian;
-    const Eigen::VectorXd slope = at.jacobian.transpose() * at.residuals;
-    const Eigen::VectorXd newton = -normal.ldlt().solve(slope);
-    done = newton.allFinite() && -slope.dot(newton) <= least_gain * (1 + at.chi2);
-    for (bool lower = false; !lower && damping < most_damping;) {
-      Eigen::MatrixXd damped = normal;
-      damped.diagonal() *= 1 + damping;
-      Refinement next;
-      move(at, done ? newton : Eigen::VectorXd(-damped.ldlt().solve(slope)), next);
-      lower = evaluate(problems, common, next) && next.chi2 < at.chi2;
-      if (lower) at = std::move(next);
-      if (done) break;
-      damping = lower ? std::max(least_damping, damping / 8) : damping * 5;
-    }
-  }
-  if (!done) return unconstrained(at, fmt::format("no convergence in {} iterations", most_iterations));
+  at = std::move(fit->state);
+  if (!fit->converged)
+    return unconstrained(at, fmt::format("no convergence in {} iterations", iteration.max_iterations));
   return covariance_of(at).map([&](const Eigen::MatrixXd& covariance) {
     at.covariance = covariance;
     return at;

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/ray.h"
 
 namespace helicarm::geometry {
@@ -17,7 +19,6 @@ namespace {
 constexpr double least_angle_deg = 1;
 constexpr double farthest_mm = 1e5;      // from a source: beyond any room
 constexpr double least_sigma_px = 1e-6;  // an exact pixel still needs a finite weight
-constexpr int most_iterations = 20;
 
 constexpr double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
@@ -109,27 +110,29 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   const Eigen::LLT<Eigen::MatrixXd> root(covariance_px2 + floor);
   if (root.info() != Eigen::Success)
     return fail(Reason::bad_value, "the covariance of the pixels is not positive definite");
-  Intersection result{*start, {}, largest_gap(ray_observations), 0};
-  for (int i = 0; i < most_iterations; ++i) {
-    Eigen::MatrixX3d jacobian(2 * n, 3);
-    Eigen::VectorXd residual(2 * n);
+  Eigen::MatrixX3d jacobian(2 * n, 3);
+  Eigen::VectorXd residual(2 * n);
+  const auto linearise = [&](const Eigen::Vector3d& point) -> std::optional<NormalEquations<3>> {
+    if (!check_place(ray_observations, point)) return std::nullopt;
     for (Eigen::Index k = 0; k < n; ++k) {
-      const RayObservation& sight = ray_observations[std::size_t(k)];
-      jacobian.middleRows<2>(2 * k) = projection_jacobian(sight.view, result.point);
-      residual.segment<2>(2 * k) = sight.pixel - sight.view.project(result.point);
+      const RayObservation& ray = ray_observations[std::size_t(k)];
+      jacobian.middleRows<2>(2 * k) = projection_jacobian(ray.view, point);
+      residual.segment<2>(2 * k) = ray.pixel - ray.view.project(point);
     }
     root.matrixL().solveInPlace(jacobian);
     root.matrixL().solveInPlace(residual);
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> qr(jacobian);
-    const Eigen::Vector3d step = qr.solve(residual);
-    result.chi2 = residual.squaredNorm();
-    result.covariance = (jacobian.transpose() * jacobian).inverse();
-    result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
-    result.point += step;
-    if (auto placed = check_place(ray_observations, result.point); !placed)
-      return tl::unexpected<Failure>(placed.error());
-    if (step.norm() <= 1e-12 * (1 + result.point.norm())) break;
-  }
+    return NormalEquations<3>{jacobian.transpose() * jacobian, jacobian.transpose() * residual,
+                              residual.squaredNorm()};
+  };
+  const auto fit = fit_least_squares<3>(
+      *start, linearise,
+      [](const Eigen::Vector3d& point, const Eigen::Vector3d& step) { return point + step; });
+  if (!fit->converged)
+    return fail(Reason::point_at_infinity, "the intersection of the rays does not converge");
+  Intersection result{fit->state, fit->equations.information.inverse(), largest_gap(ray_observations),
+                      fit->equations.chi2};
+  linearise(result.point);
+  result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
   return result;
 }
 

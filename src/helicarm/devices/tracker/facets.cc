@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
@@ -47,34 +48,33 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
 }
 
 FusedPose fuse(const std::vector<SeenFacet>& seen) {
-  constexpr int max_iterations = 10;
-  constexpr double small_step = 1e-12;
-  FusedPose fused;
-  geometry::RigidTransform& pose = fused.tracker_from_calibrator;
-  pose = seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse();
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    PoseCovariance information = PoseCovariance::Zero();
-    Eigen::Matrix<double, 6, 1> gradient = Eigen::Matrix<double, 6, 1>::Zero();
-    fused.chi2 = 0;
+  using Vector6 = Eigen::Matrix<double, 6, 1>;
+  const auto linearise = [&](const geometry::RigidTransform& pose) {
+    geometry::NormalEquations<6> equations{PoseCovariance::Zero(), Vector6::Zero()};
     for (const SeenFacet& facet : seen) {
       const geometry::RigidTransform predicted = pose * facet.calibrator_from_facet;
-      Eigen::Matrix<double, 6, 1> residual;
+      Vector6 residual;
       residual.head<3>() = facet.tracker_from_facet.translation - predicted.translation;
       residual.tail<3>() =
           geometry::vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
       PoseCovariance jacobian = PoseCovariance::Identity();
       jacobian.topRightCorner<3, 3>() = -geometry::cross_matrix(predicted.translation - pose.translation);
-      information += jacobian.transpose() * facet.information * jacobian;
-      gradient += jacobian.transpose() * facet.information * residual;
-      fused.chi2 += residual.dot(facet.information * residual);
+      equations.information += jacobian.transpose() * facet.information * jacobian;
+      equations.gradient += jacobian.transpose() * facet.information * residual;
+      equations.chi2 += residual.dot(facet.information * residual);
     }
-    const Eigen::LLT<PoseCovariance> solver(information);
-    const Eigen::Matrix<double, 6, 1> step = solver.solve(gradient);
-    pose = {geometry::rotation_from_vector(step.tail<3>()) * pose.rotation,
-            pose.translation + step.head<3>()};
-    fused.covariance = solver.solve(PoseCovariance::Identity());
-    if (step.norm() < small_step) break;
-  }
+    return std::optional(equations);
+  };
+  const auto moved = [](const geometry::RigidTransform& pose, const Vector6& step) {
+    return geometry::RigidTransform{geometry::rotation_from_vector(step.tail<3>()) * pose.rotation,
+                                    pose.translation + step.head<3>()};
+  };
+  const auto fit = geometry::fit_least_squares<6>(
+      seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse(), linearise, moved);
+  FusedPose fused;
+  fused.tracker_from_calibrator = fit->state;
+  fused.covariance = fit->equations.information.llt().solve(PoseCovariance::Identity());
+  fused.chi2 = fit->equations.chi2;
   for (const SeenFacet& facet : seen) fused.used.push_back(facet.name);
   return fused;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,7 @@
 #include <Eigen/QR>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
@@ -111,27 +113,31 @@ geometry::RigidTransform moved(const geometry::RigidTransform& pose, const Eigen
 }
 
 void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double sigma_rad, HandEye& at) {
-  constexpr int max_iterations = 20;
-  constexpr double small_step = 1e-11;
+  using Equations = geometry::NormalEquations<12>;
   Residual weights;
   weights << Eigen::Vector3d::Constant(1 / (sigma_mm * sigma_mm)),
       Eigen::Vector3d::Constant(1 / (sigma_rad * sigma_rad));
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    Matrix12 information = Matrix12::Zero();
-    Vector12 gradient = Vector12::Zero();
+  const auto linearise = [&](const HandEye& state) {
+    Equations equations{Matrix12::Zero(), Vector12::Zero()};
     for (const HandEyePair& pair : pairs) {
-      const Eigen::Matrix<double, 6, 12> jacobian = jacobian_of(pair, at);
+      const Eigen::Matrix<double, 6, 12> jacobian = jacobian_of(pair, state);
       const Eigen::Matrix<double, 12, 6> weighted = jacobian.transpose() * weights.asDiagonal();
-      information += weighted * jacobian;
-      gradient += weighted * residual_of(pair, at);
+      const Residual residual = residual_of(pair, state);
+      equations.information += weighted * jacobian;
+      equations.gradient += weighted * residual;
+      equations.chi2 += residual.dot(weights.asDiagonal() * residual);
     }
-    const Eigen::LDLT<Matrix12> solver(information);
-    const Vector12 step = solver.solve(gradient);
-    at.flange_from_marker = moved(at.flange_from_marker, step.head<6>());
-    at.tracker_from_base = moved(at.tracker_from_base, step.tail<6>());
-    at.covariance = solver.solve(Matrix12::Identity());
-    if (step.norm() < small_step) break;
-  }
+    return std::optional(equations);
+  };
+  const auto stepped = [](const HandEye& from, const Vector12& step) {
+    HandEye to = from;
+    to.flange_from_marker = moved(from.flange_from_marker, step.head<6>());
+    to.tracker_from_base = moved(from.tracker_from_base, step.tail<6>());
+    return to;
+  };
+  const auto fit = geometry::fit_least_squares<12>(at, linearise, stepped);
+  at = fit->state;
+  at.covariance = fit->equations.information.ldlt().solve(Matrix12::Identity());
 }
 
 }  // namespace
