@@ -32,17 +32,18 @@ Eigen::Matrix3d information_of_ray(const DatedView& dated, Bone bone, const Eige
 
 /// Intersects the rays in the bone's frame, each transformed by the readings of its own moment: their errors
 /// enter with the weight of each ray in the intersection.
-PropagatedPoint met_in_bone(const XrayPoint& point, Bone bone, const Readings& readings) {
+PropagatedPoint met_in_bone(const localization::LocatedPoint& point, std::span<const DatedView> views,
+                            Bone bone, const Readings& readings) {
   std::vector<Eigen::Matrix3d> information;
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const DatedView& view : point.views) {
+  for (const DatedView& view : views) {
     information.push_back(information_of_ray(view, bone, point.point_in_anchor));
     sum += information.back();
   }
   PropagatedPoint met{point.point_in_anchor, point.covariance_in_anchor, {}, point.by_calibration};
   const Eigen::Matrix3d scale = sum.inverse();
-  for (std::size_t i = 0; i < point.views.size(); ++i) {
-    const Poses& poses = point.views[i].poses;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Poses& poses = views[i].poses;
     const int moment = static_cast<int>(i);
     PropagatedPoint ray{*calibrator_from(bone, poses) * met.point, Eigen::Matrix3d::Zero(), {}, {}};
     ray = enter_tracker(std::move(ray), *poses.tracker_from_calibrator,
@@ -71,9 +72,10 @@ Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, 
   return point.total_covariance(noise);
 }
 
-PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise) {
+PointInFrames guide(const localization::LocatedPoint& point, std::optional<Bone> anchor,
+                    std::span<const DatedView> views, const Poses& now, const TrackerNoise& noise) {
   const Readings readings(noise.samples);
-  const Poses then = point.views.empty() ? Poses{} : point.views.front().poses;
+  const Poses then = views.empty() ? Poses{} : views.front().poses;
   PointInFrames guided;
   const auto put = [&](const PropagatedPoint& at, auto& place, auto& covariance) {
     place = at.point;
@@ -82,13 +84,13 @@ PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise
 
   std::optional<PropagatedPoint> in_tracker_then;
   std::optional<PropagatedPoint> in_tracker_now;
-  if (point.anchor) {
-    const PropagatedPoint in_bone = met_in_bone(point, *point.anchor, readings);
-    const Marker marker = marker_of(*point.anchor);
-    in_tracker_then = enter_tracker(in_bone, *then.tracker_from(*point.anchor), readings.at(marker, 0));
+  if (anchor) {
+    const PropagatedPoint in_bone = met_in_bone(point, views, *anchor, readings);
+    const Marker marker = marker_of(*anchor);
+    in_tracker_then = enter_tracker(in_bone, *then.tracker_from(*anchor), readings.at(marker, 0));
     put(leave_tracker(*in_tracker_then, *then.tracker_from_calibrator, readings.at(Marker::calibrator, 0)),
         guided.in_calibrator, guided.covariance_in_calibrator);
-    if (const auto& tracker_from_bone = now.tracker_from(*point.anchor))
+    if (const auto& tracker_from_bone = now.tracker_from(*anchor))
       in_tracker_now = enter_tracker(in_bone, *tracker_from_bone, readings.at(marker, present));
   } else {
     const PropagatedPoint in_calibrator{

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <optional>
-#include <vector>
+#include <span>
 
 #include <Eigen/Core>
 
 #include "helicarm/geometry/view.h"
 #include "helicarm/guidance/poses.h"
 #include "helicarm/guidance/propagated_point.h"
+#include "helicarm/localization/locate.h"
 
 namespace helicarm::guidance {
 
@@ -17,16 +18,6 @@ struct DatedView {
   geometry::View view;  ///< world = calibrator
   Poses poses;          ///< at the acquisition
   double sigma_px = 1;  ///< standard deviation of the pixel per axis: weight of this ray
-};
-
-/// A point located in X-ray images. `anchor` is the frame in which its rays were intersected: the calibrator,
-/// or the bone it moves with, whose poses every view must then contain.
-struct XrayPoint {
-  Eigen::Vector3d point_in_anchor;       ///< mm
-  Eigen::Matrix3d covariance_in_anchor;  ///< mm^2, from pixels and calibration only
-  std::optional<Bone> anchor;            ///< nothing: the calibrator
-  std::vector<DatedView> views;          ///< the first one's moment defines `in_calibrator`
-  Eigen::Matrix3Xd by_calibration = {};  ///< d point / d the views' parameters
 };
 
 /// A point transformed calibrator -> tracker -> bone -> present tracker -> tool (Eq. 16); absent where a
@@ -53,7 +44,10 @@ geometry::View seen_from_bone(const geometry::View& view,
 Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, const Poses& poses,
                                const TrackerNoise& noise);
 
-/// Eq. 16. A point without a bone is taken as fixed in the tracker's frame since the first view.
-PointInFrames guide(const XrayPoint& point, const Poses& now, const TrackerNoise& noise);
+/// Eq. 16 for a point located in these views. `anchor` is the bone in whose frame its rays were intersected,
+/// whose poses every view must then contain; nothing: the calibrator, and the point is taken as fixed in the
+/// tracker's frame since the first view.
+PointInFrames guide(const localization::LocatedPoint& point, std::optional<Bone> anchor,
+                    std::span<const DatedView> views, const Poses& now, const TrackerNoise& noise);
 
 }  // namespace helicarm::guidance

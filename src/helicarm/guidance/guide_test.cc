@@ -27,7 +27,22 @@ Poses all_poses() {
 geometry::View frontal() { return {{4000, 4000, 512, 512, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}}; }
 geometry::View lateral() { return {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 90, {0, 1, 0})}; }
 
-XrayPoint femoral_point(const Poses& first, const Poses& second) {
+struct PointInViews : localization::LocatedPoint {
+  PointInViews(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance, std::optional<Bone> bone,
+               std::vector<DatedView> views)
+      : LocatedPoint{.point_in_anchor = point, .covariance_in_anchor = covariance},
+        anchor(bone),
+        dated(std::move(views)) {}
+
+  std::optional<Bone> anchor;
+  std::vector<DatedView> dated;
+};
+
+PointInFrames guide(const PointInViews& point, const Poses& now, const TrackerNoise& noise) {
+  return guide(point, point.anchor, point.dated, now, noise);
+}
+
+PointInViews femoral_point(const Poses& first, const Poses& second) {
   const geometry::RigidTransform calibrator_from_femur = *calibrator_from(Bone::femur, first);
   return {calibrator_from_femur.inverse() * Eigen::Vector3d(10, -5, 20),
           0.01 * Eigen::Matrix3d::Identity(),
@@ -39,7 +54,7 @@ TEST(Guide, PointFollowsAMovedFemurToTheTool) {
   const geometry::RigidTransform bend = motion(3, -2, 5, 12, {1, 0, 0});
   Poses now = all_poses();
   now.tracker_from_femur = *now.tracker_from_femur * bend;
-  const XrayPoint point = femoral_point(all_poses(), all_poses());
+  const PointInViews point = femoral_point(all_poses(), all_poses());
 
   const PointInFrames guided = guide(point, now, {});
 
@@ -51,7 +66,7 @@ TEST(Guide, PointFollowsAMovedFemurToTheTool) {
 }
 
 TEST(Guide, PointWithoutABoneIsFixedInTheTracker) {
-  const XrayPoint point{{10, -5, 20}, Eigen::Matrix3d::Zero(), {}, {{frontal(), all_poses(), 1}}};
+  const PointInViews point{{10, -5, 20}, Eigen::Matrix3d::Zero(), {}, {{frontal(), all_poses(), 1}}};
   Poses now = all_poses();
   now.tracker_from_femur = motion(0, 0, 0, 90, {0, 0, 1});
   const PointInFrames guided = guide(point, now, {});
@@ -61,7 +76,7 @@ TEST(Guide, PointWithoutABoneIsFixedInTheTracker) {
 }
 
 TEST(Guide, MissingReadingsLeavePositionsAbsent) {
-  const XrayPoint point{{1, 2, 3}, Eigen::Matrix3d::Identity(), {}, {{frontal(), {}, 1}}};
+  const PointInViews point{{1, 2, 3}, Eigen::Matrix3d::Identity(), {}, {{frontal(), {}, 1}}};
   const PointInFrames guided = guide(point, all_poses(), {});
   EXPECT_FALSE(guided.in_femur);
   EXPECT_FALSE(guided.in_tibia);
@@ -71,7 +86,7 @@ TEST(Guide, MissingReadingsLeavePositionsAbsent) {
 
 TEST(Guide, WithoutNoiseTheCovarianceIsOnlyRotated) {
   Poses poses = all_poses();
-  XrayPoint point = femoral_point(poses, poses);
+  PointInViews point = femoral_point(poses, poses);
   point.covariance_in_anchor = Eigen::Vector3d(1, 4, 9).asDiagonal();
   const PointInFrames guided = guide(point, poses, {});
   EXPECT_NEAR(guided.covariance_in_tool->trace(), 14, 1e-9);
@@ -80,7 +95,7 @@ TEST(Guide, WithoutNoiseTheCovarianceIsOnlyRotated) {
 
 TEST(Guide, SharedReadingOfABoneCancelsInTheTool) {
   const Poses poses = all_poses();
-  XrayPoint point = femoral_point(poses, poses);
+  PointInViews point = femoral_point(poses, poses);
   point.covariance_in_anchor.setZero();
   const double only_shift = guide(point, poses, {0.1, 0, Samples::shared}).covariance_in_tool->trace();
   EXPECT_NEAR(only_shift, 3 * 2 * 0.01, 1e-9);  // calibrator and tool remain
@@ -123,7 +138,7 @@ TEST(Guide, CovarianceAgreesWithMonteCarloReadings) {
   const Poses first = all_poses();
   Poses second = all_poses();
   second.tracker_from_femur = *second.tracker_from_femur * motion(2, 1, -1, 5, {0, 1, 0});
-  XrayPoint point = femoral_point(first, second);
+  PointInViews point = femoral_point(first, second);
   point.covariance_in_anchor.setZero();
   const std::vector<Eigen::Vector3d> seen = {*calibrator_from(Bone::femur, first) * point.point_in_anchor,
                                              *calibrator_from(Bone::femur, second) * point.point_in_anchor};
@@ -133,7 +148,7 @@ TEST(Guide, CovarianceAgreesWithMonteCarloReadings) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (int trial = 0; trial < trials; ++trial) {
     RandomStream stream(7, 1, static_cast<std::uint64_t>(trial));
-    std::vector<DatedView> drawn = point.views;
+    std::vector<DatedView> drawn = point.dated;
     for (DatedView& view : drawn) {
       view.poses.tracker_from_calibrator = noisy(*view.poses.tracker_from_calibrator, noise, stream);
       view.poses.tracker_from_femur = noisy(*view.poses.tracker_from_femur, noise, stream);

@@ -196,9 +196,8 @@ std::vector<Warning> locate_points(const Case& given, const calibration::Calibra
     if (located->point.missing_rays) add_warning(point, warnings, *located->point.missing_rays);
     point.rays_miss = located->point.missing_rays.has_value();
     point.ray_gap_mm = located->point.ray_gap_mm;
-    point.place = guidance::guide({located->point.point_in_anchor, located->point.covariance_in_anchor,
-                                   located->anchor, located->views, located->point.by_calibration},
-                                  given.poses_now, given.tracker);
+    point.place =
+        guidance::guide(located->point, located->anchor, located->views, given.poses_now, given.tracker);
     if (point.moves_with && !located->anchor)
       add_warning(
           point, warnings,
