@@ -37,7 +37,7 @@ const calibration::CalibratedView& view_of(const HeldCalibration& calibration, c
 calibration::ViewFiducials view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
                                        const Doubles& sigma_px,
                                        const std::optional<std::vector<std::string>>& labels,
-                                       const calibration::IntrinsicsPrior& prior,
+                                       const geometry::IntrinsicsPrior& prior,
                                        const std::optional<Doubles>& map_covariance_px2) {
   const auto points = rows_of<3>(xyz_mm, "xyz_mm");
   const auto pixels = rows_of<2>(uv, "uv");
@@ -182,13 +182,13 @@ py::list fiducials(const HeldCalibration& calibration, const ViewKey& key) {
 }
 
 void add_priors(py::module_& module) {
-  const calibration::IntrinsicsPrior usual;
+  const geometry::IntrinsicsPrior usual;
   const auto pair_of =
-      [](const std::optional<calibration::NormalPrior>& b) -> std::optional<std::pair<double, double>> {
+      [](const std::optional<geometry::NormalPrior>& b) -> std::optional<std::pair<double, double>> {
     if (!b) return std::nullopt;
     return std::pair(b->value, b->sigma);
   };
-  py::class_<calibration::IntrinsicsPrior>(
+  py::class_<geometry::IntrinsicsPrior>(
       module, "IntrinsicsPrior",
       R"(What is known of one view's intrinsics beforehand, rectified pixels.
 
@@ -197,14 +197,14 @@ the receiver, or 1; aspect: (value, sigma) of |fx| / fy; skew: (value, sigma) ov
       .def(py::init([](std::optional<double> focal_px, const std::optional<Doubles>& principal_px,
                        double unit_px, const std::optional<std::pair<double, double>>& aspect,
                        const std::optional<std::pair<double, double>>& skew) {
-             calibration::IntrinsicsPrior prior;
+             geometry::IntrinsicsPrior prior;
              prior.focal_px = focal_px;
              if (principal_px) prior.principal_px = rows_of<2>(*principal_px, "principal_px").at(0);
              prior.unit_px = unit_px;
              prior.aspect.reset();
              prior.skew.reset();
-             if (aspect) prior.aspect = calibration::NormalPrior{aspect->first, aspect->second};
-             if (skew) prior.skew = calibration::NormalPrior{skew->first, skew->second};
+             if (aspect) prior.aspect = geometry::NormalPrior{aspect->first, aspect->second};
+             if (skew) prior.skew = geometry::NormalPrior{skew->first, skew->second};
              return prior;
            }),
            py::kw_only(), py::arg("focal_px") = usual.focal_px, py::arg("principal_px") = py::none(),

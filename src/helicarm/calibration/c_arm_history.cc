@@ -113,7 +113,8 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   return HistoryEntry{image, view.name, estimate, own};
 }
 
-IntrinsicsPrior learned_prior(IntrinsicsPrior prior, const LearnedIntrinsics& knowledge, bool mirrored) {
+geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const LearnedIntrinsics& knowledge,
+                                        bool mirrored) {
   prior.focal_px = knowledge.mean_mm.x() * prior.unit_px;
   *prior.principal_px +=
       prior.unit_px * Eigen::Vector2d((mirrored ? -1 : 1) * knowledge.mean_mm.y(), knowledge.mean_mm.z());

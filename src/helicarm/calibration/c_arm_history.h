@@ -46,7 +46,8 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
                                              const CommonPrior& unknown);
 
 /// `prior` with the history's mean in place of the nominal values.
-IntrinsicsPrior learned_prior(IntrinsicsPrior prior, const LearnedIntrinsics& knowledge, bool mirrored);
+geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const LearnedIntrinsics& knowledge,
+                                        bool mirrored);
 
 /// machine.json (docs/formats.md).
 Expected<CArmHistory> read_history(const std::filesystem::path& path);

@@ -22,7 +22,8 @@ ViewFiducials acquisition_with(const Vector3d& intrinsics_mm, bool mirrored, Ran
   view.intrinsics = {hand * px_per_mm * intrinsics_mm.x(), px_per_mm * intrinsics_mm.x(),
                      512 + hand * px_per_mm * intrinsics_mm.y(), 512 + px_per_mm * intrinsics_mm.z(), 0};
   ViewFiducials seen = observed_fiducials("AP", view, 0.05, random);
-  seen.prior = {px_per_mm * nominal.x(), Eigen::Vector2d(512, 512), px_per_mm, NormalPrior{1, 1e-3}};
+  seen.prior = {px_per_mm * nominal.x(), Eigen::Vector2d(512, 512), px_per_mm,
+                geometry::NormalPrior{1, 1e-3}};
   return seen;
 }
 
@@ -80,7 +81,7 @@ TEST(LearnIntrinsics, CovarianceOfTheNextAcquisitionIsConsistent) {
 
 TEST(LearnedPrior, TakesTheMeanAndReflectsItForAMirroredImage) {
   const LearnedIntrinsics known{{905, 4, -2}, unknown};
-  const IntrinsicsPrior prior{900 * px_per_mm, Eigen::Vector2d(512, 512), px_per_mm};
+  const geometry::IntrinsicsPrior prior{900 * px_per_mm, Eigen::Vector2d(512, 512), px_per_mm};
   EXPECT_NEAR(*learned_prior(prior, known, false).focal_px, 905 * px_per_mm, 1e-9);
   EXPECT_NEAR(learned_prior(prior, known, false).principal_px->x(), 512 + 4 * px_per_mm, 1e-9);
   EXPECT_NEAR(learned_prior(prior, known, true).principal_px->x(), 512 - 4 * px_per_mm, 1e-9);

@@ -18,7 +18,7 @@ namespace helicarm::calibration {
 struct ViewFiducials {
   std::string name;
   std::vector<fiducials::Fiducial> fiducials;  ///< only those `used` enter
-  IntrinsicsPrior prior = {};
+  geometry::IntrinsicsPrior prior = {};
   std::optional<geometry::View> start = {};  ///< else the homogeneous DLT
   /// Covariance of the map among the used fiducials, per axis (n x n, px^2); its diagonal is part of their
   /// sigmas. Empty: independent errors.

@@ -61,7 +61,7 @@ TEST_P(ScatterWithTolerance, EqualsTheJointCovariance) {
     const Eigen::Vector2d middle(near(512, 8), near(512, 8));
     for (auto& view : views)
       view.prior = {near(6000 + common, 3), Eigen::Vector2d(near(middle.x(), 4), near(middle.y(), 4)), 1,
-                    NormalPrior{near(1, 1e-3), 1e-3}, NormalPrior{near(0, 1e-3), 1e-3}};
+                    geometry::NormalPrior{near(1, 1e-3), 1e-3}, geometry::NormalPrior{near(0, 1e-3), 1e-3}};
     for (std::size_t k = 0; k < 12; ++k) {
       const Eigen::Vector3d off =
           per_axis_mm.cwiseProduct(Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
@@ -141,7 +141,7 @@ TEST(Calibrate, CorrelatedErrorsOfTheMapAreInTheCovariance) {
         for (Eigen::Index i = 0; i < n; ++i) view.fiducials[std::size_t(i)].uv[axis] += error(i);
       }
       for (auto& f : view.fiducials) f.sigma_px = std::hypot(own, map);
-      view.prior.aspect = NormalPrior{1, 1e-3};
+      view.prior.aspect = geometry::NormalPrior{1, 1e-3};
       view.map_covariance_px2 = covariance;
     }
     const auto distance2 = [&] {
@@ -237,7 +237,8 @@ std::vector<ViewFiducials> views_of_deviating_calibrator(
     places.push_back(place(ball.centre_in_calibrator));
   for (std::size_t i = 0; i < 2; ++i) {
     const geometry::View view = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
-    views[i].prior = {6000, Eigen::Vector2d(512, 512), 1 / 0.15, NormalPrior{1, 1e-3}, NormalPrior{0, 1e-12}};
+    views[i].prior = {6000, Eigen::Vector2d(512, 512), 1 / 0.15, geometry::NormalPrior{1, 1e-3},
+                      geometry::NormalPrior{0, 1e-12}};
     for (std::size_t k = 0; k < places.size(); ++k)
       views[i].fiducials[k].uv =
           view.project(places[k]) + sigma * Eigen::Vector2d(random.normal(), random.normal());

@@ -89,7 +89,8 @@ TEST(PixelByParameters, AgreesWithDifferencesAndWithTheCentredForm) {
 
 TEST(ShrunkToPrior, TakesTheKnownIntrinsicsAndKeepsTheImages) {
   const CentredView view = centred(example, centre);
-  const IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1, NormalPrior{0.97, 0.01}};
+  const geometry::IntrinsicsPrior prior{6300, Eigen::Vector2d(512, 515), 1,
+                                        geometry::NormalPrior{0.97, 0.01}};
   const CentredView shrunk = shrunk_to_prior(view, prior);
   const geometry::Intrinsics k = uncentred(shrunk).intrinsics;
   EXPECT_NEAR((k.fy - k.fx) / 2, 6300, 1e-9);
@@ -104,8 +105,9 @@ TEST(PriorRows, JacobianAgreesWithDifferences) {
   geometry::View other = example;
   other.intrinsics = {6100, 6150, 515, 505, 0};
   const std::vector<CentredView> views{centred(example, centre), centred(other, centre)};
-  const IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, NormalPrior{1, 0.01}, NormalPrior{0, 0.01}};
-  const std::vector<IntrinsicsPrior> priors{prior, prior};
+  const geometry::IntrinsicsPrior prior{6000, Eigen::Vector2d(512, 512), 5, geometry::NormalPrior{1, 0.01},
+                                        geometry::NormalPrior{0, 0.01}};
+  const std::vector<geometry::IntrinsicsPrior> priors{prior, prior};
   const CArmPrior c_arm{IntrinsicsVariation{10, 2}, IntrinsicsVariation{7, 4}};
   const PriorRows rows = prior_rows(views, priors, c_arm);
   EXPECT_EQ(rows.residuals.size(), 2 * (2 + 1 + 2));
@@ -124,7 +126,7 @@ TEST(PriorRows, JacobianAgreesWithDifferences) {
 
 TEST(PriorRows, CommonVariationOfTwoViewsCountsOnce) {
   const std::vector<CentredView> views{centred(example, centre), centred(example, centre)};
-  IntrinsicsPrior prior{6200, std::nullopt, 4};
+  geometry::IntrinsicsPrior prior{6200, std::nullopt, 4};
   prior.skew.reset();
   const double first = (6100 - 6200) / 4.0;
   const PriorRows rows =
@@ -139,7 +141,7 @@ TEST(PriorRows, MirroredViewReversesTheVariation) {
   plain.intrinsics.u0 = 512 + 30;
   mirrored.intrinsics.u0 = 512 - 30;
   plain.intrinsics.v0 = mirrored.intrinsics.v0 = 512;
-  IntrinsicsPrior prior{std::nullopt, Eigen::Vector2d(512, 512), 4};
+  geometry::IntrinsicsPrior prior{std::nullopt, Eigen::Vector2d(512, 512), 4};
   prior.skew.reset();
   const PriorRows rows = prior_rows(std::vector{centred(plain, centre), centred(mirrored, centre)},
                                     std::vector{prior, prior}, {std::nullopt, IntrinsicsVariation{7, 4}});

@@ -36,7 +36,7 @@ class Rows {
     for (const CentredView& view : views) quantities_.push_back(quantities_of(view));
   }
 
-  void add_own(std::size_t view, Eigen::Index which, const NormalPrior& normal_prior) {
+  void add_own(std::size_t view, Eigen::Index which, const geometry::NormalPrior& normal_prior) {
     residuals_.push_back((quantities_[view].values(which) - normal_prior.value) / normal_prior.sigma);
     rows_.emplace_back(Eigen::RowVectorXd::Zero(columns_))
         .segment<view_parameters>(view_parameters * Eigen::Index(view)) =
@@ -87,7 +87,7 @@ class Rows {
 
 }  // namespace
 
-CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior) {
+CentredView shrunk_to_prior(CentredView view, const geometry::IntrinsicsPrior& prior) {
   const double magnification = (std::abs(view.ax) + view.ay) / 2;
   if (prior.aspect) {
     view.ay = 2 * magnification / (1 + prior.aspect->value);
@@ -104,12 +104,12 @@ CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior) {
   return view;
 }
 
-PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
+PriorRows prior_rows(std::span<const CentredView> views, std::span<const geometry::IntrinsicsPrior> priors,
                      const CArmPrior& c_arm) {
   Rows rows(views);
   std::vector<Rows::Nominal> focals, principals_u, principals_v;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const IntrinsicsPrior& prior = priors[i];
+    const geometry::IntrinsicsPrior& prior = priors[i];
     if (prior.aspect) rows.add_own(i, aspect, *prior.aspect);
     if (prior.skew) rows.add_own(i, skew, *prior.skew);
     if (prior.focal_px) focals.push_back({i, *prior.focal_px, prior.unit_px});

@@ -8,23 +8,9 @@
 #include <Eigen/Core>
 
 #include "helicarm/calibration/centred_view.h"
+#include "helicarm/geometry/intrinsics_prior.h"
 
 namespace helicarm::calibration {
-
-/// Normal prior of a scalar.
-struct NormalPrior {
-  double value = 0;
-  double sigma = 0;
-};
-
-/// Prior of one view's intrinsics (rectified px); absent members are unknown.
-struct IntrinsicsPrior {
-  std::optional<double> focal_px = {};  ///< nominal mean of |fx| and fy
-  std::optional<Eigen::Vector2d> principal_px = {};
-  double unit_px = 1;  ///< unit of CArmPrior in this view: px per mm on the detector, or 1
-  std::optional<NormalPrior> aspect = {};                   ///< |fx| / fy: 1 for square pixels
-  std::optional<NormalPrior> skew = NormalPrior{0, 1e-12};  ///< over fy; nothing: free
-};
 
 /// Standard deviations of a quantity from nominal: common to all views of a C-arm, and of each view (sag).
 struct IntrinsicsVariation {
@@ -48,7 +34,7 @@ struct CommonPrior {
 
 /// `view` with its intrinsics set to the prior where one exists; its projections change little. For a start
 /// whose intrinsics are poorly constrained.
-CentredView shrunk_to_prior(CentredView view, const IntrinsicsPrior& prior);
+CentredView shrunk_to_prior(CentredView view, const geometry::IntrinsicsPrior& prior);
 
 /// The priors as whitened rows of a least-squares problem in the steps of all views.
 struct PriorRows {
@@ -56,7 +42,7 @@ struct PriorRows {
   Eigen::MatrixXd jacobian;
 };
 
-PriorRows prior_rows(std::span<const CentredView> views, std::span<const IntrinsicsPrior> priors,
+PriorRows prior_rows(std::span<const CentredView> views, std::span<const geometry::IntrinsicsPrior> priors,
                      const CArmPrior& c_arm);
 
 }  // namespace helicarm::calibration

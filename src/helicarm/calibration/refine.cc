@@ -37,7 +37,7 @@ Eigen::Index map_modes(const ViewProblem& problem) {
 /// Rows at given views and offsets; false if a point is not in front of its source. Without priors on the
 /// intrinsics rho may pass through zero during the iteration.
 bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& common, Refinement& at) {
-  std::vector<IntrinsicsPrior> normal_priors;
+  std::vector<geometry::IntrinsicsPrior> normal_priors;
   Eigen::Index count = 0;
   for (const ViewProblem& problem : problems) {
     normal_priors.push_back(problem.prior);

@@ -24,7 +24,7 @@ struct Observation {
 struct ViewProblem {
   CentredView start;
   std::vector<Observation> observations;
-  IntrinsicsPrior prior;
+  geometry::IntrinsicsPrior prior;
 };
 
 /// The joint fit of all views. Rows, each over its standard deviation: u and v of the observations, view by

@@ -10,6 +10,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label.h"
+#include "helicarm/rectification/intrinsics_prior.h"
 #include "helicarm/rectification/paper_dots.h"
 
 namespace helicarm::fiducials {
@@ -46,12 +47,11 @@ std::vector<detection::Dot> plausible_balls(const std::vector<detection::Dot>& d
   return balls;
 }
 
-LabellingPrior prior_of(const xray::XrayImage& xray_image, const rectification::DistortionMap& map) {
+LabellingPrior labelling_prior(const xray::XrayImage& xray_image,
+                               const geometry::IntrinsicsPrior& intrinsics) {
   LabellingPrior prior;
-  const auto& distance = xray_image.acquisition.source_detector_mm;
-  if (distance && map.rectified_pixel_mm && map.rectified_plane == rectification::RectifiedPlane::detector)
-    prior.focal_px = *distance / *map.rectified_pixel_mm;
-  prior.principal_px = {0.5 * (xray_image.pixels.width() - 1), 0.5 * (xray_image.pixels.height() - 1)};
+  prior.focal_px = intrinsics.focal_px;
+  prior.principal_px = *intrinsics.principal_px;
   prior.principal_sigma_px = 0.03 * xray_image.pixels.width();
   prior.field_radius_px = 0.5 * std::hypot(xray_image.pixels.width(), xray_image.pixels.height());
   return prior;
@@ -204,7 +204,7 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
   }
   LabellingOptions labelling_options;
   if (method == rectification::Method::paper) labelling_options.systematic_sigma = paper_systematic;
-  LabellingPrior prior = prior_of(xray_image, map);
+  LabellingPrior prior = labelling_prior(xray_image, rectification::intrinsics_prior(xray_image, map));
   prior.mirrored = options.mirrored;
   if (options.radius_bias) {
     prior.radius_bias = *options.radius_bias;

@@ -30,7 +30,7 @@ Expected<calibration::CalibrationResult> noisy_calibration(double sigma, RandomS
   std::vector<calibration::ViewFiducials> views;
   for (const geometry::View& view : truth) {
     calibration::ViewFiducials seen{fmt::format("V{}", views.size()), {}};
-    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, calibration::NormalPrior{1, 0.001}};
+    seen.prior = {std::nullopt, Eigen::Vector2d(512, 512), 1, geometry::NormalPrior{1, 0.001}};
     for (int k = 0; k < 12; ++k) {
       const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);
       fiducials::Fiducial f{fmt::format("P{}", k), {radius * std::cos(t), radius * std::sin(t), 3.979 * t}};

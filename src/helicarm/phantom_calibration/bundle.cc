@@ -100,7 +100,7 @@ bool has_nominal_focal(const BundleProblem& given) {
 }
 
 void add_priors(Blocks& blocks, const BundleProblem& given, std::size_t v) {
-  const calibration::IntrinsicsPrior& prior = given.views[v].prior;
+  const geometry::IntrinsicsPrior& prior = given.views[v].prior;
   ViewBlocks& view = blocks.views[v];
   double* own = view.intrinsics.data();
   double* shared = blocks.c_arm.data();

@@ -25,7 +25,7 @@ struct FiducialImage {
 struct BundleView {
   std::string name;
   geometry::View start;  ///< world: that of `BundleProblem::centres`; fx < 0 where the image is mirrored
-  calibration::IntrinsicsPrior prior;
+  geometry::IntrinsicsPrior prior;
   std::vector<FiducialImage> images;
   /// Of the distortion map among the images, per axis (n x n, px^2). Empty: the map is exact.
   Eigen::MatrixXd map_covariance_px2 = {};

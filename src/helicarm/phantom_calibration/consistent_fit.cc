@@ -78,7 +78,7 @@ void expect_as_others(BundleProblem& alone, const BundleProblem& others, const B
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (std::size_t v = 0; v < fit.views.size(); ++v) {
     const geometry::Intrinsics& k = fit.views[v].intrinsics;
-    const calibration::IntrinsicsPrior& prior = others.views[v].prior;
+    const geometry::IntrinsicsPrior& prior = others.views[v].prior;
     focal += (std::abs(k.fx) + k.fy) / 2 / prior.unit_px / n;
     const Eigen::Vector2d from_nominal =
         Eigen::Vector2d(k.u0, k.v0) - prior.principal_px.value_or(Eigen::Vector2d::Zero());

@@ -8,7 +8,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label_fiducials.h"
-#include "helicarm/pipeline/prior.h"
+#include "helicarm/rectification/intrinsics_prior.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
@@ -54,7 +54,7 @@ PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<
   result.view.name = detected.name;
   result.view.labelling = labelling_prior(*detected.xray_image, map);
   result.view.labelling.mirrored = mirrored;
-  result.view.prior = pipeline::intrinsics_prior(*detected.xray_image, map);
+  result.view.prior = rectification::intrinsics_prior(*detected.xray_image, map);
   const Range radii = map.rectified_pixel_mm
                           ? fiducials::ball_radii_px(balls_of(diameters_mm), *map.rectified_pixel_mm)
                           : Range{2, 1e9};
@@ -97,8 +97,8 @@ std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detec
     for (std::size_t ball = 0; ball < centres.size(); ++ball)
       if (diameters_mm[ball] == kind && candidate_of[ball] >= 0)
         labelled.push_back(prepared.dots[std::size_t(candidate_of[ball])]);
-    const detection::DotAppearance appearance =
-        detection::estimate_appearance(xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
+    const detection::DotAppearance appearance = detection::estimate_appearance(
+        xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
     for (std::size_t ball = 0; ball < centres.size(); ++ball) {
       if (diameters_mm[ball] != kind) continue;
       const Eigen::Vector2d predicted = pose.project(centres[ball]);

@@ -17,7 +17,7 @@ struct PhantomView {
   std::string name;
   std::vector<fiducials::BallCandidate> candidates;  ///< rectified px
   fiducials::LabellingPrior labelling;               ///< of the camera; `mirrored` where it is known
-  calibration::IntrinsicsPrior prior;
+  geometry::IntrinsicsPrior prior;
 };
 
 /// A phantom and its views as first found, by candidates' centres: to a fraction of a millimetre.

@@ -57,7 +57,7 @@ inline BundleProblem synthetic_problem(const std::vector<Eigen::Vector3d>& truth
     view.prior.unit_px = 1 / 0.23;
     view.prior.focal_px = 1000 * view.prior.unit_px;
     view.prior.principal_px = Eigen::Vector2d(511.5, 511.5);
-    view.prior.aspect = calibration::NormalPrior{1, 0.001};
+    view.prior.aspect = geometry::NormalPrior{1, 0.001};
     for (std::size_t i = 0; i < truth.size(); ++i)
       view.images.push_back({i, exact.project(truth[i]) + noise(sigma_px).head<2>(), sigma_px});
     problem.views.push_back(std::move(view));

@@ -22,7 +22,7 @@ calibration::CommonPrior common_prior(const phantom::Calibrator& calibrator) {
 /// The prior of these views from a C-arm history, without entries of these images.
 Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews& views,
                                                             const calibration::CArmHistory& history) {
-  const calibration::IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
+  const geometry::IntrinsicsPrior nominal = fiducials_of(views.front()).prior;
   for (const LabelledView& view : views)
     if (!fiducials_of(view).prior.focal_px)
       return fail(Reason::bad_value,

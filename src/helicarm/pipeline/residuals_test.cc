@@ -29,7 +29,7 @@ std::vector<calibration::ViewFiducials> helix_views(std::uint64_t seed) {
     const geometry::View view{{1015 / pixel_mm, 1015 / pixel_mm, centre.x() + 10, centre.y() - 15, 0},
                               {rotation, Eigen::Vector3d(3, -2, 700) - rotation * Eigen::Vector3d(0, 0, 45)}};
     calibration::ViewFiducials seen{alpha == 0 ? "AP" : "LAT", {}};
-    seen.prior = {1020 / pixel_mm, centre, 1 / pixel_mm, calibration::NormalPrior{1, 0.001}};
+    seen.prior = {1020 / pixel_mm, centre, 1 / pixel_mm, geometry::NormalPrior{1, 0.001}};
     seen.start = view;
     for (int k = 0; k < 12; ++k) {
       const double t = std::numbers::pi / 6 + k * std::numbers::pi / 2, radius = 60 * std::exp(-t / 31.529);

@@ -7,7 +7,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/core/parallel.h"
-#include "helicarm/pipeline/prior.h"
+#include "helicarm/rectification/intrinsics_prior.h"
 #include "helicarm/rectification/usable.h"
 #include "helicarm/xray/read_xray_image.h"
 
@@ -163,8 +163,8 @@ calibration::ViewFiducials fiducials_of(const LabelledView& view) {
   std::vector<Eigen::Vector2d> used;
   for (const fiducials::Fiducial& ball : view.fiducials.fiducials)
     if (ball.status == fiducials::FiducialStatus::used) used.push_back(ball.uv);
-  return {view.name, view.fiducials.fiducials, intrinsics_prior(*view.xray_image, map), view.fiducials.view,
-          map.covariance_px2(used)};
+  return {view.name, view.fiducials.fiducials, rectification::intrinsics_prior(*view.xray_image, map),
+          view.fiducials.view, map.covariance_px2(used)};
 }
 
 OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views, const Case& given,

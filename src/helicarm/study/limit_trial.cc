@@ -102,7 +102,7 @@ KnownCArm c_arm_with_history(const LimitSetting& setting, const std::vector<Vect
   while (int(true_views.size()) < entries_of_history)
     for (const geometry::View& view : views_of(stiff, known.mean_variation_mm, aspect_sigma, random)) {
       calibration::ViewFiducials seen = pictured("", view, balls, setting.sigma_px, random);
-      seen.prior.aspect = calibration::NormalPrior{1, aspect_sigma};
+      seen.prior.aspect = geometry::NormalPrior{1, aspect_sigma};
       if (const auto true_view = calibration::history_entry_of(seen, "", {make}))
         true_views.push_back(*true_view);
     }
@@ -113,8 +113,8 @@ KnownCArm c_arm_with_history(const LimitSetting& setting, const std::vector<Vect
 /// The priors given to the estimator and to the bound.
 struct PriorKnowledge {
   calibration::CArmPrior c_arm;
-  std::optional<calibration::NormalPrior> aspect;
-  std::optional<calibration::NormalPrior> skew = calibration::NormalPrior{0, pinned};
+  std::optional<geometry::NormalPrior> aspect;
+  std::optional<geometry::NormalPrior> skew = geometry::NormalPrior{0, pinned};
   PriorInformation bound;
 };
 
@@ -126,18 +126,16 @@ PriorKnowledge told_of(LimitModel model) {
   };
   const auto with = [&](const calibration::CArmPrior& c_arm, double aspect) {
     return PriorKnowledge{c_arm,
-                          calibration::NormalPrior{1, aspect},
-                          calibration::NormalPrior{0, pinned},
+                          geometry::NormalPrior{1, aspect},
+                          geometry::NormalPrior{0, pinned},
                           {variations(*c_arm.focal), variations(*c_arm.principal), aspect, pinned}};
   };
   switch (model) {
     case LimitModel::free:
       return {{}, {}, {}, {}};
     case LimitModel::square:
-      return {{},
-              calibration::NormalPrior{1, pinned},
-              calibration::NormalPrior{0, pinned},
-              {{}, {}, pinned, pinned}};
+      return {
+          {}, geometry::NormalPrior{1, pinned}, geometry::NormalPrior{0, pinned}, {{}, {}, pinned, pinned}};
     case LimitModel::prior:
       return with(make, aspect_sigma);
     case LimitModel::c_arm:  // bound for a C-arm with known mean and sag
