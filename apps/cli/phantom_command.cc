@@ -109,7 +109,8 @@ Files exported(const phantom::Calibrator& calibrator, const PhantomArguments& ar
 }
 
 Files exported(const phantom::Plate& plate, const PhantomArguments& arguments) {
-  if (arguments.stl) throw BadInput(Reason::usage, "--stl: only the calibrator has a printable body");
+  if (arguments.stl)
+    throw BadInput(Reason::usage, "--stl: only the calibrator can be exported for 3D printing; omit --plate");
   Files files;
   if (arguments.svg) files.emplace_back(*arguments.svg, value_or_throw(phantom::drawing_of(plate)));
   if (arguments.file) files.emplace_back(*arguments.file, to_text(phantom::to_json(plate)) + "\n");
@@ -168,9 +169,9 @@ phantom_calibration::PhantomResult measured(const PhantomArguments& arguments, c
 
 void print(const phantom_calibration::PhantomResult& result, const std::filesystem::path& out,
            Console& console) {
-  console.out << fmt::format("  {} balls, {} views, {:.3f} px rms per axis, scale by {} to {:.2g} %\n\n",
-                             result.balls.size(), result.views.size(), result.rms_px, result.scale.source,
-                             100 * result.scale.relative_sigma);
+  console.out << fmt::format(
+      "  {} balls, {} views, {:.3f} px rms per axis, scale from {}, sigma {:.2g} %\n\n", result.balls.size(),
+      result.views.size(), result.rms_px, result.scale.source, 100 * result.scale.relative_sigma);
   console.out << fmt::format("  {:<10}{:>10}{:>10}{:>10}{:>14}{:>16}\n", "ball", "x mm", "y mm", "z mm",
                              "sigma mm", "from nominal mm");
   for (const phantom_calibration::MeasuredBall& ball : result.balls)
@@ -178,9 +179,10 @@ void print(const phantom_calibration::PhantomResult& result, const std::filesyst
                                ball.centre.x(), ball.centre.y(), ball.centre.z(),
                                std::sqrt(ball.covariance_mm2.trace() / 3),
                                ball.from_nominal ? fmt::format("{:.3f}", ball.from_nominal->norm()) : "");
-  console.out << fmt::format("\n  worth measuring by hand: {} to {}, {:.1f} mm\n  written to {}\n",
-                             result.balls[result.pair.a].label, result.balls[result.pair.b].label,
-                             result.pair.distance_mm, out.string());
+  console.out << fmt::format(
+      "\n  the distance that would determine the scale best: {} to {}, {:.1f} mm\n  written to {}\n",
+      result.balls[result.pair.a].label, result.balls[result.pair.b].label, result.pair.distance_mm,
+      out.string());
 }
 
 void measure(const PhantomArguments& arguments, Console& console) {
@@ -213,14 +215,15 @@ void verify(const PhantomArguments& arguments, Console& console) {
     value_or_throw(
         write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   notify(result.warnings, console);
-  if (console.json) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
+  if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) {
     for (const phantom_calibration::VerifiedBall& ball : result.balls)
-      console.out << fmt::format("  {:<10}{:>9.3f} mm from the file, {:.3f} mm possible (95 %)   {}\n",
+      console.out << fmt::format("  {:<10}{:>9.3f} mm from the file's position, 95 % limit {:.3f} mm   {}\n",
                                  ball.label, ball.distance_mm.value_or(0), ball.bound_mm,
                                  phantom_calibration::word(ball.state));
     if (!result.failure && !result.balls.empty())
-      console.out << fmt::format("\n  still as in the file, to within {:.3f} mm\n", result.within_mm);
+      console.out << fmt::format("\n  all balls are at the file's positions within {:.3f} mm\n",
+                                 result.within_mm);
   }
   if (result.failure) throw BadInput(*result.failure);
 }

@@ -26,9 +26,13 @@ using Eigen::Vector2d;
 constexpr double max_shift_px = 8;
 constexpr double sigma_floor_px = 0.06;  // model error of a template on a smooth background
 
-/// Parameters: cubic background, contrast, shift.
+constexpr double max_log_size = 0.25;  // of a ball in the image from the file's diameter
+
+/// Parameters: cubic background, contrast, shift, logarithm of a ball's size over the template's.
 constexpr int n_background = 10;
-constexpr int n_parameters = n_background + 3;
+constexpr int n_parameters = n_background + 4;
+constexpr int at_shift = n_background + 1;
+constexpr int at_size = n_background + 3;
 using Vector = Eigen::Matrix<double, n_parameters, 1>;
 using Normal = Eigen::Matrix<double, n_parameters, n_parameters>;
 
@@ -83,6 +87,7 @@ struct Patch {
   double window;
   int side;
   detection::NoiseCorrelation noise;
+  bool sized;  ///< the size is fitted: a calibrator's scale and diameters are known to some percent only
 };
 
 struct Sums {
@@ -94,18 +99,22 @@ struct Sums {
 
 /// Derivatives and residuals at the given parameters.
 void evaluate(Patch& patch, const SolidTemplate& absorbed, const Vector& p) {
-  const Vector2d shift = p.tail<2>();
+  const Vector2d shift = p.segment<2>(at_shift);
+  const double size = std::exp(p[at_size]);
   const auto contrast = static_cast<float>(p[n_background]);
   const auto row = [&](int k) { return patch.rows.row(k).data(); };
   float* by_contrast = row(n_background);
-  float* by_u = row(n_background + 1);
-  float* by_v = row(n_background + 2);
+  float* by_u = row(at_shift);
+  float* by_v = row(at_shift + 1);
+  float* by_size = row(at_size);
   float* residual = row(n_parameters);
   for (std::size_t i = 0; i < patch.offsets.size(); ++i) {
-    const auto [value, slope] = absorbed.at(patch.offsets[i] - shift);
+    const Vector2d in_template = (patch.offsets[i] - shift) / size;
+    const auto [value, slope] = absorbed.at(in_template);
     by_contrast[i] = -static_cast<float>(value);
-    by_u[i] = contrast * static_cast<float>(slope.x());
-    by_v[i] = contrast * static_cast<float>(slope.y());
+    by_u[i] = contrast * static_cast<float>(slope.x() / size);
+    by_v[i] = contrast * static_cast<float>(slope.y() / size);
+    by_size[i] = patch.sized ? contrast * static_cast<float>(slope.dot(in_template)) : 0;
     residual[i] = patch.grey[i] - contrast * by_contrast[i];
   }
   patch.rows.row(n_parameters) -=
@@ -113,7 +122,8 @@ void evaluate(Patch& patch, const SolidTemplate& absorbed, const Vector& p) {
 }
 
 Sums accumulate(const Patch& patch, std::span<const float> weights) {
-  const Eigen::MatrixXd products = detection::weighted_products(patch.rows, weights);
+  Eigen::MatrixXd products = detection::weighted_products(patch.rows, weights);
+  if (!patch.sized) products(at_size, at_size) = 1;
   return {products.topLeftCorner<n_parameters, n_parameters>(),
           products.col(n_parameters).head<n_parameters>(), products(n_parameters, n_parameters),
           products(0, 0)};
@@ -125,7 +135,7 @@ double jackknife_variance(const Patch& patch, const Vector& p) {
   constexpr int sectors = 8;
   std::vector<int> sector(patch.offsets.size());
   for (std::size_t i = 0; i < sector.size(); ++i) {
-    const Vector2d from = patch.offsets[i] - p.tail<2>();
+    const Vector2d from = patch.offsets[i] - p.segment<2>(at_shift);
     const double turn = std::atan2(from.y(), from.x()) / (2 * std::numbers::pi) + 0.5;
     sector[i] = static_cast<int>(std::min(sectors - 1.0, sectors * turn));
   }
@@ -137,8 +147,8 @@ double jackknife_variance(const Patch& patch, const Vector& p) {
       if (sector[i] == k) rest[i] = 0;
     const Sums sums = accumulate(patch, rest);
     const Vector step = sums.normal.ldlt().solve(sums.right);
-    sum += step.tail<2>();
-    squares += step.tail<2>().squaredNorm();
+    sum += step.segment<2>(at_shift);
+    squares += step.segment<2>(at_shift).squaredNorm();
   }
   return 0.5 * (sectors - 1.0) / sectors * (squares - sum.squaredNorm() / sectors);
 }
@@ -166,12 +176,14 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
     Vector step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) return std::nullopt;
     // The template is not smooth: a step that reverses the one before it is damped.
-    if (step.tail<2>().dot(before) < 0) damping *= 0.5;
-    before = step.tail<2>();
-    step.tail<2>() *= damping * std::min(1.0, 2 / std::max(1e-9, before.norm()));
-    move = step.tail<2>().norm();
+    if (step.segment<2>(at_shift).dot(before) < 0) damping *= 0.5;
+    before = step.segment<2>(at_shift);
+    step.segment<2>(at_shift) *= damping * std::min(1.0, 2 / std::max(1e-9, before.norm()));
+    step[at_size] = std::clamp(step[at_size], -max_log_size / 5, max_log_size / 5);
+    move = step.segment<2>(at_shift).norm();
     p += step;
-    if (p.tail<2>().norm() > max_shift_px) return std::nullopt;
+    if (p.segment<2>(at_shift).norm() > max_shift_px || std::abs(p[at_size]) > max_log_size)
+      return std::nullopt;
     if (i >= 5 && move < 2e-3) break;
   }
   if (move > 0.05) return std::nullopt;
@@ -185,10 +197,10 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
   const Normal covariance =
       inverse * detection::correlated_normal(patch.noise, weighted, patch.cells, patch.side) * inverse;
   Fit fit;
-  fit.shift = p.tail<2>();
+  fit.shift = p.segment<2>(at_shift);
   fit.contrast = p[n_background] * patch.scale;
   fit.sigma_px = std::sqrt(detection::prior_variance(
-      0.5 * variance * (covariance(linear, linear) + covariance(linear + 1, linear + 1)),
+      0.5 * variance * (covariance(at_shift, at_shift) + covariance(at_shift + 1, at_shift + 1)),
       jackknife_variance(patch, p)));
   fit.noise = std::sqrt(variance) * patch.scale;
   fit.misfit = double(patch.rows.row(n_parameters).norm()) / std::sqrt(double(residuals.size())) /
@@ -200,10 +212,10 @@ std::optional<Fit> fit_template(Patch patch, const SolidTemplate& absorbed) {
 Expected<Patch> gather(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
                        const Vector2d& centre, double half_width, const PathImage& view_image,
                        std::span<const detection::Disc> others, const detection::NoiseCorrelation& noise,
-                       const std::string& name) {
+                       const phantom::CalibratorTarget& target) {
   const SolidTemplate near_metal(view_image, 1, 2.5);
   const auto not_seen = [&] {
-    return fail(Reason::not_seen, fmt::format("check target \"{}\" lies outside the image", name));
+    return fail(Reason::not_seen, fmt::format("check target \"{}\" lies outside the image", target.name));
   };
   const Vector2d raw = map.raw_from_rectified(centre);
   if (!raw.allFinite() || !xray_image.pixels.contains(static_cast<int>(raw.x()), static_cast<int>(raw.y())))
@@ -212,7 +224,8 @@ Expected<Patch> gather(const xray::XrayImage& xray_image, const rectification::D
   if (!inverse) return not_seen();
   const detection::DotFitOptions limits = detection::fit_options_for(xray_image);
   const int half = static_cast<int>(std::ceil(half_width));
-  Patch patch{{}, {}, {}, {}, {}, 1, half_width, 2 * half + 1, noise};
+  Patch patch{{}, {},         {},           {},    {},
+              1,  half_width, 2 * half + 1, noise, target.kind == phantom::TargetKind::ball};
   const int u0 = static_cast<int>(std::lround(raw.x()));
   const int v0 = static_cast<int>(std::lround(raw.y()));
   int inside = 0;
@@ -270,7 +283,7 @@ Expected<ImagePoint> find_target(const xray::XrayImage& xray_image, const rectif
                               : 2.5 * target.diameter_mm;
   const double half_width = reach_mm * px_per_mm + 2.5;
   const PathImage view_image = image_of_target(target, view, half_width + max_shift_px);
-  const auto patch = gather(xray_image, map, centre, half_width, view_image, others, noise, target.name);
+  const auto patch = gather(xray_image, map, centre, half_width, view_image, others, noise, target);
   if (!patch) return tl::unexpected<Failure>(patch.error());
   std::optional<Fit> best;
   const auto try_template = [&](double attenuation, double blur) {

@@ -90,6 +90,19 @@ TEST(FindTarget, BallWithinATenthOfAPixel) { expect_found(0); }
 TEST(FindTarget, CrossWithinATenthOfAPixel) { expect_found(1); }
 TEST(FindTarget, LineEndWithinATenthOfAPixel) { expect_found(2); }
 
+TEST(FindTarget, BallOfAFileWhoseScaleIsWrongWithinATenthOfAPixel) {
+  for (const double factor : {0.88, 1.13}) {
+    const Bench bench(false);
+    phantom::CalibratorTarget target = bench.targets[0];
+    target.diameter_mm *= factor;
+    const auto found = find_target(bench.xray_image, rectification::identity_map(256, 256, {}), bench.view,
+                                   target, {}, detection::noise_correlation(bench.xray_image));
+    ASSERT_TRUE(found) << factor << ": " << found.error().message;
+    EXPECT_LT((found->uv - bench.view.project(target.point_in_calibrator)).norm(), 0.1) << factor;
+    EXPECT_LT(found->sigma_px, 0.1) << factor;
+  }
+}
+
 TEST(FindTarget, CrossOnTheCalibratorWithinATenthOfAPixel) {
   for (const SimulatedView& view : simulated_case().views)
     for (const std::size_t k : {1u, 2u}) {

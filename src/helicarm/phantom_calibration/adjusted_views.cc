@@ -2,6 +2,7 @@
 #include "helicarm/phantom_calibration/adjusted_views.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <tuple>
 
@@ -15,8 +16,6 @@
 namespace helicarm::phantom_calibration {
 namespace {
 
-constexpr double reversal_ratio = 1.5;  // of the rms of a depth-reversed phantom to that of the best
-
 std::optional<bool> mirrored(const pipeline::DetectedView& detected, const pipeline::CaseView& view,
                              bool from_scratch) {
   if (view.mirrored) return view.mirrored;
@@ -24,15 +23,38 @@ std::optional<bool> mirrored(const pipeline::DetectedView& detected, const pipel
   return std::nullopt;
 }
 
-Expected<void> check_handedness(const Reconstruction& r) {
-  if (!r.reversed_rms_px || *r.reversed_rms_px > reversal_ratio * r.rms_px) return {};
-  return fail(
-      Reason::ambiguous_handedness,
-      fmt::format(
-          "the phantom and its depth-reversed image fit almost alike ({:.3f} and {:.3f} px rms): take "
-          "views farther apart, or use a less flat phantom",
-          r.rms_px, *r.reversed_rms_px),
-      {{"rms_px", r.rms_px}, {"reversed_rms_px", *r.reversed_rms_px}});
+/// A fiducial without a candidate at its place may have moved by more than the assignment's gate: its image
+/// is the nearest free candidate of its size, unless something else covers its place. The adjustment rejects
+/// it where it does not fit.
+void follow_moved(const pipeline::DetectedView& detected, const PreparedView& prepared, Reconstruction& r,
+                  std::size_t v) {
+  constexpr double reach_mm = 8, alike = 0.15;
+  const geometry::View& pose = *r.views[v];
+  const rectification::DistortionMap& map = detected.rectification.map;
+  for (std::size_t ball = 0; ball < r.centres.size(); ++ball) {
+    if (r.candidate_of[v][ball] >= 0) continue;
+    const Eigen::Vector2d raw = map.raw_from_rectified(pose.project(r.centres[ball]));
+    const double px_per_mm = std::abs(pose.intrinsics.fy) / pose.depth(r.centres[ball]);
+    const double radius_px = r.diameters_mm[ball] / 2 * px_per_mm;
+    double nearest = reach_mm * px_per_mm;
+    int which = -1;
+    for (std::size_t k = 0; k < prepared.dots.size(); ++k) {
+      const double distance = (prepared.dots[k].centre_px - raw).norm();
+      if (distance >= nearest || std::ranges::count(r.candidate_of[v], int(k)) > 0 ||
+          std::abs(std::log(prepared.view.candidates[k].radius_px / radius_px)) > alike)
+        continue;
+      nearest = distance;
+      which = int(k);
+    }
+    if (which < 0 || !map.shows(raw)) continue;
+    const Eigen::Vector2d there = prepared.dots[std::size_t(which)].centre_px;
+    const auto covers = [&](const detection::Dot& dot) {
+      return dot.centre_px != there && (dot.centre_px - raw).norm() < dot.radius_px;
+    };
+    if (std::ranges::none_of(detected.candidates.dots, covers) &&
+        std::ranges::none_of(detected.rectification.plate_dots, covers))
+      r.candidate_of[v][ball] = which;
+  }
 }
 
 using Observations = std::vector<std::vector<std::optional<Observed>>>;
@@ -117,10 +139,11 @@ void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& ba
                      std::vector<Warning>& warnings) {
   for (std::size_t v = 0; v < views.size(); ++v)
     if (!r.views[v])
-      warnings.push_back({Reason::too_few_fiducials,
-                          "the fiducials of this view agree with no other view: it is not used",
-                          views[v].view.name,
-                          {}});
+      warnings.push_back(
+          {Reason::too_few_fiducials,
+           "the fiducials of this view are inconsistent with every other view: the view is not used",
+           views[v].view.name,
+           {}});
   for (std::size_t ball = 0; nominal && ball < r.centres.size(); ++ball)
     if (std::ranges::find(balls, ball) == balls.end())
       warnings.push_back({Reason::not_seen,
@@ -163,6 +186,8 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
   auto r =
       from_scratch ? reconstruct_from_scratch(plain, kinds) : reconstruct_nominal(plain, given.calibrator);
   if (!r) return tl::unexpected<Failure>(r.error());
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (r->views[v]) follow_moved(detected[v], views[v], *r, v);
   auto observed = observe_twice(detected, views, *r, threads);
   if (!observed) return tl::unexpected<Failure>(observed.error());
 
@@ -175,7 +200,6 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
                 {{"views", double(used.size())}, {"needed", double(least_views)}});
   auto consistent = adjust_without_outliers(std::move(problem));
   if (!consistent) return tl::unexpected<Failure>(consistent.error());
-  if (auto handed = check_handedness(*r); !handed) return tl::unexpected<Failure>(handed.error());
 
   AdjustedViews found{*std::move(consistent), {}, {}, {}, {}, used, {}, {}};
   for (const std::size_t ball : balls) found.diameters_mm.push_back(r->diameters_mm[ball]);

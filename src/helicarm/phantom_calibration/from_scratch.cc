@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include <Eigen/Cholesky>
+#include <fmt/format.h>
 
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/phantom_calibration/correspondence.h"
@@ -28,6 +29,7 @@ constexpr int least_tracks = 6;
 constexpr double usual_focal_widths = 4.4;  // 1000 mm over a field of 230 mm
 constexpr double good_rms_px = 0.6;         // per axis, by uncorrected blob centres
 constexpr double largest_rms_px = 2;
+constexpr double reversal_ratio = 1.5;  // of the rms of a depth-reversed phantom to that of the best
 
 struct PlainView {
   std::vector<PlainCandidate> candidates;
@@ -95,14 +97,22 @@ std::vector<int> as_map(const PairHypothesis& h, std::size_t count) {
   return map;
 }
 
+/// Matches of two views, each made once.
+using PairMatches = std::map<std::pair<std::size_t, std::size_t>, std::vector<PairHypothesis>>;
+
 /// Exact and near duplicates of a hypothesis cost time only: those with most tracks first.
-std::vector<Triple> triples_of(const std::vector<PlainView>& views, const std::array<std::size_t, 3>& at) {
+std::vector<Triple> triples_of(const std::vector<PlainView>& views, const std::array<std::size_t, 3>& at,
+                               PairMatches& pairs) {
   const auto& a = views[at[0]].candidates;
   const auto& b = views[at[1]].candidates;
-  const auto& c = views[at[2]].candidates;
-  const auto ab = match_pair(a, b, most_pairs);
-  const auto bc = match_pair(b, c, most_pairs);
-  const auto ac = match_pair(a, c, most_pairs);
+  const auto matches = [&](std::size_t i, std::size_t j) -> const std::vector<PairHypothesis>& {
+    const auto [found, fresh] = pairs.try_emplace({i, j});
+    if (fresh) found->second = match_pair(views[i].candidates, views[j].candidates, most_pairs);
+    return found->second;
+  };
+  const auto& ab = matches(at[0], at[1]);
+  const auto& bc = matches(at[1], at[2]);
+  const auto& ac = matches(at[0], at[2]);
   std::vector<std::vector<int>> map_bc, map_ac;
   for (const auto& h : bc) map_bc.push_back(as_map(h, b.size()));
   for (const auto& h : ac) map_ac.push_back(as_map(h, a.size()));
@@ -227,9 +237,9 @@ Expected<Reconstruction> start_of(const std::vector<PhantomView>& given, const s
 std::optional<Reconstruction> best_start(const std::vector<PhantomView>& given,
                                          const std::vector<PlainView>& views,
                                          const std::array<std::size_t, 3>& at,
-                                         const std::vector<double>& diameters_mm) {
+                                         const std::vector<double>& diameters_mm, PairMatches& pairs) {
   std::optional<Reconstruction> best;
-  for (const Triple& t : triples_of(views, at)) {
+  for (const Triple& t : triples_of(views, at, pairs)) {
     if (best && best->centres.size() > t.tracks.size() + 1) break;
     std::vector<std::array<Vector2d, 3>> images;
     std::array<Vector2d, 3> means;
@@ -292,6 +302,17 @@ Reconstruction reversed(const Reconstruction& r) {
   return other;
 }
 
+Expected<void> check_handedness(const Reconstruction& r) {
+  if (!r.reversed_rms_px || *r.reversed_rms_px > reversal_ratio * r.rms_px) return {};
+  return fail(
+      Reason::ambiguous_handedness,
+      fmt::format(
+          "the phantom and its depth-reversed image fit almost alike ({:.3f} and {:.3f} px rms): take "
+          "views farther apart, or use a less flat phantom",
+          r.rms_px, *r.reversed_rms_px),
+      {{"rms_px", r.rms_px}, {"reversed_rms_px", *r.reversed_rms_px}});
+}
+
 }  // namespace
 
 Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>& given,
@@ -302,11 +323,11 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
   std::vector<PlainView> views;
   for (const PhantomView& view : given) {
     if (!view.labelling.mirrored) {
-      Failure failure{
-          Reason::ambiguous_handedness,
-          "a phantom and its mirror image in mirrored images look alike: state \"mirrored\" in the view",
-          view.name,
-          {}};
+      Failure failure{Reason::ambiguous_handedness,
+                      "the images do not distinguish a phantom from its mirror image in mirrored images: "
+                      "state \"mirrored\" in the view",
+                      view.name,
+                      {}};
       return tl::unexpected<Failure>(std::move(failure));
     }
     views.push_back(plain(view, diameters_mm));
@@ -319,8 +340,9 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
   std::ranges::stable_sort(order, {}, [](const auto& t) { return t[2] - t[0]; });
   constexpr std::size_t most_tries = 20;
   Reconstruction best;
+  PairMatches pairs;
   for (std::size_t i = 0; i < std::min(order.size(), most_tries); ++i) {
-    auto start = best_start(given, views, order[i], diameters_mm);
+    auto start = best_start(given, views, order[i], diameters_mm, pairs);
     if (!start) continue;
     if (!complete(*start, given)) continue;
     add_fiducials(*start, given, diameters_mm);
@@ -334,9 +356,10 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
     if (count_views(best) == given.size() && best.rms_px < good_rms_px) break;
   }
   if (count_views(best) < 3)
-    return fail(Reason::ambiguous_labels,
-                "no three views agree on six fiducials: take the views 10 to 30 degrees apart in a chain",
-                {{"views", double(count_views(best))}});
+    return fail(
+        Reason::ambiguous_labels,
+        "no three views agree on six fiducials: take further views, each 10 to 30 degrees from the next",
+        {{"views", double(count_views(best))}});
   Reconstruction other = reversed(best);
   if (readjust(other, given)) {
     best.reversed_rms_px = other.rms_px;
@@ -345,6 +368,7 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
       best = std::move(other);
     }
   }
+  if (auto handed = check_handedness(best); !handed) return tl::unexpected<Failure>(handed.error());
   return best;
 }
 

@@ -11,7 +11,8 @@ namespace helicarm::phantom_calibration {
 /// Finds corresponding candidates in views of an unknown phantom and its shape, in mm by the balls' diameters
 /// as seen. Three views first: pairs by affine epipolar geometry, tracks that close over the three, rotations
 /// by exhaustive search, adjustment in perspective from both depth-reversed starts; then the other views.
-/// Every view's `mirrored` must be known: `ambiguous_handedness`. `too_few_views`; `ambiguous_labels` where
+/// `ambiguous_handedness` where a view's `mirrored` is not known, or where the depth-reversed phantom fits
+/// almost as well. `too_few_views`; `ambiguous_labels` where
 /// no three views agree on six fiducials.
 Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>& views,
                                                   const std::vector<double>& diameters_mm);

@@ -45,6 +45,18 @@ double median_contrast(const std::vector<detection::Dot>& dots) {
   return contrasts[contrasts.size() / 2];
 }
 
+/// Whether the image of another fiducial touches that of this one: each would disturb the other's place.
+bool is_overlapped(std::size_t ball, const geometry::View& pose, const std::vector<Eigen::Vector3d>& centres,
+                   const std::vector<double>& diameters_mm) {
+  const auto radius_px = [&](std::size_t i) {
+    return diameters_mm[i] / 2 * std::abs(pose.intrinsics.fy) / pose.depth(centres[i]);
+  };
+  const Eigen::Vector2d uv = pose.project(centres[ball]);
+  for (std::size_t i = 0; i < centres.size(); ++i)
+    if (i != ball && (pose.project(centres[i]) - uv).norm() < radius_px(i) + radius_px(ball)) return true;
+  return false;
+}
+
 }  // namespace
 
 PreparedView prepared(const pipeline::DetectedView& detected, const std::vector<double>& diameters_mm,
@@ -100,7 +112,7 @@ std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detec
     const detection::DotAppearance appearance = detection::estimate_appearance(
         xray_image, detected.rectification.noise, labelled.empty() ? all : labelled);
     for (std::size_t ball = 0; ball < centres.size(); ++ball) {
-      if (diameters_mm[ball] != kind) continue;
+      if (diameters_mm[ball] != kind || is_overlapped(ball, pose, centres, diameters_mm)) continue;
       const Eigen::Vector2d predicted = pose.project(centres[ball]);
       const double depth = pose.depth(centres[ball]);
       const double px_per_mm = std::abs(pose.intrinsics.fy) / depth;

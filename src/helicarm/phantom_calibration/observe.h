@@ -29,7 +29,7 @@ struct Observed {
 };
 
 /// Fits every fiducial's image with the appearance of this image's balls: at its candidate, or where the pose
-/// puts it. Nothing for one that is not seen.
+/// puts it. Nothing for one that is not seen or overlaps another.
 std::vector<std::optional<Observed>> observe(const pipeline::DetectedView& detected,
                                              const PreparedView& prepared, const geometry::View& pose,
                                              const std::vector<Eigen::Vector3d>& centres,

@@ -268,6 +268,11 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
     result.failure = failure;
     return result;
   };
+  if (given.views.size() < least_views)
+    return refuse({Reason::too_few_views,
+                   "at least two views are required to verify a phantom",
+                   {},
+                   {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
   const auto detected = detected_views(given, threads);
   if (!detected) return refuse(detected.error());
   const auto found = adjusted_views(*detected, given, false, least_views, threads, result.warnings);

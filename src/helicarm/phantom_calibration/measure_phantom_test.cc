@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/measure_phantom.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "helicarm/phantom_calibration/gauge.h"
+#include "helicarm/phantom_calibration/simulated_phantom_test.h"
+
+namespace helicarm::phantom_calibration {
+namespace {
+
+using Eigen::Vector3d;
+
+const simulation::SimulatedCase& five_views() {
+  static const simulation::SimulatedCase simulated = simulated_phantom({0, 12, 24, 36, 48});
+  return simulated;
+}
+
+/// What the file would say of a glued phantom: all balls 0.2 mm off, P3 by 3 mm.
+void misplace(PhantomFolder& folder) {
+  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) {
+    const double turn = 2.4 * double(&ball - folder.given.calibrator.balls.data());
+    ball.centre_in_calibrator += 0.2 * Vector3d(std::cos(turn), std::sin(turn), std::cos(3 * turn));
+  }
+  folder.ball("P3").centre_in_calibrator += Vector3d(2, -1, 2);
+}
+
+double largest_error(const PhantomResult& result, const phantom::Calibrator& truth) {
+  std::vector<Vector3d> found, places;
+  for (std::size_t i = 0; i < truth.balls.size(); ++i) {
+    found.push_back(result.balls[i].centre);
+    places.push_back(truth.balls[i].centre_in_calibrator);
+  }
+  const auto fit = similarity_between(found, places, Eigen::VectorXd::Ones(Eigen::Index(found.size())), true);
+  double largest = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    largest = std::max(largest, (fit * found[i] - places[i]).norm());
+  return largest;
+}
+
+PhantomResult measured(const pipeline::Case& given, PhantomOptions options = {}) {
+  options.threads = 2;
+  const auto result = measure_phantom(given, options);
+  EXPECT_TRUE(result) << result.error().message;
+  return result.value_or(PhantomResult{});
+}
+
+TEST(MeasurePhantom, BallsThatTheFileMisplacesAreMeasured) {
+  PhantomFolder folder(five_views());
+  const phantom::Calibrator truth = folder.given.calibrator;
+  misplace(folder);
+  PhantomOptions options;
+  options.distances = {
+      {"P1", "P3", (truth.balls[0].centre_in_calibrator - truth.balls[2].centre_in_calibrator).norm()}};
+  const auto result = measured(folder.given, options);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  ASSERT_EQ(result.balls.size(), 12u);
+  EXPECT_LT(largest_error(result, truth), 0.2);  // a third of a pixel
+  EXPECT_NEAR(result.balls[2].from_nominal->norm(), 3, 0.5);
+  EXPECT_EQ(result.scale.source, "distances");
+}
+
+TEST(MeasurePhantom, FromScratchNothingButTheDiameterIsNeeded) {
+  PhantomFolder folder(five_views());
+  const phantom::Calibrator truth = folder.given.calibrator;
+  folder.given.calibrator = {};
+  folder.given.diameters_mm = {4};
+  for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
+  PhantomOptions options;
+  options.from_scratch = true;
+  const auto result = measured(folder.given, options);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  EXPECT_EQ(result.balls.size(), 12u);
+  EXPECT_EQ(result.balls.front().label, "B1");
+  EXPECT_EQ(result.warnings.back().reason, Reason::scale_weak);
+}
+
+TEST(MeasurePhantom, BallThatMovedBetweenTheViewsIsPhantomChanged) {
+  simulation::SimulatedCase simulated = five_views();
+  simulation::SimulatedView& last = simulated.views[4];
+  const auto ball = std::ranges::find(last.balls, "P4", &simulation::TruePoint::name);
+  ASSERT_EQ(ball->visibility, simulation::Visibility::clear);
+  // Its image 4 px (about 1.6 mm) to the right; the background is flat.
+  const auto u = int(ball->raw.x()), v = int(ball->raw.y());
+  for (int y = v - 12; y <= v + 12; ++y)
+    for (int x = u + 16; x >= u - 12; --x) last.pixels(x, y) = last.pixels(x - 4, y);
+  PhantomFolder folder(simulated);
+  const auto result = measured(folder.given);
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::phantom_changed);
+  EXPECT_EQ(result.failure->message.substr(0, 2), "P4") << result.failure->message;
+}
+
+TEST(MeasurePhantom, ViewsAFewDegreesApartAreTooClose) {
+  PhantomFolder folder(simulated_phantom({0, 3, 6}));
+  const auto result = measured(folder.given);
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::views_too_close) << result.failure->message;
+}
+
+TEST(MeasurePhantom, TwoViewsAreTooFew) {
+  PhantomFolder folder(five_views());
+  folder.given.views.resize(2);
+  EXPECT_EQ(measured(folder.given).failure->reason, Reason::too_few_views);
+}
+
+TEST(MeasurePhantom, UnknownLabelOfADistanceIsUnusableInput) {
+  PhantomFolder folder(five_views());
+  PhantomOptions options;
+  options.distances = {{"P1", "Q7", 80}};
+  const auto result = measure_phantom(folder.given, options);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::bad_value);
+}
+
+TEST(HandDistance, LabelsAndPixelsAreRead) {
+  const auto labels = hand_distance_from("P1,P7=83.42", false);
+  ASSERT_TRUE(labels) << labels.error().message;
+  EXPECT_EQ(std::get<std::string>(labels->b), "P7");
+  EXPECT_EQ(labels->mm, 83.42);
+  const auto pixels = hand_distance_from("174.5,373;812,366=110.3", true);
+  ASSERT_TRUE(pixels) << pixels.error().message;
+  EXPECT_EQ(std::get<Eigen::Vector2d>(pixels->a), Eigen::Vector2d(174.5, 373));
+}
+
+TEST(HandDistance, WrongOnesAreRefused) {
+  for (const char* text : {"P1,P7", "P1=83", "P1,P7,P8=83", "P1,P7=-3", "P1,P7=nan", "P1,P7=1e9", "P1,P7=8x"})
+    EXPECT_FALSE(hand_distance_from(text, false)) << text;
+  for (const char* text : {"P1,P7=83", "1,2;3=4", "1;2,3=4", "1,2;3,4="})
+    EXPECT_FALSE(hand_distance_from(text, true)) << text;
+}
+
+}  // namespace
+}  // namespace helicarm::phantom_calibration

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/phantom_calibration/verify_phantom.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/phantom_calibration/simulated_phantom_test.h"
+
+namespace helicarm::phantom_calibration {
+namespace {
+
+const simulation::SimulatedCase& three_views() {
+  static const simulation::SimulatedCase simulated = simulated_phantom({0, 30, 75});
+  return simulated;
+}
+
+std::vector<std::string> labels_of(const PhantomVerification& result, BallState state) {
+  std::vector<std::string> labels;
+  for (const VerifiedBall& ball : result.balls)
+    if (ball.state == state) labels.push_back(ball.label);
+  return labels;
+}
+
+TEST(VerifyPhantom, UnchangedPhantomPasses) {
+  PhantomFolder folder(three_views());
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(result->failure) << result->failure->message;
+  EXPECT_EQ(labels_of(*result, BallState::as_in_file).size(), 12u);
+  EXPECT_LT(result->within_mm, 0.1);
+}
+
+TEST(VerifyPhantom, BallHalfAMillimetreOffIsNamed) {
+  PhantomFolder folder(three_views());
+  folder.ball("P4").centre_in_calibrator += Eigen::Vector3d(0.3, -0.4, 0);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
+  EXPECT_EQ(labels_of(*result, BallState::moved), std::vector<std::string>{"P4"});
+  EXPECT_NEAR(*result->balls[3].distance_mm, 0.5, 0.1);
+}
+
+TEST(VerifyPhantom, TwoExchangedFiducialsAreBothNamed) {
+  PhantomFolder folder(three_views());
+  // What the phantom would show if P5 and P9 had been put back in each other's holes, 0.7 mm too deep.
+  folder.ball("P5").centre_in_calibrator += Eigen::Vector3d(0, 0, 0.7);
+  folder.ball("P9").centre_in_calibrator -= Eigen::Vector3d(0, 0, 0.7);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(labels_of(*result, BallState::moved), (std::vector<std::string>{"P5", "P9"}));
+}
+
+TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
+  PhantomFolder folder(three_views());
+  folder.ball("P8").diameter_mm = 6;
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
+  EXPECT_EQ(labels_of(*result, BallState::swapped), std::vector<std::string>{"P8"});
+}
+
+TEST(VerifyPhantom, LostBallIsNamed) {
+  PhantomFolder folder(simulated_phantom({0, 30, 75}, {"P8"}));
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch);
+  EXPECT_EQ(labels_of(*result, BallState::lost), std::vector<std::string>{"P8"});
+}
+
+TEST(VerifyPhantom, OneViewIsTooFew) {
+  PhantomFolder folder(three_views());
+  folder.given.views.resize(1);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::too_few_views) << result->failure->message;
+}
+
+TEST(VerifyPhantom, HistoryGrowsByOneEntryEachTime) {
+  const std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("helicarm_history_" + std::to_string(::getpid()) + ".json");
+  PhantomVerification verification;
+  verification.date = "2026-01-02";
+  verification.balls.push_back({"P1", 0.01, 0.03, BallState::as_in_file, 2});
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(add_to_history(path, verification));
+  const auto json = read_json(path);
+  ASSERT_TRUE(json) << json.error().message;
+  EXPECT_EQ((*json)["verifications"].size(), 2u);
+  std::filesystem::remove(path);
+}
+
+}  // namespace
+}  // namespace helicarm::phantom_calibration
