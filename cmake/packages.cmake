@@ -1,4 +1,4 @@
-# Debian packages by CPack: tools/packages.sh builds them, tools/check_packages.sh tries them in a bare system.
+# Debian packages by CPack: tools/packages.sh builds them, tools/check_packages.sh tests them on a minimal system.
 if(HELICARM_CLI)
   install(TARGETS helicarm RUNTIME COMPONENT cli)
   # From the program's own help, so that they cannot differ from it; tools/packages.sh builds this target.

@@ -35,7 +35,7 @@ def spread(values, digits):
 
 
 def efficiency(rows):
-    yield "| model | balls | error over bound | its worst place | DLT over bound | failures |"
+    yield "| model | balls | error over bound | position of the largest ratio | DLT over bound | failures |"
     yield "| --- | --- | --- | --- | --- | --- |"
     for model in dict.fromkeys(row["model"] for row in rows):
         for balls in (8, 12, 20):
@@ -82,8 +82,8 @@ def centres(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--groups", type=int, default=10000, help="trials of each setting of the limit study")
-    parser.add_argument("--balls", type=int, default=1000, help="balls of each situation of the centres study")
+    parser.add_argument("--groups", type=int, default=10000, help="number of trials per setting of the limit study")
+    parser.add_argument("--balls", type=int, default=1000, help="number of balls per situation of the centres study")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=["limit", "centres"])
     parser.add_argument("--helicarm", default=str(ROOT / "build/bin/helicarm"))

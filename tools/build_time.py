@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """CPU seconds (user + system) that a cold build takes, without ccache: tools/build_time.py [TARGET ...]
 
-Builds into build/cold, which it deletes first, and prints the dearest units. Elapsed time depends on what else runs;
-CPU seconds hardly do. TARGET: helicarm-first-demo (what ./run shows first), helicarm, all, ...
+Builds into build/cold, which it deletes first, and prints the slowest translation units. Elapsed time depends on what
+else runs; CPU seconds hardly do. TARGET: helicarm-first-demo (what ./run shows first), helicarm, all, ...
 """
 import os
 import pathlib

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Runs a command while N loops per core compute: tools/busy.sh N COMMAND ...
+# Runs a command under CPU load (N busy loops per core): tools/busy.sh N COMMAND ...
 set -euo pipefail
 
 [ $# -ge 2 ] || { echo "usage: tools/busy.sh N COMMAND ..." >&2; exit 2; }

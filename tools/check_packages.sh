@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs the packages in a bare Debian 12 system and runs them there: tools/check_packages.sh [FOLDER_OF_DEBS]
+# Installs the packages on a minimal Debian 12 system and runs them there: tools/check_packages.sh [FOLDER_OF_DEBS]
 # Needs root, and a Debian mirror (MIRROR=http://...).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -31,4 +31,4 @@ if [ -e "$root/usr/bin/helicarm-gui" ]; then
 fi
 inside apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends cmake g++ make >/dev/null
 inside sh -c 'cmake -S /example -B /tmp/example >/dev/null && cmake --build /tmp/example >/dev/null && /tmp/example/locate_point'
-echo "Packages work in a bare system." >&2
+echo "Packages work on a minimal system." >&2

@@ -32,6 +32,13 @@ REPLACED = {
     r"tells? apart|told apart": "distinguished by",
     r"drawn to": "shrunk to",
     r"by and by": "gradually",
+    r"beats?": "heartbeat",
+    r"the print": "the publication",
+    r"as printed": "as published",
+    r"printed recipe": "published recipe, paper method",
+    r"dearest": "slowest, most expensive",
+    r"lock-outs?": "whether other peers are served",
+    r"told to end": "stopped",
 }
 IN_SOURCES = {
     r"desk": "controller",
@@ -39,11 +46,9 @@ IN_SOURCES = {
     r"in vain": "timeout",
     r"misses (?:its|their|the)": "distance, residual",
     r"comes? out otherwise|came out otherwise": "differs on recomputation",
-    r"told to end": "stopped",
     r"virtual (?:operating )?rooms?": "virtual devices",
     r"false (?:blobs?|discs?)": "outliers",
     r"error bars?": "confidence region",
-    r"printed recipe": "paper method",
 }
 SUBWORDS = {
     "theatre": "scene",

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Many peers that are silent, only echo, or never read, over raw sockets, against `helicarm receive` and
+"""Many misbehaving peers (silent, echo only, never reading), over raw sockets, against `helicarm receive` and
 `helicarm virtual-or`.
 
     tools/drill_crowds.py [--program build/bin/helicarm] [--seconds 20] [--only NAME]

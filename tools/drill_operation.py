@@ -54,16 +54,16 @@ def drill_images(program, folder):
         devices.command("fault frozen on", "frozen on")
         time.sleep(POSE_WINDOW_S)
         devices.command("shoot AP", "shot AP")
-        devices.navigation.wait_for("(no|stale)_pose.*expose again")
+        devices.navigation.wait_for("(no|stale)_pose.*acquire this view again")
         devices.command("fault frozen off", "frozen off")
         time.sleep(POSE_WINDOW_S)
         devices.acquire("AP", "waiting for LAT")
         for fault, reason in (("same_picture", "views_too_close"), ("other_patient", "patient_mismatch")):
             devices.command(f"shoot LAT {fault}", "shot LAT")
-            check(f"{fault}: expose again", bool(devices.navigation.wait_for(f"{reason}.*expose again")))
+            check(f"{fault}: acquire again", bool(devices.navigation.wait_for(f"{reason}.*acquire this view again")))
         devices.command("shoot LAT held_back", "shot LAT")
-        check("image sent late while the leg moved: expose again",
-              bool(devices.navigation.wait_for("stale_pose.*later after its acquisition.*expose again")))
+        check("image sent late while the leg moved: acquire again",
+              bool(devices.navigation.wait_for("stale_pose.*later after its acquisition.*acquire this view again")))
         time.sleep(POSE_WINDOW_S)
         devices.acquire("LAT", "^measure: ")
         devices.navigation.end(signal.SIGKILL)
@@ -77,8 +77,8 @@ def drill_images(program, folder):
         devices.command("fault hide:femur on", "hide:femur on")
         time.sleep(POSE_WINDOW_S)
         devices.command("shoot AP", "shot AP")
-        check("femur hidden during the acquisition: expose again",
-              bool(devices.navigation.wait_for("no_pose: AP: the marker of the femur.*expose again")))
+        check("femur hidden during the acquisition: acquire again",
+              bool(devices.navigation.wait_for("no_pose: AP: the marker of the femur.*acquire this view again")))
 
 
 def drill_checks(program, folder):

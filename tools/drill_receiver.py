@@ -120,7 +120,7 @@ def drill_plain(program, folder, images):
         check("wrong called title is rejected", not echo(receiver.port, called="OTHER"))
         check("unknown calling title is rejected", not echo(receiver.port, "-aet", "STRANGER"))
         store(receiver.port, images[1], "--abort")
-        check("an abort is logged", receiver.logs("cut: ") and receiver.logs("aborted by the peer"))
+        check("an abort is logged", receiver.logs("interrupted: ") and receiver.logs("aborted by the peer"))
         check("accepts associations after an abort", echo(receiver.port))
         senders = [subprocess.Popen(["storescu", "-aec", "HELICARM", "127.0.0.1", receiver.port, image],
                                     stderr=subprocess.DEVNULL) for image in images[:20]]

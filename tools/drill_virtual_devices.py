@@ -143,7 +143,7 @@ class VirtualDevices:
         """Acquires until accepted: on a loaded machine tracker data may be late."""
         for _ in range(5):
             self.command(f"shoot {view}", f"shot {view}")
-            if "expose again" not in self.navigation.wait_for(f"expose again|{then}"):
+            if "acquire this view again" not in self.navigation.wait_for(f"acquire this view again|{then}"):
                 return
             time.sleep(POSE_WINDOW_S)
         raise TimeoutError(f"{view} was not accepted in 5 acquisitions")

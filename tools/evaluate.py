@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Runs `helicarm run` on every case of a folder that has a truth.json, and compares: labels, ball centres, FRE, TRE.
+"""Runs `helicarm run` on every case of a folder that has a truth.json, and compares labels, fiducial centres, FRE and TRE
+with it.
 
   tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm]
   tools/evaluate.py --simulate 4 --readme README.md     simulates cases first, and renews the README's tables
@@ -104,7 +105,7 @@ def simulate(helicarm, folder, count):
 
 def evaluate(helicarm, cases, method):
     """Rows of the cases, and their results by group."""
-    lines = ["| case | labels wrong | balls | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | in 95 % | ms |",
+    lines = ["| case | labels wrong | balls | fiducial centre px rms | FRE mm mean | TRE mm mean | TRE mm max | points | in 95 % | ms |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     groups = defaultdict(list)
     for case in cases:
@@ -143,7 +144,7 @@ def evaluate_grids(helicarm, grids):
                        f"{rectified['mean_px']:.3f} | {rectified['max_px']:.3f} |")
 
 
-GROUP_HEAD = ["| method | group | cases | labels wrong | ball centre px rms | FRE mm mean | TRE mm mean | TRE mm max | in 95 % ellipsoid |",
+GROUP_HEAD = ["| method | group | cases | labels wrong | fiducial centre px rms | FRE mm mean | TRE mm mean | TRE mm max | in 95 % ellipsoid |",
               "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
 
 

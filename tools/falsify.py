@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks on the inputs of simulated cases: what helicarm answers, the real error and the claimed one.
+"""Attacks on the inputs of simulated cases: the answer of helicarm, the actual error and the reported one.
 
   tools/falsify.py                          prints the table
   tools/falsify.py --doc docs/faults.md     and renews it between the marks of that document
   tools/falsify.py --cases FOLDER           also attacks every case of a folder that has a truth.json (printed only)
   tools/falsify.py --only motion            those whose name contains a word
 
-Each attack changes a copy of a case. The row shows, of the points that the attack changed, the one of largest real error,
-or without a warning of largest error against its claim (95 %). A warning counts only if the untouched case does not give
-it, and a point's own warning only for that point. A row is wrong (exit code 1) if an error exceeds its claim without a
-warning, unless the attack is marked "no data can show it" and the result carries the note that is named there.
-tools/falsify_labels.py, where it is present, adds the attacks on labels and phantoms."""
+Each attack changes a copy of a case. A row shows one of the points that the attack changed: that of the largest actual
+error if there is a warning, else that of the largest ratio of actual to reported error (95 %). A warning counts only if
+the untouched case does not give it, and a point's own warning only for that point. A row is wrong (exit code 1) if an
+error exceeds the reported one without a warning, unless the attack is marked "no data can show it" and the result
+carries the note that is named there. tools/falsify_labels.py, where it is present, adds the attacks on labels and
+phantoms."""
 import argparse
 import json
 import math
@@ -43,7 +44,7 @@ def rows_of(bench, folders, word):
 
 
 def label_rows(bench, word):
-    """Of tools/falsify_labels.py, where it is present: (attack, outcome, real error mm, claimed error mm)."""
+    """Of tools/falsify_labels.py, where it is present: (attack, outcome, actual error mm, reported error mm)."""
     try:
         import falsify_labels
     except ImportError:
@@ -56,7 +57,7 @@ def label_rows(bench, word):
 def table(rows):
     def number(value):
         return "-" if value is None or math.isnan(value) else f"{value:.3f}"
-    yield "| attack | case | outcome | real error mm | claimed mm (95 %) | |"
+    yield "| attack | case | outcome | actual error mm | reported mm (95 %) | |"
     yield "| --- | --- | --- | --- | --- | --- |"
     for r in rows:
         yield f"| {r.attack} | {r.case} | {r.outcome} | {number(r.error)} | {number(r.claim)} | {r.mark} |"
@@ -84,7 +85,7 @@ def main():
             print("", *table(more), sep="\n")
             rows += more
     wrong = [r for r in rows if r.wrong]
-    print(f"\n{len(rows)} rows, {len(wrong)} with an error beyond its claim and no warning", file=sys.stderr)
+    print(f"\n{len(rows)} rows, {len(wrong)} with an error beyond the reported one and no warning", file=sys.stderr)
     return 1 if wrong else 0
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks on the calibrator's file and on the labels: outcome, real error and claimed error of the worst point.
+"""Attacks on the calibrator's file and on the labels: outcome, actual error and reported error of the worst point.
 
   tools/falsify_labels.py [--cases FOLDER] [--repeat N]     the table of attacks on calibrators' files
   tools/falsify_labels.py --real MAKER --seeds 0-999        labels on real images: MAKER SEED OUT makes a case, whose
@@ -8,7 +8,7 @@
   tools/falsify_labels.py --printed 0.3 --repeat 100        phantoms whose balls scatter: refusals and coverage
 
 Without --cases, cases are simulated. A row is wrong if the real error exceeds the claim and nothing warns of it, unless
-no data can show it and a note says so. `rows(helicarm)` yields (attack, outcome, real error mm, claimed error mm)."""
+no data can show it and a note says so. `rows(helicarm)` yields (attack, outcome, actual error mm, reported error mm)."""
 import argparse
 import json
 import math
@@ -229,7 +229,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=Path, help="folder of cases with truth.json")
     parser.add_argument("--repeat", type=int, default=1)
-    parser.add_argument("--printed", type=float, metavar="MM", help="only: balls scattered by so much")
+    parser.add_argument("--printed", type=float, metavar="MM", help="only phantoms whose balls scatter with this standard deviation, mm")
     parser.add_argument("--undeclared", action="store_true", help="with --printed: the file states no tolerance")
     parser.add_argument("--real", type=Path, metavar="MAKER")
     parser.add_argument("--seeds", default="0-119")
@@ -245,7 +245,7 @@ def main():
             printed(options.helicarm, cases, work, options.printed, None if options.undeclared else options.printed,
                     options.repeat)
             return
-        print("| attack | outcome | real error mm | claimed mm (95 %) |", "| --- | --- | --- | --- |", sep="\n")
+        print("| attack | outcome | actual error mm | reported mm (95 %) |", "| --- | --- | --- | --- |", sep="\n")
         wrong = False
         for name, outcome, error, claim in rows_of(options.helicarm, cases, work, options.repeat):
             number = lambda x: "-" if math.isnan(x) else f"{x:.3f}"  # noqa: E731

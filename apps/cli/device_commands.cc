@@ -37,11 +37,12 @@ void add_receive(CLI::App& app, Action& action) {
           ->capture_default_str();
   auto* peer = command->add_option("--peer", a.receiver.negotiation.peers,
                                    "Title of a C-arm that may send; repeatable (default: any)");
-  auto* certificate = command->add_option("--tls-certificate", a.certificate,
-                                          "PEM: certificate; only TLS connections are accepted");
-  auto* key = command->add_option("--tls-key", a.key, "PEM: key of the certificate");
+  auto* certificate =
+      command->add_option("--tls-certificate", a.certificate,
+                          "PEM file of this receiver's certificate; only TLS connections are then accepted");
+  auto* key = command->add_option("--tls-key", a.key, "PEM file of the certificate's private key");
   auto* authorities = command->add_option("--tls-authorities", a.authorities,
-                                          "PEM: authorities that sign the C-arms' certificates");
+                                          "PEM file of the authorities that sign the C-arms' certificates");
   certificate->needs(key, authorities);
   key->needs(certificate);
   authorities->needs(certificate);
@@ -54,7 +55,7 @@ void add_receive(CLI::App& app, Action& action) {
 
 void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
   command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
-  command->add_option("--seconds", a.seconds, "End after this time; default: when interrupted")
+  command->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
   a.options.ask_for_tracking = true;
   command->add_flag("--ask,!--no-ask", a.options.ask_for_tracking,
@@ -80,12 +81,12 @@ void add_tracker(CLI::App& app, Action& action) {
   auto* replay = tracker->add_subcommand("replay", "Play a MetaImage sequence file as a tracker, repeatedly");
   auto& replayed = arguments_of(replay, action, tracker_replay_command);
   replay->add_option("FILE", replayed.file, "The file to play")->required();
-  add_port(replay, "--port", replayed.options.port, "Port to listen on; 0: any");
+  add_port(replay, "--port", replayed.options.port, "Port to listen on; 0: any free port");
   replay
       ->add_option("--address", replayed.options.address,
                    "Address to listen on; every host that reaches it may connect")
       ->capture_default_str();
-  replay->add_option("--seconds", replayed.seconds, "End after this time; default: when interrupted")
+  replay->add_option("--seconds", replayed.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
   replay->add_flag("--tdata", replayed.as_tracking, "Send TDATA on request instead of TRANSFORM to all");
 
@@ -105,7 +106,8 @@ void add_virtual_or(CLI::App& app, Action& action) {
   command->add_option("--plan", a.plan, "Write a plan for navigate, with simulated picks");
   command->add_flag("--check-points", a.check_points, "The plan requires a check point on each bone");
   add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
-  add_port(command, "--tracker-port", a.virtual_or.tracker_port, "OpenIGTLink; each port 0: any free one");
+  add_port(command, "--tracker-port", a.virtual_or.tracker_port,
+           "Port of the tracker (OpenIGTLink); 0: a free port, as for the ports below");
   add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
   add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
   add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");
@@ -123,7 +125,9 @@ void add_navigate(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, navigate_command);
   command->add_option("PLAN", a.plan, "plan.json (docs/formats.md)")->required();
   command->add_option("--out", a.out, "Folder of the session: images, cases, record")->capture_default_str();
-  command->add_option("--picks", a.picks, "JSON with \"picks\" as in case.json; awaited after the images");
+  command->add_option(
+      "--picks", a.picks,
+      "JSON file with \"picks\" as in case.json; it may be written after the images have arrived");
   command->add_option("--address", a.receiver.address, "Address to listen on for images")
       ->capture_default_str();
   constexpr auto& age = field_named<operation::OperationPlan>(operation::plan_fields, "plan_stale_s");
@@ -134,14 +138,15 @@ void add_navigate(CLI::App& app, Action& action) {
   add_fields(command, a.receiver, receiver::receiver_fields);
   command->add_option("--title", a.receiver.negotiation.title, "Application entity title of this receiver")
       ->capture_default_str();
-  command->add_flag("--yes", a.yes, "Confirm every order automatically; only where no person can be injured");
+  command->add_flag("--yes", a.yes,
+                    "Confirm every order automatically; use it only where no person can be injured");
 }
 
 void add_operate(CLI::App& app, Action& action) {
   auto* command = add_command(app, "operate", "Table 2's experiment with virtual devices, end to end",
                               "helicarm operate --cases 4 --out operate");
   auto& a = arguments_of(command, action, operate_command);
-  command->add_option("--cases", a.cases, "Pairs of bones, four points each")
+  command->add_option("--cases", a.cases, "Number of simulated pairs of bones, with four points each")
       ->check(within(1, 1000))
       ->capture_default_str();
   command->add_option("--out", a.out, "Folder for operate.csv, operate.json and the sessions")

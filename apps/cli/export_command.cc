@@ -31,9 +31,10 @@ CommandResult export_command(const ExportArguments& arguments, Console& console)
     const std::vector<report::Export> kinds = exports_named(arguments.as);
     const std::filesystem::path& folder = arguments.run.folder;
     if (std::filesystem::exists(folder / "result.json") && !std::filesystem::exists(folder / "case.json"))
-      throw BadInput(Reason::usage,
-                     fmt::format("{}: holds a result; give the case of this result, which is measured again",
-                                 folder.string()));
+      throw BadInput(
+          Reason::usage,
+          fmt::format("{}: holds a result; give the folder of the case instead, which is then measured again",
+                      folder.string()));
     const pipeline::Result result = value_or_throw(measure(arguments.run, console));
     const auto written = value_or_throw(report::write_exports(result, arguments.run.out, kinds));
     if (console.json) {

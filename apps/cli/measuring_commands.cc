@@ -59,11 +59,12 @@ void add_predict(CLI::App& app, Action& action) {
   command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
   command->add_option("--at", a.at,
                       "x,y,z in the calibrator's frame, mm; repeatable (default: the calibrator's centre)");
-  command->add_option("--sigma-px", a.sigma_px, "Noise of a pick, per axis")
+  command->add_option("--sigma-px", a.sigma_px, "Standard deviation of a picked point, per axis, px")
       ->check(within(0, 100))
       ->capture_default_str();
   add_motion(command, a.motion_sigma_mm);
-  command->add_option("--max-error", a.max_error_mm, "Limit of the decision, mm (95 %)")
+  command
+      ->add_option("--max-error", a.max_error_mm, "A point is accepted if its 95 % error is at most this, mm")
       ->check(within(1e-6, 1000))
       ->capture_default_str();
   command->add_option("--machine", a.history, "The C-arm's history (JSON), read only");

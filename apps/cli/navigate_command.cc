@@ -32,7 +32,8 @@ void check_plan(const operation::OperationPlan& plan, const NavigateArguments& a
   };
   if (!arguments.yes && !::isatty(STDIN_FILENO))
     throw BadInput(Reason::order_not_confirmed,
-                   "no terminal to confirm orders; --yes confirms all, only where no person can be injured");
+                   "there is no terminal to confirm orders at; --yes confirms all orders: use it only where "
+                   "no person can be injured");
   if (plan.tunnels.empty()) refuse(Reason::bad_value, "\"tunnels\" is empty");
   if (plan.calibrator != phantom::udcsc().name && !fs::exists(plan.calibrator))
     refuse(Reason::missing_file, fmt::format("\"calibrator\": {}: no such file", plan.calibrator));
@@ -104,7 +105,7 @@ void print_tour(const std::vector<robot::RobotOrder>& orders, Console& console) 
   if (console.quiet || orders.empty()) return;
   const geometry::RigidTransform home = orders.back().waypoints.back().base_from_tcp;  // where it stands now
   console.progress << fmt::format(
-      "hand-eye calibration: {} moves at {:g} mm/s about the tool's present pose\n", orders.size(),
+      "hand-eye calibration: {} moves at {:g} mm/s about the tool's current pose\n", orders.size(),
       orders.front().waypoints.back().speed_mm_s);
   for (std::size_t i = 0; i < orders.size(); ++i) {
     const geometry::RigidTransform there = orders[i].waypoints.back().base_from_tcp;
@@ -228,7 +229,8 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
       const auto taken = operation->take(view, image->arrival, image->time_s);
       if (!taken)
-        console.progress << fmt::format("{}: {}: {}; expose again\n", view, code(taken.error().reason),
+        console.progress << fmt::format("{}: {}: {}; acquire this view again\n", view,
+                                        tracker::code(taken.error().reason),
                                         without_control_characters(taken.error().message))
                          << std::flush;
     }

@@ -67,7 +67,7 @@ CommandResult predict_command(const PredictArguments& arguments, Console& consol
   return guarded([&] {
     if (2 * arguments.half_mm / arguments.step_mm + 1 > most_points_per_edge)
       throw BadInput(Reason::usage,
-                     fmt::format("--step: {:g} mm over +-{:g} mm is more than {:g} points an edge",
+                     fmt::format("--step: {:g} mm over +-{:g} mm gives more than {:g} points per edge",
                                  arguments.step_mm, arguments.half_mm, most_points_per_edge));
     std::vector<Eigen::Vector3d> places;
     for (const std::string& word : arguments.at) places.push_back(place_from(word));

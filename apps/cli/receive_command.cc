@@ -21,7 +21,7 @@ class ReceptionLog {
   receiver::ReceiverHooks hooks() {
     return {[this](const receiver::Arrival& arrival) { notify(arrival); },
             [this](const Failure& why) { notify("refused", why); },
-            [this](const Failure& why) { notify("cut", why); }};
+            [this](const Failure& why) { notify("interrupted", why); }};
   }
 
  private:
@@ -59,9 +59,9 @@ class ReceptionLog {
 void check_titles(const receiver::dicom::NegotiationOptions& options) {
   const auto check = [](const char* option, const std::string& title) {
     if (!receiver::dicom::is_title(title))
-      throw BadInput(Reason::usage,
-                     fmt::format("{}: \"{}\" is not a title: 1 to 16 printable characters, no backslash",
-                                 option, without_control_characters(title)));
+      throw BadInput(Reason::usage, fmt::format("{}: \"{}\" is not a valid title: it must have 1 to 16 "
+                                                "printable characters without a backslash",
+                                                option, without_control_characters(title)));
   };
   check("--title", options.title);
   for (const std::string& peer : options.peers) check("--peer", peer);
@@ -92,7 +92,7 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
         throw BadInput(Reason::missing_file,
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
       if (std::filesystem::equivalent(arguments.watch, arguments.out))
-        throw BadInput(Reason::usage, "--watch: is the folder of --out; give another folder");
+        throw BadInput(Reason::usage, "--watch and --out name the same folder; give another one");
       watched.emplace(arguments.watch, *inbox, tale.hooks(), receiver::WatchedFolder::usual_pause,
                       arguments.count);
     }

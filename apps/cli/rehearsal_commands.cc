@@ -50,10 +50,9 @@ void add_simulate(CLI::App& app, Action& action) {
   command->add_option("--response", a.response,
                       "Response of the grey values: linear or log (default: log with the knee, else linear)");
   command
-      ->add_option(
-          "--view", a.views,
-          "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 has the source below, "
-          "LAT:90,0 from the side (default: these two, approximately)")
+      ->add_option("--view", a.views,
+                   "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 has the source "
+                   "below the knee, LAT:90,0 beside it (default: these two, approximately)")
       ->allow_extra_args(false);
   command->add_option("--arm-seed", a.arm_seed, "Seed of the C-arm (default: the seed)")
       ->check(within(0, 1e19));
@@ -82,7 +81,7 @@ void add_drr(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, drr_command);
   command->add_option("VOLUME", a.volume, "MetaImage, NRRD, NIfTI-1, or a folder of DICOM CT slices")
       ->required();
-  command->add_option("--out", a.out, "PNG, 16 bits, from no attenuation (black) to the greatest (white)");
+  command->add_option("--out", a.out, "PNG, 16 bits: black = no attenuation, white = maximum");
   command->add_option("--raw", a.raw, "The line integrals as 32-bit floats, little endian, row by row");
   command->add_option("--size", a.size, "Pixels per side")->check(within(1, 8192))->capture_default_str();
   command->add_option("--pixel", a.pixel_mm, "Pixel on the detector, mm")
@@ -132,18 +131,22 @@ void add_study(CLI::App& app, Action& action) {
                    "limit: error over the Cramer-Rao bound, and coverage of the confidence regions\n"
                    "centres: errors of ball centres under wrong assumptions about the image")
       ->required();
-  command->add_option("--groups", a.groups, "Trials of each setting; centres: balls of each situation")
+  command
+      ->add_option("--groups", a.groups,
+                   "Number of trials per setting; centres: number of balls per situation")
       ->check(within(1, 1e6));
   command->add_option("--out", a.out, "Folder for NAME.csv, NAME.json and NAME.svg")->capture_default_str();
   command->add_flag("--resume", a.resume, "Continue an interrupted run that wrote to the same folder");
-  command->add_option("--balls", a.balls, "number: 6,7,8; uniformity, design: one number")
+  command
+      ->add_option("--balls", a.balls,
+                   "Number of balls; study number takes several, as 6,7,8, uniformity and design take one")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(6, 64));
   command
-      ->add_option(
-          "--sigma", a.sigmas,
-          "Reading of N(0, 2.34): std, var, mean_distance, rms_distance; number: several (default: all)")
+      ->add_option("--sigma", a.sigmas,
+                   "Interpretation of N(0, 2.34): std, var, mean_distance, rms_distance; study number takes "
+                   "several (default: all)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
@@ -173,10 +176,10 @@ void add_phantom(CLI::App& app, Action& action) {
   command
       ->add_option(
           "ACTION", a.action,
-          "show, check, export: a file\n"
+          "show, check, export: a calibrator or plate\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
           "30 degrees apart)\n"
-          "verify: whether the balls still lie as in the file, from a case of two views or more")
+          "verify: whether the balls are still at the file's positions, from a case of two views or more")
       ->transform(CLI::CheckedTransformer(
           std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
                                                {"check", PhantomAction::check},
@@ -188,8 +191,8 @@ void add_phantom(CLI::App& app, Action& action) {
       "NAME_OR_FILE", a.name_or_file,
       "Name of a built-in or a file (default: udcsc or plate48). measure, verify: the case's folder");
   command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
-  command->add_option("--stl", a.stl, "export: the printable body");
-  command->add_option("--svg", a.svg, "export: the drawing");
+  command->add_option("--stl", a.stl, "export: the body for 3D printing, as STL");
+  command->add_option("--svg", a.svg, "export: the drawing, as SVG");
   command->add_option("--file", a.file, "export: calibrator.json or plate.json");
   command->add_option("--out", a.out,
                       "measure: folder for calibrator.json, result.json and report.html; verify: for "
@@ -201,14 +204,15 @@ void add_phantom(CLI::App& app, Action& action) {
       ->add_option(
           "--distance", a.distances,
           "measure: distance of two balls by caliper, A,B=MM with labels; from scratch u1,v1;u2,v2=MM with "
-          "raw pixels in the first view; repeatable. Without it the scale is good to 3 % only")
+          "raw pixels in the first view; repeatable. Without it the scale has a sigma of 3 %")
       ->allow_extra_args(false);
   command
-      ->add_option("--distance-sigma", a.distance_sigma_mm, "measure: of each distance, mm (default: 0.05)")
+      ->add_option("--distance-sigma", a.distance_sigma_mm,
+                   "measure: standard error of each distance, mm (default: 0.05)")
       ->check(within(1e-4, 10));
   command
       ->add_option("--distance-is", a.distance_is,
-                   "measure: between the balls' centres, or outer, over both balls")
+                   "measure: centres (centre to centre) or outer (outside dimension across both balls)")
       ->capture_default_str();
   command->add_option("--history", a.history, "verify: JSON file to which this verification is added");
 }

@@ -45,7 +45,7 @@ calibration::ViewFiducials view_points(const std::string& name, const Doubles& x
   if (pixels.size() != n || (labels && labels->size() != n) ||
       (sigma_px.ndim() != 0 && std::size_t(sigma_px.size()) != n))
     raise({Reason::bad_value,
-           fmt::format("view {}: xyz_mm, uv, sigma_px and labels are not of one length", name),
+           fmt::format("view {}: xyz_mm, uv, sigma_px and labels differ in length", name),
            {},
            {}});
   calibration::ViewFiducials view{name, {}, prior, {}, {}};
@@ -107,7 +107,8 @@ py::array projected(const HeldCalibration& calibration, const Doubles& xyz_mm, c
 localization::PointObservation observation_from(const HeldCalibration& calibration, const ViewKey& key,
                                                 const Doubles& uv, std::optional<double> sigma_px, bool raw) {
   const auto pixels = rows_of<2>(uv, "observations");
-  if (pixels.size() != 1) raise({Reason::bad_value, "observations: is not one (u, v) for each view", {}, {}});
+  if (pixels.size() != 1)
+    raise({Reason::bad_value, "observations: must hold one (u, v) for each view", {}, {}});
   if (sigma_px && !(*sigma_px >= 0)) raise({Reason::bad_value, "sigma_px: is negative", {}, {}});
   const std::size_t view = index_of(calibration, key);
   const auto& map = calibration.maps[view];
@@ -254,7 +255,7 @@ void add_points(py::module_& module) {
           [](const localization::LocatedPoint& p) {
             return localization::length_at_95(p.covariance_in_anchor);
           },
-          "95 % of the errors with this covariance are no longer, mm.")
+          "Length that 95 % of the errors with this covariance do not exceed, mm.")
       .def_property_readonly("predicted_rms_mm", &localization::LocatedPoint::predicted_rms_mm,
                              "Root of the covariance's trace, mm.")
       .def_readonly("ray_gap_mm", &localization::LocatedPoint::ray_gap_mm,

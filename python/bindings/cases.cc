@@ -113,7 +113,8 @@ void add_points(py::module_& module) {
   const auto of_place = [](auto get) {
     return [get](const Point& p) -> py::object { return p.place ? get(*p.place) : py::none(); };
   };
-  py::class_<Point>(module, "ResultPoint", "A pick or check target of a case: its place, or why it has none.")
+  py::class_<Point>(module, "ResultPoint",
+                    "A pick or check target of a case: its position, or why it was not located.")
       .def_readonly("name", &Point::name)
       .def_property_readonly(
           "source",
@@ -127,10 +128,11 @@ void add_points(py::module_& module) {
                                return matrix_array(g.covariance_in_calibrator);
                              }),
                              "(3, 3) mm^2, or None.")
-      .def_property_readonly("error_95_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
-                               return py::float_(localization::length_at_95(g.covariance_in_calibrator));
-                             }),
-                             "95 % of the errors with this covariance are no longer, mm; or None.")
+      .def_property_readonly(
+          "error_95_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
+            return py::float_(localization::length_at_95(g.covariance_in_calibrator));
+          }),
+          "Length that 95 % of the errors with this covariance do not exceed, mm; or None.")
       .def_property_readonly("in_femur_mm", of_place([](const guidance::PointInFrames& g) {
                                return vector_array<3>(g.in_femur);
                              }),

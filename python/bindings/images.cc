@@ -24,11 +24,10 @@ std::pair<float, float> range_of(const py::array& pixels,
            {}});
   const char kind = pixels.dtype().kind();
   if (kind == 'u' && pixels.itemsize() <= 2) return {0.f, pixels.itemsize() == 1 ? 255.f : 65535.f};
-  raise(
-      {Reason::bad_value,
-       "range: is needed for pixels that are neither uint8 nor uint16: the least and the greatest grey value",
-       {},
-       {}});
+  raise({Reason::bad_value,
+         "range: (least, greatest) grey value, is required for pixels that are neither uint8 nor uint16",
+         {},
+         {}});
 }
 
 std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
@@ -120,7 +119,7 @@ Raises InputError: bad_size, bad_value, not_finite.)")
           "Least and greatest grey value that the file could have stored.")
       .def_property_readonly(
           "pixel_mm", [](const xray::XrayImage& i) { return vector_array<2>(i.acquisition.pixel_mm); },
-          "(column, row) spacing on the detector, mm; None where the file does not say.")
+          "(column, row) spacing on the detector, mm; None where the file does not state it.")
       .def_property_readonly(
           "source_detector_mm", [](const xray::XrayImage& i) { return i.acquisition.source_detector_mm; },
           "mm, or None.")

@@ -35,10 +35,10 @@ void save(const T& thing, const std::filesystem::path& path) {
 }  // namespace
 
 void add_phantom(py::module_& module) {
-  py::class_<phantom::Calibrator>(module, "Calibrator",
-                                  "The phantom: balls of known place, and check targets (calibrator.json).")
-      .def_static("udcsc", &phantom::udcsc,
-                  "The built-in one: twelve 4 mm balls on the conical helix of Eq. 9.")
+  py::class_<phantom::Calibrator>(
+      module, "Calibrator", "The phantom: balls at known positions, and check targets (calibrator.json).")
+      .def_static("udcsc", &udcsc,
+                  "The built-in calibrator: twelve 4 mm balls on the conical helix of Eq. 9.")
       .def_static(
           "load",
           [](const std::filesystem::path& path) { return value_or_raise(phantom::read_calibrator(path)); },
@@ -59,7 +59,7 @@ void add_phantom(py::module_& module) {
       .def_property_readonly("xyz_mm", &centres, "(N, 3) centres of the balls, calibrator frame, mm.")
       .def_property_readonly("diameters_mm", &diameters, "(N,)")
       .def_readonly("tolerance_mm", &phantom::Calibrator::tolerance_mm,
-                    "Of the places: standard deviation per axis, mm.")
+                    "Standard deviation of the balls' positions per axis, mm.")
       .def_readonly("scale_sigma", &phantom::Calibrator::scale_sigma,
                     "Relative standard deviation of all lengths; 0: not stated.")
       .def_property_readonly(
@@ -74,7 +74,7 @@ void add_phantom(py::module_& module) {
   py::class_<phantom::Plate>(module, "Plate",
                              "The rectification plate in front of the receiver (plate.json).")
       .def_static("plate48", &phantom::plate48,
-                  "The built-in one: 7 x 7 balls of 2.5 mm at 25 mm, without the centre.")
+                  "The built-in plate: 7 x 7 balls of 2.5 mm at 25 mm pitch, without the central one.")
       .def_static(
           "load", [](const std::filesystem::path& path) { return value_or_raise(phantom::read_plate(path)); },
           py::arg("path"), "Reads plate.json. Raises InputError.")

@@ -86,7 +86,7 @@ the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-l
             return rectification::identity_map(width, height, pixel_mm);
           },
           py::arg("width"), py::arg("height"), py::arg("pixel_mm") = py::none(),
-          "Of a flat panel: no distortion. pixel_mm: detector pixel, mm, or None.")
+          "The map of a flat panel, without distortion. pixel_mm: detector pixel, mm, or None.")
       .def_static("load", &loaded, py::arg("path"), "Reads map.json. Raises InputError.")
       .def_static(
           "from_dict",
@@ -119,7 +119,9 @@ Raises InputError: bad_value for another shape, not_finite.)")
           [](const rectification::DistortionMap& map, const Doubles& uv) {
             return carried(map, uv, rectification::raw_in_image);
           },
-          py::arg("uv"), "The inverse: (N, 2) or (2,) rectified pixels to raw ones. As rectified_from_raw.")
+          py::arg("uv"),
+          "(N, 2) or (2,) rectified pixels to raw pixels: the inverse of rectified_from_raw, with the same "
+          "shapes, NaN and errors.")
       .def("rectify_image", &rectified_pixels, py::arg("image"),
            R"(An XrayImage resampled to rectified pixels (Eq. 3): (height, width) float32, same size.
 
@@ -128,7 +130,8 @@ Raises InputError: bad_size where the map is for another image size.)")
       .def("sigma_px", &sigmas, py::arg("uv"),
            "(N,) standard deviation per axis of the map itself at rectified pixels.")
       .def_readonly("model", &rectification::DistortionMap::model)
-      .def_readonly("order", &rectification::DistortionMap::order, "Of the polynomial; 0: the identity.")
+      .def_readonly("order", &rectification::DistortionMap::order,
+                    "Order of the polynomial; 0: the identity.")
       .def_readonly("residual_rms_px", &rectification::DistortionMap::residual_rms_px)
       .def_readonly("residual_max_px", &rectification::DistortionMap::residual_max_px)
       .def_readonly("held_out_rms_px", &rectification::DistortionMap::held_out_rms_px)
@@ -139,14 +142,15 @@ Raises InputError: bad_size where the map is for another image size.)")
             if (!map.rectified_plane) return std::nullopt;
             return map.rectified_plane == rectification::RectifiedPlane::detector ? "detector" : "plate";
           },
-          "\"detector\", \"plate\" or None: where rectified_pixel_mm holds.")
+          "Plane of rectified_pixel_mm: \"detector\", \"plate\" or None.")
       .def_property_readonly(
           "shape", [](const rectification::DistortionMap& map) { return std::pair(map.height, map.width); },
           "(height, width) of the image it belongs to.")
       .def("__repr__", [](const rectification::DistortionMap& map) {
         return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model, map.width, map.height);
       });
-  py::class_<rectification::Rectification>(module, "Rectification", "What one image of the plate gives.")
+  py::class_<rectification::Rectification>(
+      module, "Rectification", "The distortion map and its residuals, from one image of the plate.")
       .def_readonly("map", &rectification::Rectification::map, "DistortionMap")
       .def_property_readonly("uv_raw", &dots, "(N, 2) plate dots used, raw pixels.")
       .def_property_readonly(
@@ -154,7 +158,7 @@ Raises InputError: bad_size where the map is for another image size.)")
           [](const rectification::Rectification& r) {
             return py::array_t<double>(py::ssize_t(r.residual_px.size()), r.residual_px.data());
           },
-          "(N,) distance of each from the map.")
+          "(N,) residual of each plate dot to the fitted map, raw pixels.")
       .def_readonly("dots_found", &rectification::Rectification::dots_found)
       .def_readonly("dots_expected", &rectification::Rectification::dots_expected,
                     "None for an unbounded lattice.")

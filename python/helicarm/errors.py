@@ -27,4 +27,4 @@ class InputError(HelicarmError):
 
 
 class RefusedError(HelicarmError):
-    """The data do not allow a trustworthy answer (exit code 3 of the program)."""
+    """The data do not support a reliable result (exit code 3 of the program)."""

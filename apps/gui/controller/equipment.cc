@@ -98,8 +98,8 @@ Expected<pipeline::Case> case_of_images(const std::vector<std::filesystem::path>
   }
   if (given.views.size() < 2)
     return fail(Reason::usage,
-                "at least two views are required to locate a point: drop two or more images at once, or a "
-                "case folder");
+                "at least two views are required to locate a point: drag two or more images together, or a "
+                "case folder, into the window");
   return given;
 }
 

@@ -72,7 +72,7 @@ StatusIndicator robot_indicator(const robot::RobotLinkStatus& status) {
 
 StatusIndicator c_arm_indicator(const operation::CArmStatus& status, double now_s) {
   StatusIndicator indicator{tr("C-arm"), Light::off, tr("no image yet"),
-                            tr("it connects when it has an image")};
+                            tr("the C-arm connects when it has an image to send")};
   if (status.last_image_s)
     indicator = {indicator.name, Light::green, tr("%1 ago").arg(age_text(now_s - *status.last_image_s)), {}};
   if (status.broke_off) {

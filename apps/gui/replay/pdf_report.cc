@@ -59,7 +59,7 @@ void draw_summary(const pipeline::Result& result, PdfLayout& layout) {
   layout.cards(cards);
   if (!result.warnings.empty()) layout.heading(Words::tr("Warnings"));
   for (const Warning& warning : result.warnings) layout.paragraph("• " + message_of(warning));
-  if (!result.notes.empty()) layout.heading(Words::tr("Notes: what these data cannot show"));
+  if (!result.notes.empty()) layout.heading(Words::tr("Notes: limitations of these data"));
   for (const Warning& note : result.notes) layout.paragraph("• " + message_of(note));
 }
 
@@ -171,8 +171,8 @@ void draw_rectification(const pipeline::Result& result, PdfLayout& layout) {
                     fixed(of.raw_max_px, 2)});
     if (const std::string figure = report::distortion_figure(view); !figure.empty())
       figures.push_back(
-          {print_svg(figure, true),
-           Words::tr("Distortion in %1: from the rectified to the raw position").arg(text_of(view.name))});
+          {print_svg(figure, true), Words::tr("Distortion in %1: displacement from rectified to raw position")
+                                        .arg(text_of(view.name))});
   }
   if (rows.empty()) return;
   layout.heading(Words::tr("Rectification"));

@@ -211,9 +211,10 @@ void MainWindow::show_images() {
     if (has && shown_->views[i].xray_image)
       xrays_[i]->show_view(shown_, i);
     else
-      xrays_[i]->clear(state.source == Source::none ? tr("Drop a case folder or X-ray images here")
-                       : has                        ? tr("%1: no image yet").arg(text(shown_->views[i].name))
-                                                    : tr("No second view"));
+      xrays_[i]->clear(state.source == Source::none
+                           ? tr("Drag two or more X-ray images, or a case folder, into the window")
+                       : has ? tr("%1: no image yet").arg(text(shown_->views[i].name))
+                             : tr("No second view"));
   }
   if (std::exchange(shown_bones_, state.bones) != state.bones)
     scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);

@@ -105,9 +105,10 @@ void AcquirePage::show_state(const ApplicationState& state) {
 }
 
 RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
-    : Page(tr("Corrects the intensifier's distortion by the plate's dots. Check that the residuals are "
-              "small."),
-           controller, parent) {
+    : Page(
+          tr("Corrects the intensifier's distortion from the dots of the plate. Check that the residuals are "
+             "small."),
+          controller, parent) {
   auto* row = new QHBoxLayout;
   auto* group = new QButtonGroup(this);
   for (const auto& [layer, words, name] : {std::tuple(Layer::raw, tr("Raw"), "layerRaw"),

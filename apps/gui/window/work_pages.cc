@@ -117,7 +117,9 @@ void PlanPage::tell_next() {
         tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_)));
   const auto wanted = next_pick(state);
   if (!wanted)
-    return next_->setText(tr("All ends are placed. To move one, select it in the table and click."));
+    return next_->setText(
+        tr("All ends are placed. To move one, select it in the table and click its new position in both "
+           "X-ray images."));
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
       const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);
@@ -140,9 +142,9 @@ NavigatePage::NavigatePage(Controller& controller, QWidget* parent)
   says_->setObjectName("robotSays");
   says_->setWordWrap(true);
   layout()->addWidget(says_);
-  unlock_ = add_hold(tr("1  &Unlock the robot: no person is near it"), "unlock",
+  unlock_ = add_hold(tr("1  &Unlock the robot (only when no person is near it)"), "unlock",
                      [this] { controller_.unlock("the person at the screen"); });
-  register_ = add_hold(tr("2  &Register the robot: about twelve small moves about its tip"), "register",
+  register_ = add_hold(tr("2  &Register the robot (about twelve small moves)"), "register",
                        [this] { controller_.register_robot(); });
   tour_ = new QLabel;
   tour_->setWordWrap(true);
@@ -192,24 +194,25 @@ QString NavigatePage::next_step() const {
     case robot::LinkPhase::disconnected:
       return why + tr("Check the robot's power and cable; the connection is retried.");
     case robot::LinkPhase::idle:
-      return tr("The robot is locked. Hold 1 when no person is near it.");
+      return tr("The robot is locked. Hold button 1 when no person is near it.");
     case robot::LinkPhase::stopped:
-      return why + tr("It stays stopped until you have checked it and hold 1.");
+      return why + tr("The robot stays stopped until you have checked it and hold button 1.");
     case robot::LinkPhase::starting:
     case robot::LinkPhase::moving:
       return tr("The robot moves.");
     case robot::LinkPhase::ready:
       break;
   }
-  if (state.tool_is_out) return tr("The tool is at a tunnel: withdraw it (5) first.");
-  if (state.order) return tr("Inspect the path in both X-ray images, then hold 4.");
+  if (state.tool_is_out) return tr("The tool is at a tunnel: hold button 5 to withdraw it first.");
+  if (state.order) return tr("Inspect the path in both X-ray images, then hold button 4.");
   if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
-  if (!state.hand_eye_rms_mm) return tr("Hold 2 to register the robot.");
+  if (!state.hand_eye_rms_mm) return tr("Hold button 2 to register the robot.");
   if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
   if (const auto refusal = state.refusals.find(Phase::navigate);
       refusal != state.refusals.end() && refusal->second.reason == Reason::plan_stale)
-    return sentence_of(refusal->second) + tr(". The robot does not move along this path.");
-  return tr("Select a tunnel and plan the path (3).");
+    return sentence_of(refusal->second) +
+           tr(". The robot will not be moved along this path: plan it again with button 3.");
+  return tr("Select a tunnel and plan its path with button 3.");
 }
 
 void NavigatePage::allow() {
@@ -226,11 +229,11 @@ void NavigatePage::allow() {
 }
 
 VerifyPage::VerifyPage(Controller& controller, QWidget* parent)
-    : Page(
-          tr("Distance (mm) of each end from the tool's axis by tracker and X-ray images, with the predicted "
-             "value; then in the X-ray images only: Eq. 17 in px and mm, and in space."),
-          controller, parent) {
-  table_ = add_table({tr("Tunnel, end"), tr("Off"), tr("Expect"), tr("px"), tr("mm"), tr("Space")},
+    : Page(tr("Error: distance of each tunnel end from the tool's axis by tracker and X-ray images, mm, with "
+              "its predicted value. From the X-ray images alone: Eq. 17 in px and mm, and the distance in "
+              "space, mm."),
+           controller, parent) {
+  table_ = add_table({tr("Tunnel, end"), tr("Error"), tr("Predicted"), tr("px"), tr("mm"), tr("Space")},
                      "outcomeTable");
   add_button(tr("&Export report, CSV, JSON and other formats..."), "export",
              [this] { emit report_wanted(); });

@@ -39,8 +39,8 @@ Expected<double> dlt_condition(std::span<const PointPair> points);
 /// Least-squares solution of Eq. 7, unweighted and unchecked: at least 6 points in general position.
 DltFactors solve_dlt(std::span<const PointPair> points);
 
-/// Eq. 7 as printed. Refuses as `dlt_condition`; also `point_at_infinity` where t_z = 0 makes Eq. 7 singular,
-/// and `behind_source` where no source position has all points in front of it.
+/// Eq. 7 as published. Refuses as `dlt_condition`; also `point_at_infinity` where t_z = 0 makes Eq. 7
+/// singular, and `behind_source` where no source position has all points in front of it.
 Expected<DltResult> dlt_least_squares(std::span<const PointPair> points);
 
 /// Normalised homogeneous form (Hartley 1997), not singular at t_z = 0.

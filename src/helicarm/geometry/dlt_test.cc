@@ -39,7 +39,7 @@ std::vector<PointPair> pictured(const View& view, const std::vector<Eigen::Vecto
   return pairs;
 }
 
-/// Reference: the normal equations as printed, in extended precision.
+/// Reference: the normal equations as published, in extended precision.
 DltFactors normal_equations(const std::vector<PointPair>& pairs) {
   using Wide = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   const Eigen::Index n = Eigen::Index(pairs.size());

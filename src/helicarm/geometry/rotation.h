@@ -19,7 +19,7 @@ struct EulerAngles {
   bool gimbal_locked = false;
 };
 
-/// Eq. 5 with r13 = -CaSbCg + SaSg; as printed (SbSg) the matrix is not a rotation.
+/// Eq. 5 with r13 = -CaSbCg + SaSg; as published (SbSg) the matrix is not a rotation.
 Eigen::Matrix3d rotation_from_euler(double alpha, double beta, double gamma);
 
 /// Inverse of `rotation_from_euler`, beta in [-90, 90] degrees.

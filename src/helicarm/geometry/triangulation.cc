@@ -93,7 +93,8 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   const double angle_deg = degrees(widest_angle(ray_observations));
   if (!(angle_deg >= least_angle_deg))
     return fail(Reason::parallel_rays,
-                fmt::format("the rays are {:.3g} degrees apart, limit {:g}", angle_deg, least_angle_deg),
+                fmt::format("the rays are {:.3g} degrees apart, at least {:g} are required", angle_deg,
+                            least_angle_deg),
                 {{"angle_deg", angle_deg}});
   std::vector<Projection> projections;
   std::vector<Eigen::Vector2d> pixels;

@@ -21,11 +21,12 @@ inline constexpr std::array<Field<OperationPlan>, 13> plan_fields{
          .unit = "mm",
          .range = {0.3, 10},
          .help = "The robot does not start, or stops, after a larger motion of bone, robot base or tool"}),
-    bound<&OperationPlan::limits, &PlanLimits::turn_deg>({.name = "plan_stale_deg",
-                                                          .label = "Rotation since planning",
-                                                          .unit = "deg",
-                                                          .range = {0.3, 10},
-                                                          .help = "As above, for the rotation"}),
+    bound<&OperationPlan::limits, &PlanLimits::turn_deg>(
+        {.name = "plan_stale_deg",
+         .label = "Rotation since planning",
+         .unit = "deg",
+         .range = {0.3, 10},
+         .help = "The robot does not start, or stops, after a larger rotation of bone, robot base or tool"}),
     bound<&OperationPlan::limits, &PlanLimits::age_s>(
         {.name = "plan_stale_s",
          .label = "Age of a plan",

@@ -68,9 +68,9 @@ std::vector<Eigen::Vector3d> directions_from(JsonReader& reader, std::size_t cou
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d direction = vector3(values, 3 * i);
     if (std::abs(direction.norm() - 1) > 1e-3)
-      reader.refuse(
-          Reason::bad_value, "directions",
-          fmt::format("length {} of direction {}, must be 1 within 0.001", direction.norm(), i + 1));
+      reader.refuse(Reason::bad_value, "directions",
+                    fmt::format("direction {1} has length {0}, must be a unit vector (1 within 0.001)",
+                                direction.norm(), i + 1));
     directions.push_back(direction.normalized());
   }
   return directions;
@@ -109,8 +109,8 @@ void check_names(const Calibrator& calibrator, const std::string& origin) {
 
 void check_places(const std::vector<CalibratorBall>& balls, const std::string& origin) {
   if (balls.size() < least_balls)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("{}: \"balls\": {} balls, at least {}", origin, balls.size(), least_balls));
+    throw BadInput(Reason::bad_value, fmt::format("{}: \"balls\": {} balls, at least {} are required", origin,
+                                                  balls.size(), least_balls));
   Eigen::Matrix3Xd centres(3, balls.size());
   for (std::size_t i = 0; i < balls.size(); ++i) {
     centres.col(static_cast<Eigen::Index>(i)) = balls[i].centre_in_calibrator;
@@ -121,19 +121,23 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
   }
   const double extent = (centres.rowwise().maxCoeff() - centres.rowwise().minCoeff()).maxCoeff();
   if (extent < least_extent_mm)
-    throw BadInput(Reason::bad_value,
-                   fmt::format("{}: \"balls\": all within {} mm, at least {} mm; check the unit (metres?)",
-                               origin, extent, least_extent_mm));
+    throw BadInput(
+        Reason::bad_value,
+        fmt::format(
+            "{}: \"balls\": they extend over {} mm, at least {} mm are required; check the unit (metres?)",
+            origin, extent, least_extent_mm));
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose() /
                                                             double(balls.size()));
   const Eigen::Vector3d sizes = axes.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
   if (sizes[2] < least_flatness * sizes[0])
-    throw BadInput({Reason::coplanar_fiducials,
-                    fmt::format("{}: the balls lie within {:.3g} mm rms of one plane, at least {:.3g} mm",
-                                origin, sizes[2], least_flatness * sizes[0]),
-                    {},
-                    {{"plane_rms_mm", sizes[2]}, {"limit_mm", least_flatness * sizes[0]}}});
+    throw BadInput(
+        {Reason::coplanar_fiducials,
+         fmt::format(
+             "{}: the balls' distance from one plane is {:.3g} mm rms, at least {:.3g} mm are required",
+             origin, sizes[2], least_flatness * sizes[0]),
+         {},
+         {{"plane_rms_mm", sizes[2]}, {"limit_mm", least_flatness * sizes[0]}}});
 }
 
 Json numbers(const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); }

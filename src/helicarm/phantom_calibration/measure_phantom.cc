@@ -64,9 +64,9 @@ Expected<void> check_unmoved(const AdjustedViews& found) {
     views += (views.empty() ? "" : ", ") + found.consistent.problem.views[v].name;
   return fail(
       Reason::phantom_changed,
-      fmt::format("{} lies {:.2g} mm elsewhere in {}: it moved between the views; fix it and take all "
-                  "images again",
-                  found.labels[moved->fiducial], moved->moved_mm, views),
+      fmt::format(
+          "{} is displaced by {:.2g} mm in {}: it moved between the views; fix it and take all images again",
+          found.labels[moved->fiducial], moved->moved_mm, views),
       {{"moved_mm", moved->moved_mm}, {"views", double(moved->views.size())}});
 }
 
@@ -96,7 +96,8 @@ Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedVie
   if (const auto* label = std::get_if<std::string>(&name)) {
     const auto at = std::ranges::find(found.labels, *label);
     if (at != found.labels.end()) return std::size_t(at - found.labels.begin());
-    return fail(Reason::bad_value, fmt::format("--distance: \"{}\" is no measured ball", *label));
+    return fail(Reason::bad_value,
+                fmt::format("--distance: \"{}\" is not one of the measured balls", *label));
   }
   constexpr double reach_px = 20;
   const auto& place = std::get<Eigen::Vector2d>(name);
@@ -127,7 +128,7 @@ Expected<std::vector<CentreDistance>> distances_of(const AdjustedViews& found,
     const double over = options.outer ? (found.diameters_mm[*a] + found.diameters_mm[*b]) / 2 : 0;
     if (*a == *b || !(given.mm - over > 0))
       return fail(Reason::bad_value,
-                  fmt::format("--distance: {:g} mm is no distance of two balls", given.mm));
+                  fmt::format("--distance: {:g} mm cannot be the distance of two different balls", given.mm));
     distances.push_back({*a, *b, given.mm - over, options.distance_sigma_mm});
   }
   return distances;
@@ -151,11 +152,10 @@ Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd&
   result.scale = {"diameters", diameter_scale_sigma};
   result.warnings.push_back(
       {Reason::scale_weak,
-       fmt::format(
-           "the scale comes from the balls' diameters as seen, to {:.2g} % (one sigma): measure {} to {} "
-           "(about {:.1f} mm) and give it by --distance",
-           100 * diameter_scale_sigma, found.labels[result.pair.a], found.labels[result.pair.b],
-           result.pair.distance_mm),
+       fmt::format("the scale is estimated from the diameters of the balls' images, with a sigma of {:.2g} "
+                   "%: measure {} to {} (about {:.1f} mm) and give it by --distance",
+                   100 * diameter_scale_sigma, found.labels[result.pair.a], found.labels[result.pair.b],
+                   result.pair.distance_mm),
        {},
        {{"relative_sigma", diameter_scale_sigma}}});
   return points;
@@ -279,7 +279,7 @@ Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& option
   for (const RejectedImage& rejected : found.consistent.rejected)
     result.warnings.push_back(
         {Reason::residual_too_large,
-         fmt::format("the image of {} is {:.2g} px from where the other views put it: left out",
+         fmt::format("the image of {} is {:.2g} px from the position predicted by the other views: left out",
                      found.labels[rejected.image.fiducial], rejected.off_px.norm()),
          found.consistent.problem.views[rejected.view].name,
          {{"off_px", rejected.off_px.norm()}}});

@@ -58,17 +58,18 @@ std::string summary(const PhantomResult& result) {
     html += fmt::format("<div class=\"card\"><b>{}</b><span>{}</span></div>\n", value, what);
   };
   card(fmt::format("{:.3f} px", result.rms_px), "reprojection error, rms per axis");
-  card(fmt::format("{:.3f} mm", measured_rms(result)), "sigma of a ball's centre, all axes together");
+  card(fmt::format("{:.3f} mm", measured_rms(result)),
+       "sigma of a ball's centre, root of the sum over the axes");
   card(fmt::format("{:.2g} %", 100 * result.scale.relative_sigma),
-       fmt::format("sigma of the scale, by {}", report::escaped(result.scale.source)));
+       fmt::format("sigma of the scale, estimated from the {}", report::escaped(result.scale.source)));
   card(fmt::format("{:.0f} / {}", result.chi2, result.dof), "chi-square / degrees of freedom");
   html += "</div>\n";
-  return html +
-         fmt::format(
-             "<p>Worth measuring by hand: {} to {}, about {:.1f} mm; it gives the scale to {:.2g} %.</p>\n",
-             report::escaped(result.balls[result.pair.a].label),
-             report::escaped(result.balls[result.pair.b].label), result.pair.distance_mm,
-             100 * result.pair.relative_sigma);
+  return html + fmt::format(
+                    "<p>The distance that would determine the scale best: {} to {}, about {:.1f} mm. "
+                    "Measured with a caliper, it gives the scale with a sigma of {:.2g} %.</p>\n",
+                    report::escaped(result.balls[result.pair.a].label),
+                    report::escaped(result.balls[result.pair.b].label), result.pair.distance_mm,
+                    100 * result.pair.relative_sigma);
 }
 
 std::string warnings(const PhantomResult& result) {
@@ -104,11 +105,11 @@ std::string residual_figure(const MeasuredView& view) {
         at.x(), at.y(), at.x(), at.y(), tip.x(), tip.y());
   }
   return svg + fmt::format(
-                   "</svg><figcaption>{}: residuals, {:g} times enlarged; {:.3f} px rms per axis{}"
+                   "</svg><figcaption>{}: residuals, magnified {:g} times; {:.3f} px rms per axis{}"
                    "</figcaption></figure>\n",
                    report::escaped(view.name), enlarged, view.rms_px,
                    view.left_out_rms_px
-                       ? fmt::format(", {:.3f} px when the other views predict it", *view.left_out_rms_px)
+                       ? fmt::format(", {:.3f} px when predicted from the other views", *view.left_out_rms_px)
                        : "");
 }
 
@@ -178,10 +179,10 @@ std::string arrows_figure(const PhantomResult& result, Eigen::Index across, Eige
         from.x(), from.y(), from.x(), from.y(), to.x(), to.y(), from.x() + 3, from.y() - 2,
         report::escaped(ball.label));
   }
-  return svg +
-         fmt::format(
-             "</svg><figcaption>{}; from the nominal place, {:.0f} times enlarged</figcaption></figure>\n",
-             caption, enlarged);
+  return svg + fmt::format(
+                   "</svg><figcaption>Seen {}. Displacement from the nominal position, magnified {:.0f} "
+                   "times</figcaption></figure>\n",
+                   caption, enlarged);
 }
 
 std::string nominal_section(const PhantomResult& result) {
@@ -193,8 +194,8 @@ std::string nominal_section(const PhantomResult& result) {
   for (const Vector3d& centre : centres) extent = std::max(extent, (centre - mean).norm());
   for (const auto& [name, point] :
        {std::pair{"middle of the balls", mean},
-        {"farthest ball's distance along x", Vector3d(mean + Vector3d(extent, 0, 0))},
-        {"the same along z", Vector3d(mean + Vector3d(0, 0, extent))}})
+        {"at the farthest ball's distance, along x", Vector3d(mean + Vector3d(extent, 0, 0))},
+        {"at the farthest ball's distance, along z", Vector3d(mean + Vector3d(0, 0, extent))}})
     table.row({name, report::fixed(predicted_tre_mm(centres, nominal_rms(result), point), 3),
                report::fixed(std::hypot(predicted_tre_mm(centres, measured_rms(result), point),
                                         result.scale.relative_sigma * (point - mean).norm()),
@@ -202,10 +203,9 @@ std::string nominal_section(const PhantomResult& result) {
   return "<h2>From nominal</h2>\n<div class=\"views\">" +
          arrows_figure(result, 0, 2, "along y: x to the right, z up") +
          arrows_figure(result, 0, 1, "along z: x to the right, y up") +
-         "</div>\n<h2>What the balls' errors do to a located point</h2>\n" + table.html() +
-         "<p class=\"soft\">rms error that the coordinates' errors alone cause, as if they were independent "
-         "(Fitzpatrick, "
-         "West and Maurer 1998); noise of the images comes on top.</p>\n";
+         "</div>\n<h2>Effect of the balls' errors on a located point</h2>\n" + table.html() +
+         "<p class=\"soft\">rms error caused by the errors of the coordinates alone, taken as independent "
+         "(Fitzpatrick, West and Maurer 1998). Image noise adds to it.</p>\n";
 }
 
 }  // namespace

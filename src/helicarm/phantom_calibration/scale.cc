@@ -80,8 +80,8 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
     const CentreDistance& d = distances[std::size_t(worst)];
     return fail(
         Reason::distances_disagree,
-        fmt::format("the distances contradict each other: {} to {} is {:.3f} mm by hand and {:.3f} mm by the "
-                    "images and the other distances; measure them again",
+        fmt::format("the distances are inconsistent: {} to {} is {:.3f} mm as measured by hand, {:.3f} mm as "
+                    "computed from the images and the other distances; measure them again",
                     labels[d.a], labels[d.b], d.mm, factor * reckoned[worst]),
         {{"chi2", chi2}, {"limit", chi2_limit(int(count) - 1)}, {"difference_mm", residual[worst]}});
   }

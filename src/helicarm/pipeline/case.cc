@@ -87,8 +87,8 @@ void refuse_metres(const Case& read) {
   if (farthest == 0 || farthest >= least_mm) return;
   throw BadInput(
       {Reason::bad_value,
-       fmt::format("case.json: poses: no marker is more than {:.3g} from the tracker's origin, where "
-                   "at least {:g} mm are expected: translations are in mm, not in metres",
+       fmt::format("case.json: poses: the largest distance of a marker from the tracker's origin is {:.3g} "
+                   "mm, at least {:g} mm are expected: give translations in mm, not in metres",
                    farthest, least_mm),
        {},
        {{"farthest_mm", farthest}, {"limit_mm", least_mm}}});
@@ -223,7 +223,7 @@ std::vector<CaseView> views_from(JsonReader& reader, const Case& known, std::siz
   }
   if (views.size() < least_views)
     reader.refuse(Reason::bad_value, "views",
-                  fmt::format("{} views, at least {}", views.size(), least_views));
+                  fmt::format("{} views, at least {} are required", views.size(), least_views));
   return views;
 }
 

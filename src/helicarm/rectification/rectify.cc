@@ -300,7 +300,7 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
         Reason::plate_mismatch,
         fmt::format(
             "{} the plate in the image: its rectified dots are {:.2f} px rms off a lattice, limit {:.2f}",
-            map.is_identity() ? "without a map, distortion bends" : "the map does not fit",
+            map.is_identity() ? "there is no map, but distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
   result.other_dots = detection::dots_except(*result.other_dots, members);

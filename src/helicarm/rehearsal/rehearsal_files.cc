@@ -78,7 +78,7 @@ std::string table_of(std::span<const Rehearsal> rehearsals) {
   row("max", &operation::ErrorFigures::max, "        1.55  1.89");
   row("min", &operation::ErrorFigures::min, "        0.34  0.19");
   row("mean", &operation::ErrorFigures::mean, "        0.81  0.88");
-  row("SD", &operation::ErrorFigures::sd, "        0.45  0.55   (printed as RMS)");
+  row("SD", &operation::ErrorFigures::sd, "        0.45  0.55   (published as RMS)");
   row("RMS", &operation::ErrorFigures::rms, "        0.93  1.04   (from its mean and SD)");
   text += fmt::format(
       "  mean of all {:.2f}; RMS {:.2f}, predicted {:.2f}; {} of {} within their 95 % ellipses\n",

@@ -199,8 +199,8 @@ std::string rectification_section(const pipeline::Result& result) {
                fixed(r.map.held_out_rms_px, 3), fixed(r.raw_mean_px, 2), fixed(r.raw_max_px, 2)});
     if (const std::string figure = distortion_figure(view); !figure.empty())
       figures += fmt::format(
-          "<figure class=\"plain\">{}<figcaption>Distortion in {}: from the rectified to the raw "
-          "place.</figcaption></figure>\n",
+          "<figure class=\"plain\">{}<figcaption>Distortion in {}: displacement from rectified to raw "
+          "position.</figcaption></figure>\n",
           figure, escaped(view.name));
   }
   if (table.empty()) return {};
@@ -224,7 +224,7 @@ std::string timing_section(const pipeline::Result& result) {
 std::string notes_section(const pipeline::Result& result) {
   std::string html;
   for (const Warning& note : result.notes) html += "<li>" + message_of(note) + "</li>\n";
-  return html.empty() ? html : headed("Notes: what these data cannot show", "<ul>\n" + html + "</ul>\n");
+  return html.empty() ? html : headed("Notes: limitations of these data", "<ul>\n" + html + "</ul>\n");
 }
 
 std::string warnings_section(const pipeline::Result& result) {

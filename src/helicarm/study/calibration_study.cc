@@ -168,9 +168,9 @@ StudyFiles files_of(const std::vector<CalibrationTests>& tests, const Calibratio
                          row.best.figures()[2]);
   }
   files.summary = fmt::format(
-      "Table 1's columns of UDCSC and Fig. 14, from {} simulated tests with an AP and a lateral image, mean "
-      "errors in mm: {}. Refused: {} by the paper method, {} by the best method. The published values are of "
-      "a real C-arm with unknown distortion, noise and calibrator tolerance.",
+      "UDCSC columns of Table 1, and Fig. 14: mean errors in mm of {} simulated tests, each with an AP and a "
+      "lateral image. {}. Tests refused: {} by the paper method, {} by the best method. The published values "
+      "are of a real C-arm with unknown distortion, noise and calibrator tolerance.",
       tests.size(), means, refused_paper, refused_best);
   files.json = study_json("calibration", options);
   files.json.update({{"size_px", options.size_px},

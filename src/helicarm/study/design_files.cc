@@ -32,9 +32,10 @@ StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
   const auto gain = [&](const DesignedSet& other) { return 100 * (1 - answer.design.tre_mm / other.tre_mm); };
   const bool ruled = !answer.best_random_ruled.calibrator.balls.empty();
   files.summary = fmt::format(
-      "{} balls on the {}, TRE in the cone (rms, exact target pixels): {:.3f} mm by design, {:.3f} mm with "
-      "udcsc ({:.0f} % less), {:.3f} mm with the best of {} random sets ({:.0f} % less; {}), median of the "
-      "random sets {:.3f} mm. The design {} all rules that do not depend on labels.",
+      "{} balls on the {}, TRE in the cone (rms, exact target pixels): {:.3f} mm with the optimised design, "
+      "{:.3f} mm with udcsc (the design has {:.0f} % less), {:.3f} mm with the best of {} random sets (the "
+      "design has {:.0f} % less; {}); the median of the random sets is {:.3f} mm. The design {} all rules "
+      "that do not depend on labels.",
       options.balls, name_of(options.surface), answer.design.tre_mm, answer.udcsc.tre_mm, gain(answer.udcsc),
       answer.best_random.tre_mm, options.groups, gain(answer.best_random),
       answer.best_random.keeps_rules ? "it keeps the rules"
@@ -59,7 +60,7 @@ StudyFiles files_of(const DesignAnswer& answer, const DesignOptions& options) {
                         up == 1 ? "Y, mm" : "Z, mm"};
     chart.series = {drawn_set("design", answer.design.calibrator, up),
                     drawn_set("udcsc", answer.udcsc.calibrator, up)};
-    chart.note = fmt::format("TRE in the cone: {:.3f} mm by design, {:.3f} mm with udcsc",
+    chart.note = fmt::format("TRE in the cone: {:.3f} mm with the optimised design, {:.3f} mm with udcsc",
                              answer.design.tre_mm, answer.udcsc.tre_mm);
     charts.push_back(std::move(chart));
   }

@@ -94,9 +94,9 @@ std::string number_summary(const std::vector<NumberCurve>& curves) {
   if (curves.empty()) return {};
   const SigmaReading sigma = curves.front().sigma;
   std::string text = fmt::format(
-      "Published (Fig. 5): FRE of {:.2f} to {:.2f} mm, least at {} balls; TRE decreases, little beyond {}. "
-      "The paper defines neither sigma nor the back-projected pixels. Medians over the groups, sigma read as "
-      "{}: ",
+      "Published (Fig. 5): FRE of {:.2f} to {:.2f} mm, with its minimum at {} balls; TRE decreases, only "
+      "slightly beyond {} balls. The paper does not define sigma or state which pixels are back-projected. "
+      "Medians over the groups, with sigma interpreted as {}: ",
       printed_fre_low, printed_fre_high, printed_dip, printed_dip, name_of(sigma));
   if (curves.front().rows.size() < 2) {
     for (const NumberCurve& curve : curves)

@@ -108,7 +108,7 @@ std::string_view skip_header(std::string_view bytes, const MetaHeader& header, s
   if (size.empty() || size[0] == 0) return bytes;
   if (size[0] == -1 && bytes.size() >= needed) return bytes.substr(bytes.size() - needed);
   if (!(size[0] > 0 && size[0] <= static_cast<double>(bytes.size())))
-    throw BadInput(Reason::truncated, fmt::format("{} is {}, the data have {} bytes",
+    throw BadInput(Reason::truncated, fmt::format("{} is {}, but the data contain only {} bytes",
                                                   header.field("HeaderSize"), size[0], bytes.size()));
   return bytes.substr(static_cast<std::size_t>(size[0]));
 }

@@ -197,7 +197,7 @@ Volume read_nrrd(const std::filesystem::path& path, std::string_view bytes) {
     const double start =
         skip[0] == -1 ? static_cast<double>(rest.size()) - static_cast<double>(needed) : skip[0];
     if (!(start >= 0 && start <= static_cast<double>(rest.size())))
-      throw BadInput(Reason::truncated, fmt::format("{} is {}, the data have {} bytes",
+      throw BadInput(Reason::truncated, fmt::format("{} is {}, but the data contain only {} bytes",
                                                     header.field("byte skip"), skip[0], rest.size()));
     rest.remove_prefix(static_cast<std::size_t>(start));
   }

@@ -43,10 +43,9 @@ Expected<void> check_grid(const Eigen::Affine3d& patient_from_voxel, const std::
                                                  least_spacing_mm, most_spacing_mm));
   const double cell = std::abs(patient_from_voxel.linear().determinant()) / spacing.prod();
   if (!(cell >= least_cell))
-    return fail(Reason::bad_value,
-                fmt::format("{}: the directions of the axes are nearly in one plane (volume of their unit "
-                            "vectors {:.3g}, must be at least {})",
-                            origin, cell, least_cell));
+    return fail(Reason::bad_value, fmt::format("{}: the axes' directions are nearly coplanar (triple product "
+                                               "of their unit vectors {:.3g}, minimum {})",
+                                               origin, cell, least_cell));
   return {};
 }
 

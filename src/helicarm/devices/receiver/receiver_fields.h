@@ -26,7 +26,7 @@ inline constexpr std::array<Field<ReceiverOptions>, 6> receiver_fields{
          .flag = "--associations-of-address",
          .range = {1, 1000},
          .step = 1,
-         .help = "Of these, from one address; C-arms behind one router count together"}),
+         .help = "Concurrent associations from one address; C-arms behind one router have the same address"}),
     bound<&ReceiverOptions::echo_limit_s>(
         {.name = "echo_limit_s",
          .flag = "--echo-limit",

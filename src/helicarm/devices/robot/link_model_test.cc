@@ -16,10 +16,10 @@ using Stops = LinkStateMachine::Stops;
 constexpr std::uint64_t sequences = 100000;
 constexpr std::uint64_t enough = 20000;  ///< sequences needed to find a broken rule
 constexpr int most_plans = 6;
-/// A beat older than 80 ms allows no motion, so motion ends at most this long after the last beat before a
-/// stop.
+/// A heartbeat older than 80 ms allows no motion, so motion ends at most this long after the last heartbeat
+/// before a stop.
 constexpr int beat_steps = 80 / step_ms;
-/// The link sends no beats 100 ms after the program's last check.
+/// The link sends no heartbeats 100 ms after the program's last check.
 constexpr int program_steps = 100 / step_ms;
 
 /// One plan with its order; a new plan has another order.
@@ -221,7 +221,7 @@ class World {
   void lose() {
     connected_ = heard_protective_ = false;
     back_at_ = soon(25);
-    runs_at_stop_ = 0;  // no stop beat reaches it
+    runs_at_stop_ = 0;  // no stop heartbeat reaches it
     note_stop();
   }
   void restart() {
@@ -420,7 +420,7 @@ TEST(LinkModel, NothingMovesWithoutAConfirmationSinceTheLastStop) {
   EXPECT_GT(tally.motions, tally.sequences / 2);
   EXPECT_GT(tally.completed, tally.sequences / 5);
   EXPECT_GT(tally.stops_in_motion, tally.sequences / 10);
-  // Without disturbance a stop reaches the script with the next state and beat.
+  // Without disturbance a stop reaches the script with the next state and heartbeat.
   EXPECT_LE(tally.longest_steps * step_ms, 16);
   RecordProperty("motions", static_cast<int>(tally.motions));
   RecordProperty("completed", static_cast<int>(tally.completed));
@@ -448,7 +448,7 @@ TEST(LinkModel, EveryBrokenRuleOfTheTableIsDetected) {
       expect_found(what + ": ignored", [&](Rules& rules) {
         rule(rules, phase, event) = {phase, LinkAction::none};
       });
-      // Sent, but without a beat yet: an order that kept its number still receives none.
+      // Sent, but without a heartbeat yet: an order that kept its number still receives none.
       if (phase != starting)
         expect_found(what + ": not counted",
                      [&](Rules& rules) { rule(rules, phase, event).action = LinkAction::none; });
@@ -459,7 +459,7 @@ TEST(LinkModel, EveryBrokenRuleOfTheTableIsDetected) {
 
 TEST(LinkModel, EveryBrokenRuleOfTheScriptIsDetected) {
   // Each rule alone would suffice; both are compared with the script below.
-  expect_found("number and stop beat",
+  expect_found("number and stop heartbeat",
                [](Rules& rules) { rules.script.number_during = rules.script.stop_beat = false; });
   expect_found("age", [](Rules& rules) { rules.script.age = false; });
   expect_found("once", [](Rules& rules) { rules.script.once = false; });

@@ -18,7 +18,7 @@ struct ScriptRules {
   bool number_during = true;
   bool once = true;  ///< ends immediately if it has begun before
   bool stop_beat = true;
-  bool age = true;                        ///< a beat's age is checked
+  bool age = true;                        ///< a heartbeat's age is checked
   int patience = 10, longest_wait = 125;  ///< ticks
 };
 

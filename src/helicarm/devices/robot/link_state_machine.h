@@ -34,10 +34,10 @@ enum class LinkEvent {
 enum class LinkAction {
   none,
   refuse,  ///< the event fails and changes nothing
-  halt,    ///< count a stop, invalidate all confirmations, no order may move, send stop beats
-  permit,  ///< a new number may move once it has beats; stop beats until then
+  halt,    ///< count a stop, invalidate all confirmations, no order may move, send the heartbeat -1 (stop)
+  permit,  ///< a new number may move once its heartbeats are positive; -1 (stop) until then
   beat,    ///< answer the script's ticks
-  rest,    ///< no order may move, send stop beats
+  rest,    ///< no order may move, send the heartbeat -1 (stop)
 };
 
 struct LinkRule {
@@ -51,7 +51,7 @@ extern const LinkTable link_table;
 /// Seconds.
 struct LinkTimes {
   double stale_s = 0.1;            ///< a state older than this is not used
-  double program_silence_s = 0.1;  ///< beats end this long after the program's last check
+  double program_silence_s = 0.1;  ///< heartbeats end this long after the program's last check
   double start_s = 2;              ///< time limit for a script to begin
 };
 

@@ -14,7 +14,7 @@ struct OrderNumber {
   bool operator==(const OrderNumber&) const = default;
 };
 
-/// Beat that commands a stop. Beats of an order are the script's ticks and positive.
+/// Heartbeat that commands a stop. Heartbeats of an order are the script's ticks and positive.
 inline constexpr std::int32_t stop_beat = -1;
 
 /// Written to the robot's input registers 24 to 26 with every received state.
@@ -25,9 +25,9 @@ struct Heartbeat {
 
 enum class ScriptStage : std::int32_t {
   none,
-  waiting,  ///< loaded, waits for its first beat
+  waiting,  ///< loaded, waits for its first heartbeat
   begun,    ///< moving
-  stopped,  ///< by a stop beat, another order's number, or a missing beat
+  stopped,  ///< by a stop heartbeat, another order's number, or a missing heartbeat
   done,
 };
 

@@ -175,7 +175,7 @@ Expected<RobotState> RobotLink::supervise(Stops since, const Watch& watch) {
   auto looked = Clock::now();
   std::unique_lock lock(guard_);
   for (;;) {
-    if (Clock::now() - std::exchange(looked, Clock::now()) > held_up)  // the beat is not renewed meanwhile
+    if (Clock::now() - std::exchange(looked, Clock::now()) > held_up)  // no heartbeat meanwhile
       news_.wait_for(lock, catch_up, [&] { return machine_.stops() != since; });
     lock.unlock();  // a stop does not wait for the watch
     const auto watched = watch();

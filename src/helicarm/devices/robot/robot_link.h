@@ -24,7 +24,7 @@ struct RobotConfig {
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
   double stale_s = 0.1;            ///< a state older than this is not used
-  double program_silence_s = 0.1;  ///< beats end this long after the program's last check
+  double program_silence_s = 0.1;  ///< heartbeats end this long after the program's last check
   double lost_s = 1;               ///< reconnect after this time without an answer or a state
   double start_s = 2;              ///< time limit for a script to begin
   double mismatch_mm = 0.5;        ///< kinematic mismatch above which a warning is given

@@ -71,7 +71,7 @@ struct Drill {
     return result ? Failure{Reason::usage, "it was carried out"} : result.error();
   }
 
-  /// Time on the robot's clock until it rests, without beats.
+  /// Time on the robot's clock until it rests, without heartbeats.
   double silent_stop_s() {
     const double now_s = robot->truth().state.time_s;
     robot->advance(0.5);

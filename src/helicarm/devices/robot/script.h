@@ -8,12 +8,13 @@
 
 namespace helicarm::robot {
 
-/// The script stops the robot when its latest beat is older than this, round trip included, so that a
+/// The script stops the robot when its latest heartbeat is older than this, round trip included, so that a
 /// delaying channel stops it too. With 75 ms to brake from the highest allowed speed, and a period each for
 /// sending and reading, it rests within 200 ms.
 inline constexpr double silence_s = 0.08;
 inline constexpr double stop_rad_s2 = 8;
-/// A loaded script ends if it finds another number for this time, or then receives no beat for this time.
+/// A loaded script ends if it finds another number for this time, or then receives no heartbeat for this
+/// time.
 inline constexpr double longest_wait_s = 1;
 
 /// The URScript that executes an order: a thread moves from waypoint to waypoint while the program checks the

@@ -240,7 +240,7 @@ UrValue VirtualController::call(const std::string& name, const std::vector<UrVal
   const auto place = [&](double first, std::size_t count) {
     const double index = one(arguments[0]) - first;
     if (!(index >= 0 && index < static_cast<double>(count)))
-      throw BadInput(Reason::unsupported, name + ": our scripts do not use this register");
+      throw BadInput(Reason::unsupported, name + ": register not used by helicarm's robot scripts");
     return static_cast<std::size_t>(index);
   };
   if (name == "set_tcp") {

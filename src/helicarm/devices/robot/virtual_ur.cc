@@ -180,7 +180,8 @@ class VirtualUr::Server {
                                    });
   }
 
-  /// A stalled machine stalls the robot's clock too: otherwise it would miss beats that could not be sent.
+  /// A stalled machine stalls the robot's clock too: otherwise it would miss heartbeats that could not be
+  /// sent.
   void tick(std::chrono::steady_clock::time_point due) {
     timer_.expires_at(due);
     timer_.async_wait([this, due](const std::error_code& error) {

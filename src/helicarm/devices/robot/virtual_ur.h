@@ -70,7 +70,7 @@ class VirtualUr {
   void delay_scripts(std::vector<double> delays_s);
   /// While held the dashboard does not answer; then it answers all pending commands.
   void hold_dashboard(bool on);
-  /// In lockstep: advances the robot's clock, with or without beats.
+  /// In lockstep: advances the robot's clock, with or without heartbeats.
   void advance(double seconds);
   VirtualTruth truth();
   VirtualUrCounters counters();

@@ -149,12 +149,11 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   const std::vector<Motion> motions = motions_of(pairs);
   if (pairs.size() >= min_pairs) result.turn_deg = second_turn_deg(motions);
   if (result.turn_deg < options.min_turn_deg || pairs.size() < min_pairs)
-    return fail(
-        Reason::poses_too_alike,
-        fmt::format("{} poses rotate by {:.3g} degrees rms about a second axis, at least {} poses and {:g} "
-                    "degrees",
-                    pairs.size(), result.turn_deg, min_pairs, options.min_turn_deg),
-        {{"poses", static_cast<double>(pairs.size())}, {"turn_deg", result.turn_deg}});
+    return fail(Reason::poses_too_alike,
+                fmt::format("{} poses rotate by {:.3g} degrees rms about a second axis, at least {} poses "
+                            "and {:g} degrees are required",
+                            pairs.size(), result.turn_deg, min_pairs, options.min_turn_deg),
+                {{"poses", static_cast<double>(pairs.size())}, {"turn_deg", result.turn_deg}});
 
   result.flange_from_marker = start_of_x(motions);
   result.tracker_from_base = start_of_y(pairs, result.flange_from_marker);

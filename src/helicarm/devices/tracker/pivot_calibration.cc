@@ -87,12 +87,11 @@ Expected<PivotCalibration> calibrate_pivot(std::span<const geometry::RigidTransf
   constexpr int max_rounds = 5;
   std::vector<geometry::RigidTransform> poses(tracker_from_tool.begin(), tracker_from_tool.end());
   const auto too_alike = [&](double turn_deg) {
-    return fail(
-        Reason::poses_too_alike,
-        fmt::format("{} poses rotate by {:.3g} degrees rms about their least rotated direction, at least "
-                    "{} poses and {:g} degrees",
-                    poses.size(), turn_deg, min_pivot_poses, options.min_turn_deg),
-        {{"poses", static_cast<double>(poses.size())}, {"turn_deg", turn_deg}});
+    return fail(Reason::poses_too_alike,
+                fmt::format("{} poses rotate by {:.3g} degrees rms about the direction of least rotation, at "
+                            "least {} poses and {:g} degrees are required",
+                            poses.size(), turn_deg, min_pivot_poses, options.min_turn_deg),
+                {{"poses", static_cast<double>(poses.size())}, {"turn_deg", turn_deg}});
   };
   if (static_cast<int>(poses.size()) < min_pivot_poses) return too_alike(0);
 
