@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Times each stage and the whole of `helicarm run` on a simulated pair of 1024 x 1024 images.
 #include <filesystem>
+#include <string>
 
 #include <benchmark/benchmark.h>
 
@@ -8,6 +9,7 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/label_fiducials.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/simulation/simulate_case.h"
@@ -48,7 +50,7 @@ void read_file(benchmark::State& state) {
 BENCHMARK(read_file)->Unit(benchmark::kMillisecond);
 
 void search_blobs(benchmark::State& state) {
-  for (auto _ : state) benchmark::DoNotOptimize(find_blobs(xray_image().pixels, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(detection::find_blobs(xray_image().pixels, {}));
 }
 BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
@@ -62,7 +64,8 @@ void fit_one_ball(benchmark::State& state) {
     for (const fiducials::Fiducial& ball : found.fiducials)
       if (ball.status == fiducials::FiducialStatus::used && (ball.uv_raw - dot.centre_px).norm() < 1)
         balls.push_back(dot);
-  const detection::DotAppearance appearance = detection::estimate_appearance(xray_image(), rectification().noise, balls);
+  const detection::DotAppearance appearance =
+      detection::estimate_appearance(xray_image(), rectification().noise, balls);
   for (auto _ : state)
     benchmark::DoNotOptimize(detection::refit_dots(xray_image(), {balls.front()}, appearance, {}));
 }
@@ -93,6 +96,30 @@ void run_whole_case(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(pipeline::run_case(simulated_case(), options));
 }
 BENCHMARK(run_whole_case)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
+
+/// Ten picked points against a held calibration: observation, intersection and covariance.
+void locate_ten_picks(benchmark::State& state) {
+  pipeline::RunOptions options;
+  options.threads = 1;
+  pipeline::Case given = simulated_case();
+  const auto calibration = pipeline::calibrate_case(given, options);
+  if (!calibration) return state.SkipWithError(calibration.error().failure.message.c_str());
+  given.calibrator.targets.clear();
+  given.picks.clear();
+  const Eigen::Vector3d centre = phantom::middle_of(given.calibrator);
+  for (int point = 0; point < 10; ++point)
+    for (std::size_t view = 0; view < given.views.size(); ++view) {
+      const Eigen::Vector2d uv = calibration->views[view].view.project(
+          centre + Eigen::Vector3d(2.0 * point - 9, 3.0 * (point % 3), 1.5 * (point % 4)));
+      pipeline::Pick pick;
+      pick.name = "point " + std::to_string(point);
+      pick.view = given.views[view].name;
+      pick.uv_raw = calibration->images[view].rectification.map.raw_from_rectified(uv);
+      given.picks.push_back(pick);
+    }
+  for (auto _ : state) benchmark::DoNotOptimize(pipeline::locate_case(given, *calibration, options));
+}
+BENCHMARK(locate_ten_picks)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace helicarm

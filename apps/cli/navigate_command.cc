@@ -230,7 +230,7 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
       const auto taken = operation->take(view, image->arrival, image->time_s);
       if (!taken)
         console.progress << fmt::format("{}: {}: {}; acquire this view again\n", view,
-                                        tracker::code(taken.error().reason),
+                                        code(taken.error().reason),
                                         without_control_characters(taken.error().message))
                          << std::flush;
     }

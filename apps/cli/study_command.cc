@@ -89,7 +89,7 @@ Options options_of(const StudyRun& run) {
     if (a.sigmas.size() > 1) refuse(fmt::format("{} takes one --sigma", a.name));
     if (!a.sigmas.empty()) options.sigma = named("--sigma", a.sigmas[0], study::sigma_readings);
   }
-  if constexpr (requires { options.balls = 12; }) {
+  if constexpr (requires { options.balls = 12; }) {  // NOLINT(bugprone-assignment-in-if-condition): required
     if (a.balls.size() > 1) refuse(fmt::format("{} takes one number of --balls", a.name));
     if (!a.balls.empty()) options.balls = a.balls[0];
   }

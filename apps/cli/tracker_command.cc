@@ -160,7 +160,7 @@ CommandResult tracker_replay_command(const TrackerReplayArguments& arguments, Co
     console.progress << fmt::format("{} frames at {} port {}\n", frames->size(), arguments.options.address,
                                     (*server)->port())
                      << std::flush;
-  const std::jthread player([&](std::stop_token stop) {
+  const std::jthread player([&](const std::stop_token& stop) {
     tracker::replay(
         *frames, arguments.as_tracking,
         [&](const tracker::IgtlMessage& message) { (*server)->send(message); }, stop);

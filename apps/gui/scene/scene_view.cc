@@ -26,7 +26,7 @@ void SceneView::redraw() {
   update();
 }
 
-void SceneView::show_result(std::shared_ptr<const pipeline::Result> result,
+void SceneView::show_result(const std::shared_ptr<const pipeline::Result>& result,
                             const phantom::Calibrator& calibrator) {
   scene_ = result ? scene_of(*result, calibrator) : ResultScene{};
   middle_ = phantom::middle_of(calibrator);

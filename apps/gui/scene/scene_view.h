@@ -33,7 +33,8 @@ class SceneView : public QWidget {
   const std::optional<QString>& obstacle() const;
 
   /// Null clears the scene. The live part stays.
-  void show_result(std::shared_ptr<const pipeline::Result> result, const phantom::Calibrator& calibrator);
+  void show_result(const std::shared_ptr<const pipeline::Result>& result,
+                   const phantom::Calibrator& calibrator);
   /// In the calibrator's frame, at the acquisition.
   void show_bones(std::optional<BoneMeshes> bones);
   void show_live(const LiveScene& live);

@@ -56,7 +56,7 @@ void ShapeBuilder::add_ellipsoid(const Ellipsoid& ellipsoid, const Colour& colou
                                      normal.normalized(), colour);
       if (ring == 0 && side == 0) first = id;
       if (ring == 0) continue;
-      const vtkIdType below = first + ring * sides, above = below - sides;
+      const vtkIdType below = first + vtkIdType{ring} * sides, above = below - sides;
       const int next = (side + 1) % sides;
       if (ring > 1) add_triangle(above + side, below + side, above + next);
       if (ring < rings) add_triangle(above + next, below + side, below + next);
@@ -83,7 +83,7 @@ void ShapeBuilder::add_tube(const Segment& axis, double from_radius_mm, double t
     add_point(axis.to + to_radius_mm * out, normal, colour);
     add_point(axis.from + from_radius_mm * out, -z, colour);
     add_point(axis.to + to_radius_mm * out, z, colour);
-    const vtkIdType here = first + 4 * side, next = first + 4 * ((side + 1) % sides);
+    const vtkIdType here = first + vtkIdType{4} * side, next = first + vtkIdType{4} * ((side + 1) % sides);
     add_triangle(here, next, here + 1);
     add_triangle(here + 1, next, next + 1);
     add_triangle(from, next + 2, here + 2);

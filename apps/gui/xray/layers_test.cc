@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/xray/layers.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "gui/xray/simulated_result_test.h"
@@ -13,7 +15,7 @@ double grey_at(const image::Image<float>& view_image, const Eigen::Vector2d& pla
   double sum = 0;
   for (int dv = -2; dv <= 2; ++dv)
     for (int du = -2; du <= 2; ++du)
-      sum += double(view_image(int(place.x() + 0.5) + du, int(place.y() + 0.5) + dv));
+      sum += double(view_image(int(std::lround(place.x())) + du, int(std::lround(place.y())) + dv));
   return sum / 25;
 }
 

@@ -25,7 +25,7 @@ void cross(QPainter& painter, const QPointF& at, double arm) {
 
 /// Draws twice: a dark edge, then the line.
 template <class Shape>
-void edged(QPainter& painter, QPen pen, const Shape& shape) {
+void edged(QPainter& painter, const QPen& pen, const Shape& shape) {
   painter.setBrush(Qt::NoBrush);
   QPen edge = pen;
   edge.setColor(QColor(0, 0, 0, 150));

@@ -145,7 +145,7 @@ void XrayView::set_path(std::vector<Eigen::Vector2d> rectified) {
   carry_live();
 }
 
-void XrayView::set_tool(std::optional<verification::ImageLine> rectified, const QString& note) {
+void XrayView::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
   if (!rectified && !live_.has_tool()) return;
   live_.set_tool(rectified, note);
   carry_live();

@@ -43,7 +43,7 @@ class XrayView : public QWidget {
   /// Marks over the view: rectified pixels, except picks.
   void set_epipolar(std::vector<Eigen::Vector2d> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
-  void set_tool(std::optional<verification::ImageLine> rectified, const QString& note);
+  void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
 
   /// Whether the requested layer is still being computed; until then the previous one is displayed.

@@ -74,7 +74,8 @@ TEST_P(ScatterWithTolerance, EqualsTheJointCovariance) {
       const geometry::View& view = result->views[std::size_t(i)].view;
       const geometry::View truth = paper_view(i == 0 ? 0 : std::numbers::pi / 2);
       const geometry::Intrinsics& k = view.intrinsics;
-      error.segment<view_parameters>(view_parameters * i) << k.fx - 6000, k.fy - 6000, k.u0 - 512, k.v0 - 512,
+      error.segment<view_parameters>(Eigen::Index(view_parameters) * i) << k.fx - 6000, k.fy - 6000,
+          k.u0 - 512, k.v0 - 512,
           geometry::vector_from_rotation(view.camera_from_world.rotation *
                                          truth.camera_from_world.rotation.transpose()),
           view.camera_from_world.translation - truth.camera_from_world.translation, k.skew;
@@ -103,7 +104,7 @@ TEST(Calibrate, ErrorOfTheScaleIsOneNumberSharedByAllViews) {
       f.centre_in_calibrator = mean + scale * (f.centre_in_calibrator - mean);
   const auto scaled = calibrate(larger, {});
   ASSERT_TRUE(scaled);
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(2 * view_parameters);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(Eigen::Index{2} * view_parameters);
   for (int i = 0; i < 2; ++i)
     change.segment<3>(view_parameters * i + 7) =
         (scaled->views[std::size_t(i)].view.camera_from_world.translation -

@@ -94,8 +94,9 @@ bool has_outlier(const std::vector<ViewProblem>& problems, Refinement fit, doubl
 
 }  // namespace
 
-Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, const CommonPrior& common,
-                                           double probability, std::size_t least_kept) {
+Expected<CleanFit> refine_without_outliers(const std::vector<ViewProblem>& problems,
+                                           const CommonPrior& common, double probability,
+                                           std::size_t least_kept) {
   auto fit = refine(problems, common);
   if (!fit) return tl::unexpected<Failure>(fit.error());
   CleanFit clean{problems, *fit, {}};

@@ -23,7 +23,8 @@ struct CleanFit {
 /// Generalised extreme studentised deviate test (Rosner 1983): removes the worst observation repeatedly, up
 /// to a third of all, keeping `least_kept` in each view. The outliers are all up to the last significant
 /// removal, which prevents masking.
-Expected<CleanFit> refine_without_outliers(std::vector<ViewProblem> problems, const CommonPrior& common,
-                                           double probability, std::size_t least_kept);
+Expected<CleanFit> refine_without_outliers(const std::vector<ViewProblem>& problems,
+                                           const CommonPrior& common, double probability,
+                                           std::size_t least_kept);
 
 }  // namespace helicarm::calibration

@@ -31,12 +31,14 @@ struct Lags {
 const Quadratic& quadratics() {
   static const Quadratic columns = [] {
     Eigen::MatrixXf raw(side * side, 6);
-    for (int i = 0; i < side * side; ++i) {
-      const float x = float(i % side) / (0.5f * side) - 1;
-      const float y = float(i / side) / (0.5f * side) - 1;
-      raw.row(i) << 1, x, y, x * x, x * y, y * y;
-    }
-    return Quadratic(raw.householderQr().householderQ() * Eigen::MatrixXf::Identity(side * side, 6));
+    for (int v = 0; v < side; ++v)
+      for (int u = 0; u < side; ++u) {
+        const float x = float(u) / (0.5f * side) - 1;
+        const float y = float(v) / (0.5f * side) - 1;
+        raw.row(v * side + u) << 1, x, y, x * x, x * y, y * y;
+      }
+    return Quadratic(raw.householderQr().householderQ() *
+                     Eigen::MatrixXf::Identity(Eigen::Index{side} * side, 6));
   }();
   return columns;
 }
@@ -92,7 +94,7 @@ std::optional<Lags> lags_of_block(const xray::XrayImage& xray_image, int u, int 
   float cut = 1e30f;
   for (int pass = 0; pass < 3; ++pass) {
     const Column residual = grey - fitted;
-    cut = tukey_cut(std::span(residual.data(), std::size_t{side * side}), 0.f);
+    cut = tukey_cut(std::span(residual.data(), std::size_t{side} * side), 0.f);
     const Column drawn_in = fitted + residual.cwiseMin(0.5f * cut).cwiseMax(-0.5f * cut);
     fitted = quadratics() * (quadratics().transpose() * drawn_in).eval();
   }

@@ -46,7 +46,7 @@ class LocalInverse {
       for (int i = 0; i < 3; ++i) {
         const auto uv = map.rectified_from_raw(raw + half * Vector2d(i - 1, j - 1));
         if (!uv) return std::nullopt;
-        inverse.nodes_[static_cast<std::size_t>(3 * j + i)] = *uv;
+        inverse.nodes_[3 * static_cast<std::size_t>(j) + static_cast<std::size_t>(i)] = *uv;
       }
     return inverse;
   }

@@ -92,13 +92,13 @@ TEST(FindTarget, LineEndWithinATenthOfAPixel) { expect_found(2); }
 
 TEST(FindTarget, BallOfAFileWhoseScaleIsWrongWithinATenthOfAPixel) {
   for (const double factor : {0.88, 1.13}) {
-    const Bench bench(false);
-    phantom::CalibratorTarget target = bench.targets[0];
+    const TargetImage scene(false);
+    phantom::CalibratorTarget target = scene.targets[0];
     target.diameter_mm *= factor;
-    const auto found = find_target(bench.xray_image, rectification::identity_map(256, 256, {}), bench.view,
-                                   target, {}, detection::noise_correlation(bench.xray_image));
+    const auto found = find_target(scene.xray_image, rectification::identity_map(256, 256, {}), scene.view,
+                                   target, {}, detection::noise_correlation(scene.xray_image));
     ASSERT_TRUE(found) << factor << ": " << found.error().message;
-    EXPECT_LT((found->uv - bench.view.project(target.point_in_calibrator)).norm(), 0.1) << factor;
+    EXPECT_LT((found->uv - scene.view.project(target.point_in_calibrator)).norm(), 0.1) << factor;
     EXPECT_LT(found->sigma_px, 0.1) << factor;
   }
 }

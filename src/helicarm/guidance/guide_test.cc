@@ -29,10 +29,11 @@ geometry::View lateral() { return {{4000, 4000, 512, 512, 0}, motion(0, 0, 800, 
 
 struct PointInViews : localization::LocatedPoint {
   PointInViews(const Eigen::Vector3d& point, const Eigen::Matrix3d& covariance, std::optional<Bone> bone,
-               std::vector<DatedView> views)
-      : LocatedPoint{.point_in_anchor = point, .covariance_in_anchor = covariance},
-        anchor(bone),
-        dated(std::move(views)) {}
+               std::vector<DatedView> dated_views)
+      : anchor(bone), dated(std::move(dated_views)) {
+    point_in_anchor = point;
+    covariance_in_anchor = covariance;
+  }
 
   std::optional<Bone> anchor;
   std::vector<DatedView> dated;

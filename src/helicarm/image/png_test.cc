@@ -29,7 +29,7 @@ std::string encoded(std::uint32_t format, int channels) {
   image.width = image.height = 4;
   image.format = format;
   image.colormap_entries = 2;
-  const std::string indices(16, '\1'), colours(2 * 3, 'c');
+  const std::string indices(16, '\1'), colours(6, 'c');
   const bool palette = format & PNG_FORMAT_FLAG_COLORMAP;
   png_alloc_size_t size = 4096;
   std::string bytes(size, '\0');

@@ -137,13 +137,14 @@ Expected<GreyImage> decode_tiff(std::string_view bytes, int page, const std::str
     const std::size_t word = layout.bits / 8u;
     const unsigned top = layout.photometric == PHOTOMETRIC_MINISWHITE ? (1u << layout.bits) - 1 : 0;
     GreyImage grey_image{{static_cast<int>(layout.width), static_cast<int>(layout.height)}, layout.bits};
-    std::vector<unsigned char> row(std::max<std::size_t>(
-        layout.width * layout.channels * word, static_cast<std::size_t>(TIFFScanlineSize(file.get()))));
+    std::vector<unsigned char> row(
+        std::max<std::size_t>(std::size_t{layout.width} * layout.channels * word,
+                              static_cast<std::size_t>(TIFFScanlineSize(file.get()))));
     for (std::uint32_t v = 0; v < layout.height; ++v) {
       if (TIFFReadScanline(file.get(), row.data(), v) != 1)
         throw BadInput(Reason::truncated, fmt::format("{}: TIFF row {} is damaged or missing", origin, v));
       for (std::uint32_t u = 0; u < layout.width; ++u) {
-        const unsigned char* at = row.data() + u * layout.channels * word;
+        const unsigned char* at = row.data() + std::size_t{u} * layout.channels * word;
         if (layout.channels == 3 &&
             (std::memcmp(at, at + word, word) != 0 || std::memcmp(at, at + 2 * word, word) != 0))
           throw BadInput(Reason::unsupported, fmt::format("{}: a colour image; convert it to grey", origin));

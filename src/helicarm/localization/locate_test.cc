@@ -119,7 +119,7 @@ TEST(Locate, LengthAt95IsNeverBelowHalfTheRayGap) {
   calibration::Calibration paper = exact_calibration();
   for (calibration::CalibratedView& view : paper.views) view.reprojection_rms_px = 0.5;
   for (const calibration::Calibration& calibration :
-       {calibration::Calibration(*calibrated), exact_calibration(), paper})
+       {static_cast<const calibration::Calibration&>(*calibrated), exact_calibration(), paper})
     for (const double sigma : {0.0, 0.5, 5.0})
       for (const double off : {0.0, 0.3, 5.0, 150.0}) {
         const auto point = locate("T", PointSource::pick, wrong_images({off, off}, sigma), calibration);
@@ -134,7 +134,7 @@ TEST(Locate, RaysThatMissAreWarnedOfWithAndWithoutCovariance) {
   const auto calibrated = noisy_calibration(0.05, random);
   ASSERT_TRUE(calibrated.has_value());
   for (const calibration::Calibration& calibration :
-       {calibration::Calibration(*calibrated), exact_calibration()}) {
+       {static_cast<const calibration::Calibration&>(*calibrated), exact_calibration()}) {
     const auto wrong = locate("T", PointSource::pick, wrong_images({60, 60}, 0.5), calibration);
     ASSERT_TRUE(wrong && wrong->missing_rays);
     EXPECT_EQ(wrong->missing_rays->reason, Reason::residual_too_large);

@@ -21,7 +21,9 @@ struct TreVolume {
   std::vector<double> rms_mm;
 
   Eigen::Vector3d place(int i, int j, int k) const { return first + step_mm * Eigen::Vector3d(i, j, k); }
-  double at(int i, int j, int k) const { return rms_mm[std::size_t((k * side + j) * side + i)]; }
+  double at(int i, int j, int k) const {
+    return rms_mm[(std::size_t(k) * std::size_t(side) + std::size_t(j)) * std::size_t(side) + std::size_t(i)];
+  }
 };
 
 /// Within `half_mm` of a centre, for points picked with the given noise in every view.

@@ -91,7 +91,7 @@ class Replay {
     }
     for (const auto& [view, recorded] : image_digests_) {
       ++report.images;
-      const std::string name = folder + "/" + view + ".dcm";
+      const std::string name = fmt::format("{}/{}.dcm", folder, view);
       const auto file = read_file(value_or_throw(path_inside(session_, name)), most_image_bytes);
       if (!file)
         differ(origin, file.error().message);

@@ -93,7 +93,7 @@ Expected<PoseWindow> pose_window_from(const Json& json, const std::string& origi
       if (!list.is_array()) reader.refuse(Reason::bad_value, "tools", "must contain lists");
       std::vector<tracker::PoseSample>& samples = window.samples[tool];
       for (const Json& entry : list) {
-        JsonReader sample(entry, origin + ": " + tool);
+        JsonReader sample(entry, fmt::format("{}: {}", origin, tool));
         const double time = sample.number("time_s", any_time), device = sample.number("device_s", any_time);
         const double arrival = sample.number("arrival_s", any_time);
         const geometry::RigidTransform pose =

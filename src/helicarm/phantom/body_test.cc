@@ -20,8 +20,8 @@ std::size_t open_edges(const std::string& stl) {
   for (std::size_t at = 84; at < stl.size(); at += 50) {
     float v[9];
     std::memcpy(v, stl.data() + at + 12, sizeof v);
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t j = (i + 1) % 3;
       ++edges[{{v[3 * i], v[3 * i + 1], v[3 * i + 2]}, {v[3 * j], v[3 * j + 1], v[3 * j + 2]}}];
     }
   }

@@ -60,7 +60,8 @@ class Marcher {
       const Eigen::Vector3i index = origin + Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2);
       const auto& values = i >> 2 ? above : below;
       cube[static_cast<std::size_t>(i)] = {
-          index, values[static_cast<std::size_t>(index.y() * count_.x() + index.x())]};
+          index, values[static_cast<std::size_t>(index.y()) * static_cast<std::size_t>(count_.x()) +
+                        static_cast<std::size_t>(index.x())]};
       inside += cube[static_cast<std::size_t>(i)].value < 0;
     }
     if (inside == 0 || inside == 8) return;

@@ -30,7 +30,7 @@ std::vector<PhantomView> detections(const std::vector<Vector3d>& centres,
     view.prior.unit_px = 1 / 0.23;
     view.prior.focal_px = 1000 / 0.23;
     view.prior.principal_px = Vector2d(511.5, 511.5);
-    view.prior.aspect = calibration::NormalPrior{1, 0.001};
+    view.prior.aspect = geometry::NormalPrior{1, 0.001};
     for (std::size_t i = 0; i < centres.size(); ++i) {
       const Vector3d& centre = centres[(i * 5 + views.size()) % centres.size()];
       const Vector2d noise(0.05 * random.normal(), 0.05 * random.normal());

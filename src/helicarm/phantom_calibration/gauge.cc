@@ -42,7 +42,7 @@ std::optional<Eigen::MatrixXd> inner_constraint_covariance(const Eigen::MatrixXd
                                                            const Eigen::MatrixXd& motions) {
   // With orthonormal G of the null space, (N + k G G')^-1 = N^+ + G G' / k.
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(motions, Eigen::ComputeThinU);
-  const Eigen::MatrixXd null = svd.matrixU();
+  const Eigen::MatrixXd& null = svd.matrixU();
   const double k = normal.trace() / double(normal.rows());
   const Eigen::LDLT<Eigen::MatrixXd> solver(normal + k * null * null.transpose());
   if (solver.info() != Eigen::Success || !solver.isPositive() || !(solver.rcond() > 1e-14))

@@ -179,7 +179,7 @@ TEST(FitMap, ErrorBetweenDotsAgreesWithTheReportedSigma) {
               std::pow(fit->map.sigma_px(rectified), 2);
     }
   }
-  const double z = std::sqrt(chi2 / double(2 * draws * between.size()));
+  const double z = std::sqrt(chi2 / (2.0 * draws * double(between.size())));
   EXPECT_GT(z, 0.85);
   EXPECT_LT(z, 1.15);
 }

@@ -138,7 +138,7 @@ Places grow(const std::vector<detection::Dot>& dots, const Cells& cells, phantom
   places[{0, 0}] = seed.dot;
   frames[{0, 0}] = {seed.a, seed.b};
   taken[seed.dot] = true;
-  const auto refined = [&](const Vector2i& at, Frame frame) {
+  const auto refined = [&](const Vector2i& at, const Frame& frame) {
     // Differences to placed neighbours, averaged with the inherited vectors.
     Vector2d sum_a = frame.a;
     Vector2d sum_b = frame.b;

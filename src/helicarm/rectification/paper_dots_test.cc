@@ -15,7 +15,8 @@ using Eigen::Vector2d;
 TEST(FindDotsPaper, CirclesOfTheGivenSizeWithinOneAndAHalfPixels) {
   detection::drawn::Shade shade(256, 256);
   std::vector<Vector2d> places;
-  for (int k = 0; k < 9; ++k) places.emplace_back(50.3 + 75.4 * (k % 3), 50.6 + 75.2 * (k / 3));
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) places.emplace_back(50.3 + 75.4 * column, 50.6 + 75.2 * row);
   for (const Vector2d& place : places) detection::drawn::add_ball(shade, place, 8, 0.9, 3);
   image::Image<float> image = detection::drawn::grey(shade, 1500);
   RandomStream random(1, 1);

@@ -237,7 +237,7 @@ TEST_F(StalePlan, CreepingBoneStopsTheToolWhichIsThenWithdrawn) {
     ASSERT_FALSE(gone);
     EXPECT_EQ(robot().status().phase, robot::LinkPhase::stopped);
     EXPECT_FALSE(virtual_or_->robot().truth().moving);
-    const Failure refused = gone.error();
+    const Failure& refused = gone.error();
     try_to([&] { return operation_->withdraw(order, rest, nod_); });
     const robot::RobotState back = robot().wait_connected(5s).value();
     EXPECT_LT((back.base_from_tcp.translation - rest.base_from_tcp.translation).norm(), 0.5);

@@ -184,7 +184,7 @@ class ChartDrawing {
   void field(const ChartField& field) {
     for (std::size_t kind = 0; kind < field.hatchings.size(); ++kind) hatching(field, kind);
     const auto at = [&](int column, int row) {
-      return field.values[std::size_t(row * field.columns + column)];
+      return field.values[std::size_t(row) * std::size_t(field.columns) + std::size_t(column)];
     };
     for (std::size_t i = 0; i < field.levels.size(); ++i) {
       const double level = field.levels[i];

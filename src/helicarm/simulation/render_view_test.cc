@@ -169,8 +169,8 @@ image::Image<float> render_by_brute_force(const Scene& scene, const VirtualDetec
         for (int column = std::max(u - 1, 0); column <= std::min(u + 1, detector.width - 1); ++column)
           edge = edge || std::abs(paths(column, row) - paths(u, v)) > 0.05f;
       double sum = edge ? 0 : 9 * signal(u, v);
-      for (int part = 0; edge && part < 9; ++part)
-        sum += signal(u + (part % 3 - 1) / 3.0, v + (part / 3 - 1) / 3.0);
+      for (int row = -1; edge && row <= 1; ++row)
+        for (int column = -1; column <= 1; ++column) sum += signal(u + column / 3.0, v + row / 3.0);
       image(u, v) = static_cast<float>(sum / 9);
     }
   return image;

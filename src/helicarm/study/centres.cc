@@ -86,7 +86,8 @@ CentreRow row_of(const std::string& group, const std::string& name, const Centre
 Expected<std::vector<CentreRow>> study_centres(const CentreOptions& options, const EngineOptions& engine,
                                                const Ranks& ranks) {
   if (options.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
-  const auto squares = std::size_t(options.squares * options.squares), measured = squares - (squares + 7) / 8;
+  const auto squares = std::size_t(options.squares) * std::size_t(options.squares),
+             measured = squares - (squares + 7) / 8;
   const std::size_t images = (options.groups + measured - 1) / measured;
   const auto wanted = [&](const std::string& group) {
     return options.only.empty() || std::ranges::count(options.only, group) > 0;

@@ -10,6 +10,7 @@
 
 namespace helicarm::study {
 
+// GoogleTest finds it by this name. NOLINTNEXTLINE(readability-identifier-naming)
 void PrintTo(const SmallStudy& study, std::ostream* out) { *out << study.name; }
 
 namespace {

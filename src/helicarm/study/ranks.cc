@@ -32,7 +32,7 @@ Ranks::Ranks() : exceptions_(std::uncaught_exceptions()) {
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &threads);
   MPI_Comm_size(MPI_COMM_WORLD, &count_);
   MPI_Comm_rank(MPI_COMM_WORLD, &own_);
-  MPI_Comm here;
+  MPI_Comm here = MPI_COMM_NULL;
   MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &here);
   MPI_Comm_size(here, &on_this_machine_);
   MPI_Comm_free(&here);

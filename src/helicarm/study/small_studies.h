@@ -32,7 +32,7 @@ SmallStudy small(const char* name, std::size_t blocks, std::size_t stop, std::si
   options.seed = 4;
   const auto bytes = [options](const EngineOptions& engine, const Ranks& ranks,
                                const std::filesystem::path& folder) {
-    Options given = options;
+    Options given = options;  // NOLINT(performance-unnecessary-copy-initialization): some have a folder
     if constexpr (requires { given.folder; }) given.folder = folder;
     const auto answer = study(given, engine, ranks).value();
     if (!ranks.leads()) return std::string();

@@ -47,7 +47,7 @@ void need(const OFCondition& done, const char* what) {
 void send(const fs::path& file, const ImageReceiver& receiver, CArmFault fault) {
   DcmSCU sender;
   sender.setAETitle("VIRTUAL_C_ARM");
-  sender.setPeerHostName(receiver.address.c_str());
+  sender.setPeerHostName(receiver.address.c_str());  // an OFString. NOLINT(readability-redundant-string-cstr)
   sender.setPeerPort(receiver.port);
   sender.setPeerAETitle(fault == CArmFault::wrong_title ? "SOMEBODY" : receiver.title.c_str());
   sender.setProgressNotificationMode(false);

@@ -154,9 +154,10 @@ const Absorber::Block& Absorber::block_for(int axis) const {
           for (int x = x0; x < std::min(x0 + tile, size_.x() + 1); ++x) {
             const std::int16_t* from =
                 block_.values.data() + x + static_cast<std::ptrdiff_t>(block_.stride.z()) * z;
-            std::int16_t* to = turned_.values.data() + turned_.stride.x() * x +
+            std::int16_t* to = turned_.values.data() + static_cast<std::ptrdiff_t>(turned_.stride.x()) * x +
                                static_cast<std::ptrdiff_t>(turned_.stride.z()) * z;
-            for (int y = y0; y < std::min(y0 + tile, size_.y() + 1); ++y) to[y] = from[y * block_.stride.y()];
+            for (int y = y0; y < std::min(y0 + tile, size_.y() + 1); ++y)
+              to[y] = from[std::ptrdiff_t{y} * block_.stride.y()];
           }
   });
   return turned_;
@@ -196,7 +197,7 @@ void Absorber::integrate(const Vector3d& source, std::span<const Vector3d> direc
     double leave = std::numeric_limits<double>::infinity();
     clip(start, direction, size, enter, leave);
     if (!(leave > enter)) continue;
-    int d;
+    int d = 0;
     direction.cwiseAbs().maxCoeff(&d);
     const int p = d == 0 ? 1 : 0;
     const int q = 3 - d - p;

@@ -19,7 +19,9 @@ using Eigen::Vector3d;
 using Eigen::Vector3i;
 
 std::size_t index(const Vector3i& size, int x, int y, int z) {
-  return static_cast<std::size_t>(x + size.x() * (y + size.y() * z));
+  return static_cast<std::size_t>(x) +
+         static_cast<std::size_t>(size.x()) *
+             (static_cast<std::size_t>(y) + static_cast<std::size_t>(size.y()) * static_cast<std::size_t>(z));
 }
 
 template <class Value>

@@ -25,18 +25,19 @@ Expected<image::Image<float>> drr(const Absorber& absorber, const geometry::View
   constexpr int tile = 64;
   const int across = (width + tile - 1) / tile;
   const int down = (height + tile - 1) / tile;
-  parallel_for(static_cast<std::size_t>(across * down), threads, [&](std::size_t number) {
-    const int u0 = static_cast<int>(number) % across * tile;
-    const int v0 = static_cast<int>(number) / across * tile;
-    const int count = std::min(tile, width - u0);
-    std::array<Eigen::Vector3d, tile> directions;
-    for (int v = v0; v < std::min(v0 + tile, height); ++v) {
-      for (int i = 0; i < count; ++i)
-        directions[static_cast<std::size_t>(i)] = world_from_pixel * Eigen::Vector3d(u0 + i, v, 1);
-      const auto rays = static_cast<std::size_t>(count);
-      absorber.integrate(source, {directions.data(), rays}, {integrals.row(v) + u0, rays});
-    }
-  });
+  parallel_for(
+      static_cast<std::size_t>(across) * static_cast<std::size_t>(down), threads, [&](std::size_t number) {
+        const int u0 = static_cast<int>(number) % across * tile;
+        const int v0 = static_cast<int>(number) / across * tile;
+        const int count = std::min(tile, width - u0);
+        std::array<Eigen::Vector3d, tile> directions;
+        for (int v = v0; v < std::min(v0 + tile, height); ++v) {
+          for (int i = 0; i < count; ++i)
+            directions[static_cast<std::size_t>(i)] = world_from_pixel * Eigen::Vector3d(u0 + i, v, 1);
+          const auto rays = static_cast<std::size_t>(count);
+          absorber.integrate(source, {directions.data(), rays}, {integrals.row(v) + u0, rays});
+        }
+      });
   return integrals;
 }
 

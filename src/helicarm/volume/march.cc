@@ -2,6 +2,7 @@
 #include "helicarm/volume/march.h"
 
 #include <cstring>
+#include <numeric>
 
 #ifdef __AVX2__
 #include <immintrin.h>
@@ -23,7 +24,7 @@ HELICARM_INLINE Floats real(const Ints& lanes) { return __builtin_convertvector(
 HELICARM_INLINE Ints gather_pairs(const std::int16_t* values, const Ints& index) {
   Ints pairs;
   for (int lane = 0; lane < march_simd; ++lane) {
-    int pair;
+    int pair = 0;
     std::memcpy(&pair, values + index[lane], sizeof pair);
     pairs[lane] = pair;
   }
@@ -88,7 +89,7 @@ void march(const MarchBlock& block, const MarchRays& rays, int first, int last, 
   load(q, rays.q), load(dq, rays.dq), load(per_dq, rays.per_dq), load(alike, rays.alike);
   const Ints rising = alike > 0;
   // Rays from one source keep their order, so the middle slab decides which end has the smallest index.
-  const auto middle = static_cast<float>((first + last) / 2);
+  const auto middle = static_cast<float>(std::midpoint(first, last));
   const Floats place = (q + middle * dq) * static_cast<float>(block.row) + p + middle * dp;
   const Ints least = Ints{} + (place[0] <= place[march_simd - 1] ? 0 : march_simd - 1);
 #pragma GCC unroll 2

@@ -52,7 +52,8 @@ class DicomBuilder {
   /// Pixel Data of undefined length: an empty offset table, then the fragments.
   DicomBuilder& fragments(const std::vector<std::string>& fragments, const std::string& offsets = "") {
     std::string items = item(offsets);
-    for (std::string fragment : fragments) items += item(fragment.size() % 2 ? fragment + '\0' : fragment);
+    for (const std::string& fragment : fragments)
+      items += item(fragment.size() % 2 ? fragment + '\0' : fragment);
     elements_.erase(0x7FE00010);
     tail_ = tag_bytes(0x7FE00010) + "OB" + number(0, 2) + number(-1, 4) + items + tag_bytes(0xFFFEE0DD) +
             number(0, 4);

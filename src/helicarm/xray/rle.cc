@@ -16,7 +16,8 @@ constexpr std::size_t header_bytes = 64;
 bool unpack(std::string_view packed, std::size_t pixels, std::size_t step, char* out) {
   std::size_t done = 0;
   for (std::size_t at = 0; done < pixels && at < packed.size();) {
-    const int control = static_cast<signed char>(packed[at++]);
+    const auto byte = static_cast<unsigned char>(packed[at++]);
+    const int control = byte < 128 ? byte : byte - 256;
     if (control == -128) continue;
     const auto count = static_cast<std::size_t>(control < 0 ? 1 - control : 1 + control);
     const std::size_t source = control < 0 ? 1 : count;

@@ -33,7 +33,7 @@ std::optional<Admission::Id> Admission::connect(const std::string& address, std:
                                                 Clock::time_point now) {
   const std::lock_guard lock(mutex_);
   const bool address_is_full = count(false, &address) >= limits_.connections * limits_.of_address;
-  if (address_is_full || peers_.size() >= limits_.connections * limits_.associations)
+  if (address_is_full || peers_.size() >= std::size_t{limits_.connections} * limits_.associations)
     if (!make_room(false, address_is_full ? &address : nullptr, now)) return std::nullopt;
   peers_.emplace(next_, Peer{address, std::move(evict), false, false, now});
   return next_++;

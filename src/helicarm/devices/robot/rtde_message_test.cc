@@ -100,7 +100,7 @@ TEST(RtdeMessage, StateOfAnyOtherLengthOrRecipeIsRefused) {
 }
 
 TEST(RtdeMessage, StateWhosePoseOverflowsIsNotFinite) {
-  constexpr std::size_t pose_at = 1 + 8 + 6 * 8 + 6 * 8, turn_at = pose_at + 3 * 8;
+  constexpr std::size_t pose_at = 1 + 8 + 6 * 8 + 6 * 8, turn_at = pose_at + 24;
   for (const std::size_t at : {pose_at, turn_at}) {
     RtdeMessage message = state_message(7, some_state());
     message.content.replace(at, 8, BigEndianWriter().put(1e307).bytes());

@@ -14,6 +14,9 @@
 namespace helicarm::tracker {
 namespace {
 
+/// Translation (mm), then rotation vector (rad).
+using Twist = Eigen::Matrix<double, 6, 1>;
+
 /// 99.9 % quantile of chi-square, Wilson and Hilferty's approximation.
 double chi2_limit(double dof) {
   constexpr double normal_at_999 = 3.0902323061678132;
@@ -48,12 +51,11 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
 }
 
 FusedPose fuse(const std::vector<SeenFacet>& seen) {
-  using Vector6 = Eigen::Matrix<double, 6, 1>;
   const auto linearise = [&](const geometry::RigidTransform& pose) {
-    geometry::NormalEquations<6> equations{PoseCovariance::Zero(), Vector6::Zero()};
+    geometry::NormalEquations<6> equations{PoseCovariance::Zero(), Twist::Zero()};
     for (const SeenFacet& facet : seen) {
       const geometry::RigidTransform predicted = pose * facet.calibrator_from_facet;
-      Vector6 residual;
+      Twist residual;
       residual.head<3>() = facet.tracker_from_facet.translation - predicted.translation;
       residual.tail<3>() =
           geometry::vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
@@ -65,7 +67,7 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
     }
     return std::optional(equations);
   };
-  const auto moved = [](const geometry::RigidTransform& pose, const Vector6& step) {
+  const auto moved = [](const geometry::RigidTransform& pose, const Twist& step) {
     return geometry::RigidTransform{geometry::rotation_from_vector(step.tail<3>()) * pose.rotation,
                                     pose.translation + step.head<3>()};
   };

@@ -34,7 +34,9 @@ std::uint64_t count_of(const Counters& counters, const std::string& name) {
   return found == counters.end() ? 0 : found->second;
 }
 
-std::unique_ptr<IgtlServer> a_server(IgtlServerOptions options = {}) { return *IgtlServer::start(options); }
+std::unique_ptr<IgtlServer> a_server(const IgtlServerOptions& options = {}) {
+  return *IgtlServer::start(options);
+}
 
 /// A client that stores received messages.
 struct Listener {

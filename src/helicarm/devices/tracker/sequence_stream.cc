@@ -81,7 +81,7 @@ GatedPoses gated_poses(std::span<const SequenceFrame> frames, const std::string&
 }
 
 void replay(std::span<const SequenceFrame> frames, bool as_tracking,
-            const std::function<void(const IgtlMessage&)>& send, std::stop_token stop) {
+            const std::function<void(const IgtlMessage&)>& send, const std::stop_token& stop) {
   if (frames.empty()) return;
   std::mutex mutex;
   std::condition_variable_any wake;

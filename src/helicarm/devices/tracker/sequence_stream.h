@@ -46,6 +46,6 @@ GatedPoses gated_poses(std::span<const SequenceFrame> frames, const std::string&
 /// Sends the frames repeatedly with their recorded timing, stamped with the present time, until stopped;
 /// stops immediately. Frames must be ordered by time.
 void replay(std::span<const SequenceFrame> frames, bool as_tracking,
-            const std::function<void(const IgtlMessage&)>& send, std::stop_token stop);
+            const std::function<void(const IgtlMessage&)>& send, const std::stop_token& stop);
 
 }  // namespace helicarm::tracker
