@@ -78,7 +78,12 @@ HeldCalibration calibrated(const std::vector<calibration::ViewFiducials>& views,
              {}});
   calibration::CalibrationResult result =
       value_or_raise(without_gil([&] { return calibration::calibrate(views, options); }));
-  HeldCalibration held{result,         {}, result.fiducials, result.chi2, result.dof, result.variance_scale,
+  HeldCalibration held{static_cast<const calibration::Calibration&>(result),
+                       {},
+                       result.fiducials,
+                       result.chi2,
+                       result.dof,
+                       result.variance_scale,
                        result.warnings};
   held.maps.resize(held.views.size());
   return held;
@@ -87,7 +92,7 @@ HeldCalibration calibrated(const std::vector<calibration::ViewFiducials>& views,
 HeldCalibration loaded(const std::filesystem::path& path) {
   calibration::SavedCalibration saved = value_or_raise(
       calibration::saved_calibration_from_json(value_or_raise(read_json(path)), path.filename().string()));
-  return {saved, std::move(saved.maps), {}, {}, {}, {}, {}};
+  return {static_cast<const calibration::Calibration&>(saved), std::move(saved.maps), {}, {}, {}, {}, {}};
 }
 
 py::array projected(const HeldCalibration& calibration, const Doubles& xyz_mm, const ViewKey& key, bool raw) {

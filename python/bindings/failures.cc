@@ -42,6 +42,7 @@ Json json_from(const py::object& value) {
 }
 
 void add_failures(py::module_&) {
+  // By value, as pybind11 calls it. NOLINTNEXTLINE(performance-unnecessary-value-param)
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

@@ -37,7 +37,7 @@ void save(const T& thing, const std::filesystem::path& path) {
 void add_phantom(py::module_& module) {
   py::class_<phantom::Calibrator>(
       module, "Calibrator", "The phantom: balls at known positions, and check targets (calibrator.json).")
-      .def_static("udcsc", &udcsc,
+      .def_static("udcsc", &phantom::udcsc,
                   "The built-in calibrator: twelve 4 mm balls on the conical helix of Eq. 9.")
       .def_static(
           "load",

@@ -39,7 +39,7 @@ class ReplayPanel : public QWidget {
   bool is_playing() const { return clock_.isActive(); }
   QString verdict() const;
 
- public Q_SLOTS:
+ public Q_SLOTS:  // NOLINT(readability-redundant-access-specifiers): for moc
   void set_moment(int index);
   void step(int by);
   void set_playing(bool playing);
