@@ -31,7 +31,7 @@ geometry::View view_along(int axis, double turn_deg) {
 
 /// 1024 x 1024 rays that all (unrotated) meet the volume: axis, rotation, threads.
 void drr_of_256(benchmark::State& state) {
-  const volume::Absorber absorber(full_volume(), attenuation_from_hu);
+  const volume::Absorber absorber(full_volume(), volume::attenuation_from_hu);
   const geometry::View view =
       view_along(static_cast<int>(state.range(0)), static_cast<double>(state.range(1)));
   for (auto _ : state)
@@ -46,7 +46,7 @@ void prepare_256(benchmark::State& state) {
   const volume::Volume volume = full_volume();
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        volume::Absorber(volume, attenuation_from_hu, static_cast<unsigned>(state.range(0)))
+        volume::Absorber(volume, volume::attenuation_from_hu, static_cast<unsigned>(state.range(0)))
             .contains(Eigen::Vector3d::Zero()));
 }
 BENCHMARK(prepare_256)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -21,8 +21,8 @@ study::NumberOptions yardstick() {
   study::NumberOptions options;
   options.groups = groups;
   options.balls = {balls};
-  options.sigmas = {SigmaReading::std};
-  options.readings = {PixelReading::calibration_pixels};
+  options.sigmas = {study::SigmaReading::std};
+  options.readings = {study::PixelReading::calibration_pixels};
   return options;
 }
 
@@ -43,7 +43,7 @@ BENCHMARK(number_simd)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTi
 /// One sigma, independent noise, FRE and TRE of 43 targets.
 void number_with_targets(benchmark::State& state) {
   study::NumberOptions options = yardstick();
-  options.readings = {PixelReading::fresh_noise};
+  options.readings = {study::PixelReading::fresh_noise};
   run_study(state, options);
 }
 BENCHMARK(number_with_targets)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond)->UseRealTime();
@@ -84,7 +84,7 @@ geometry::Projection calibrated(const std::vector<Eigen::Vector3d>& world,
 
 double fre_of_group(std::mt19937_64& engine, const std::array<geometry::View, 2>& views) {
   std::uniform_real_distribution<double> angle(0, phantom::ConicalHelix().t_end);
-  std::normal_distribution<double> noise(0, printed_fle);
+  std::normal_distribution<double> noise(0, study::printed_fle);
   std::vector<Eigen::Vector3d> world(balls);
   std::vector<Eigen::Vector2d> pixels[2];
   for (auto& ball : world) ball = phantom::ConicalHelix().point(angle(engine));
@@ -116,7 +116,7 @@ void number_in_eigen(benchmark::State& state) {
     std::mt19937_64 engine(1);
     std::vector<double> fre(groups);
     for (double& value : fre) value = fre_of_group(engine, views);
-    state.counters["median_fre_mm"] = column_statistics(fre).median;
+    state.counters["median_fre_mm"] = study::column_statistics(fre).median;
   }
 }
 BENCHMARK(number_in_eigen)->Unit(benchmark::kMillisecond)->UseRealTime();

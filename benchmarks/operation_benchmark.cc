@@ -39,13 +39,14 @@ void message_to_lines_in_xrays(benchmark::State& state) {
     time_s += 0.01;
     const std::string bytes = message_at(time_s);
     state.ResumeTiming();
-    const IgtlHeader header = decode_header(bytes).value();
-    board.take(decode(header, std::string_view(bytes).substr(IgtlHeader::size)).value(), begin + time_s);
+    const tracker::IgtlHeader header = tracker::decode_header(bytes).value();
+    board.take(tracker::decode(header, std::string_view(bytes).substr(tracker::IgtlHeader::size)).value(),
+               begin + time_s);
     guidance::Poses now;
     now.tracker_from_tool = board.latest("tool", begin + time_s).value().tracker_from_tool;
     now.tracker_from_femur = board.latest("femur", begin + time_s).value().tracker_from_tool;
     const verification::ToolLine line =
-        tool_line("femur", guidance::Bone::femur, xray_image, now, {}).value();
+        operation::tool_line("femur", guidance::Bone::femur, xray_image, now, {}).value();
     for (const geometry::View& view : views) benchmark::DoNotOptimize(verification::line_in_xray(view, line));
   }
 }

@@ -11,7 +11,7 @@ namespace helicarm::fuzz {
 namespace {
 
 /// Splits the stream into PDUs as the socket does; a length beyond the input takes the rest.
-void converse(Association& association, std::string_view bytes) {
+void converse(receiver::Association& association, std::string_view bytes) {
   while (!association.over() && bytes.size() >= receiver::dicom::pdu_header_bytes) {
     Choices choices(bytes);
     const auto [type, length] =
@@ -37,16 +37,16 @@ void run(std::string_view bytes) {
   static const auto inbox = receiver::Inbox::open(folder() / "inbox").value();
   receiver::ReceiverOptions options;
   options.most_object_bytes = 4096;  // so that inputs reach the limit
-  ReceiverShared shared(options, *inbox, {});
+  receiver::ReceiverShared shared(options, *inbox, {});
   const auto id = shared.admission
                       .connect(
-                          "192.0.2.1", [] {}, Admission::Clock::now())
+                          "192.0.2.1", [] {}, receiver::Admission::Clock::now())
                       .value();
   {
-    Association association(shared, "192.0.2.1", id);
+    receiver::Association association(shared, "192.0.2.1", id);
     try {
       converse(association, bytes);
-    } catch (const Breach& breach) {
+    } catch (const receiver::Breach& breach) {
       check(!breach.why.empty(), "a protocol violation has a reason");
     }
     check(!association.peer().empty(), "the peer has a name");
@@ -65,13 +65,14 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  const std::string request = peer::Request().bytes(), store = peer::store(xray::DicomBuilder());
-  return {request + peer::echo() + peer::release(),
-          request + store + peer::release(),
-          request + store + store + peer::echo() + peer::release(),
-          request + peer::store(xray::DicomBuilder(), "2.25.18"),
-          request + peer::pdu(7, std::string(4, '\0')),
-          peer::Request{.called = peer::padded("OTHER")}.bytes()};
+  const std::string request = receiver::peer::Request().bytes(),
+                    store = receiver::peer::store(xray::DicomBuilder());
+  return {request + receiver::peer::echo() + receiver::peer::release(),
+          request + store + receiver::peer::release(),
+          request + store + store + receiver::peer::echo() + receiver::peer::release(),
+          request + receiver::peer::store(xray::DicomBuilder(), "2.25.18"),
+          request + receiver::peer::pdu(7, std::string(4, '\0')),
+          receiver::peer::Request{.called = receiver::peer::padded("OTHER")}.bytes()};
 }
 
 }  // namespace helicarm::fuzz

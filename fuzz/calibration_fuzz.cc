@@ -33,7 +33,7 @@ std::vector<std::string> seeds() {
                      {"camera_from_calibrator", geometry::json_rows(view.camera_from_world.matrix())}});
   }
   views[0]["rectification"] = {{"map", to_json(rectification::identity_map(64, 48, 0.3))}};
-  const auto n = Eigen::Index(view_parameters * 2);
+  const auto n = Eigen::Index(calibration::view_parameters * 2);
   const Json result{
       {"format", "helicarm-result/1"},
       {"status", "ok"},

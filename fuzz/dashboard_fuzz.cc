@@ -11,7 +11,7 @@ namespace helicarm::fuzz {
 
 void run(std::string_view bytes) {
   Choices choices(bytes);
-  const auto command = static_cast<DashboardCommand>(choices.byte() % 10);
+  const auto command = static_cast<robot::DashboardCommand>(choices.byte() % 10);
   const std::size_t segment = 1 + choices.byte();
   robot::VirtualController controller(robot::ur5(), robot::drill(), robot::resting_joints());
   std::string received;
@@ -19,7 +19,7 @@ void run(std::string_view bytes) {
     received += bytes.substr(0, segment);
     bytes.remove_prefix(std::min(segment, bytes.size()));
     for (;;) {
-      const auto line = take_dashboard_line(received);
+      const auto line = robot::take_dashboard_line(received);
       if (!line) return;
       if (!*line) break;
       check((*line)->size() <= 1000 && !holds_control_character(**line),

@@ -10,7 +10,7 @@ Json write(const calibration::CArmHistory& history) { return to_json(history); }
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto read = [](const Json& json) { return history_from_json(json, "machine.json"); };
+  const auto read = [](const Json& json) { return calibration::history_from_json(json, "machine.json"); };
   run_round_trip(bytes, read, write);
   const auto json = parse_json(bytes, "machine.json");
   if (!json) return;

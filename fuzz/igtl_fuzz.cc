@@ -11,12 +11,12 @@ namespace {
 
 /// Sets the checksum of each message, which mutations do not find by chance.
 std::string with_check_sums(std::string bytes) {
-  for (std::size_t at = 0; bytes.size() >= at + IgtlHeader::size;) {
+  for (std::size_t at = 0; bytes.size() >= at + tracker::IgtlHeader::size;) {
     BigEndianReader size(std::string_view(bytes).substr(at + 42, 8));
     const auto body = size.take<std::uint64_t>();
-    const std::size_t start = at + IgtlHeader::size;
+    const std::size_t start = at + tracker::IgtlHeader::size;
     if (body > bytes.size() - start) break;
-    const std::uint64_t sum = crc64(std::string_view(bytes).substr(start, body));
+    const std::uint64_t sum = tracker::crc64(std::string_view(bytes).substr(start, body));
     bytes.replace(at + 50, 8, BigEndianWriter().put(sum).bytes());
     at = start + body;
   }
@@ -30,16 +30,16 @@ void run(std::string_view bytes) {
   const unsigned mode = choices.byte();
   const std::size_t segment = 1 + choices.byte();
   const std::string stream_bytes = mode & 1 ? std::string(bytes) : with_check_sums(std::string(bytes));
-  IgtlStream stream;
+  tracker::IgtlStream stream;
   tracker::PoseBoard board;
   double now_s = 1000;
   const auto sink = [&](tracker::IgtlMessage&& message) {
     now_s += 0.02;
     board.take(message, now_s);
     const std::string once = encode(message);
-    const auto header = decode_header(std::string_view(once).substr(0, IgtlHeader::size));
+    const auto header = tracker::decode_header(std::string_view(once).substr(0, tracker::IgtlHeader::size));
     check(header.has_value(), "the header of an encoded message can be decoded");
-    const auto again = decode(*header, std::string_view(once).substr(IgtlHeader::size));
+    const auto again = decode(*header, std::string_view(once).substr(tracker::IgtlHeader::size));
     check(again.has_value(), "an encoded message can be decoded");
     check(encode(*again) == once, "encoding is reproducible");
   };
@@ -60,7 +60,7 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   std::vector<std::string> all;
   std::string together("\0\x40", 2);
-  for (tracker::IgtlMessage message : sample_messages()) {
+  for (tracker::IgtlMessage message : tracker::sample_messages()) {
     all.push_back(std::string("\0\xff", 2) + encode(message));
     together += encode(message);
     message.version = 2;

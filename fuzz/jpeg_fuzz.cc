@@ -56,7 +56,7 @@ void run(std::string_view bytes) {
   const int word_bytes = mode & 2 ? 2 : 1;
   const int wide = own_size ? 1 + static_cast<int>(choices.byte() % 64) : width;
   const int high = own_size ? 1 + static_cast<int>(choices.byte() % 64) : height;
-  const auto decoded = decode_jpeg(std::string(bytes), lossless, wide, high, word_bytes, "input");
+  const auto decoded = xray::decode_jpeg(std::string(bytes), lossless, wide, high, word_bytes, "input");
   if (decoded)
     check(decoded->size() == std::size_t(wide * high * word_bytes), "the byte count matches the pixels");
 }

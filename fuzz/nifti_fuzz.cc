@@ -13,7 +13,7 @@ void set(std::string& bytes, std::size_t at, T value) {
 }
 
 /// 2 x 1 x 2 voxels of 16 bits, positioned by the sform (1), the qform (2) or neither (0).
-std::string phantom::volume(int form) {
+std::string volume_file(int form) {
   std::string bytes(352, '\0');
   set<std::int32_t>(bytes, 0, 348);
   for (const auto& [at, value] : {std::pair{40, 3}, {42, 2}, {44, 1}, {46, 2}, {70, 4}, {72, 16}})
@@ -48,8 +48,8 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   std::vector<std::string> all;
   for (const int form : {0, 1, 2})
-    for (const char packed : {'\0', '\1'}) all.push_back(packed + phantom::volume(form));
-  all.push_back('\0' + gzipped(phantom::volume(1)));
+    for (const char packed : {'\0', '\1'}) all.push_back(packed + volume_file(form));
+  all.push_back('\0' + gzipped(volume_file(1)));
   return all;
 }
 

@@ -12,7 +12,7 @@ Json write(const robot::RobotOrder& order) { return to_json(order); }
 }  // namespace
 
 void run(std::string_view bytes) {
-  const auto read = [](const Json& json) { return robot_order_from(json, "order.json"); };
+  const auto read = [](const Json& json) { return robot::robot_order_from(json, "order.json"); };
   const auto json = parse_json(bytes, "order.json");
   if (!json) return;
   const auto order = read(*json);
@@ -20,7 +20,7 @@ void run(std::string_view bytes) {
   check(all_finite(write(*order)), "accepted numbers are finite");
   // Angles are converted through degrees: a second reading may differ in the last bit.
   check(read(write(*order)).has_value(), "written data are accepted");
-  (void)check_order(*order, resting_state());
+  (void)check_order(*order, robot::resting_state());
 }
 
 std::vector<std::string> seeds() { return {write(robot::planned()).dump()}; }

@@ -65,9 +65,11 @@ void run(std::string_view bytes) {
 }
 
 std::vector<std::string> seeds() {
-  return {'\0' + peer::Request().body(),
-          '\1' + peer::fragment(3, 3, peer::command(1, xa_class, "2.25.17")) + peer::fragment(3, 2, "data"),
-          '\2' + peer::command(1, xa_class, "2.25.17"), '\2' + peer::command(0x30, verification_class)};
+  return {'\0' + receiver::peer::Request().body(),
+          '\1' + receiver::peer::fragment(3, 3, receiver::peer::command(1, receiver::xa_class, "2.25.17")) +
+              receiver::peer::fragment(3, 2, "data"),
+          '\2' + receiver::peer::command(1, receiver::xa_class, "2.25.17"),
+          '\2' + receiver::peer::command(0x30, receiver::verification_class)};
 }
 
 }  // namespace helicarm::fuzz

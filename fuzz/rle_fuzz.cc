@@ -11,7 +11,7 @@ void run(std::string_view bytes) {
   Choices choices(bytes);
   const int word_bytes = 1 + static_cast<int>(choices.byte() % 2);
   const std::size_t pixels = 1 + choices.byte() * 16;
-  const auto decoded = decode_rle(bytes, pixels, word_bytes, "input");
+  const auto decoded = xray::decode_rle(bytes, pixels, word_bytes, "input");
   if (decoded)
     check(decoded->size() == pixels * static_cast<std::size_t>(word_bytes),
           "the byte count matches the pixels");

@@ -9,11 +9,11 @@ namespace {
 
 constexpr std::uint8_t recipe = 1;
 
-void run_message(const RtdeMessage& message) {
+void run_message(const robot::RtdeMessage& message) {
   if (const auto text = read_text(message)) check(text->size() <= 255, "a text has at most 255 bytes");
   (void)read_granted(message, message.kind);
   (void)read_controller_version(message);
-  (void)read_recipe(message, state_names, state_types);
+  (void)read_recipe(message, robot::state_names, robot::state_types);
   const auto state = read_state(message, recipe);
   if (!state) return;
   check(state->joints.allFinite() && state->joint_speeds.allFinite(), "joints are finite");
@@ -32,7 +32,7 @@ void run_message(const RtdeMessage& message) {
 
 void run(std::string_view bytes) {
   const std::size_t segment = 1 + Choices(bytes).byte();
-  RtdeStream stream;
+  robot::RtdeStream stream;
   while (!bytes.empty()) {
     stream.append(bytes.substr(0, segment));
     bytes.remove_prefix(std::min(segment, bytes.size()));
@@ -52,19 +52,19 @@ std::vector<std::string> seeds() {
   state.joints << 0.1, -1.2, 1.3, -0.4, 0.5, 0.6;
   state.base_from_tcp.translation = {400, -100, 300};
   const std::string data = to_bytes(state_message(recipe, state));
-  const std::string types = fmt::format("{}", fmt::join(state_types, ","));
+  const std::string types = fmt::format("{}", fmt::join(robot::state_types, ","));
   const std::string version("\0\0\0\5\0\0\0\x19\0\0\0\1\0\0\0\0", 16);
-  const std::vector<RtdeMessage> others = {{RtdeKind::outputs, '\1' + types},
-                                           {RtdeKind::inputs, std::string("\1IN_USE")},
-                                           {RtdeKind::inputs, "\1INT32"},
-                                           {RtdeKind::outputs, "\1NOT_FOUND"},
-                                           {RtdeKind::version, "\1"},
-                                           {RtdeKind::start, "\1"},
-                                           {RtdeKind::controller_version, version},
-                                           {RtdeKind::text, "\5hello\2me\1"}};
+  const std::vector<robot::RtdeMessage> others = {{robot::RtdeKind::outputs, '\1' + types},
+                                                  {robot::RtdeKind::inputs, std::string("\1IN_USE")},
+                                                  {robot::RtdeKind::inputs, "\1INT32"},
+                                                  {robot::RtdeKind::outputs, "\1NOT_FOUND"},
+                                                  {robot::RtdeKind::version, "\1"},
+                                                  {robot::RtdeKind::start, "\1"},
+                                                  {robot::RtdeKind::controller_version, version},
+                                                  {robot::RtdeKind::text, "\5hello\2me\1"}};
   std::vector<std::string> all{'\xff' + data, '\x10' + data + data};
   std::string handshake(1, '\x20');
-  for (const RtdeMessage& message : others) {
+  for (const robot::RtdeMessage& message : others) {
     all.push_back('\xff' + to_bytes(message));
     handshake += to_bytes(message);
   }

@@ -6,7 +6,7 @@
 namespace helicarm::fuzz {
 namespace {
 
-bool same(const RecordedPose& a, const RecordedPose& b) {
+bool same(const tracker::RecordedPose& a, const tracker::RecordedPose& b) {
   for (int i = 0; i < 16; ++i) {
     const double x = a.matrix(i / 4, i % 4), y = b.matrix(i / 4, i % 4);
     if (x != y && !(std::isnan(x) && std::isnan(y))) return false;

@@ -18,7 +18,7 @@ void run(std::string_view bytes) {
   constexpr int steps = 60;
   for (int i = 0; i < steps; ++i) {
     const robot::ScriptReport script = controller.state().script;
-    controller.set_heartbeat({i < beats ? script.tick : stop_beat, number});
+    controller.set_heartbeat({i < beats ? script.tick : robot::stop_beat, number});
     controller.step();
     const robot::RobotState state = controller.state();
     check(state.joints.allFinite() && state.joint_speeds.allFinite(), "the joints stay finite");
