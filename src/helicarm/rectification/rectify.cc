@@ -73,8 +73,9 @@ SeenLattice seen_lattice(const std::vector<detection::Dot>& dots, const phantom:
 }
 
 /// Refits the lattice's dots with their own profile and their neighbours masked.
-detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image, const detection::NoiseCorrelation& noise,
-                                 const std::vector<detection::Dot>& all, SeenLattice& seen) {
+detection::DotAppearance refit_lattice_dots(const xray::XrayImage& xray_image,
+                                            const detection::NoiseCorrelation& noise,
+                                            const std::vector<detection::Dot>& all, SeenLattice& seen) {
   std::vector<detection::Dot> members;
   for (const IndexedDot& d : seen.lattice.dots) members.push_back(seen.dots[d.dot]);
   const detection::DotAppearance appearance = detection::estimate_appearance(xray_image, noise, members);

@@ -226,12 +226,14 @@ Expected<Rectification> flat_panel(const xray::XrayImage& xray_image) {
 }
 
 TEST(Rectify, BlankAndSaturatedImagesAreRefused) {
-  EXPECT_EQ(
-      rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 1800)), phantom::plate48(), {}).error().reason,
-      Reason::blank_image);
-  EXPECT_EQ(
-      rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 4095)), phantom::plate48(), {}).error().reason,
-      Reason::saturated);
+  EXPECT_EQ(rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 1800)), phantom::plate48(), {})
+                .error()
+                .reason,
+            Reason::blank_image);
+  EXPECT_EQ(rectify(detection::drawn::xray_image(image::Image<float>(256, 256, 4095)), phantom::plate48(), {})
+                .error()
+                .reason,
+            Reason::saturated);
   EXPECT_EQ(flat_panel(detection::drawn::xray_image(image::Image<float>(256, 256, 1800))).error().reason,
             Reason::blank_image);
 }

@@ -154,7 +154,9 @@ TEST(FindGrid, PlateDotsAndFieldRimDoNotMoveCrossings) {
   }
 }
 
-TEST(FindGrid, EmptyFieldHasNoCrossings) { EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(side, side))).empty()); }
+TEST(FindGrid, EmptyFieldHasNoCrossings) {
+  EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(side, side))).empty());
+}
 
 }  // namespace
 }  // namespace helicarm::rectification

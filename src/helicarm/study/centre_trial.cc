@@ -95,7 +95,8 @@ class TileFit {
         xray_image_(xray_image),
         found_(detection::find_dots(xray_image, {})),
         alone_(dots_alone(scene, found_)),
-        appearance_(detection::estimate_appearance(xray_image, detection::noise_correlation(xray_image), alone_)) {
+        appearance_(
+            detection::estimate_appearance(xray_image, detection::noise_correlation(xray_image), alone_)) {
     appearance_.profile = detection::BallProfile(situation.blur_factor * appearance_.profile.blur(),
                                                  appearance_.profile.absorbance());
     appearance_.options.free_radius = !situation.held_radius;
