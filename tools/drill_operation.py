@@ -179,7 +179,7 @@ def drill_stale(program, folder):
         devices.navigation.wait_for("^preview: ")
         devices.confirm()
         devices.navigation.wait_for("navigate: femur", 120)
-        devices.wait_moving()
+        devices.wait_moving(30)
         devices.command("move femur 3 0 0", "moved")
         devices.navigation.wait_for("^plan_stale: ", 30)
         devices.navigation.wait_for("press Enter")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """For drill_operation.py: programs with output to wait for, and `virtual-or` with `navigate`."""
 
+import math
 import os
 import pty
 import queue
@@ -168,12 +169,17 @@ class VirtualDevices:
         found = re.search(r"at rest for ([\d.]+) s", self.command("where", "^tip "))
         return float(found.group(1)) if found else None
 
-    def wait_moving(self):
+    def tip_mm(self):
+        return [float(number) for number in re.findall(r"-?\d+\.?\d*", self.command("where", "^tip "))[:3]]
+
+    def wait_moving(self, distance_mm=0):
+        """Until the robot moves, `distance_mm` from where it is now at least."""
+        begin = self.tip_mm()
         for _ in range(1000):
-            if "moving" in self.command("where", "^tip "):
+            if "moving" in self.command("where", "^tip ") and math.dist(begin, self.tip_mm()) >= distance_mm:
                 return
             time.sleep(0.005)
-        raise TimeoutError("the robot did not start to move")
+        raise TimeoutError(f"the robot did not move by {distance_mm} mm")
 
     def stop_s(self, begun):
         """Seconds from `begun` until the robot was at rest."""
