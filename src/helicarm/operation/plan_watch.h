@@ -53,8 +53,9 @@ Expected<void> check_motion(const std::string& what, const Motion& motion, const
                             const std::string& since = "planning", const std::string& then = "plan again");
 
 /// Compares the newest poses with those of the plan. Each value is the componentwise median of up to five
-/// samples of the last 0.1 s: single outliers have no effect, and a motion is detected with its third sample,
-/// also a jump that the gate does not accept yet. A value: each thread may use a copy.
+/// samples of the last 0.1 s (bone) or twelve of the last 0.25 s (tool): single outliers have no effect, and
+/// a motion is detected with the third or seventh sample, also a jump that the gate does not accept yet. A
+/// value: each thread may use a copy.
 class PlanWatch {
  public:
   PlanWatch(const PlanLimits& limits, const TrackerPlan& tracker, PlanBasis basis)

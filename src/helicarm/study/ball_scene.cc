@@ -224,7 +224,7 @@ double centre_bound_px(const BallScene& scene, const BallTile& tile, const simul
           shares.emplace_back(int(i), v + side * u,
                               taps.at<double>(du + reach) * taps.at<double>(dv + reach));
       }
-  Eigen::SparseMatrix<double, Eigen::RowMajor> spread(n, side * side);
+  Eigen::SparseMatrix<double, Eigen::RowMajor> spread(n, Eigen::Index{side} * side);
   spread.setFromTriplets(shares.begin(), shares.end());
   Eigen::MatrixXd seen(n, Eigen::Index(slopes.size()));
   for (std::size_t k = 0; k < slopes.size(); ++k)
