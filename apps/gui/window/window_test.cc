@@ -9,7 +9,68 @@
 namespace helicarm::gui {
 namespace {
 
-TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
+class WholeOperation : public Window {
+ protected:
+  void expect_ends_as_measured() {
+    const Json measured = result_file();
+    ASSERT_EQ(measured["points"].size(), state().result->points.size());
+    auto* ends = find<QTableWidget>("endTable");
+    ASSERT_EQ(ends->rowCount(), 4);
+    for (int row = 0; row < 4; ++row)
+      for (const Json& point : measured["points"])
+        if (point["name"] == ends->item(row, 0)->text().toStdString()) {
+          EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
+                    fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
+        }
+    EXPECT_GE(state().measurements, 2)
+        << "one for the images; ends picked during a measurement are measured together";
+    EXPECT_LE(state().measurements, 5);
+  }
+  void move_to_each_tunnel() {
+    for (const operation::PlannedTunnel& tunnel : state().tunnels) {
+      find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
+      const auto go = [&] {
+        click("planWay");
+        if (!wait_idle() || !state().order) return;
+        if (state().outcomes.empty()) screenshot("5-path");
+        hold("go");
+      };
+      ASSERT_TRUE(with_robot("the tool is in the tunnel", go,
+                             [&] { return state().outcomes.contains(tunnel.name); }));
+      screenshot("6-navigate");
+      ASSERT_TRUE(make_ready());
+    }
+  }
+  void expect_outcomes_as_measured() {
+    auto* table = find<QTableWidget>("outcomeTable");
+    ASSERT_EQ(table->rowCount(), 4);
+    // Checks followed the measurement of the picks, at least one for each tunnel; the last one belongs to the
+    // last tunnel.
+    int last = state().measurements + 2;
+    while (fs::exists(case_folder(last + 1))) ++last;
+    const Json checked = read_json(case_folder(last) / "result.json").value();
+    const Json& line = checked.at("verification").at(0);
+    const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
+    EXPECT_EQ(table->item(row, 3)->text().toStdString(),
+              fmt::format("{:.2f}", line.at("err_start_px").get<double>()));
+  }
+  void expect_export_and_replay() {
+    window_->controller().export_to(folder_ / "export");
+    ASSERT_TRUE(wait_idle());
+    for (const char* file : {"report.html", "report.pdf", "result.json"})
+      EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
+
+    window_->open_paths({state().folder});
+    auto* replay = window_->findChild<ReplayPanel*>();
+    ASSERT_TRUE(replay->timeline());
+    replay->set_moment(int(replay->timeline()->moments.size()) - 1);
+    ASSERT_TRUE(wait("the replayed tool is shown", [&] { return window_->recorded().has_value(); }));
+    EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
+    screenshot("8-replay");
+  }
+};
+
+TEST_F(WholeOperation, CompletesAllSixStepsByMouseAndKeyboard) {
   screenshot("0-start");
   open_rehearsal();
   EXPECT_EQ(card(Phase::acquire).status, StepStatus::waiting);
@@ -33,68 +94,23 @@ TEST_F(Window, CompletesAllSixStepsByMouseAndKeyboard) {
   pick_all();
   ASSERT_TRUE(card(Phase::plan).status == StepStatus::good || card(Phase::plan).status == StepStatus::warning)
       << card(Phase::plan).why.toStdString();
-  const Json second = result_file();
-  ASSERT_EQ(second["points"].size(), state().result->points.size());
-  auto* ends = find<QTableWidget>("endTable");
-  ASSERT_EQ(ends->rowCount(), 4);
-  for (int row = 0; row < 4; ++row)
-    for (const Json& point : second["points"])
-      if (point["name"] == ends->item(row, 0)->text().toStdString()) {
-        EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
-                  fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
-      }
-  EXPECT_GE(state().measurements, 2)
-      << "one for the images; ends picked during a measurement are measured together";
-  EXPECT_LE(state().measurements, 5);
+  ASSERT_NO_FATAL_FAILURE(expect_ends_as_measured());
   screenshot("4-plan");
 
   ASSERT_NO_FATAL_FAILURE(register_robot(true));
-  for (const operation::PlannedTunnel& tunnel : state().tunnels) {
-    find<QComboBox>("tunnel")->setCurrentText(QString::fromStdString(tunnel.name));
-    const auto go = [&] {
-      click("planWay");
-      if (!wait_idle() || !state().order) return;
-      if (state().outcomes.empty()) screenshot("5-path");
-      hold("go");
-    };
-    ASSERT_TRUE(
-        with_robot("the tool is in the tunnel", go, [&] { return state().outcomes.contains(tunnel.name); }));
-    screenshot("6-navigate");
-    ASSERT_TRUE(make_ready());
-  }
+  ASSERT_NO_FATAL_FAILURE(move_to_each_tunnel());
   EXPECT_EQ(card(Phase::navigate).status, StepStatus::good);
   EXPECT_EQ(card(Phase::verify).status, StepStatus::good);
   QTest::keyClick(window_.get(), Qt::Key_6, Qt::AltModifier);
   ASSERT_TRUE(wait("the verification's page is chosen",
                    [&] { return window_->strip().button(Phase::verify)->isChecked(); }));
-  auto* table = find<QTableWidget>("outcomeTable");
-  ASSERT_EQ(table->rowCount(), 4);
-  // Checks followed the measurement of the picks, at least one for each tunnel; the last one belongs to the
-  // last tunnel.
-  int last = state().measurements + 2;
-  while (fs::exists(case_folder(last + 1))) ++last;
-  const Json checked = read_json(case_folder(last) / "result.json").value();
-  const Json& line = checked.at("verification").at(0);
-  const int row = state().tunnels.back().name > state().tunnels.front().name ? 2 : 0;
-  EXPECT_EQ(table->item(row, 3)->text().toStdString(),
-            fmt::format("{:.2f}", line.at("err_start_px").get<double>()));
+  ASSERT_NO_FATAL_FAILURE(expect_outcomes_as_measured());
   window_->scene().set_preset(SceneView::Preset::lateral);
   screenshot("7-verify");
 
   std::printf("longest blocking of the interface: %lld ms, event %s\n", WatchedApplication::longest_ms,
               WatchedApplication::longest_what.c_str());
-  window_->controller().export_to(folder_ / "export");
-  ASSERT_TRUE(wait_idle());
-  for (const char* file : {"report.html", "report.pdf", "result.json"})
-    EXPECT_TRUE(fs::exists(folder_ / "export" / file)) << file;
-
-  window_->open_paths({state().folder});
-  auto* replay = window_->findChild<ReplayPanel*>();
-  ASSERT_TRUE(replay->timeline());
-  replay->set_moment(int(replay->timeline()->moments.size()) - 1);
-  ASSERT_TRUE(wait("the replayed tool is shown", [&] { return window_->recorded().has_value(); }));
-  EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
-  screenshot("8-replay");
+  ASSERT_NO_FATAL_FAILURE(expect_export_and_replay());
   open_rehearsal();
   EXPECT_FALSE(window_->recorded()) << "a tool of previous images";
 }

@@ -20,6 +20,8 @@ using testing::HasSubstr;
 
 /// Timeout of a wait: longer than any step takes with every core busy.
 constexpr int patience_ms = 180000;
+/// Timeout of a wait for a button.
+constexpr int enabled_ms = 10000;
 /// Number of attempts: a busy machine may delay the tracker or stop the robot.
 constexpr int most_attempts = 10;
 /// The window's steps do not depend on the delay of poses and states on a busy machine.
@@ -121,11 +123,19 @@ class Window : public testing::Test {
     EXPECT_NE(found, nullptr) << name;
     return found;
   }
-  void click(const char* name) { QTest::mouseClick(find(name), Qt::LeftButton); }
+  /// A page follows the devices by a timer: a button may be enabled later than the devices allow it. A
+  /// button that stays disabled has no effect, as for a person; the wait for its effect fails or tries again.
+  static bool enabled(const QWidget* button) {
+    return QTest::qWaitFor([&] { return button->isEnabled(); }, enabled_ms);
+  }
+  void click(const char* name) {
+    auto* button = find(name);
+    if (enabled(button)) QTest::mouseClick(button, Qt::LeftButton);
+  }
   /// With the mouse, or with Enter, until the button is full or disabled.
   void hold(const char* name, bool by_key = false) {
     auto* button = find<HoldButton>(name);
-    if (!wait(fmt::format("{} is enabled", name).c_str(), [&] { return button->isEnabled(); })) return;
+    if (!enabled(button)) return;
     bool over = false;
     const auto full = QObject::connect(button, &HoldButton::held, [&] { over = true; });
     const auto until_over = [&] {
