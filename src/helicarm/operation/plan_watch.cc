@@ -17,15 +17,15 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// The limit of FreshnessLimits for poses and states.
 constexpr double recent_s = 0.1;
-/// The median of so many samples, not older than this, is compared with the plan.
-struct Samples {
+/// The median of the last `most` samples in `window_s` is compared with the plan.
+struct MedianWindow {
   double window_s;
   std::size_t most;
 };
-constexpr Samples of_bone{recent_s, 5};
-/// The tool's rotational noise acts on the tip by the tool's length: at 0.22 degrees and 130 mm the median of
-/// five samples scatters by 0.39 mm rms, of twelve (0.2 s at 60 Hz) by 0.24 mm, at a limit of 1 mm.
-constexpr Samples of_tool{0.25, 12};
+constexpr MedianWindow of_bone{recent_s, 5};
+/// The tool's rotational noise acts on the tip by the tool's length: with 0.2 degrees per sample the median
+/// of five samples deviates by up to 1.25 mm in ten minutes, of twelve by 0.74 mm, at a limit of 1 mm.
+constexpr MedianWindow of_tool{0.25, 12};
 /// Lever that converts a rotation to a distance when the nearest pose of a path is sought.
 constexpr double lever_mm = 200;
 constexpr double deg_per_rad = 180 / std::numbers::pi;
@@ -53,7 +53,7 @@ Vector6d median_of(const std::vector<Vector6d>& steps) {
 }
 
 std::vector<tracker::PoseSample> recent(const tracker::PoseBoard& board, const std::string& name,
-                                        double now_s, const Samples& wanted) {
+                                        double now_s, const MedianWindow& wanted) {
   if (const auto elsewhere = board.elsewhere(name, now_s, recent_s)) return {*elsewhere};
   value_or_throw(board.latest(name, now_s, recent_s));
   // A sample may arrive after `now`.

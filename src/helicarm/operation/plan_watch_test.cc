@@ -210,6 +210,20 @@ TEST(PlanWatch, TenMinutesOfNoiseStayBelowTheLimit) {
   RecordProperty("most_mdeg", int(most_deg * 1000));
 }
 
+TEST(PlanWatch, TenMinutesOfRotationalNoiseOfTheToolStayBelowTheLimit) {
+  Scene scene;
+  scene.sigma_deg = 0.2;
+  const PlanWatch watch = scene.watch();
+  double most_mm = 0;
+  while (scene.time_s < 600) {
+    scene.next_sample();
+    most_mm =
+        std::max(most_mm, watch.base_motion(scene.board, scene.track, scene.time_s).value().distance_mm);
+  }
+  EXPECT_LT(most_mm, 1);
+  RecordProperty("most_um", int(most_mm * 1000));
+}
+
 TEST(PlanWatch, CreepingBoneStopsTheRobot) {
   // Fifteen steps of 2 mm, as when someone shifts the leg.
   const Outcome creep = Scene().carry_out(robot::planned(), from(on_the_axis_s, [](double t) {
