@@ -22,7 +22,7 @@ struct NormalEquations {
 struct LeastSquaresOptions {
   int max_iterations = 50;
   double initial_damping = 1e-3;
-  double min_gain = 1e-12;  ///< converged where a step is predicted to lower chi2 by less, over 1 + chi2
+  double min_gain = 1e-8;  ///< converged where a step is predicted to lower chi2 by less, over 1 + chi2
 };
 
 template <class State, int n>

@@ -127,13 +127,12 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   };
   const auto fit = fit_least_squares<3>(
       *start, linearise,
-      [](const Eigen::Vector3d& point, const Eigen::Vector3d& step) { return point + step; },
-      {.min_gain = 1e-8});
+      [](const Eigen::Vector3d& point, const Eigen::Vector3d& step) { return point + step; });
   if (!fit->converged)
     return fail(Reason::point_at_infinity, "the intersection of the rays does not converge");
   Intersection result{fit->state, fit->equations.information.inverse(), largest_gap(ray_observations),
                       fit->equations.chi2};
-  linearise(result.point);
+  linearise(result.point);  // the last trial may have been rejected: its Jacobian is of another point
   result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
   return result;
 }

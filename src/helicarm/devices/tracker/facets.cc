@@ -9,13 +9,10 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/least_squares.h"
-#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/pose_step.h"
 
 namespace helicarm::tracker {
 namespace {
-
-/// Translation (mm), then rotation vector (rad).
-using Twist = Eigen::Matrix<double, 6, 1>;
 
 /// 99.9 % quantile of chi-square, Wilson and Hilferty's approximation.
 double chi2_limit(double dof) {
@@ -52,13 +49,10 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
 
 FusedPose fuse(const std::vector<SeenFacet>& seen) {
   const auto linearise = [&](const geometry::RigidTransform& pose) {
-    geometry::NormalEquations<6> equations{PoseCovariance::Zero(), Twist::Zero()};
+    geometry::NormalEquations<6> equations{PoseCovariance::Zero(), geometry::PoseStep::Zero()};
     for (const SeenFacet& facet : seen) {
       const geometry::RigidTransform predicted = pose * facet.calibrator_from_facet;
-      Twist residual;
-      residual.head<3>() = facet.tracker_from_facet.translation - predicted.translation;
-      residual.tail<3>() =
-          geometry::vector_from_rotation(facet.tracker_from_facet.rotation * predicted.rotation.transpose());
+      const geometry::PoseStep residual = geometry::step_between(predicted, facet.tracker_from_facet);
       PoseCovariance jacobian = PoseCovariance::Identity();
       jacobian.topRightCorner<3, 3>() = -geometry::cross_matrix(predicted.translation - pose.translation);
       equations.information += jacobian.transpose() * facet.information * jacobian;
@@ -67,12 +61,10 @@ FusedPose fuse(const std::vector<SeenFacet>& seen) {
     }
     return std::optional(equations);
   };
-  const auto moved = [](const geometry::RigidTransform& pose, const Twist& step) {
-    return geometry::RigidTransform{geometry::rotation_from_vector(step.tail<3>()) * pose.rotation,
-                                    pose.translation + step.head<3>()};
-  };
   const auto fit = geometry::fit_least_squares<6>(
-      seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse(), linearise, moved);
+      seen[0].tracker_from_facet * seen[0].calibrator_from_facet.inverse(), linearise, geometry::moved);
+  if (!fit->converged)
+    throw BadInput(Reason::uncertain, "the mean pose of the calibrator's facets does not converge");
   FusedPose fused;
   fused.tracker_from_calibrator = fit->state;
   fused.covariance = fit->equations.information.llt().solve(PoseCovariance::Identity());

@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/least_squares.h"
+#include "helicarm/geometry/pose_step.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::tracker {
@@ -19,9 +20,12 @@ namespace {
 
 using Matrix12 = Eigen::Matrix<double, 12, 12>;
 using Vector12 = Eigen::Matrix<double, 12, 1>;
-using Residual = Eigen::Matrix<double, 6, 1>;
 
 constexpr double deg_per_rad = 180 / std::numbers::pi;
+
+/// Simulated poses may be exact: far below any tracker, far above rounding.
+constexpr double least_sigma_mm = 1e-6;
+constexpr double least_sigma_rad = 1e-9;
 
 /// A of the flange, B of the marker: AX = XB.
 struct Motion {
@@ -83,14 +87,9 @@ geometry::RigidTransform start_of_y(std::span<const HandEyePair> pairs, const ge
   return {geometry::nearest_rotation(sum.rotation), sum.translation};
 }
 
-Residual residual_of(const HandEyePair& pair, const HandEye& at) {
-  const geometry::RigidTransform predicted =
-      at.tracker_from_base * pair.base_from_flange * at.flange_from_marker;
-  Residual residual;
-  residual.head<3>() = pair.tracker_from_marker.translation - predicted.translation;
-  residual.tail<3>() =
-      geometry::vector_from_rotation(pair.tracker_from_marker.rotation * predicted.rotation.transpose());
-  return residual;
+geometry::PoseStep residual_of(const HandEyePair& pair, const HandEye& at) {
+  return geometry::step_between(at.tracker_from_base * pair.base_from_flange * at.flange_from_marker,
+                                pair.tracker_from_marker);
 }
 
 /// Derivatives of the predicted marker's position and rotation with respect to position and rotation of X,
@@ -108,13 +107,10 @@ Eigen::Matrix<double, 6, 12> jacobian_of(const HandEyePair& pair, const HandEye&
   return jacobian;
 }
 
-geometry::RigidTransform moved(const geometry::RigidTransform& pose, const Eigen::Ref<const Residual>& step) {
-  return {geometry::rotation_from_vector(step.tail<3>()) * pose.rotation, pose.translation + step.head<3>()};
-}
-
-void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double sigma_rad, HandEye& at) {
+Expected<HandEye> refined(std::span<const HandEyePair> pairs, double sigma_mm, double sigma_rad,
+                          const HandEye& start) {
   using Equations = geometry::NormalEquations<12>;
-  Residual weights;
+  geometry::PoseStep weights;
   weights << Eigen::Vector3d::Constant(1 / (sigma_mm * sigma_mm)),
       Eigen::Vector3d::Constant(1 / (sigma_rad * sigma_rad));
   const auto linearise = [&](const HandEye& state) {
@@ -122,7 +118,7 @@ void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double
     for (const HandEyePair& pair : pairs) {
       const Eigen::Matrix<double, 6, 12> jacobian = jacobian_of(pair, state);
       const Eigen::Matrix<double, 12, 6> weighted = jacobian.transpose() * weights.asDiagonal();
-      const Residual residual = residual_of(pair, state);
+      const geometry::PoseStep residual = residual_of(pair, state);
       equations.information += weighted * jacobian;
       equations.gradient += weighted * residual;
       equations.chi2 += residual.dot(weights.asDiagonal() * residual);
@@ -131,13 +127,14 @@ void refine_hand_eye(std::span<const HandEyePair> pairs, double sigma_mm, double
   };
   const auto stepped = [](const HandEye& from, const Vector12& step) {
     HandEye to = from;
-    to.flange_from_marker = moved(from.flange_from_marker, step.head<6>());
-    to.tracker_from_base = moved(from.tracker_from_base, step.tail<6>());
+    to.flange_from_marker = geometry::moved(from.flange_from_marker, step.head<6>());
+    to.tracker_from_base = geometry::moved(from.tracker_from_base, step.tail<6>());
     return to;
   };
-  const auto fit = geometry::fit_least_squares<12>(at, linearise, stepped);
-  at = fit->state;
-  at.covariance = fit->equations.information.ldlt().solve(Matrix12::Identity());
+  auto fit = geometry::fit_least_squares<12>(start, linearise, stepped);
+  if (!fit->converged) return fail(Reason::uncertain, "the hand-eye calibration does not converge");
+  fit->state.covariance = fit->equations.information.ldlt().solve(Matrix12::Identity());
+  return fit->state;
 }
 
 }  // namespace
@@ -162,18 +159,20 @@ Expected<HandEye> calibrate_hand_eye(std::span<const HandEyePair> pairs, const H
   double sigma_rad = (known_noise ? options.sigma_deg : 0.1) / deg_per_rad;
   const double count = static_cast<double>(pairs.size());
   for (int round = 0; round < (known_noise ? 1 : noise_rounds); ++round) {
-    refine_hand_eye(pairs, sigma_mm, sigma_rad, result);
+    const auto refinement = refined(pairs, sigma_mm, sigma_rad, result);
+    if (!refinement) return refinement;
+    result = *refinement;
     double square_mm = 0, square_rad = 0;
     for (const HandEyePair& pair : pairs) {
-      const Residual residual = residual_of(pair, result);
+      const geometry::PoseStep residual = residual_of(pair, result);
       square_mm += residual.head<3>().squaredNorm();
       square_rad += residual.tail<3>().squaredNorm();
     }
     result.rms_mm = std::sqrt(square_mm / count);
     result.rms_deg = std::sqrt(square_rad / count) * deg_per_rad;
     // Six of the twelve unknowns are rotations.
-    sigma_mm = std::sqrt(std::max(square_mm / (3 * count - 6), 1e-18));
-    sigma_rad = std::sqrt(std::max(square_rad / (3 * count - 6), 1e-24));
+    sigma_mm = std::max(std::sqrt(square_mm / (3 * count - 6)), least_sigma_mm);
+    sigma_rad = std::max(std::sqrt(square_rad / (3 * count - 6)), least_sigma_rad);
   }
   if (result.rms_mm > options.max_rms_mm || result.rms_deg > options.max_rms_deg)
     return fail(
