@@ -193,10 +193,7 @@ void measure(const PhantomArguments& arguments, Console& console) {
     std::filesystem::remove(out / file, ignored);
   const phantom_calibration::PhantomResult result = measured(arguments, console);
   notify(result.warnings, console);
-  if (!result.failure)
-    value_or_throw(write_file(out / "calibrator.json", to_text(phantom::to_json(result.calibrator)) + "\n"));
-  value_or_throw(write_file(out / "report.html", phantom_calibration::phantom_report_html(result)));
-  value_or_throw(write_file(out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
+  value_or_throw(phantom_calibration::write_phantom(result, out));
   if (result.failure) throw BadInput(*result.failure);
   if (console.json)
     console.out << to_text(phantom_calibration::to_json(result)) << "\n";

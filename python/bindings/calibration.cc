@@ -280,25 +280,10 @@ void add_points(py::module_& module) {
       });
 }
 
-}  // namespace
+using Held = HeldCalibration;
 
-void add_calibration(py::module_& module) {
-  add_priors(module);
-  add_points(module);
-  using Held = HeldCalibration;
-  py::class_<Held>(module, "Calibration", R"(Views calibrated together; all that points are located by.
-
-World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given by its name or index.)")
-      .def_static("load", &loaded, py::arg("path"),
-                  "From result.json of a run that was not refused. Raises InputError.")
-      .def_property_readonly("names",
-                             [](const Held& c) {
-                               std::vector<std::string> names;
-                               for (const auto& view : c.views) names.push_back(view.name);
-                               return names;
-                             })
-      .def("__len__", [](const Held& c) { return c.views.size(); })
-      .def(
+void add_parameters(py::class_<Held>& held) {
+  held.def(
           "projection",
           [](const Held& c, const ViewKey& v) { return matrix_array(view_of(c, v).view.projection()); },
           py::arg("view"),
@@ -333,7 +318,26 @@ World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given 
       .def_readonly("dof", &Held::dof)
       .def_readonly("variance_scale", &Held::variance_scale,
                     "Factor of the covariance where the residuals exceed the sigmas.")
-      .def_property_readonly("warnings", [](const Held& c) { return warning_list(c.warnings); })
+      .def_property_readonly("warnings", [](const Held& c) { return warning_list(c.warnings); });
+}
+
+}  // namespace
+
+void add_calibration(py::module_& module) {
+  add_priors(module);
+  add_points(module);
+  py::class_<Held> held(module, "Calibration", R"(Views calibrated together; all that points are located by.
+
+World: calibrator frame, mm. Pixels: rectified unless raw=True. A view is given by its name or index.)");
+  held.def_static("load", &loaded, py::arg("path"),
+                  "From result.json of a run that was not refused. Raises InputError.")
+      .def_property_readonly("names",
+                             [](const Held& c) {
+                               std::vector<std::string> names;
+                               for (const auto& view : c.views) names.push_back(view.name);
+                               return names;
+                             })
+      .def("__len__", [](const Held& c) { return c.views.size(); })
       .def("project", &projected, py::arg("xyz_mm"), py::arg("view"), py::kw_only(), py::arg("raw") = false,
            "(N, 3) or (3,) calibrator mm to (N, 2) or (2,) pixels; NaN behind the source or (raw) off the "
            "image.")
@@ -353,6 +357,7 @@ a click. Returns a LocatedPoint. Raises RefusedError: not_seen, parallel_rays, p
 
 Returns {"first_mm": (3,), "step_mm", "rms_mm": (n, n, n) indexed [x, y, z], not copied, NaN where no point can be
 located}. Releases the GIL. Raises InputError: bad_value.)");
+  add_parameters(held);
   const calibration::CalibrationOptions usual;
   module.def("calibrate", &calibrated, py::arg("views"), py::kw_only(), py::arg("c_arm") = usual.common.c_arm,
              py::arg("ball_covariance_mm2") = py::none(), py::arg("scale_sigma") = usual.common.scale_sigma,

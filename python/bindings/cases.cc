@@ -160,10 +160,7 @@ void add_points(py::module_& module) {
       });
 }
 
-}  // namespace
-
-void add_cases(py::module_& module) {
-  add_points(module);
+void add_result(py::module_& module) {
   py::class_<pipeline::Result>(module, "Result", "The answer of run_case; to_dict() is result.json.")
       .def_property_readonly("status", [](const pipeline::Result& r) { return r.failure ? "refused" : "ok"; })
       .def_property_readonly("warnings", [](const pipeline::Result& r) { return warning_list(r.warnings); })
@@ -212,6 +209,13 @@ void add_cases(py::module_& module) {
           "The content of result.json.")
       .def("write", &write, py::arg("folder"),
            "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.");
+}
+
+}  // namespace
+
+void add_cases(py::module_& module) {
+  add_points(module);
+  add_result(module);
   const pipeline::RunOptions usual;
   module.def(
       "run_case", &run, py::arg("folder"), py::kw_only(),

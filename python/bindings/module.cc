@@ -12,6 +12,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_rectification(module);
   add_calibration(module);
   add_cases(module);
+  add_phantom_calibration(module);
 }
 
 }  // namespace helicarm::python

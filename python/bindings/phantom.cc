@@ -32,9 +32,7 @@ void save(const T& thing, const std::filesystem::path& path) {
   value_or_raise(write_file(path, to_text(phantom::to_json(thing)) + "\n"));
 }
 
-}  // namespace
-
-void add_phantom(py::module_& module) {
+void add_calibrator(py::module_& module) {
   py::class_<phantom::Calibrator>(
       module, "Calibrator", "The phantom: balls at known positions, and check targets (calibrator.json).")
       .def_static("udcsc", &phantom::udcsc,
@@ -71,6 +69,9 @@ void add_phantom(py::module_& module) {
       .def("__repr__", [](const phantom::Calibrator& c) {
         return fmt::format("<Calibrator {}: {} balls>", c.name, c.balls.size());
       });
+}
+
+void add_plate(py::module_& module) {
   py::class_<phantom::Plate>(module, "Plate",
                              "The rectification plate in front of the receiver (plate.json).")
       .def_static("plate48", &phantom::plate48,
@@ -100,6 +101,13 @@ void add_phantom(py::module_& module) {
       .def("__repr__", [](const phantom::Plate& p) {
         return fmt::format("<Plate {}: {} dots>", p.name, p.dots_mm.size());
       });
+}
+
+}  // namespace
+
+void add_phantom(py::module_& module) {
+  add_calibrator(module);
+  add_plate(module);
 }
 
 }  // namespace helicarm::python

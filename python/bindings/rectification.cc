@@ -74,12 +74,39 @@ rectification::Method method_of(const std::string& word) {
   return rectification::Method(found - pipeline::method_words.begin());
 }
 
-void add_rectification(py::module_& module) {
-  py::class_<rectification::DistortionMap>(module, "DistortionMap",
-                                           R"(Raw pixels of an image to rectified ones, and back (Eq. 1).
+namespace {
+
+void add_attributes(py::class_<rectification::DistortionMap>& map_class) {
+  map_class.def_readonly("model", &rectification::DistortionMap::model)
+      .def_readonly("order", &rectification::DistortionMap::order,
+                    "Order of the polynomial; 0: the identity.")
+      .def_readonly("residual_rms_px", &rectification::DistortionMap::residual_rms_px)
+      .def_readonly("residual_max_px", &rectification::DistortionMap::residual_max_px)
+      .def_readonly("held_out_rms_px", &rectification::DistortionMap::held_out_rms_px)
+      .def_readonly("rectified_pixel_mm", &rectification::DistortionMap::rectified_pixel_mm, "mm, or None.")
+      .def_property_readonly(
+          "rectified_plane",
+          [](const rectification::DistortionMap& map) -> std::optional<std::string> {
+            if (!map.rectified_plane) return std::nullopt;
+            return map.rectified_plane == rectification::RectifiedPlane::detector ? "detector" : "plate";
+          },
+          "Plane of rectified_pixel_mm: \"detector\", \"plate\" or None.")
+      .def_property_readonly(
+          "shape", [](const rectification::DistortionMap& map) { return std::pair(map.height, map.width); },
+          "(height, width) of the image it belongs to.")
+      .def("__repr__", [](const rectification::DistortionMap& map) {
+        return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model, map.width, map.height);
+      });
+}
+
+void add_distortion_map(py::module_& module) {
+  py::class_<rectification::DistortionMap> map_class(
+      module, "DistortionMap",
+      R"(Raw pixels of an image to rectified ones, and back (Eq. 1).
 
 Both directions agree: one is the numerical inverse of the other. Rectified pixels have the raw scale and no rotation at
-the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-left pixel.)")
+the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-left pixel.)");
+  map_class
       .def_static(
           "identity",
           [](int width, int height, std::optional<double> pixel_mm) {
@@ -128,27 +155,14 @@ Raises InputError: bad_value for another shape, not_finite.)")
 Outside the raw image it holds the lowest grey value. The array owns its pixels. Releases the GIL.
 Raises InputError: bad_size where the map is for another image size.)")
       .def("sigma_px", &sigmas, py::arg("uv"),
-           "(N,) standard deviation per axis of the map itself at rectified pixels.")
-      .def_readonly("model", &rectification::DistortionMap::model)
-      .def_readonly("order", &rectification::DistortionMap::order,
-                    "Order of the polynomial; 0: the identity.")
-      .def_readonly("residual_rms_px", &rectification::DistortionMap::residual_rms_px)
-      .def_readonly("residual_max_px", &rectification::DistortionMap::residual_max_px)
-      .def_readonly("held_out_rms_px", &rectification::DistortionMap::held_out_rms_px)
-      .def_readonly("rectified_pixel_mm", &rectification::DistortionMap::rectified_pixel_mm, "mm, or None.")
-      .def_property_readonly(
-          "rectified_plane",
-          [](const rectification::DistortionMap& map) -> std::optional<std::string> {
-            if (!map.rectified_plane) return std::nullopt;
-            return map.rectified_plane == rectification::RectifiedPlane::detector ? "detector" : "plate";
-          },
-          "Plane of rectified_pixel_mm: \"detector\", \"plate\" or None.")
-      .def_property_readonly(
-          "shape", [](const rectification::DistortionMap& map) { return std::pair(map.height, map.width); },
-          "(height, width) of the image it belongs to.")
-      .def("__repr__", [](const rectification::DistortionMap& map) {
-        return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model, map.width, map.height);
-      });
+           "(N,) standard deviation per axis of the map itself at rectified pixels.");
+  add_attributes(map_class);
+}
+
+}  // namespace
+
+void add_rectification(py::module_& module) {
+  add_distortion_map(module);
   py::class_<rectification::Rectification>(
       module, "Rectification", "The distortion map and its residuals, from one image of the plate.")
       .def_readonly("map", &rectification::Rectification::map, "DistortionMap")

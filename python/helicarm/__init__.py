@@ -5,14 +5,16 @@ Points are (u, v) in pixels, (0, 0) the centre of the top-left pixel; images are
 degrees. A matrix named a_from_b maps points of b into a. Failures are InputError and RefusedError.
 """
 from ._helicarm import (  # noqa: F401
-    CArmPrior, Calibration, Calibrator, DistortionMap, IntrinsicsPrior, LocatedPoint, Plate, Rectification, Result,
-    ResultPoint, ViewPoints, XrayImage, __version__, calibrate, detect, read_image, rectify, run_case, simulate_case)
+    CArmPrior, Calibration, Calibrator, DistortionMap, IntrinsicsPrior, LocatedPoint, MeasuredPhantom, Plate,
+    Rectification, Result, ResultPoint, ViewPoints, XrayImage, __version__, calibrate, detect, measure_phantom,
+    read_image, rectify, run_case, simulate_case, verify_phantom)
 from .errors import HelicarmError, InputError, RefusedError  # noqa: F401
 
 __all__ = [
     "CArmPrior", "Calibration", "Calibrator", "DistortionMap", "HelicarmError", "InputError", "IntrinsicsPrior",
-    "LocatedPoint", "Plate", "Rectification", "RefusedError", "Result", "ResultPoint", "ViewPoints", "XrayImage",
-    "calibrate", "detect", "figures", "read_image", "rectify", "run_case", "simulate_case"]
+    "LocatedPoint", "MeasuredPhantom", "Plate", "Rectification", "RefusedError", "Result", "ResultPoint", "ViewPoints",
+    "XrayImage", "calibrate", "detect", "figures", "measure_phantom", "read_image", "rectify", "run_case",
+    "simulate_case", "verify_phantom"]
 
 
 def __getattr__(name):

@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
+#include "helicarm/core/files.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/style.h"
 
@@ -241,6 +242,16 @@ std::string phantom_report_html(const PhantomResult& result) {
              "</main>\n<footer><p class=\"soft\">helicarm {}. Millimetres and pixels.</p></footer>\n</body>\n"
              "</html>\n",
              HELICARM_VERSION);
+}
+
+Expected<void> write_phantom(const PhantomResult& result, const std::filesystem::path& folder) {
+  return guarded([&] {
+    if (!result.failure)
+      value_or_throw(
+          write_file(folder / "calibrator.json", to_text(phantom::to_json(result.calibrator)) + "\n"));
+    value_or_throw(write_file(folder / "report.html", phantom_report_html(result)));
+    value_or_throw(write_file(folder / "result.json", to_text(to_json(result)) + "\n"));
+  });
 }
 
 }  // namespace helicarm::phantom_calibration
