@@ -33,6 +33,103 @@ std::array<Vector<T>, 3> frame_of(const Vector<T>& e1, const Vector<T>& e2) {
   return {along, normal.cross(along), normal};
 }
 
+/// A triangle of balls in each lane: squared lengths of two edges, their product, and the corners.
+template <class Simd>
+struct ModelTriangles {
+  Simd a, b, c;
+  std::array<Vector<Simd>, 3> corners;
+};
+
+/// Relative depths of the second and third corner behind the first.
+template <class Simd>
+struct Depths {
+  Simd behind1, behind2;
+  Simd inverse_distance2 = Simd::Zero();  ///< of the first corner
+  Simd open = Simd::Ones();               ///< 0 where the iteration has settled
+};
+
+template <class Simd, class Image>
+std::array<Vector<Simd>, 2> lifted_edges(const Image& image, const Depths<Simd>& depths) {
+  const auto lift = [&](const Eigen::Vector2f& at, const Simd& behind) -> Vector<Simd> {
+    return {(1 + behind) * at.x() - image.at0.x(), (1 + behind) * at.y() - image.at0.y(), behind};
+  };
+  return {lift(image.at1, depths.behind1), lift(image.at2, depths.behind2)};
+}
+
+/// Perspective depths, iterated from scaled orthography.
+template <class Simd, class Image>
+void settle(const ModelTriangles<Simd>& model, const Image& image, Depths<Simd>& depths) {
+  for (int iteration = 0; iteration < most_depth_iterations && (depths.open > 0).any(); ++iteration) {
+    const auto [e1, e2] = lifted_edges(image, depths);
+    const Simd a = e1.x * e1.x + e1.y * e1.y;
+    const Simd b = e2.x * e2.x + e2.y * e2.y;
+    const Simd c = e1.x * e2.x + e1.y * e2.y;
+    const Simd w = inverse_distance2(model.a, model.b, model.c, a, b, c);
+    const Simd size2 = (w * model.b - b).max(0).sqrt();
+    Simd next1 = (w * model.a - a).max(0).sqrt();
+    Simd next2 = (w * model.c < c).select(-size2, size2);
+    const Simd sign =
+        (next1 * depths.behind1 + next2 * depths.behind2 < 0).select(Simd::Constant(-1), Simd::Ones());
+    next1 *= sign;
+    next2 *= sign;
+    const Simd moved = (next1 - depths.behind1).abs().max((next2 - depths.behind2).abs());
+    const Simd deepest = next1.abs().max(next2.abs());
+    depths = {next1, next2, w,
+              (moved >= static_cast<float>(depth_settled) && deepest < static_cast<float>(deepest_corner))
+                  .select(Simd::Ones(), Simd::Zero())};
+  }
+}
+
+/// What the projected balls are compared with.
+struct Support {
+  const CandidateGrid& near;
+  const Eigen::Vector2d& principal_px;
+  const std::vector<Eigen::Vector3f>& balls;
+};
+
+/// Adds for each lane the balls that project near a candidate, in the pose and in its mirror image about the
+/// triangle's plane.
+template <class Simd, class Image, class Counts>
+void count_near(const ModelTriangles<Simd>& model, const Depths<Simd>& depths, const Image& image,
+                const Support& support, Counts& upright, Counts& mirrored) {
+  const auto [e1, e2] = lifted_edges(image, depths);
+  const auto lifted = frame_of(e1, e2);
+  const auto own = frame_of(model.corners[1] - model.corners[0], model.corners[2] - model.corners[0]);
+  const Simd distance = depths.inverse_distance2.rsqrt();
+  const CandidateGrid& near = support.near;
+  const Eigen::Array2f centre =
+      ((support.principal_px.array() - near.low_px()) / near.cell_px()).template cast<float>();
+  const float focal = image.focal_px * static_cast<float>(1 / near.cell_px());
+  // Rows of the pose without the component along the triangle's normal, which changes sign if mirrored.
+  const auto in_plane = [&](const Simd& along, const Simd& across, const Simd& origin) {
+    const Vector<Simd> row = own[0] * along + own[1] * across;
+    return std::pair<Vector<Simd>, Simd>(row, origin - row.dot(model.corners[0]));
+  };
+  const auto x = in_plane(lifted[0].x, lifted[1].x, image.at0.x() * distance);
+  const auto y = in_plane(lifted[0].y, lifted[1].y, image.at0.y() * distance);
+  const auto z = in_plane(lifted[0].z, lifted[1].z, distance);
+  const Simd normal_offset = own[2].dot(model.corners[0]);
+  for (const auto& ball : support.balls) {
+    const auto at = [&](const std::pair<Vector<Simd>, Simd>& row) -> Simd {
+      return row.first.x * ball.x() + row.first.y * ball.y() + row.first.z * ball.z() + row.second;
+    };
+    const Simd px = at(x);
+    const Simd py = at(y);
+    const Simd pz = at(z);
+    const Simd out = own[2].x * ball.x() + own[2].y * ball.y() + own[2].z * ball.z() - normal_offset;
+    const Simd ox = out * lifted[2].x;
+    const Simd oy = out * lifted[2].y;
+    const Simd oz = out * lifted[2].z;
+    const auto count_marked = [&](const Simd& qx, const Simd& qy, const Simd& qz, Counts& count) {
+      const Simd per_depth = focal / qz;
+      near.add_marks<Simd::RowsAtCompileTime>(qx * per_depth + centre.x(), qy * per_depth + centre.y(),
+                                              count);
+    };
+    count_marked(px + ox, py + oy, pz + oz, upright);
+    count_marked(px - ox, py - oy, pz - oz, mirrored);
+  }
+}
+
 }  // namespace
 
 CandidateGrid::CandidateGrid(const Scene& scene) : cell_px_(rough_gate_px(scene) / reach) {
@@ -129,88 +226,30 @@ void HypothesisFilter::gather_starts(const std::array<int, 3>& candidates, const
 }
 
 void HypothesisFilter::test(const Start* starts, int used, const Image& image, int required) {
-  Simd model_a, model_b, model_c, h1, h2;
-  std::array<Vector<Simd>, 3> model;
+  ModelTriangles<Simd> model;
+  Depths<Simd> depths;
   for (int lane = 0; lane < width; ++lane) {
     const Start& start = starts[std::min(lane, used - 1)];
-    model_a[lane] = a_[start.triangle];
-    model_b[lane] = b_[start.triangle];
-    model_c[lane] = c_[start.triangle];
-    h1[lane] = start.behind1;
-    h2[lane] = start.behind2;
+    model.a[lane] = a_[start.triangle];
+    model.b[lane] = b_[start.triangle];
+    model.c[lane] = c_[start.triangle];
+    depths.behind1[lane] = start.behind1;
+    depths.behind2[lane] = start.behind2;
     for (int corner = 0; corner < 3; ++corner) {
       const auto& ball = balls_[static_cast<std::size_t>(triangles_[start.triangle].balls[corner])];
-      model[corner].x[lane] = ball.x();
-      model[corner].y[lane] = ball.y();
-      model[corner].z[lane] = ball.z();
+      model.corners[corner].x[lane] = ball.x();
+      model.corners[corner].y[lane] = ball.y();
+      model.corners[corner].z[lane] = ball.z();
     }
   }
-
-  const auto lift = [&](const Eigen::Vector2f& at, const Simd& behind) -> Vector<Simd> {
-    return {(1 + behind) * at.x() - image.at0.x(), (1 + behind) * at.y() - image.at0.y(), behind};
-  };
-  Simd w = Simd::Zero();
-  Simd open = Simd::Ones();
-  for (int iteration = 0; iteration < most_depth_iterations && (open > 0).any(); ++iteration) {
-    const Vector<Simd> e1 = lift(image.at1, h1);
-    const Vector<Simd> e2 = lift(image.at2, h2);
-    const Simd a = e1.x * e1.x + e1.y * e1.y;
-    const Simd b = e2.x * e2.x + e2.y * e2.y;
-    const Simd c = e1.x * e2.x + e1.y * e2.y;
-    w = inverse_distance2(model_a, model_b, model_c, a, b, c);
-    const Simd size2 = (w * model_b - b).max(0).sqrt();
-    Simd next1 = (w * model_a - a).max(0).sqrt();
-    Simd next2 = (w * model_c < c).select(-size2, size2);
-    const Simd sign = (next1 * h1 + next2 * h2 < 0).select(Simd::Constant(-1), Simd::Ones());
-    next1 *= sign;
-    next2 *= sign;
-    const Simd moved = (next1 - h1).abs().max((next2 - h2).abs());
-    const Simd deepest = next1.abs().max(next2.abs());
-    open = (moved >= static_cast<float>(depth_settled) && deepest < static_cast<float>(deepest_corner))
-               .select(Simd::Ones(), Simd::Zero());
-    h1 = next1;
-    h2 = next2;
-  }
-
-  const auto lifted = frame_of(lift(image.at1, h1), lift(image.at2, h2));
-  const auto own = frame_of(model[1] - model[0], model[2] - model[0]);
-  const Simd distance = w.rsqrt();
-  const float scale = static_cast<float>(1 / near_.cell_px());
-  const Eigen::Array2f centre =
-      ((scene_.camera.principal_px.array() - near_.low_px()) / near_.cell_px()).cast<float>();
-  const float focal = image.focal_px * scale;
-  // Rows of the pose without the component along the triangle's normal, which changes sign if mirrored.
-  const auto in_plane = [&](const Simd& along, const Simd& across, const Simd& origin) {
-    const Vector<Simd> row = own[0] * along + own[1] * across;
-    return std::pair<Vector<Simd>, Simd>(row, origin - row.dot(model[0]));
-  };
-  const auto x = in_plane(lifted[0].x, lifted[1].x, image.at0.x() * distance);
-  const auto y = in_plane(lifted[0].y, lifted[1].y, image.at0.y() * distance);
-  const auto z = in_plane(lifted[0].z, lifted[1].z, distance);
-  const Simd normal_offset = own[2].dot(model[0]);
+  settle(model, image, depths);
   std::array<int, width> upright{};
   std::array<int, width> mirrored{};
-  for (const auto& ball : balls_) {
-    const auto at = [&](const std::pair<Vector<Simd>, Simd>& row) -> Simd {
-      return row.first.x * ball.x() + row.first.y * ball.y() + row.first.z * ball.z() + row.second;
-    };
-    const Simd px = at(x);
-    const Simd py = at(y);
-    const Simd pz = at(z);
-    const Simd out = own[2].x * ball.x() + own[2].y * ball.y() + own[2].z * ball.z() - normal_offset;
-    const Simd ox = out * lifted[2].x;
-    const Simd oy = out * lifted[2].y;
-    const Simd oz = out * lifted[2].z;
-    const auto count_marked = [&](const Simd& qx, const Simd& qy, const Simd& qz,
-                                  std::array<int, width>& count) {
-      const Simd per_depth = focal / qz;
-      near_.add_marks<width>(qx * per_depth + centre.x(), qy * per_depth + centre.y(), count);
-    };
-    count_marked(px + ox, py + oy, pz + oz, upright);
-    count_marked(px - ox, py - oy, pz - oz, mirrored);
-  }
+  count_near(model, depths, image, {near_, scene_.camera.principal_px, balls_}, upright, mirrored);
   for (int lane = 0; lane < used; ++lane) {
-    if (open[lane] > 0 || std::max(std::abs(h1[lane]), std::abs(h2[lane])) >= deepest_corner) continue;
+    if (depths.open[lane] > 0 ||
+        std::max(std::abs(depths.behind1[lane]), std::abs(depths.behind2[lane])) >= deepest_corner)
+      continue;
     const auto& balls = triangles_[starts[lane].triangle].balls;
     for (const bool flip : {false, true}) {
       if ((flip ? mirrored : upright)[lane] >= required)

@@ -79,6 +79,25 @@ struct Reduced {
   }
 };
 
+/// Projection of mm to px from its rows at the scaled balls, whose mean is `d`.
+SimdProjection unscaled(const Row& of_u, const Row& of_v, const Row& of_w, const SimdPixel& mean_px,
+                        const SimdPoint& d) {
+  SimdProjection projection;
+  projection.w[0] = of_w.y.x / world_scale_mm;
+  projection.w[1] = of_w.y.y / world_scale_mm;
+  projection.w[2] = of_w.y.z / world_scale_mm;
+  const auto put = [&](const Row& row, Simd mean, Simd(&out)[4]) {
+    constexpr double scale = pixel_scale_px / world_scale_mm;
+    out[0] = scale * row.y.x + mean * projection.w[0];
+    out[1] = scale * row.y.y + mean * projection.w[1];
+    out[2] = scale * row.y.z + mean * projection.w[2];
+    out[3] = pixel_scale_px * (row.one - dot(row.y, d)) + mean;
+  };
+  put(of_u, mean_px.u, projection.u);
+  put(of_v, mean_px.v, projection.v);
+  return projection;
+}
+
 }  // namespace
 
 SimdBalls::SimdBalls(std::span<const SimdPoint> balls) : count_(balls.size()), centre_{} {
@@ -153,20 +172,7 @@ SimdProjection SimdBalls::calibrate(std::span<const SimdPixel> pixels) const {
     of_w += step;
   }
 
-  SimdProjection projection;
-  projection.w[0] = of_w.y.x / world_scale_mm;
-  projection.w[1] = of_w.y.y / world_scale_mm;
-  projection.w[2] = of_w.y.z / world_scale_mm;
-  const auto put = [&](const Row& row, Simd mean_px, Simd(&out)[4]) {
-    constexpr double scale = pixel_scale_px / world_scale_mm;
-    out[0] = scale * row.y.x + mean_px * projection.w[0];
-    out[1] = scale * row.y.y + mean_px * projection.w[1];
-    out[2] = scale * row.y.z + mean_px * projection.w[2];
-    out[3] = pixel_scale_px * (row.one - dot(row.y, d)) + mean_px;
-  };
-  put(of_u, mean.u, projection.u);
-  put(of_v, mean.v, projection.v);
-  return projection;
+  return unscaled(of_u, of_v, of_w, mean, d);
 }
 
 }  // namespace helicarm::study
