@@ -2,13 +2,12 @@
 #pragma once
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/simulation/write_case.h"
 
@@ -32,15 +31,11 @@ inline simulation::SimulatedCase simulated_phantom(const std::vector<double>& an
 /// The case as read from its files, which lie in a folder of their own until the test ends.
 class PhantomFolder {
  public:
-  explicit PhantomFolder(const simulation::SimulatedCase& simulated)
-      : path_(std::filesystem::temp_directory_path() / ("helicarm_phantom_" + std::to_string(::getpid()))) {
-    EXPECT_TRUE(simulation::write_case(path_, simulated));
-    given = *pipeline::read_phantom_case(path_);
+  explicit PhantomFolder(const simulation::SimulatedCase& simulated) {
+    EXPECT_TRUE(simulation::write_case(folder_.path() / "case", simulated));
+    given = *pipeline::read_phantom_case(folder_.path() / "case");
     given.calibrator.targets.clear();
   }
-  ~PhantomFolder() { std::filesystem::remove_all(path_); }
-  PhantomFolder(const PhantomFolder&) = delete;
-  PhantomFolder& operator=(const PhantomFolder&) = delete;
 
   phantom::CalibratorBall& ball(const std::string& label) {
     return *std::ranges::find(given.calibrator.balls, label, &phantom::CalibratorBall::label);
@@ -49,7 +44,7 @@ class PhantomFolder {
   pipeline::Case given;
 
  private:
-  std::filesystem::path path_;
+  TemporaryFolder folder_;
 };
 
 }  // namespace helicarm::phantom_calibration

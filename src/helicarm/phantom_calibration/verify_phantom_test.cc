@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/core/temporary_folder.h"
 #include "helicarm/phantom_calibration/simulated_phantom_test.h"
 
 namespace helicarm::phantom_calibration {
@@ -40,9 +41,8 @@ TEST(VerifyPhantom, BallHalfAMillimetreOffIsNamed) {
   EXPECT_NEAR(*result->balls[3].distance_mm, 0.5, 0.1);
 }
 
-TEST(VerifyPhantom, TwoExchangedFiducialsAreBothNamed) {
+TEST(VerifyPhantom, TwoDisplacedFiducialsAreBothNamed) {
   PhantomFolder folder(three_views());
-  // What the phantom would show if P5 and P9 had been put back in each other's holes, 0.7 mm too deep.
   folder.ball("P5").centre_in_calibrator += Eigen::Vector3d(0, 0, 0.7);
   folder.ball("P9").centre_in_calibrator -= Eigen::Vector3d(0, 0, 0.7);
   const auto result = verify_phantom(folder.given, 2);
@@ -80,8 +80,8 @@ TEST(VerifyPhantom, OneViewIsTooFew) {
 }
 
 TEST(VerifyPhantom, HistoryGrowsByOneEntryEachTime) {
-  const std::filesystem::path path =
-      std::filesystem::temp_directory_path() / ("helicarm_history_" + std::to_string(::getpid()) + ".json");
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder.path() / "history.json";
   PhantomVerification verification;
   verification.date = "2026-01-02";
   verification.balls.push_back({"P1", 0.01, 0.03, BallState::as_in_file, 2});
@@ -89,7 +89,6 @@ TEST(VerifyPhantom, HistoryGrowsByOneEntryEachTime) {
   const auto json = read_json(path);
   ASSERT_TRUE(json) << json.error().message;
   EXPECT_EQ((*json)["verifications"].size(), 2u);
-  std::filesystem::remove(path);
 }
 
 }  // namespace
