@@ -4,9 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Eigenvalues>
-
 #include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/simulation/calibrator_body.h"
 
 namespace helicarm::gui {
@@ -67,10 +66,10 @@ PointShape shape_of(const pipeline::PointResult& point, const pipeline::Result& 
 }  // namespace
 
 Ellipsoid ellipsoid_95(const Vector3d& centre, const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-  Eigen::Matrix3d axes = solver.eigenvectors();
+  const auto [values, vectors] = geometry::symmetric_eigen(covariance);
+  Eigen::Matrix3d axes = vectors;
   if (axes.determinant() < 0) axes.col(0) *= -1;
-  return {centre, axes, (chi2_95 * solver.eigenvalues().cwiseMax(0)).cwiseSqrt()};
+  return {centre, axes, (chi2_95 * values.cwiseMax(0)).cwiseSqrt()};
 }
 
 std::optional<phantom::TriangleMesh> cone_of(const phantom::Calibrator& calibrator) {

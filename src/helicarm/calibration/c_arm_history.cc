@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -34,7 +35,7 @@ HistoryEntry entry_from(JsonReader& reader) {
   HistoryEntry entry{reader.text("picture"), reader.text("view"), Vector3d(estimate.data()),
                      Matrix3d(information.data())};
   reader.finish();
-  const double lowest = Eigen::SelfAdjointEigenSolver<Matrix3d>(entry.information).eigenvalues().minCoeff();
+  const double lowest = geometry::symmetric_eigen(entry.information).values[0];
   if (!(lowest > 0) || !entry.information.isApprox(entry.information.transpose(), 1e-9))
     reader.refuse(Reason::bad_value, "information_per_mm2", "is not symmetric and positive");
   return entry;
@@ -104,10 +105,8 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   const Matrix3d assumed = squares(variance_of(*unknown.c_arm.focal), variance_of(*unknown.c_arm.principal))
                                .cwiseInverse()
                                .asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> difference(information - assumed);
-  const Matrix3d own = difference.eigenvectors() *
-                       difference.eigenvalues().cwiseMax(least_information).asDiagonal() *
-                       difference.eigenvectors().transpose();
+  const auto [values, vectors] = geometry::symmetric_eigen(information - assumed);
+  const Matrix3d own = vectors * values.cwiseMax(least_information).asDiagonal() * vectors.transpose();
   // The posterior is the mean of estimate and nominal values, weighted by `own` and `assumed`.
   const Vector3d estimate = posterior + own.ldlt().solve(assumed * (posterior - nominal));
   return HistoryEntry{image, view.name, estimate, own};

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/calibrator_warnings.h"
 #include "helicarm/calibration/outliers.h"
 #include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -47,9 +47,8 @@ Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<geom
 void split_map_errors(std::vector<Observation>& observations, const Eigen::MatrixXd& covariance_px2) {
   constexpr double least_own_share = 0.1;  // of the variance
   if (covariance_px2.size() == 0 || covariance_px2.isZero()) return;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_px2);
-  const Eigen::MatrixXd modes =
-      eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  const auto [values, vectors] = geometry::symmetric_eigen(covariance_px2);
+  const Eigen::MatrixXd modes = vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal();
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const auto k = Eigen::Index(i);
     const double variance = observations[i].sigma_px * observations[i].sigma_px;
@@ -61,9 +60,8 @@ void split_map_errors(std::vector<Observation>& observations, const Eigen::Matri
 
 /// Symmetric square root of a covariance, which may be singular.
 Eigen::Matrix3d root_of(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
-         eigen.eigenvectors().transpose();
+  const auto [values, vectors] = geometry::symmetric_eigen(covariance);
+  return vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal() * vectors.transpose();
 }
 
 Expected<ViewProblem> problem_of(const ViewFiducials& view,

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -16,11 +17,11 @@ constexpr double least_freedom = 1e-6;  // below it the residual is determined b
 
 /// Decrease of chi2 on removal of an observation. `freedom`: covariance of its residual for unit noise.
 double decrease_without(const Eigen::Vector2d& residual, const Eigen::Matrix2d& freedom) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(freedom);
-  const Eigen::Vector2d r = eigen.eigenvectors().transpose() * residual;
+  const auto [values, vectors] = geometry::symmetric_eigen(freedom);
+  const Eigen::Vector2d r = vectors.transpose() * residual;
   double decrease = 0;
   for (Eigen::Index k = 0; k < 2; ++k)
-    if (eigen.eigenvalues()(k) > least_freedom) decrease += r(k) * r(k) / eigen.eigenvalues()(k);
+    if (values[k] > least_freedom) decrease += r[k] * r[k] / values[k];
   return decrease;
 }
 

@@ -5,7 +5,8 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -61,14 +62,13 @@ Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit
   Strain result;
   for (std::size_t k = 0; k < modes.size(); ++k) result.strain += amounts[Eigen::Index(k)] * modes[k];
   result.chi2_gain = -slope.dot(amounts);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 5, 5>> shown(information);
   constexpr double longest = 2.0 / 3;  // squared extension of a strain of unit norm along one axis
-  result.sigma = std::sqrt(longest / shown.eigenvalues().minCoeff());
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(result.strain);
+  result.sigma = std::sqrt(longest / geometry::symmetric_eigen(information).values[0]);
+  const auto [values, vectors] = geometry::symmetric_eigen(result.strain);
   Eigen::Index largest = 0;
-  eigen.eigenvalues().cwiseAbs().maxCoeff(&largest);
-  result.extension = eigen.eigenvalues()[largest];
-  result.axis = eigen.eigenvectors().col(largest);
+  values.cwiseAbs().maxCoeff(&largest);
+  result.extension = values[largest];
+  result.axis = vectors.col(largest);
   return result;
 }
 

@@ -6,10 +6,9 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/three_point.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::fiducials {
 namespace {
@@ -20,7 +19,7 @@ constexpr std::size_t most_candidates = 16;  // more do not extend the search
 Eigen::Matrix3d principal_axes_of(const std::vector<ModelBall>& balls) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const ModelBall& ball : balls) spread += ball.centre * ball.centre.transpose();
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  return geometry::symmetric_eigen(spread).vectors;
 }
 
 /// Random triples in which all items occur equally often.

@@ -7,11 +7,11 @@
 #include <numbers>
 #include <set>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/phantom/conical_helix.h"
 
 namespace helicarm::phantom {
@@ -47,10 +47,10 @@ Eigen::Matrix3d covariance_from(JsonReader& reader) {
   if ((given - given.transpose()).cwiseAbs().maxCoeff() > rounding * size)
     reader.refuse(Reason::bad_value, "covariance_mm2", "is not symmetric");
   const Eigen::Matrix3d symmetric = (given + given.transpose()) / 2;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(symmetric);
-  if (eigen.eigenvalues()[0] < -rounding * size)
+  const double least = geometry::symmetric_eigen(symmetric).values[0];
+  if (least < -rounding * size)
     reader.refuse(Reason::bad_value, "covariance_mm2",
-                  fmt::format("has the negative eigenvalue {:g}", eigen.eigenvalues()[0]));
+                  fmt::format("has the negative eigenvalue {:g}", least));
   return symmetric;
 }
 
@@ -127,9 +127,9 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
             "{}: \"balls\": they extend over {} mm, at least {} mm are required; check the unit (metres?)",
             origin, extent, least_extent_mm));
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose() /
-                                                            double(balls.size()));
-  const Eigen::Vector3d sizes = axes.eigenvalues().cwiseMax(0).cwiseSqrt().reverse();
+  const Eigen::Vector3d variances =
+      geometry::symmetric_eigen(spread * spread.transpose() / double(balls.size())).values;
+  const Eigen::Vector3d sizes = variances.cwiseMax(0).cwiseSqrt().reverse();
   if (sizes[2] < least_flatness * sizes[0])
     throw BadInput(
         {Reason::coplanar_fiducials,
@@ -229,10 +229,9 @@ std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator) {
         calibrator.tolerance_mm * calibrator.tolerance_mm * Eigen::Matrix3d::Identity();
     if (ball.covariance_mm2) {
       const Eigen::Vector3d by_scale = calibrator.scale_sigma * (ball.centre_in_calibrator - middle);
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> own(*ball.covariance_mm2 -
-                                                               by_scale * by_scale.transpose());
-      covariance +=
-          own.eigenvectors() * own.eigenvalues().cwiseMax(0).asDiagonal() * own.eigenvectors().transpose();
+      const Eigen::Matrix3d own = *ball.covariance_mm2 - by_scale * by_scale.transpose();
+      const auto [values, vectors] = geometry::symmetric_eigen(own);
+      covariance += vectors * values.cwiseMax(0).asDiagonal() * vectors.transpose();
     }
     exact &= covariance.isZero(0);
     covariances.push_back(covariance);

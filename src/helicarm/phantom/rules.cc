@@ -7,9 +7,10 @@
 #include <map>
 #include <numbers>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <fmt/format.h>
+
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::phantom {
 namespace {
@@ -44,8 +45,8 @@ double misfit_mm(const Points& points, int dimensions) {
   Eigen::Matrix3Xd spread(3, points.size());
   for (std::size_t i = 0; i < points.size(); ++i) spread.col(static_cast<Eigen::Index>(i)) = points[i];
   spread.colwise() -= spread.rowwise().mean().eval();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread * spread.transpose());
-  return (axes.eigenvectors().leftCols(3 - dimensions).transpose() * spread).colwise().norm().maxCoeff();
+  const Eigen::MatrixXd axes = geometry::symmetric_eigen(spread * spread.transpose()).vectors;
+  return (axes.leftCols(3 - dimensions).transpose() * spread).colwise().norm().maxCoeff();
 }
 
 double middle_to_chord_mm(const Points& three) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/rectification/basis.h"
 
 namespace helicarm::rectification {
@@ -90,8 +91,8 @@ Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const Matr
   kernels -= trend * (trend.transpose() * kernels);
   MatrixX2d raw = root.asDiagonal() * data.raw;
   raw -= trend * (trend.transpose() * raw);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> modes(kernels.transpose() * kernels);
-  const MatrixX2d along = modes.eigenvectors().transpose() * (kernels.transpose() * raw);
+  const geometry::SymmetricEigen modes = geometry::symmetric_eigen(kernels.transpose() * kernels);
+  const MatrixX2d along = modes.vectors.transpose() * (kernels.transpose() * raw);
   const double freedom = 2.0 * double(rows.rows() - terms);
   Roughness best;
   for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
@@ -99,7 +100,7 @@ Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const Matr
     double energy = raw.squaredNorm();
     double log_determinant = 0;
     for (Index k = 0; k < knots; ++k) {
-      const double raised = 1 + gain * std::max(0.0, modes.eigenvalues()[k]);
+      const double raised = 1 + gain * std::max(0.0, modes.values[k]);
       energy -= gain / raised * along.row(k).squaredNorm();
       log_determinant += 2 * std::log(raised);
     }

@@ -5,8 +5,9 @@
 #include <numbers>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
+
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::robot {
 namespace {
@@ -119,9 +120,7 @@ Eigen::Matrix<double, 6, 6> jacobian(const RobotModel& model, const Joints& join
 double least_singular_value(const RobotModel& model, const Joints& joints) {
   Eigen::Matrix<double, 6, 6> scaled = jacobian(model, joints);
   scaled.topRows<3>() /= 1000;
-  const Eigen::Matrix<double, 6, 6> square = scaled * scaled.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(square, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, solver.eigenvalues().minCoeff()));
+  return std::sqrt(std::max(0.0, geometry::symmetric_eigen(scaled * scaled.transpose()).values[0]));
 }
 
 std::vector<Joints> inverse(const RobotModel& model, const geometry::RigidTransform& base_from_flange) {

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::tracker {
 namespace {
@@ -51,7 +51,7 @@ double second_turn_deg(const std::vector<Motion>& motions) {
     const Eigen::Vector3d turn = geometry::vector_from_rotation(motion.a.rotation);
     spread += turn * turn.transpose() / static_cast<double>(motions.size());
   }
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[1]) * deg_per_rad;
+  return std::sqrt(geometry::symmetric_eigen(spread).values[1]) * deg_per_rad;
 }
 
 geometry::RigidTransform start_of_x(const std::vector<Motion>& motions) {

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::tracker {
 namespace {
@@ -26,7 +26,7 @@ double least_turn(const std::vector<geometry::RigidTransform>& poses) {
   for (const geometry::RigidTransform& pose : poses)
     mean += pose.rotation / static_cast<double>(poses.size());
   const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() - mean.transpose() * mean;
-  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues()[0];
+  const double least = geometry::symmetric_eigen(spread).values[0];
   return std::asin(std::sqrt(std::clamp(least, 0.0, 1.0)));
 }
 
