@@ -71,8 +71,8 @@ function(helicarm_public target scope)
   target_compile_features(${target} ${scope} cxx_std_20)
 endfunction()
 
-# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES room ... LIBRARIES target ... TESTS a_test.cc ...)
-# A room's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
+# helicarm_module(NAME [APART] [TESTS_APART] [PRIVATE] SOURCES a.cc ... USES module ... LIBRARIES target ... TESTS a_test.cc ...)
+# A module's files are compiled as one unit, and its tests in groups; APART, TESTS_APART: file by file, as they use one
 # name for several things. PRIVATE: no part of the installed library.
 function(helicarm_module name)
   cmake_parse_arguments(ARG "APART;TESTS_APART;PRIVATE" "" "SOURCES;USES;LIBRARIES;TESTS;TEST_USES" ${ARGN})

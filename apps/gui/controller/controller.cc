@@ -354,7 +354,7 @@ void Controller::set_fault(const std::string& name, bool on) {
     equipment_->c_arm_fault = on ? *of_c_arm : virtual_devices::CArmFault::none;
     return;
   }
-  background_.start(
+  faults_.start(
       [equipment = equipment_, name, on] { static_cast<void>(equipment->virtual_or->set_fault(name, on)); });
 }
 

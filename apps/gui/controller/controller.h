@@ -120,7 +120,8 @@ class Controller : public QObject {
   pipeline::RunOptions options_;
   operation::FreshnessLimits freshness_;
   QTimer images_;
-  QThreadPool background_;  ///< tasks that must not wait for the worker, such as the robot's stop
+  QThreadPool faults_;  ///< of the virtual devices
+  QThreadPool stops_;   ///< of the robot; they wait for no other task
   Worker worker_;           ///< last: its jobs use all other members
 };
 

@@ -135,7 +135,7 @@ void Controller::withdraw() {
 void Controller::stop() {
   if (!equipment_ || !equipment_->devices) return;
   equipment_->stopped = true;
-  background_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
+  stops_.start([equipment = equipment_] { equipment->devices->robot().stop(); });
 }
 
 LiveState Controller::live() const {

@@ -30,7 +30,7 @@ struct Equipment {
 /// All views of the operation with the images received so far.
 using Images = std::vector<pipeline::ViewResult>;
 
-/// Acquires an image until the tracker has valid poses at rest. Refuses interrupted once `room.stopped`.
+/// Acquires an image until the tracker has valid poses at rest. Refuses interrupted once `equipment.stopped`.
 Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view);
 /// Takes a received image; its file may assign it to another view.
 Expected<Images> take(Equipment& equipment, const std::string& view,
