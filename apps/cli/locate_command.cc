@@ -90,6 +90,12 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
     if (why) progress << fmt::format("{}: {}\n", name, why->message);
     std::vector<Warning> own_warnings, own_notes;
     if (point && why) own_warnings.push_back(*why);
+    if (const auto on_ball = point ? localization::pick_on_fiducial(name, images, calibration,
+                                                                    calibration.balls, why.has_value())
+                                   : std::nullopt) {
+      progress << fmt::format("{}\n", on_ball->message);
+      own_warnings.push_back(*on_ball);
+    }
     if (point)
       own_notes.push_back(localization::unobservable_motion(name, point->point_in_anchor,
                                                             calibration.views[images.front().view], motion));

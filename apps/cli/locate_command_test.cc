@@ -84,6 +84,16 @@ TEST(LocateCommand, RaysThatMissAreWarnedOfAtThePointAlsoWithImportedCameras) {
   EXPECT_GE(point["error_95_mm"].get<double>(), 0.5 * point["ray_gap_mm"].get<double>());
 }
 
+TEST(LocateCommand, PickOnABallOfTheResultsCalibratorIsWarnedOf) {
+  Json result = result_json();
+  result["calibrator"] = {{"balls", {{{"label", "P7"}, {"xyz_mm", {10, 20, 30}}, {"diameter_mm", 4}}}}};
+  const Json on_ball = locate_in(result, picks_of({10.5, 20, 30})).json["warnings"];
+  ASSERT_EQ(on_ball.size(), 1u);
+  EXPECT_EQ(on_ball[0]["code"], "pick_on_fiducial");
+  EXPECT_NE(on_ball[0]["message"].get<std::string>().find("P7 in AP"), std::string::npos);
+  EXPECT_TRUE(locate_in(result, picks_of({15, 20, 30})).json["warnings"].empty());
+}
+
 TEST(LocateCommand, EachPointHasTheNoteOfUnobservableMotion) {
   const Answer answer = locate_in(result_json(), picks_of({10, 20, 30}));
   ASSERT_EQ(answer.json["notes"].size(), 1u);  // not the point that is not located

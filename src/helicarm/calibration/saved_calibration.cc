@@ -38,6 +38,17 @@ std::optional<rectification::DistortionMap> map_from(JsonReader& reader) {
       rectification::distortion_map_from_json(rectification.raw("map"), rectification.where() + ": map"));
 }
 
+std::vector<phantom::CalibratorBall> balls_from(JsonReader calibrator) {
+  constexpr std::size_t most_balls = 10000;
+  std::vector<phantom::CalibratorBall> balls;
+  for (JsonReader& ball : calibrator.objects("balls", false, most_balls)) {
+    const auto xyz = ball.numbers("xyz_mm", 3, {-1e4, 1e4});
+    balls.push_back(
+        {ball.text("label"), Eigen::Vector3d(xyz.data()), ball.number("diameter_mm", {0.01, 1000})});
+  }
+  return balls;
+}
+
 }  // namespace
 
 Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin) {
@@ -51,6 +62,7 @@ Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const s
       saved.views.push_back(view_from(view));
       saved.maps.push_back(map_from(view));
     }
+    if (reader.has("calibrator")) saved.balls = balls_from(reader.object("calibrator"));
     if (reader.has("calibration")) {
       JsonReader calibration = reader.object("calibration");
       const auto n = view_parameters * saved.views.size();

@@ -7,6 +7,7 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
+#include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::calibration {
@@ -14,7 +15,8 @@ namespace helicarm::calibration {
 /// A calibration read from a result file.
 struct SavedCalibration : Calibration {
   std::vector<std::optional<rectification::DistortionMap>>
-      maps;  ///< per view; nothing if the image was not rectified
+      maps;                                    ///< per view; nothing if the image was not rectified
+  std::vector<phantom::CalibratorBall> balls;  ///< empty in results of earlier versions
 };
 
 /// From "views" (name, projection, camera_from_calibrator, rectification.map) and "calibration"

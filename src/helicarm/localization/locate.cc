@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/localization/locate.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -144,6 +145,28 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
   inflate_if_rays_miss(located);
   bound_by_ray_gap(located);
   return located;
+}
+
+std::optional<Warning> pick_on_fiducial(const std::string& name,
+                                        std::span<const PointObservation> observations,
+                                        const calibration::Calibration& calibration,
+                                        std::span<const phantom::CalibratorBall> balls, bool rays_miss) {
+  std::vector<std::string> hits;
+  for (const PointObservation& observation : observations) {
+    const calibration::CalibratedView& seen = calibration.views[observation.view];
+    const auto ball = std::ranges::find_if(balls, [&](const phantom::CalibratorBall& one) {
+      const double radius_px = 0.5 * one.diameter_mm * std::abs(seen.view.intrinsics.fy) /
+                               seen.view.depth(one.centre_in_calibrator);
+      return (seen.view.project(one.centre_in_calibrator) - observation.uv).norm() < radius_px;
+    });
+    if (ball != balls.end()) hits.push_back(fmt::format("{} in {}", ball->label, seen.name));
+  }
+  if (hits.empty() || (hits.size() < observations.size() && !rays_miss)) return std::nullopt;
+  return Warning{Reason::pick_on_fiducial,
+                 fmt::format("\"{}\" lies on fiducial {}: pick the point of the bone", name,
+                             fmt::join(hits, " and on ")),
+                 {},
+                 {{"views", double(hits.size())}}};
 }
 
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,

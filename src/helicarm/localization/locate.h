@@ -11,6 +11,7 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/geometry/rigid_transform.h"
+#include "helicarm/phantom/calibrator.h"
 
 namespace helicarm::localization {
 
@@ -56,6 +57,13 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
 /// amount without a ray gap. The direction is a unit vector in the calibrator's frame.
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
                             const calibration::CalibratedView& first, double motion_sigma_mm);
+
+/// pick_on_fiducial: the point was picked on the projections of balls in all its views, or in some while its
+/// rays miss each other.
+std::optional<Warning> pick_on_fiducial(const std::string& name,
+                                        std::span<const PointObservation> observations,
+                                        const calibration::Calibration& calibration,
+                                        std::span<const phantom::CalibratorBall> balls, bool rays_miss);
 
 /// Covariance (mm^2) of a point observed in all views with the given noise per axis; the predicted TRE is the
 /// square root of its trace. Refuses as `locate`, and `behind_source`.

@@ -31,7 +31,7 @@ Result initial_result(const Case& given, const RunOptions& options, std::vector<
   Result result;
   result.options = options;
   result.calibrator = {given.calibrator.name, given.calibrator.tolerance_mm, given.calibrator.scale_sigma,
-                       given.calibrator.measured};
+                       given.calibrator.measured, given.calibrator.balls};
   result.views = std::move(views);
   result.tool_lines = given.tool_lines;
   result.warnings = given.warnings;

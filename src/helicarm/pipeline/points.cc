@@ -52,19 +52,6 @@ std::vector<detection::Disc> detections_of(const LabelledView& image, const geom
   return discs;
 }
 
-/// Label of the fiducial on whose image a point lies.
-std::optional<std::string> fiducial_at(const fiducials::ImagePoint& seen, const geometry::View& camera,
-                                       const std::vector<fiducials::Fiducial>& fiducials,
-                                       const phantom::Calibrator& calibrator) {
-  for (std::size_t k = 0; k < fiducials.size(); ++k) {
-    const fiducials::Fiducial& ball = fiducials[k];
-    const double radius_px = 0.5 * calibrator.balls[k].diameter_mm * std::abs(camera.intrinsics.fy) /
-                             camera.depth(ball.centre_in_calibrator);
-    if ((camera.project(ball.centre_in_calibrator) - seen.uv).norm() < radius_px) return ball.label;
-  }
-  return std::nullopt;
-}
-
 /// A pick or a target in one view.
 struct Task {
   std::size_t point;
@@ -225,28 +212,17 @@ std::vector<Warning> note_motion(const Case& given, const calibration::Calibrati
   return notes;
 }
 
-std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration& calibration,
+std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Calibration& calibration,
                                         std::vector<PointResult>& points) {
   std::vector<Warning> warnings;
   for (PointResult& point : points) {
     if (point.source != localization::PointSource::pick || !point.place) continue;
-    std::vector<std::string> hits;
-    std::size_t views = 0;
-    for (std::size_t i = 0; i < point.seen.size(); ++i) {
-      if (!point.seen[i]) continue;
-      ++views;
-      const calibration::CalibratedView& view = calibration.views[i];
-      if (const auto label =
-              fiducial_at(*point.seen[i], view.view, calibration.fiducials[i], given.calibrator))
-        hits.push_back(fmt::format("{} in {}", *label, view.name));
-    }
-    if (hits.empty() || (hits.size() < views && !point.rays_miss)) continue;
-    add_warning(point, warnings,
-                {Reason::pick_on_fiducial,
-                 fmt::format("\"{}\" lies on fiducial {}: pick the point of the bone", point.name,
-                             fmt::join(hits, " and on ")),
-                 {},
-                 {{"views", double(hits.size())}}});
+    std::vector<localization::PointObservation> observations;
+    for (std::size_t i = 0; i < point.seen.size(); ++i)
+      if (point.seen[i]) observations.push_back({i, point.seen[i]->uv, Eigen::Matrix2d::Zero()});
+    const auto warning = localization::pick_on_fiducial(point.name, observations, calibration,
+                                                        given.calibrator.balls, point.rays_miss);
+    if (warning) add_warning(point, warnings, *warning);
   }
   return warnings;
 }

@@ -26,7 +26,7 @@ std::vector<Warning> note_motion(const Case& given, const calibration::Calibrati
                                  std::vector<PointResult>& points, double motion_sigma_mm);
 
 /// Picks on fiducials in all their views, or in some while the rays miss each other (pick_on_fiducial).
-std::vector<Warning> picks_on_fiducials(const Case& given, const CaseCalibration& calibration,
+std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Calibration& calibration,
                                         std::vector<PointResult>& points);
 
 }  // namespace helicarm::pipeline

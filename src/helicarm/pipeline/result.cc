@@ -213,6 +213,12 @@ Json json_of(const Timing& timing) {
           {"total", optional_number(timing.total)}};
 }
 
+Json json_of(const phantom::CalibratorBall& ball) {
+  return {{"label", ball.label},
+          {"xyz_mm", vector(ball.centre_in_calibrator)},
+          {"diameter_mm", ball.diameter_mm}};
+}
+
 template <class T, class... More>
 Json list_of(const std::vector<T>& items, const More&... more) {
   Json list = Json::array();
@@ -262,7 +268,8 @@ Json to_json(const Result& result) {
       {"tolerance_mm", result.calibrator.tolerance_mm},
       {"scale_sigma",
        result.calibrator.scale_sigma > 0 ? Json(result.calibrator.scale_sigma) : Json(nullptr)},
-      {"measured", result.calibrator.measured}};
+      {"measured", result.calibrator.measured},
+      {"balls", list_of(result.calibrator.balls)}};
   json["views"] = list_of(result.views);
   json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
                                                   ? matrix(result.joint_covariance)

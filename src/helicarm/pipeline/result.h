@@ -20,6 +20,7 @@
 #include "helicarm/guidance/guide.h"
 #include "helicarm/guidance/tunnel.h"
 #include "helicarm/localization/error_bound.h"
+#include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/verification/verify.h"
 #include "helicarm/xray/xray_image.h"
@@ -76,6 +77,7 @@ struct CalibratorSource {
   double tolerance_mm = 0;
   double scale_sigma = 0;
   Json measured = nullptr;  ///< how its coordinates were obtained
+  std::vector<phantom::CalibratorBall> balls;
 };
 
 /// Result of `helicarm run`; after a refusal, all results computed before it.
