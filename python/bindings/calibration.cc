@@ -65,7 +65,8 @@ HeldCalibration calibrated(const std::vector<calibration::ViewFiducials>& views,
                            const calibration::CArmPrior& c_arm,
                            const std::optional<std::vector<Doubles>>& ball_covariance_mm2, double scale_sigma,
                            double rejection_probability, double largest_rms_px) {
-  calibration::CalibrationOptions options{{c_arm, {}, scale_sigma}, rejection_probability, largest_rms_px};
+  calibration::CalibrationOptions options{
+      {c_arm, {}, {}, scale_sigma}, rejection_probability, largest_rms_px};
   if (ball_covariance_mm2)
     for (const Doubles& one : *ball_covariance_mm2)
       options.common.ball_covariance_mm2.emplace_back(matrix_of(one, 3, 3, "ball_covariance_mm2"));

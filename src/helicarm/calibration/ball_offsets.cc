@@ -20,10 +20,21 @@ std::size_t count_of(const std::vector<ViewProblem>& problems) {
   return count;
 }
 
+std::vector<ViewProblem> without_offsets(std::vector<ViewProblem> problems) {
+  for (ViewProblem& problem : problems)
+    for (Observation& observation : problem.observations) {
+      observation.offset_root.resize(3, 0);
+      observation.first_offset = 0;
+    }
+  return problems;
+}
+
 std::vector<ViewProblem> with_tolerance(std::vector<ViewProblem> problems, double tolerance_mm) {
   for (ViewProblem& problem : problems)
-    for (Observation& observation : problem.observations)
+    for (Observation& observation : problem.observations) {
       observation.offset_root = tolerance_mm * Eigen::Matrix3d::Identity();
+      observation.first_offset = 3 * Eigen::Index(observation.ball);
+    }
   return problems;
 }
 
@@ -38,7 +49,7 @@ double log_likelihood(const Refinement& fit) {
 
 /// For independent errors of the image points, all inflated by one factor.
 std::optional<double> log_likelihood_enlarged(std::vector<ViewProblem> problems, const CommonPrior& common) {
-  problems = with_tolerance(std::move(problems), 0);
+  problems = without_offsets(std::move(problems));
   const auto exact = refine(problems, common);
   if (!exact) return std::nullopt;
   const double factor = std::sqrt(std::max(1.0, exact->chi2 / exact->dof));
@@ -80,7 +91,8 @@ double rms_offset_mm(const std::vector<ViewProblem>& problems, const Refinement&
     for (const Observation& observation : problem.observations)
       if (!observation.offset_root.isZero(0))
         squared[observation.ball] =
-            (observation.offset_root * fit.variations.segment<3>(3 * Eigen::Index(observation.ball)))
+            (observation.offset_root *
+             fit.variations.segment(observation.first_offset, observation.offset_root.cols()))
                 .squaredNorm();
   double sum = 0;
   for (const auto& [ball, squared_length] : squared) sum += squared_length / double(squared.size());

@@ -10,8 +10,8 @@
 #include "helicarm/calibration/ball_offsets.h"
 #include "helicarm/calibration/calibrator_warnings.h"
 #include "helicarm/calibration/outliers.h"
+#include "helicarm/calibration/view_problem.h"
 #include "helicarm/geometry/ray.h"
-#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -24,65 +24,6 @@ constexpr double inconsistent_sigmas = 3;  // standard deviations of chi2
 tl::unexpected<Failure> in_view(Failure failure, const std::string& view) {
   failure.view = view;
   return tl::unexpected<Failure>(std::move(failure));
-}
-
-std::vector<geometry::PointPair> pairs_of(const std::vector<fiducials::Fiducial>& fiducials) {
-  std::vector<geometry::PointPair> pairs;
-  for (const fiducials::Fiducial& f : fiducials)
-    if (f.status == fiducials::FiducialStatus::used) pairs.push_back({f.centre_in_calibrator, f.uv});
-  return pairs;
-}
-
-/// The given start, or the homogeneous DLT.
-Expected<CentredView> start_of(const ViewFiducials& view, const std::vector<geometry::PointPair>& pairs,
-                               const Eigen::Vector3d& centre) {
-  if (view.start)
-    return geometry::dlt_condition(pairs).map([&](double) { return centred(*view.start, centre); });
-  return geometry::dlt_homogeneous(pairs).map(
-      [&](const geometry::DltResult& dlt) { return shrunk_to_prior(centred(dlt.view, centre), view.prior); });
-}
-
-/// Splits each sigma into the fiducial's own and the map's, which is correlated: independent errors along the
-/// eigenvectors of its covariance.
-void split_map_errors(std::vector<Observation>& observations, const Eigen::MatrixXd& covariance_px2) {
-  constexpr double least_own_share = 0.1;  // of the variance
-  if (covariance_px2.size() == 0 || covariance_px2.isZero()) return;
-  const auto [values, vectors] = geometry::symmetric_eigen(covariance_px2);
-  const Eigen::MatrixXd modes = vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal();
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    const auto k = Eigen::Index(i);
-    const double variance = observations[i].sigma_px * observations[i].sigma_px;
-    observations[i].sigma_px =
-        std::sqrt(std::max(variance - covariance_px2(k, k), least_own_share * variance));
-    observations[i].by_map = modes.row(k);
-  }
-}
-
-/// Symmetric square root of a covariance, which may be singular.
-Eigen::Matrix3d root_of(const Eigen::Matrix3d& covariance) {
-  const auto [values, vectors] = geometry::symmetric_eigen(covariance);
-  return vectors * values.cwiseMax(0).cwiseSqrt().asDiagonal() * vectors.transpose();
-}
-
-Expected<ViewProblem> problem_of(const ViewFiducials& view,
-                                 const std::vector<Eigen::Matrix3d>& ball_covariance_mm2) {
-  std::vector<Observation> observations;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (std::size_t ball = 0; ball < view.fiducials.size(); ++ball) {
-    const fiducials::Fiducial& f = view.fiducials[ball];
-    if (f.status != fiducials::FiducialStatus::used) continue;
-    if (!(f.sigma_px > 0) || !std::isfinite(f.sigma_px))
-      return fail(Reason::bad_value,
-                  fmt::format("fiducial {}: sigma_px is {}, must be positive", f.label, f.sigma_px));
-    observations.push_back({ball, f.centre_in_calibrator, f.uv, f.sigma_px});
-    if (!ball_covariance_mm2.empty()) observations.back().offset_root = root_of(ball_covariance_mm2[ball]);
-    centre += f.centre_in_calibrator;
-  }
-  centre /= std::max(1.0, double(observations.size()));
-  split_map_errors(observations, view.map_covariance_px2);
-  const auto start = start_of(view, pairs_of(view.fiducials), centre);
-  if (!start) return tl::unexpected<Failure>(start.error());
-  return ViewProblem{*start, std::move(observations), view.prior};
 }
 
 /// One view's block of a matrix of all views.
@@ -179,7 +120,8 @@ Expected<CleanFit> clean_fit(const std::vector<ViewProblem>& problems, const Cal
                              double& found_tolerance_mm) {
   auto clean =
       refine_without_outliers(problems, options.common, options.rejection_probability, least_fiducials);
-  const bool as_in_file = options.common.ball_covariance_mm2.empty();
+  const bool as_in_file =
+      options.common.ball_covariance_mm2.empty() && options.common.joint_ball_covariance_mm2.size() == 0;
   if (!clean || !as_in_file || problems.size() < 2 || options.rejection_probability <= 0 ||
       clean->fit.dof < 1)
     return clean;
@@ -209,8 +151,9 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
                                       const CalibrationOptions& options) {
   std::vector<ViewProblem> problems;
   CalibrationResult result;
+  const OffsetRoots roots = offset_roots(options.common);
   for (const ViewFiducials& view : views) {
-    auto problem = problem_of(view, options.common.ball_covariance_mm2);
+    auto problem = problem_of(view, roots);
     if (!problem) return in_view(problem.error(), view.name);
     problems.push_back(*std::move(problem));
     result.fiducials.push_back(view.fiducials);

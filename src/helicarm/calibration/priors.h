@@ -29,6 +29,9 @@ struct CommonPrior {
   CArmPrior c_arm;
   /// Of each fiducial's coordinates, mm^2, without the scale's error; empty: exact.
   std::vector<Eigen::Matrix3d> ball_covariance_mm2 = {};
+  /// Of all fiducials' coordinates together (3n x 3n), where their errors are correlated: replaces
+  /// `ball_covariance_mm2`.
+  Eigen::MatrixXd joint_ball_covariance_mm2 = {};
   double scale_sigma = 0;  ///< of the calibrator's scale about the fiducials' mean, relative
 };
 

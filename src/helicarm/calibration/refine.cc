@@ -15,19 +15,13 @@ namespace {
 
 constexpr geometry::LeastSquaresOptions iteration{.max_iterations = 1000, .min_gain = 1e-10};
 
-Eigen::Index ball_count(const std::vector<ViewProblem>& problems) {
-  std::size_t count = 0;
+/// Number of the fiducials' unit errors; 0: as in the file.
+Eigen::Index offset_count(const std::vector<ViewProblem>& problems) {
+  Eigen::Index count = 0;
   for (const ViewProblem& problem : problems)
-    for (const Observation& observation : problem.observations) count = std::max(count, observation.ball + 1);
-  return Eigen::Index(count);
-}
-
-bool is_tolerant(const std::vector<ViewProblem>& problems) {
-  return std::ranges::any_of(problems, [](const ViewProblem& problem) {
-    return std::ranges::any_of(problem.observations, [](const Observation& observation) {
-      return !observation.offset_root.isZero(0);
-    });
-  });
+    for (const Observation& observation : problem.observations)
+      count = std::max(count, observation.first_offset + observation.offset_root.cols());
+  return count;
 }
 
 Eigen::Index map_modes(const ViewProblem& problem) {
@@ -54,15 +48,14 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
   const Eigen::Index own = at.variations.size();
   at.residuals.resize(count + priors.residuals.size() + own);
   at.jacobian = Eigen::MatrixXd::Zero(at.residuals.size(), steps + own);
-  const bool tolerant = is_tolerant(problems);
   Eigen::Index row = 0;
-  Eigen::Index map = tolerant ? 3 * ball_count(problems) : 0;
+  Eigen::Index map = offset_count(problems);
   for (std::size_t i = 0; i < problems.size(); ++i) {
     const Eigen::Index modes = map_modes(problems[i]);
     for (const Observation& observation : problems[i].observations) {
-      const Eigen::Index ball = 3 * Eigen::Index(observation.ball);
-      Eigen::Vector3d position = observation.point_in_world;
-      if (tolerant) position += observation.offset_root * at.variations.segment<3>(ball);
+      const Eigen::Index first_offset = observation.first_offset, offsets = observation.offset_root.cols();
+      const Eigen::Vector3d position =
+          observation.point_in_world + observation.offset_root * at.variations.segment(first_offset, offsets);
       ImageCoordinates image = image_of(at.views[i], position);
       if (!(image.relative_depth > 0)) return false;
       for (Eigen::Index axis = 0; axis < (modes > 0 ? 2 : 0); ++axis) {
@@ -73,9 +66,8 @@ bool evaluate(const std::vector<ViewProblem>& problems, const CommonPrior& commo
       at.residuals.segment<2>(row) = (image.pixel - observation.pixel) / observation.sigma_px;
       at.jacobian.block<2, view_parameters>(row, view_parameters * Eigen::Index(i)) =
           image.by_step / observation.sigma_px;
-      if (tolerant)
-        at.jacobian.block<2, 3>(row, steps + ball) =
-            image.by_point * observation.offset_root / observation.sigma_px;
+      at.jacobian.block(row, steps + first_offset, 2, offsets) =
+          image.by_point * observation.offset_root / observation.sigma_px;
       row += 2;
     }
     map += 2 * modes;
@@ -122,7 +114,7 @@ Expected<Eigen::MatrixXd> covariance_of(const Refinement& at) {
 
 Expected<Refinement> refine(const std::vector<ViewProblem>& problems, const CommonPrior& common) {
   Refinement at;
-  Eigen::Index own = is_tolerant(problems) ? 3 * ball_count(problems) : 0;
+  Eigen::Index own = offset_count(problems);
   for (const ViewProblem& problem : problems) {
     at.views.push_back(problem.start);
     own += 2 * map_modes(problem);

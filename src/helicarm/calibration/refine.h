@@ -17,8 +17,10 @@ struct Observation {
   Eigen::Vector2d pixel;
   double sigma_px;                 ///< without the map's
   Eigen::RowVectorXd by_map = {};  ///< effect of the map's independent unit errors on either axis
-  /// Square root of the covariance of the position, mm: position = point_in_world + root * offset.
-  Eigen::Matrix3d offset_root = Eigen::Matrix3d::Zero();
+  /// position = point_in_world + root (mm) * the independent unit errors of the fiducials' positions from
+  /// `first_offset` on. No columns: exact.
+  Eigen::Matrix3Xd offset_root = {};
+  Eigen::Index first_offset = 0;
 };
 
 struct ViewProblem {

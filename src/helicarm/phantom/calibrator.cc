@@ -12,6 +12,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom/conical_helix.h"
 
 namespace helicarm::phantom {
@@ -22,7 +23,6 @@ constexpr std::size_t most_balls = 1000;
 constexpr Range coordinate_range{-1000, 1000};
 constexpr Range diameter_range{0.5, 30};
 constexpr Range tolerance_range{0, 1};
-constexpr Range variance_range{-100, 100};  // mm^2: a 10 mm error of a ball
 constexpr Range scale_sigma_range{0, 0.1};
 constexpr double least_extent_mm = 10;
 constexpr double least_distance_mm = 0.1;
@@ -38,26 +38,10 @@ std::string name_of(JsonReader& reader, const char* key) {
   return name;
 }
 
-/// Symmetric and positive semidefinite, to rounding.
-Eigen::Matrix3d covariance_from(JsonReader& reader) {
-  constexpr double rounding = 1e-6;
-  const Eigen::Matrix3d given =
-      Eigen::Map<const Eigen::Matrix3d>(reader.matrix("covariance_mm2", 3, 3, variance_range).data());
-  const double size = given.cwiseAbs().maxCoeff();
-  if ((given - given.transpose()).cwiseAbs().maxCoeff() > rounding * size)
-    reader.refuse(Reason::bad_value, "covariance_mm2", "is not symmetric");
-  const Eigen::Matrix3d symmetric = (given + given.transpose()) / 2;
-  const double least = geometry::symmetric_eigen(symmetric).values[0];
-  if (least < -rounding * size)
-    reader.refuse(Reason::bad_value, "covariance_mm2",
-                  fmt::format("has the negative eigenvalue {:g}", least));
-  return symmetric;
-}
-
 CalibratorBall ball_from(JsonReader reader) {
   CalibratorBall ball{name_of(reader, "label"), vector3(reader.numbers("xyz_mm", 3, coordinate_range)),
                       reader.number("diameter_mm", diameter_range)};
-  if (reader.has("covariance_mm2")) ball.covariance_mm2 = covariance_from(reader);
+  if (reader.has("covariance_mm2")) ball.covariance_mm2 = covariance_from(reader, "covariance_mm2", 3);
   reader.finish();
   return ball;
 }
@@ -161,6 +145,9 @@ Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& o
       calibrator.balls.push_back(ball_from(ball));
     for (JsonReader& target : reader.objects("targets", false, most_balls))
       calibrator.targets.push_back(target_from(target));
+    if (reader.has("joint_covariance"))
+      calibrator.joint_covariance =
+          joint_covariance_from(reader.object("joint_covariance"), calibrator.balls);
     if (reader.has("tolerance_mm")) calibrator.tolerance_mm = reader.number("tolerance_mm", tolerance_range);
     calibrator.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range).value_or(0);
     calibrator.measured = reader.raw("measured");
@@ -193,6 +180,7 @@ Json to_json(const Calibrator& calibrator) {
   if (calibrator.tolerance_mm > 0) json["tolerance_mm"] = calibrator.tolerance_mm;
   if (calibrator.scale_sigma > 0) json["scale_sigma"] = calibrator.scale_sigma;
   if (!calibrator.measured.is_null()) json["measured"] = calibrator.measured;
+  if (calibrator.joint_covariance) json["joint_covariance"] = to_json(*calibrator.joint_covariance);
   for (const auto& ball : calibrator.balls) {
     Json entry{{"label", ball.label},
                {"xyz_mm", numbers(ball.centre_in_calibrator)},
@@ -218,26 +206,6 @@ Eigen::Vector3d middle_of(const Calibrator& calibrator) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const CalibratorBall& ball : calibrator.balls) sum += ball.centre_in_calibrator;
   return sum / double(calibrator.balls.size());
-}
-
-std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator) {
-  const Eigen::Vector3d middle = middle_of(calibrator);
-  std::vector<Eigen::Matrix3d> covariances;
-  bool exact = true;
-  for (const CalibratorBall& ball : calibrator.balls) {
-    Eigen::Matrix3d covariance =
-        calibrator.tolerance_mm * calibrator.tolerance_mm * Eigen::Matrix3d::Identity();
-    if (ball.covariance_mm2) {
-      const Eigen::Vector3d by_scale = calibrator.scale_sigma * (ball.centre_in_calibrator - middle);
-      const Eigen::Matrix3d own = *ball.covariance_mm2 - by_scale * by_scale.transpose();
-      const auto [values, vectors] = geometry::symmetric_eigen(own);
-      covariance += vectors * values.cwiseMax(0).asDiagonal() * vectors.transpose();
-    }
-    exact &= covariance.isZero(0);
-    covariances.push_back(covariance);
-  }
-  if (exact) covariances.clear();
-  return covariances;
 }
 
 bool same_places(const Calibrator& a, const Calibrator& b) {

@@ -20,6 +20,12 @@ struct CalibratorBall {
   std::optional<Eigen::Matrix3d> covariance_mm2 = {};  ///< of a measured centre, scale error included
 };
 
+/// Covariance of several balls' centres together, scale error included.
+struct JointCovariance {
+  std::vector<std::string> labels;
+  Eigen::MatrixXd mm2;  ///< 3n x 3n, in the order of `labels`
+};
+
 enum class TargetKind { ball, cross, line_end };
 
 /// Check point at a known position on the calibrator: used only to measure the TRE, never for calibration.
@@ -38,6 +44,7 @@ struct Calibrator {
   std::string name;
   std::vector<CalibratorBall> balls;
   std::vector<CalibratorTarget> targets;
+  std::optional<JointCovariance> joint_covariance = {};  ///< of all balls, perhaps of further ones
   double tolerance_mm = 0;  ///< standard deviation of the balls' positions per axis
   double scale_sigma = 0;   ///< relative standard deviation of the common scale; 0: not stated
   Json measured = nullptr;  ///< how the file was obtained, copied verbatim
@@ -64,6 +71,10 @@ Eigen::Vector3d middle_of(const Calibrator& calibrator);
 /// Covariance (mm^2) of each ball's centre without the scale error common to all balls: the file's covariance
 /// less that of the scale about the centroid, plus the tolerance. Empty if every ball is exact.
 std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator);
+
+/// The same of all balls together (3n x 3n): the file's joint covariance without growth about the centroid,
+/// plus the tolerance. Empty if the file has none.
+Eigen::MatrixXd joint_ball_covariance(const Calibrator& calibrator);
 
 /// Same labels in any order, each ball within 0.01 mm.
 bool same_places(const Calibrator& a, const Calibrator& b);

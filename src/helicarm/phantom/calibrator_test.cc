@@ -151,6 +151,62 @@ TEST(ReadCalibrator, MeasuredFileRoundTrips) {
   EXPECT_EQ(written["balls"][2]["covariance_mm2"], json["balls"][2]["covariance_mm2"]);
 }
 
+/// Independent errors of 0.01 mm of all balls of a file, and of one more.
+Json joint_covariance_of(const Json& file) {
+  Json joint{{"balls", {"further"}}, {"mm2", Json::array()}};
+  for (const Json& ball : file["balls"]) joint["balls"].push_back(ball["label"]);
+  const std::size_t n = 3 * joint["balls"].size();
+  for (std::size_t row = 0; row < n; ++row) {
+    joint["mm2"].push_back(Json::array());
+    for (std::size_t column = 0; column < n; ++column)
+      joint["mm2"].back().push_back(row == column ? 1e-4 : 0.0);
+  }
+  return joint;
+}
+
+TEST(ReadCalibrator, JointCovarianceRoundTrips) {
+  Json json = example();
+  json["joint_covariance"] = joint_covariance_of(json);
+  json["joint_covariance"]["mm2"][1][7] = json["joint_covariance"]["mm2"][7][1] = 5e-5;
+  const auto calibrator = calibrator_from_json(json, "c.json");
+  ASSERT_TRUE(calibrator.has_value()) << calibrator.error().message;
+  EXPECT_EQ(calibrator->joint_covariance->mm2(7, 1), 5e-5);
+  EXPECT_EQ(to_json(*calibrator)["joint_covariance"], json["joint_covariance"]);
+}
+
+TEST(ReadCalibrator, JointCovarianceThatContradictsTheBallsIsRefused) {
+  Json json = example();
+  json["joint_covariance"] = joint_covariance_of(json);
+  json["balls"][2]["covariance_mm2"] = {{2e-4, 0, 0}, {0, 1e-4, 0}, {0, 0, 1e-4}};
+  EXPECT_NE(refusal(json).message.find("differs from the covariance of"), std::string::npos)
+      << refusal(json).message;
+  json["balls"][2].erase("covariance_mm2");
+  json["joint_covariance"]["balls"][1] = "other";
+  EXPECT_NE(refusal(json).message.find("once"), std::string::npos) << refusal(json).message;
+}
+
+TEST(JointBallCovariance, HasNoGrowthAboutTheCentroid) {
+  Calibrator calibrator = udcsc();
+  EXPECT_EQ(joint_ball_covariance(calibrator).size(), 0);
+  const Eigen::Vector3d middle = middle_of(calibrator);
+  Eigen::VectorXd growth(36);
+  JointCovariance joint;
+  for (std::size_t i = 0; i < 12; ++i) {
+    joint.labels.push_back(calibrator.balls[11 - i].label);
+    growth.segment<3>(3 * Eigen::Index(i)) = calibrator.balls[11 - i].centre_in_calibrator - middle;
+  }
+  Eigen::MatrixXd own = Eigen::MatrixXd::Zero(36, 36);
+  own(0, 0) = 0.04;  // of the last ball
+  joint.mm2 = own + 1e-6 * growth * growth.transpose();
+  calibrator.joint_covariance = joint;
+  const Eigen::MatrixXd covariance = joint_ball_covariance(calibrator);
+  const Eigen::VectorXd reversed = growth.reshaped(3, 12).rowwise().reverse().reshaped();
+  EXPECT_LT((covariance * reversed).norm(), 1e-12);
+  EXPECT_NEAR(covariance(33, 33), 0.04, 0.01);
+  EXPECT_NEAR(covariance(0, 0), 0, 1e-3);
+  EXPECT_EQ(ball_covariances(calibrator)[11], (covariance.block<3, 3>(33, 33)));
+}
+
 TEST(ReadCalibrator, InvalidCovarianceIsRefused) {
   Json json = example();
   json["balls"][2]["covariance_mm2"] = {{1, 2, 0}, {0, 1, 0}, {0, 0, 1}};

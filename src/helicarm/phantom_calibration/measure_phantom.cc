@@ -12,6 +12,7 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/ray.h"
+#include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"
 
@@ -161,8 +162,9 @@ Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd&
   return points;
 }
 
-/// Carried by a rotation and a translation; the covariance into the frame that weighted points fix.
-void carry(ScaledPoints& points, const geometry::RigidTransform& by, const Eigen::VectorXd& weights) {
+/// Carried by a rotation and a translation. The covariance is that after a rigid fit of all points to their
+/// true places: the frame of the nominal file has no error of its own.
+void carry(ScaledPoints& points, const geometry::RigidTransform& by) {
   const auto n = Eigen::Index(points.centres.size());
   Eigen::MatrixXd turn = Eigen::MatrixXd::Zero(3 * n, 3 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -170,8 +172,8 @@ void carry(ScaledPoints& points, const geometry::RigidTransform& by, const Eigen
     points.centres[std::size_t(i)] = by * points.centres[std::size_t(i)];
   }
   points.covariance_mm2 = turn * points.covariance_mm2 * turn.transpose();
-  points.covariance_mm2 =
-      in_frame_of(points.covariance_mm2, similarity_motions(points.centres).leftCols<6>(), weights);
+  points.covariance_mm2 = in_frame_of(points.covariance_mm2, similarity_motions(points.centres).leftCols<6>(),
+                                      Eigen::VectorXd::Ones(n));
 }
 
 /// The frame of an unknown phantom: origin at the mean, axes along the principal directions, the longest
@@ -198,10 +200,8 @@ geometry::RigidTransform principal_frame(const std::vector<Vector3d>& centres,
 
 void set_frame(ScaledPoints& points, const AdjustedViews& found,
                const std::optional<phantom::Calibrator>& nominal) {
-  const auto n = Eigen::Index(points.centres.size());
   if (!nominal) {
-    carry(points, principal_frame(points.centres, found.consistent.fit.views[0].camera_from_world.rotation),
-          Eigen::VectorXd::Ones(n));
+    carry(points, principal_frame(points.centres, found.consistent.fit.views[0].camera_from_world.rotation));
     return;
   }
   std::vector<Vector3d> places;
@@ -209,7 +209,7 @@ void set_frame(ScaledPoints& points, const AdjustedViews& found,
     places.push_back(nominal->balls[ball].centre_in_calibrator);
   // Weights are found with the scale free, as it may be wrong in the file; the frame is rigid.
   const RobustFit fit = robust_similarity(points.centres, places, true);
-  carry(points, similarity_between(points.centres, places, fit.weights, false).a_from_b, fit.weights);
+  carry(points, similarity_between(points.centres, places, fit.weights, false).a_from_b);
 }
 
 void describe_views(const AdjustedViews& found, const PhantomOptions& options, PhantomResult& result) {
@@ -226,11 +226,25 @@ void describe_views(const AdjustedViews& found, const PhantomOptions& options, P
       view.residuals_px.emplace_back(found.consistent.problem.views[v].images[i].fiducial,
                                      fit.residuals_px[v][i]);
       view.images_px.push_back(found.consistent.problem.views[v].images[i].uv);
+      view.sigmas_px.push_back(found.consistent.problem.views[v].images[i].sigma_px);
       sum += fit.residuals_px[v][i].squaredNorm();
     }
     view.rms_px = std::sqrt(sum / double(2 * view.residuals_px.size()));
     result.views.push_back(std::move(view));
   }
+}
+
+phantom::JointCovariance joint_covariance(const ScaledPoints& points, const AdjustedViews& found) {
+  const auto n = Eigen::Index(found.order.size());
+  phantom::JointCovariance joint{{}, Eigen::MatrixXd(3 * n, 3 * n)};
+  const auto place = [&](Eigen::Index ball) { return 3 * Eigen::Index(found.order[std::size_t(ball)]); };
+  for (Eigen::Index row = 0; row < n; ++row) {
+    joint.labels.push_back(found.labels[found.order[std::size_t(row)]]);
+    for (Eigen::Index column = 0; column < n; ++column)
+      joint.mm2.block<3, 3>(3 * row, 3 * column) =
+          points.covariance_mm2.block<3, 3>(place(row), place(column));
+  }
+  return joint;
 }
 
 void describe_balls(const ScaledPoints& points, const AdjustedViews& found, PhantomResult& result) {
@@ -252,6 +266,8 @@ void describe_balls(const ScaledPoints& points, const AdjustedViews& found, Phan
     result.calibrator.balls.push_back({ball.label, ball.centre, found.diameters_mm[i], ball.covariance_mm2});
     result.balls.push_back(std::move(ball));
   }
+  if (found.order.size() <= phantom::most_correlated_balls)
+    result.calibrator.joint_covariance = joint_covariance(points, found);
 }
 
 void describe_source(const PhantomOptions& options, PhantomResult& result) {

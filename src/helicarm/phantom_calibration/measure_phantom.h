@@ -40,7 +40,7 @@ struct PhantomOptions {
 struct MeasuredBall {
   std::string label;
   Eigen::Vector3d centre;          ///< mm, in the nominal frame, or in that of the balls' principal axes
-  Eigen::Matrix3d covariance_mm2;  ///< with the scale's
+  Eigen::Matrix3d covariance_mm2;  ///< with the scale's; see `PhantomResult::calibrator`
   std::optional<Eigen::Vector3d> from_nominal;  ///< mm
   int views = 0;
 };
@@ -53,6 +53,7 @@ struct MeasuredView {
   std::optional<double> left_out_rms_px;
   std::vector<std::pair<std::size_t, Eigen::Vector2d>> residuals_px;  ///< ball, projection less image
   std::vector<Eigen::Vector2d> images_px;                             ///< rectified, in the same order
+  std::vector<double> sigmas_px;                                      ///< per axis, without the map's
 };
 
 struct PhantomScale {
@@ -64,7 +65,8 @@ struct PhantomScale {
 struct PhantomResult {
   std::optional<Failure> failure;
   std::vector<Warning> warnings;
-  phantom::Calibrator calibrator;  ///< as measured
+  /// As measured. Its covariances are errors after the best rigid fit of all balls to their true centres.
+  phantom::Calibrator calibrator;
   std::optional<phantom::Calibrator> nominal;
   std::vector<MeasuredBall> balls;
   std::vector<MeasuredView> views;

@@ -29,9 +29,14 @@ Json view_json(const MeasuredView& view, const std::vector<MeasuredBall>& balls)
                {"left_out_rms_px", optional_number(view.left_out_rms_px)},
                {"balls", view.residuals_px.size()},
                {"residuals", Json::array()}};
-  for (const auto& [ball, residual] : view.residuals_px)
-    if (ball < balls.size())
-      json["residuals"].push_back({{"label", balls[ball].label}, {"du", residual.x()}, {"dv", residual.y()}});
+  for (std::size_t i = 0; i < view.residuals_px.size(); ++i)
+    if (const auto& [ball, residual] = view.residuals_px[i]; ball < balls.size())
+      json["residuals"].push_back({{"label", balls[ball].label},
+                                   {"u", view.images_px[i].x()},
+                                   {"v", view.images_px[i].y()},
+                                   {"sigma_px", view.sigmas_px[i]},
+                                   {"du", residual.x()},
+                                   {"dv", residual.y()}});
   return json;
 }
 

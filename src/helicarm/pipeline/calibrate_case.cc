@@ -15,10 +15,6 @@ namespace {
 
 using LabelledViews = std::vector<LabelledView>;
 
-calibration::CommonPrior common_prior(const phantom::Calibrator& calibrator) {
-  return {unknown_c_arm(), phantom::ball_covariances(calibrator), calibrator.scale_sigma};
-}
-
 /// The prior of these views from a C-arm history, without entries of these images.
 Expected<calibration::LearnedIntrinsics> prior_from_history(const LabelledViews& views,
                                                             const calibration::CArmHistory& history) {

@@ -13,4 +13,9 @@ constexpr calibration::IntrinsicsVariation principal_mm{7, 4.2};
 
 calibration::CArmPrior unknown_c_arm() { return {focal_mm, principal_mm}; }
 
+calibration::CommonPrior common_prior(const phantom::Calibrator& calibrator) {
+  return {unknown_c_arm(), phantom::ball_covariances(calibrator), phantom::joint_ball_covariance(calibrator),
+          calibrator.scale_sigma};
+}
+
 }  // namespace helicarm::pipeline
