@@ -76,17 +76,21 @@ BundleProblem problem_of(const std::vector<pipeline::DetectedView>& detected,
                          std::vector<std::size_t>& used) {
   BundleProblem problem;
   problem.c_arm = pipeline::unknown_c_arm();
+  const auto is_used = [&](std::size_t v) {
+    const auto has_value = [](const auto& seen) { return seen.has_value(); };
+    return r.views[v] && std::ranges::count_if(observed[v], has_value) >= least_images;
+  };
   std::vector<std::size_t> index(r.centres.size());
   for (std::size_t ball = 0; ball < r.centres.size(); ++ball) {
     int seen = 0;
-    for (const auto& of_view : observed) seen += !of_view.empty() && of_view[ball].has_value();
+    for (std::size_t v = 0; v < views.size(); ++v) seen += is_used(v) && observed[v][ball].has_value();
     if (seen < 2) continue;
     index[ball] = balls.size();
     balls.push_back(ball);
     problem.centres.push_back(r.centres[ball]);
   }
   for (std::size_t v = 0; v < views.size(); ++v) {
-    if (!r.views[v]) continue;
+    if (!is_used(v)) continue;
     BundleView view{views[v].view.name, *r.views[v], views[v].view.prior, {}};
     std::vector<Eigen::Vector2d> places;
     for (const std::size_t ball : balls)
@@ -135,10 +139,10 @@ void name_by_size(AdjustedViews& found) {
 }
 
 void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& balls,
-                     const std::vector<PreparedView>& views, const phantom::Calibrator* nominal,
-                     std::vector<Warning>& warnings) {
+                     const std::vector<std::size_t>& used, const std::vector<PreparedView>& views,
+                     const phantom::Calibrator* nominal, std::vector<Warning>& warnings) {
   for (std::size_t v = 0; v < views.size(); ++v)
-    if (!r.views[v])
+    if (std::ranges::find(used, v) == used.end())
       warnings.push_back(
           {Reason::too_few_fiducials,
            "the fiducials of this view are inconsistent with every other view: the view is not used",
@@ -216,7 +220,7 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
     std::iota(found.order.begin(), found.order.end(), std::size_t(0));
     for (const std::size_t ball : balls) found.labels.push_back(given.calibrator.balls[ball].label);
   }
-  warn_of_missing(*r, balls, views, from_scratch ? nullptr : &given.calibrator, warnings);
+  warn_of_missing(*r, balls, used, views, from_scratch ? nullptr : &given.calibrator, warnings);
   return found;
 }
 

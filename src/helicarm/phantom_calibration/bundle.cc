@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCore>
 #include <ceres/ceres.h>
+#include <fmt/format.h>
 
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/phantom_calibration/image_cost.h"
@@ -276,6 +277,9 @@ void describe(BundleFit& fit, const Blocks& blocks, const BundleProblem& given) 
 }  // namespace
 
 Expected<BundleFit> adjust(const BundleProblem& given, const BundleOptions& options) {
+  for (const BundleView& view : given.views)
+    if (view.images.empty())
+      return fail(Reason::uncertain, fmt::format("no ball is seen in view {}", view.name));
   Blocks blocks;
   fill(blocks, given, options);
   ceres::Solver::Options how;

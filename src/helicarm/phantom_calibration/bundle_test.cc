@@ -79,5 +79,17 @@ TEST(Bundle, TwoViewsWithKnownIntrinsicsAreEnough) {
   EXPECT_TRUE(adjust(synthetic_problem(helix_centres(), 2, sigma_px, 9)));
 }
 
+TEST(Bundle, ViewWithoutImagesIsUncertain) {
+  BundleProblem problem = synthetic_problem(helix_centres(), 4, 0.05, 3);
+  problem.views[2].images.clear();
+  for (const bool robust : {false, true}) {
+    BundleOptions options;
+    options.robust = robust;
+    const auto fit = adjust(problem, options);
+    ASSERT_FALSE(fit);
+    EXPECT_EQ(fit.error().reason, Reason::uncertain);
+  }
+}
+
 }  // namespace
 }  // namespace helicarm::phantom_calibration

@@ -20,7 +20,8 @@ using Eigen::Vector3d;
 // 0.05 to 1.7 mm at a C-arm's magnification.
 constexpr double tolerances[] = {4e-4, 1.5e-3, 4e-3, 8e-3, 1.4e-2};
 constexpr double relabel_tolerance = 1.5e-3;
-constexpr double candidate_sigma_px = 0.3;  // of a blob's middle as the image of a ball's centre
+constexpr double candidate_sigma_px = 0.3;  // of a blob's middle as the image of a ball's centre; px limits
+                                            // are those of images of 1024 px a side
 constexpr double largest_radius_error = 0.15;
 constexpr double gates_px[] = {12, 6, 4, 3};
 constexpr double largest_shift_mm = 12;  // of a fiducial from its nominal place
@@ -82,7 +83,7 @@ Support support_of(const Reconstruction& r, const std::vector<PhantomView>& view
     if (!r.views[v] || !(r.views[v]->depth(centre) > 0)) continue;
     const Vector2d uv = r.views[v]->project(centre);
     const double radius = predicted_radius(*r.views[v], centre, diameter_mm);
-    double nearest = gate_px;
+    double nearest = limit_scale(views[v]) * gate_px;
     for (std::size_t k = 0; k < views[v].candidates.size(); ++k) {
       const double distance = (views[v].candidates[k].uv - uv).norm();
       if (taken[v][k] || distance >= nearest || !is_of_size(views[v].candidates[k], radius)) continue;
@@ -111,7 +112,7 @@ std::optional<Support> best_support(const Reconstruction& r, const std::vector<P
                                                                {*r.views[j], views[j].candidates[b].uv}};
           if (geometry::widest_angle(ray_observations) < 0.05) continue;
           const auto place = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
-          if (!place || place->chi2 > 16) continue;
+          if (!place || place->chi2 > 16 * limit_scale(views[i]) * limit_scale(views[i])) continue;
           if (about && (place->point - *about).norm() > reach_mm) continue;
           Support support = support_of(r, views, taken, place->point, diameter_mm);
           if (support.views < int(least_track_views)) continue;
@@ -167,7 +168,7 @@ void drop_contradicting_views(Reconstruction& r, const std::vector<PhantomView>&
       continue;
     }
     std::ranges::nth_element(errors, errors.begin() + std::ptrdiff_t(errors.size() / 2));
-    if (errors[errors.size() / 2] > largest_median_px) r.views[v].reset();
+    if (errors[errors.size() / 2] > limit_scale(views[v]) * largest_median_px) r.views[v].reset();
   }
 }
 
@@ -198,6 +199,9 @@ std::vector<int> assign(const PhantomView& view, const geometry::View& pose,
 }
 
 Expected<void> readjust(Reconstruction& r, const std::vector<PhantomView>& views) {
+  for (std::size_t v = 0; v < views.size(); ++v)
+    if (std::ranges::count_if(r.candidate_of[v], [](int k) { return k >= 0; }) < least_images)
+      r.views[v].reset();
   std::vector<int> seen(r.centres.size(), 0);
   for (std::size_t v = 0; v < views.size(); ++v)
     for (std::size_t ball = 0; r.views[v] && ball < r.centres.size(); ++ball)
@@ -223,8 +227,8 @@ Expected<void> readjust(Reconstruction& r, const std::vector<PhantomView>& views
     for (const std::size_t ball : balls)
       if (const int k = r.candidate_of[v][ball]; k >= 0) {
         const fiducials::BallCandidate& candidate = views[v].candidates[std::size_t(k)];
-        view.images.push_back(
-            {index[ball], candidate.uv, std::hypot(candidate.sigma_px, candidate_sigma_px)});
+        view.images.push_back({index[ball], candidate.uv,
+                               std::hypot(candidate.sigma_px, limit_scale(views[v]) * candidate_sigma_px)});
       }
     problem.views.push_back(std::move(view));
     used.push_back(v);
@@ -249,7 +253,9 @@ Expected<void> complete(Reconstruction& r, const std::vector<PhantomView>& views
     label_further_views(r, views);
     if (labelled_views(r) < 2) break;
     for (std::size_t v = 0; v < views.size(); ++v)
-      if (r.views[v]) r.candidate_of[v] = assign(views[v], *r.views[v], r.centres, r.diameters_mm, gate_px);
+      if (r.views[v])
+        r.candidate_of[v] =
+            assign(views[v], *r.views[v], r.centres, r.diameters_mm, limit_scale(views[v]) * gate_px);
     find_missing(r, views);
   }
   return readjust(r, views);

@@ -9,6 +9,9 @@
 
 namespace helicarm::phantom_calibration {
 
+/// Images of fiducials that determine a view's pose; a view with fewer is not used.
+inline constexpr std::ptrdiff_t least_images = 4;
+
 /// Labels the fiducials of a nominal file whose coordinates may be off by millimetres, and adjusts them:
 /// each view is labelled with growing tolerance, then views and centres support each other. Fiducials that
 /// the file misplaces are found by consistent candidates in three views. `too_few_views` where fewer than

@@ -27,7 +27,7 @@ constexpr std::size_t most_pairs = 60;    // hypotheses of two views
 constexpr std::size_t most_triples = 12;  // of three
 constexpr int least_tracks = 6;
 constexpr double usual_focal_widths = 4.4;  // 1000 mm over a field of 230 mm
-constexpr double good_rms_px = 0.6;         // per axis, by uncorrected blob centres
+constexpr double good_rms_px = 0.6;         // per axis at 1024 px a side, by uncorrected blob centres
 constexpr double largest_rms_px = 2;
 constexpr double reversal_ratio = 1.5;  // of the rms of a depth-reversed phantom to that of the best
 
@@ -36,6 +36,7 @@ struct PlainView {
   bool mirrored;
   double focal_px;
   Vector2d principal_px;
+  double limit_scale;
 };
 
 /// Which kind of ball each candidate is: the kinds' radii in the image are as their diameters, and the balls
@@ -72,7 +73,8 @@ PlainView plain(const PhantomView& view, const std::vector<double>& diameters_mm
   PlainView result{{},
                    *view.labelling.mirrored,
                    view.labelling.focal_px.value_or(usual_focal_widths * 2 * view.labelling.principal_px.x()),
-                   view.labelling.principal_px};
+                   view.labelling.principal_px,
+                   limit_scale(view)};
   const std::vector<int> kinds = kinds_of(view.candidates, diameters_mm);
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     Vector2d uv = view.candidates[k].uv - result.principal_px;
@@ -107,7 +109,8 @@ std::vector<Triple> triples_of(const std::vector<PlainView>& views, const std::a
   const auto& b = views[at[1]].candidates;
   const auto matches = [&](std::size_t i, std::size_t j) -> const std::vector<PairHypothesis>& {
     const auto [found, fresh] = pairs.try_emplace({i, j});
-    if (fresh) found->second = match_pair(views[i].candidates, views[j].candidates, most_pairs);
+    if (fresh)
+      found->second = match_pair(views[i].candidates, views[j].candidates, most_pairs, views[i].limit_scale);
     return found->second;
   };
   const auto& ab = matches(at[0], at[1]);
@@ -238,6 +241,7 @@ std::optional<Reconstruction> best_start(const std::vector<PhantomView>& given,
                                          const std::vector<PlainView>& views,
                                          const std::array<std::size_t, 3>& at,
                                          const std::vector<double>& diameters_mm, PairMatches& pairs) {
+  const double limit = views[at[0]].limit_scale;
   std::optional<Reconstruction> best;
   for (const Triple& t : triples_of(views, at, pairs)) {
     if (best && best->centres.size() > t.tracks.size() + 1) break;
@@ -256,9 +260,9 @@ std::optional<Reconstruction> best_start(const std::vector<PhantomView>& given,
     const auto angles = best_angles(images, t);
     for (const double sign : {1.0, -1.0}) {
       auto start = start_of(given, views, t, diameters_mm, angles, sign);
-      if (!start || start->rms_px > largest_rms_px) continue;
-      const auto rank = [](const Reconstruction& r) {
-        return std::tuple(-double(r.centres.size()) + (r.rms_px > good_rms_px ? 4 : 0), r.rms_px);
+      if (!start || start->rms_px > limit * largest_rms_px) continue;
+      const auto rank = [&](const Reconstruction& r) {
+        return std::tuple(-double(r.centres.size()) + (r.rms_px > limit * good_rms_px ? 4 : 0), r.rms_px);
       };
       if (!best || rank(*start) < rank(*best)) best = std::move(*start);
     }
@@ -353,7 +357,7 @@ Expected<Reconstruction> reconstruct_from_scratch(const std::vector<PhantomView>
       return std::tuple(-double(count_views(r)), -double(r.centres.size()), r.rms_px);
     };
     if (best.views.empty() || rank(*start) < rank(best)) best = *std::move(start);
-    if (count_views(best) == given.size() && best.rms_px < good_rms_px) break;
+    if (count_views(best) == given.size() && best.rms_px < views[0].limit_scale * good_rms_px) break;
   }
   if (count_views(best) < 3)
     return fail(

@@ -62,19 +62,29 @@ TEST(MeasurePhantom, BallsThatTheFileMisplacesAreMeasured) {
   EXPECT_EQ(result.scale.source, "distances");
 }
 
-TEST(MeasurePhantom, FromScratchNothingButTheDiameterIsNeeded) {
-  PhantomFolder folder(five_views());
-  const phantom::Calibrator truth = folder.given.calibrator;
+PhantomResult measured_from_scratch(const simulation::SimulatedCase& simulated) {
+  PhantomFolder folder(simulated);
   folder.given.calibrator = {};
   folder.given.diameters_mm = {4};
   for (pipeline::CaseView& view : folder.given.views) view.mirrored = false;
   PhantomOptions options;
   options.from_scratch = true;
-  const auto result = measured(folder.given, options);
+  return measured(folder.given, options);
+}
+
+TEST(MeasurePhantom, FromScratchNothingButTheDiameterIsNeeded) {
+  const auto result = measured_from_scratch(five_views());
   ASSERT_FALSE(result.failure) << result.failure->message;
   EXPECT_EQ(result.balls.size(), 12u);
   EXPECT_EQ(result.balls.front().label, "B1");
   EXPECT_EQ(result.warnings.back().reason, Reason::scale_weak);
+}
+
+TEST(MeasurePhantom, FromScratchViewsOfSmallImagesMayBeTwentyDegreesApart) {
+  const auto result = measured_from_scratch(simulated_phantom({0, 20, 40, 60, 80}));
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  EXPECT_EQ(result.balls.size(), 12u);
+  EXPECT_LT(result.rms_px, 0.05);
 }
 
 TEST(MeasurePhantom, BallThatMovedBetweenTheViewsIsPhantomChanged) {

@@ -20,7 +20,7 @@ constexpr double angle_step = 1.5 * one_degree;
 constexpr double largest_roll = 39 * one_degree;
 constexpr double scale_step = 0.015;
 constexpr double largest_log_scale = 0.15;
-constexpr double bin_px = 5;
+constexpr double usual_bin_px = 5;         // this and the tolerances: at 1024 px a side
 constexpr double largest_parallax = 0.38;  // of the phantom's width: sin(40 degrees) times its half depth
 constexpr double tolerances_px[] = {7, 5, 4};
 constexpr std::size_t most_refined = 600;
@@ -50,7 +50,7 @@ struct Vote {
 
 /// The most frequent offset of each pair of angles and scale.
 std::vector<Vote> votes_of(const std::vector<PlainCandidate>& a, const std::vector<PlainCandidate>& b,
-                           double reach) {
+                           double reach, double bin_px) {
   std::vector<Vote> votes;
   std::vector<double> p(a.size()), e(a.size()), q(b.size()), g(b.size());
   const int half = int(reach / bin_px) + 60;
@@ -103,9 +103,9 @@ Turned turned(const std::vector<PlainCandidate>& candidates, double angle) {
 
 /// g = c0 + c1 e + c2 p over the matches: what the mean plane of the phantom does across the axis.
 Eigen::Vector3d plane_of(const Turned& a, const Turned& b, const std::vector<std::pair<int, int>>& matches,
-                         double scale) {
+                         double scale, double limit_scale) {
   Eigen::Matrix3d normal = Eigen::Vector3d(1e-9, 20, 20).asDiagonal();  // towards (0, scale, 0)
-  normal *= 1e3;
+  normal *= 1e3 * limit_scale * limit_scale;
   Eigen::Vector3d right = normal * Eigen::Vector3d(0, scale, 0);
   for (const auto& [i, k] : matches) {
     const Eigen::Vector3d row(1, a.across[i], a.along[i]);
@@ -164,25 +164,26 @@ bool refit(PairHypothesis& h, const std::vector<PlainCandidate>& a, const std::v
 }
 
 bool refine_pair(PairHypothesis& h, const std::vector<PlainCandidate>& a,
-                 const std::vector<PlainCandidate>& b, double reach) {
+                 const std::vector<PlainCandidate>& b, double reach, double limit_scale) {
   const Vector2d mean_a = mean_of(a), mean_b = mean_of(b);
   Eigen::Vector3d plane(across(h.angle_b).dot(mean_b) - h.scale * across(h.angle_a).dot(mean_a), h.scale, 0);
   for (const double tolerance : tolerances_px) {
-    assign_pairs(h, a, b, plane, tolerance, reach);
+    assign_pairs(h, a, b, plane, limit_scale * tolerance, reach);
     if (!refit(h, a, b)) return false;
-    plane = plane_of(turned(a, h.angle_a), turned(b, h.angle_b), h.matches, h.scale);
+    plane = plane_of(turned(a, h.angle_a), turned(b, h.angle_b), h.matches, h.scale, limit_scale);
   }
-  assign_pairs(h, a, b, plane, tolerances_px[2], reach);
+  assign_pairs(h, a, b, plane, limit_scale * tolerances_px[2], reach);
   return refit(h, a, b);
 }
 
 }  // namespace
 
 std::vector<PairHypothesis> match_pair(const std::vector<PlainCandidate>& a,
-                                       const std::vector<PlainCandidate>& b, std::size_t most) {
+                                       const std::vector<PlainCandidate>& b, std::size_t most,
+                                       double limit_scale) {
   if (a.size() < 5 || b.size() < 5) return {};
   const double reach = largest_parallax * std::max(width_of(a), width_of(b));
-  std::vector<Vote> votes = votes_of(a, b, reach);
+  std::vector<Vote> votes = votes_of(a, b, reach, limit_scale * usual_bin_px);
   const auto kept = votes.begin() + std::ptrdiff_t(std::min(votes.size(), most_refined));
   std::ranges::partial_sort(votes, kept, std::greater{}, &Vote::count);
   votes.erase(kept, votes.end());
@@ -197,7 +198,7 @@ std::vector<PairHypothesis> match_pair(const std::vector<PlainCandidate>& a,
         vote.offset + along(vote.angle_b).dot(mean_b) - vote.scale * along(vote.angle_a).dot(mean_a),
         {},
         0};
-    if (!refine_pair(h, a, b, reach)) continue;
+    if (!refine_pair(h, a, b, reach, limit_scale)) continue;
     std::ranges::sort(h.matches);
     if (known.insert(h.matches).second) found.push_back(std::move(h));
   }

@@ -29,8 +29,9 @@ struct PairHypothesis {
 
 /// The hypotheses that pair most candidates (then the most exactly), at most `most`, of views up to about 40
 /// degrees apart that are not rolled by more. Exhaustive over both angles and the scale; the offset by a
-/// vote.
+/// vote. The tolerances are `limit_scale` times those of images of 1024 px a side.
 std::vector<PairHypothesis> match_pair(const std::vector<PlainCandidate>& a,
-                                       const std::vector<PlainCandidate>& b, std::size_t most);
+                                       const std::vector<PlainCandidate>& b, std::size_t most,
+                                       double limit_scale = 1);
 
 }  // namespace helicarm::phantom_calibration

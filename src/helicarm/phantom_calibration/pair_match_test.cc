@@ -49,6 +49,21 @@ TEST(PairMatch, FiducialsOfDifferentKindsAreNotPaired) {
     for (const auto& [i, k] : h.matches) EXPECT_EQ(i % 2, k % 2);
 }
 
+TEST(PairMatch, HalfTheImageSizeGivesTheSamePairs) {
+  const auto views = two_views(4);
+  auto half = views;
+  for (auto& view : half)
+    for (PlainCandidate& candidate : view) candidate.uv /= 2;
+  const auto pairs_of = [](const std::vector<PairHypothesis>& hypotheses) {
+    std::vector<std::vector<std::pair<int, int>>> pairs;
+    for (const PairHypothesis& h : hypotheses) pairs.push_back(h.matches);
+    return pairs;
+  };
+  const auto expected = pairs_of(match_pair(views[0], views[1], 10));
+  EXPECT_EQ(pairs_of(match_pair(half[0], half[1], 10, 0.5)), expected);
+  EXPECT_NE(pairs_of(match_pair(half[0], half[1], 10)), expected);
+}
+
 TEST(PairMatch, FourCandidatesAreTooFew) {
   auto views = two_views(0);
   views[0].resize(4);

@@ -20,6 +20,12 @@ struct PhantomView {
   geometry::IntrinsicsPrior prior;
 };
 
+/// Limits in px are those of an image of 1024 px a side; in a view they are so many times as large.
+inline double limit_scale(const PhantomView& view) {
+  constexpr double usual_field_radius_px = 724;
+  return view.labelling.field_radius_px > 0 ? view.labelling.field_radius_px / usual_field_radius_px : 1;
+}
+
 /// A phantom and its views as first found, by candidates' centres: to a fraction of a millimetre.
 struct Reconstruction {
   std::vector<Eigen::Vector3d> centres;  ///< mm
