@@ -61,22 +61,36 @@ calibration::ViewFiducials view_points(const std::string& name, const Doubles& x
   return view;
 }
 
+/// Of N balls: (N, 3, 3), each ball's own, or (3 N, 3 N), of all together.
+void set_ball_covariance(const Doubles& mm2, py::ssize_t balls, calibration::CommonPrior& common) {
+  constexpr const char* name = "ball_covariance_mm2";
+  if (mm2.ndim() == 2) {
+    common.joint_ball_covariance_mm2 = matrix_of(mm2, 3 * balls, 3 * balls, name);
+    return;
+  }
+  if (mm2.ndim() != 3 || mm2.shape(0) != balls || mm2.shape(1) != 3 || mm2.shape(2) != 3)
+    raise({Reason::bad_value,
+           fmt::format("{}: shape {} is neither ({}, 3, 3) nor ({}, {})", name, shape_of(mm2), balls,
+                       3 * balls, 3 * balls),
+           {},
+           {}});
+  check_finite(mm2, name);
+  for (py::ssize_t ball = 0; ball < balls; ++ball)
+    common.ball_covariance_mm2.emplace_back(
+        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(mm2.data(ball, 0, 0)));
+}
+
 HeldCalibration calibrated(const std::vector<calibration::ViewFiducials>& views,
                            const calibration::CArmPrior& c_arm,
-                           const std::optional<std::vector<Doubles>>& ball_covariance_mm2, double scale_sigma,
+                           const std::optional<Doubles>& ball_covariance_mm2, double scale_sigma,
                            double rejection_probability, double largest_rms_px) {
   calibration::CalibrationOptions options{
       {c_arm, {}, {}, scale_sigma}, rejection_probability, largest_rms_px};
   if (ball_covariance_mm2)
-    for (const Doubles& one : *ball_covariance_mm2)
-      options.common.ball_covariance_mm2.emplace_back(matrix_of(one, 3, 3, "ball_covariance_mm2"));
-  for (const calibration::ViewFiducials& view : views)
-    if (ball_covariance_mm2 && view.fiducials.size() != ball_covariance_mm2->size())
-      raise({Reason::bad_value,
-             fmt::format("ball_covariance_mm2: {} matrices for the {} balls of view {}",
-                         ball_covariance_mm2->size(), view.fiducials.size(), view.name),
-             {},
-             {}});
+    for (const calibration::ViewFiducials& view : views) {
+      options.common.ball_covariance_mm2.clear();
+      set_ball_covariance(*ball_covariance_mm2, py::ssize_t(view.fiducials.size()), options.common);
+    }
   calibration::CalibrationResult result =
       value_or_raise(without_gil([&] { return calibration::calibrate(views, options); }));
   HeldCalibration held{static_cast<const calibration::Calibration&>(result),
@@ -366,9 +380,9 @@ located}. Releases the GIL. Raises InputError: bad_value.)");
              py::arg("largest_rms_px") = usual.largest_rms_px,
              R"(Pinhole views by maximum likelihood, all ViewPoints at once, under their priors.
 
-c_arm: CArmPrior that all views share; ball_covariance_mm2: N matrices (3, 3), mm^2; scale_sigma: relative, of the
-calibrator. Outliers are found by tests at rejection_probability (0: none). Returns a Calibration. Releases the GIL.
-Raises RefusedError: too_few_fiducials, coplanar_fiducials, behind_source, uncertain, residual_too_large.)");
+c_arm: CArmPrior that all views share; ball_covariance_mm2: (N, 3, 3), or (3 N, 3 N) of all balls together, mm^2;
+scale_sigma: relative, of the calibrator. Outliers are found by tests at rejection_probability (0: none). Returns a
+Calibration. Releases the GIL. Raises InputError: bad_value; RefusedError: too_few_fiducials, coplanar_fiducials, behind_source, uncertain, residual_too_large.)");
 }
 
 }  // namespace helicarm::python

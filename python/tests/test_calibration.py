@@ -102,6 +102,21 @@ def test_outlier_is_rejected(pair):
     assert status["P5"] == "rejected" and list(status.values()).count("used") == 11
 
 
+def test_joint_covariance_of_independent_balls_is_that_of_each(pair):
+    random = np.random.default_rng(6)
+    views = [helicarm.ViewPoints(name, pair.xyz, pair.pixels(name, pair.xyz) + 0.1 * random.standard_normal((12, 2)),
+                                 sigma_px=0.1) for name in pair.pose]
+    each = np.array([np.diag([0.01, 0.02, 0.03])] * 12)
+    joint = np.zeros((36, 36))
+    for ball in range(12):
+        joint[3 * ball:3 * ball + 3, 3 * ball:3 * ball + 3] = each[ball]
+    first, second = (helicarm.calibrate(views, ball_covariance_mm2=mm2, rejection_probability=0) for mm2 in (each, joint))
+    assert second.covariance("AP") == pytest.approx(first.covariance("AP"), rel=1e-3, abs=1e-6)
+    assert second.projection("LAT") == pytest.approx(first.projection("LAT"), rel=1e-6, abs=1e-6)
+    with pytest.raises(helicarm.InputError, match="bad_value"):
+        helicarm.calibrate(views, ball_covariance_mm2=each[:11])
+
+
 def test_one_view_places_nothing(pair):
     with pytest.raises(helicarm.RefusedError) as error:
         pair.calibration().locate({"AP": (300, 200)})
