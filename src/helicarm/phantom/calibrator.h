@@ -72,8 +72,8 @@ Eigen::Vector3d middle_of(const Calibrator& calibrator);
 /// less that of the scale about the centroid, plus the tolerance. Empty if every ball is exact.
 std::vector<Eigen::Matrix3d> ball_covariances(const Calibrator& calibrator);
 
-/// The same of all balls together (3n x 3n): the file's joint covariance without growth about the centroid,
-/// plus the tolerance. Empty if the file has none.
+/// The same of all balls together (3n x 3n): the file's joint covariance, without growth about the centroid
+/// where the file states `scale_sigma`, plus the tolerance. Empty if the file has none.
 Eigen::MatrixXd joint_ball_covariance(const Calibrator& calibrator);
 
 /// Same labels in any order, each ball within 0.01 mm.

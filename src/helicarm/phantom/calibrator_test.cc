@@ -185,7 +185,7 @@ TEST(ReadCalibrator, JointCovarianceThatContradictsTheBallsIsRefused) {
   EXPECT_NE(refusal(json).message.find("once"), std::string::npos) << refusal(json).message;
 }
 
-TEST(JointBallCovariance, HasNoGrowthAboutTheCentroid) {
+TEST(JointBallCovariance, HasNoGrowthAboutTheCentroidWhereTheScaleIsStated) {
   Calibrator calibrator = udcsc();
   EXPECT_EQ(joint_ball_covariance(calibrator).size(), 0);
   const Eigen::Vector3d middle = middle_of(calibrator);
@@ -199,8 +199,10 @@ TEST(JointBallCovariance, HasNoGrowthAboutTheCentroid) {
   own(0, 0) = 0.04;  // of the last ball
   joint.mm2 = own + 1e-6 * growth * growth.transpose();
   calibrator.joint_covariance = joint;
-  const Eigen::MatrixXd covariance = joint_ball_covariance(calibrator);
   const Eigen::VectorXd reversed = growth.reshaped(3, 12).rowwise().reverse().reshaped();
+  EXPECT_GT((joint_ball_covariance(calibrator) * reversed).norm(), 1e-6 * growth.squaredNorm());
+  calibrator.scale_sigma = 1e-3;
+  const Eigen::MatrixXd covariance = joint_ball_covariance(calibrator);
   EXPECT_LT((covariance * reversed).norm(), 1e-12);
   EXPECT_NEAR(covariance(33, 33), 0.04, 0.01);
   EXPECT_NEAR(covariance(0, 0), 0, 1e-3);

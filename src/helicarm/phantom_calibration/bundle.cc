@@ -7,11 +7,11 @@
 #include <memory>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCore>
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/phantom_calibration/image_cost.h"
 
@@ -243,12 +243,11 @@ std::vector<std::vector<double>> falls_of(const Blocks& blocks, const Linear& li
       Eigen::Matrix2d own;
       own << freedom(i, i), freedom(i, n + i), freedom(n + i, i), freedom(n + i, n + i);
       const double size = view.whitening.col(i).squaredNorm();
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(own);
-      const Eigen::Vector2d r =
-          eigen.eigenvectors().transpose() * Eigen::Vector2d(weighted[i], weighted[n + i]);
+      const auto [values, vectors] = geometry::symmetric_eigen(own);
+      const Eigen::Vector2d r = vectors.transpose() * Eigen::Vector2d(weighted[i], weighted[n + i]);
       double fall = 0;
       for (Eigen::Index k = 0; k < 2; ++k)
-        if (eigen.eigenvalues()[k] > least_freedom * size) fall += r[k] * r[k] / eigen.eigenvalues()[k];
+        if (values[k] > least_freedom * size) fall += r[k] * r[k] / values[k];
       of_view.push_back(fall);
     }
     row += 2 * n;

@@ -7,11 +7,11 @@
 #include <numbers>
 #include <sstream>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/ray.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"
@@ -184,10 +184,10 @@ geometry::RigidTransform principal_frame(const std::vector<Vector3d>& centres,
   for (const Vector3d& centre : centres) mean += centre / double(centres.size());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Vector3d& centre : centres) spread += (centre - mean) * (centre - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
+  const Eigen::MatrixXd axes = geometry::symmetric_eigen(spread).vectors;
   Eigen::Matrix3d rotation;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
-    Vector3d direction = eigen.eigenvectors().col(2 - axis);
+    Vector3d direction = axes.col(2 - axis);
     const Vector3d in_view = view_rotation * direction;
     Eigen::Index largest = 0;
     in_view.cwiseAbs().maxCoeff(&largest);

@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/style.h"
 
@@ -215,12 +215,12 @@ double predicted_tre_mm(const std::vector<Vector3d>& balls, double ball_rms_mm, 
   const Vector3d mean = mean_of(balls);
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Vector3d& ball : balls) spread += (ball - mean) * (ball - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(spread / double(balls.size()));
+  const auto [values, vectors] = geometry::symmetric_eigen(spread / double(balls.size()));
   double sum = 0;
   for (Eigen::Index k = 0; k < 3; ++k) {
-    const Vector3d axis = axes.eigenvectors().col(k);
+    const Vector3d axis = vectors.col(k);
     const double about = (point - mean).squaredNorm() - std::pow(axis.dot(point - mean), 2);
-    const double balls_about = axes.eigenvalues().sum() - axes.eigenvalues()[k];
+    const double balls_about = values.sum() - values[k];
     sum += about / balls_about / 3;
   }
   return ball_rms_mm * std::sqrt((1 + sum) / double(balls.size()));
