@@ -122,7 +122,7 @@ class Controller : public QObject {
   QTimer images_;
   QThreadPool faults_;  ///< of the virtual devices
   QThreadPool stops_;   ///< of the robot; they wait for no other task
-  Worker worker_;           ///< last: its jobs use all other members
+  Worker worker_;       ///< last: its jobs use all other members
 };
 
 }  // namespace helicarm::gui
