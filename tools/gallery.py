@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the documents from a simulated case: PYTHONPATH=build/python tools/gallery.py [FOLDER]"""
+"""Figures of the documents from simulated cases: PYTHONPATH=build/python tools/gallery.py [FOLDER]"""
+import json
 import pathlib
 import sys
 import tempfile
@@ -9,8 +10,38 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
 
 import helicarm  # noqa: E402
+
+VIEWS = [f"V{i + 1}:{20 * i - 70},{15 * (-1) ** i}" for i in range(8)]
+
+
+def save(figure, path):
+    figure.tight_layout()
+    figure.savefig(path, dpi=100, metadata={"Software": None})
+    plt.close(figure)
+
+
+def measured_phantom(out):
+    """A phantom whose balls are 0.3 mm per axis off its file: the eight images, and what their measurement finds."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        helicarm.simulate_case(folder, seed=3, size=512, knee=False, views=VIEWS)
+        nominal = json.loads((folder / "calibrator.json").read_text())
+        true = helicarm.Calibrator.load(folder / "calibrator.json").xyz_mm
+        random = np.random.default_rng(3)
+        for ball in nominal["balls"]:
+            ball["xyz_mm"] = (np.array(ball["xyz_mm"]) + random.normal(0, 0.3, 3)).tolist()
+        (folder / "calibrator.json").write_text(json.dumps({**nominal, "targets": []}))
+        measured = helicarm.measure_phantom(folder, distances=[("P1", "P3", float(np.linalg.norm(true[0] - true[2])))])
+        case = json.loads((folder / "case.json").read_text())
+        figure, axes = plt.subplots(2, 4, figsize=(10, 5.4))
+        for ax, view in zip(axes.flat, case["views"]):
+            ax.imshow(helicarm.read_image(folder / view["image"]).pixels, cmap="gray")
+            ax.set(title=view["name"], xticks=[], yticks=[])
+    save(figure, out / "phantom-views.png")
+    save(helicarm.figures.phantom(measured).figure, out / "phantom-measured.png")
 
 
 def main():
@@ -23,9 +54,8 @@ def main():
                "residuals": helicarm.figures.residuals(result.calibration, "AP"),
                "tre": helicarm.figures.tre_map(result.calibration, centre, half_mm=60, step_mm=5, sigma_px=0.5)}
     for name, ax in figures.items():
-        ax.figure.tight_layout()
-        ax.figure.savefig(out / f"python-{name}.png", dpi=100, metadata={"Software": None})
-        plt.close(ax.figure)
+        save(ax.figure, out / f"python-{name}.png")
+    measured_phantom(out)
 
 
 if __name__ == "__main__":

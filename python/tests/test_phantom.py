@@ -58,3 +58,8 @@ def test_verification_names_every_ball_and_keeps_a_history(views, tmp_path):
     assert [ball["label"] for ball in verified["balls"]] == helicarm.Calibrator.udcsc().labels
     assert {ball["state"] for ball in verified["balls"]} == {"as in the file"}
     assert history.exists()
+
+
+def test_figure_draws_an_arrow_for_each_ball(measured):
+    ax = helicarm.figures.phantom(measured)
+    assert len(ax.texts) == 12 and ax.get_title().startswith("measured less nominal")
