@@ -61,27 +61,29 @@ def residuals(calibration, view=0, ax=None, scale=None):
 
 
 def phantom(measured, ax=None, scale=None):
-    """Arrows from the nominal places of the balls to the measured ones, enlarged, seen along y of the calibrator frame.
+    """Arrows from the nominal places of the balls to the measured ones, enlarged, seen along the axis of least extent.
 
     measured: MeasuredPhantom of a case with a nominal file. scale: enlargement; chosen from the largest difference where
-    None. Axes in mm.
+    None. Axes in mm, calibrator frame.
     """
     ax = _axes(ax)
     off = measured.from_nominal_mm
     if np.isnan(off).any():
         raise ValueError("the phantom was measured without a nominal file")
     nominal = measured.xyz_mm - off
+    extent = np.ptp(nominal, axis=0)
     if scale is None:
-        scale = 0.2 * np.ptp(nominal, axis=0).max() / max(np.linalg.norm(off, axis=1).max(), 1e-12)
-    ax.plot(nominal[:, 0], nominal[:, 2], "ko", mfc="lightgray", markersize=9)
-    ax.quiver(nominal[:, 0], nominal[:, 2], scale * off[:, 0], scale * off[:, 2], angles="xy", scale_units="xy", scale=1,
-              color="tab:red", width=0.004)
+        scale = 0.2 * extent.max() / max(np.linalg.norm(off, axis=1).max(), 1e-12)
+    across, up = sorted(np.argsort(extent, kind="stable")[1:])
+    ax.plot(nominal[:, across], nominal[:, up], "ko", mfc="lightgray", markersize=9)
+    ax.quiver(nominal[:, across], nominal[:, up], scale * off[:, across], scale * off[:, up], angles="xy",
+              scale_units="xy", scale=1, color="tab:red", width=0.004)
     for label, ball in zip(measured.labels, nominal):
-        ax.annotate(label, (ball[0], ball[2]), xytext=(6, 6), textcoords="offset points", fontsize=9)
+        ax.annotate(label, (ball[across], ball[up]), xytext=(6, 6), textcoords="offset points", fontsize=9)
     rms = np.sqrt(np.mean(np.sum(off ** 2, axis=1)))
-    ax.set(xlabel="x (mm)", ylabel="z (mm)", title=f"measured less nominal: {rms:.2f} mm rms, arrows x {scale:.0f}",
-           aspect="equal")
-    ax.margins(0.25)
+    ax.set(xlabel=f"{'xyz'[across]} (mm)", ylabel=f"{'xyz'[up]} (mm)",
+           title=f"measured less nominal: {rms:.2f} mm rms, arrows x {scale:.0f}", aspect="equal")
+    ax.margins(0.2)
     return ax
 
 

@@ -148,6 +148,13 @@ Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd&
     auto by_distances = scaled_by(centres, covariance, *distances, found.labels);
     if (!by_distances) return by_distances;
     result.scale = {"distances", by_distances->scale_sigma};
+    const auto& by_hand = by_distances->centres;
+    result.pair.distance_mm = (by_hand[result.pair.a] - by_hand[result.pair.b]).norm();
+    const double ratio =
+        result.pair.distance_mm / (points.centres[result.pair.a] - points.centres[result.pair.b]).norm();
+    const auto checked = check_scale(ratio, std::hypot(diameter_scale_sigma, by_distances->scale_sigma),
+                                     "the diameters of the balls' images", result.warnings);
+    if (!checked) return tl::unexpected<Failure>(checked.error());
     return by_distances;
   }
   result.scale = {"diameters", diameter_scale_sigma};
@@ -198,18 +205,38 @@ geometry::RigidTransform principal_frame(const std::vector<Vector3d>& centres,
   return {rotation, -(rotation * mean)};
 }
 
-void set_frame(ScaledPoints& points, const AdjustedViews& found,
-               const std::optional<phantom::Calibrator>& nominal) {
-  if (!nominal) {
+/// Against the scale of the nominal file, which is wrong by the printer's shrinkage and by the deviations of
+/// the balls.
+Expected<void> check_nominal_scale(const std::vector<Vector3d>& centres, const std::vector<Vector3d>& places,
+                                   const RobustFit& fit, std::vector<Warning>& warnings) {
+  constexpr double shrinkage_sigma = 0.005;
+  Vector3d mean = Vector3d::Zero();
+  for (const Vector3d& place : places) mean += place / double(places.size());
+  double deviation = 0, extent = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    deviation += fit.weights[Eigen::Index(i)] * (fit.a_from_b * centres[i] - places[i]).squaredNorm();
+    extent += fit.weights[Eigen::Index(i)] * (places[i] - mean).squaredNorm();
+  }
+  const double per_axis = std::sqrt(deviation / (3 * fit.weights.sum()));
+  return check_scale(1 / fit.a_from_b.scale, std::hypot(shrinkage_sigma, per_axis / std::sqrt(extent)),
+                     "the nominal file", warnings);
+}
+
+Expected<void> set_frame(ScaledPoints& points, const AdjustedViews& found, PhantomResult& result) {
+  if (!result.nominal) {
     carry(points, principal_frame(points.centres, found.consistent.fit.views[0].camera_from_world.rotation));
-    return;
+    return {};
   }
   std::vector<Vector3d> places;
   for (const std::size_t ball : found.ball_of_nominal)
-    places.push_back(nominal->balls[ball].centre_in_calibrator);
+    places.push_back(result.nominal->balls[ball].centre_in_calibrator);
   // Weights are found with the scale free, as it may be wrong in the file; the frame is rigid.
   const RobustFit fit = robust_similarity(points.centres, places, true);
+  if (result.scale.source == "distances")
+    if (auto checked = check_nominal_scale(points.centres, places, fit, result.warnings); !checked)
+      return checked;
   carry(points, similarity_between(points.centres, places, fit.weights, false).a_from_b);
+  return {};
 }
 
 void describe_views(const AdjustedViews& found, const PhantomOptions& options, PhantomResult& result) {
@@ -302,7 +329,7 @@ Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& option
   const double variance_scale = variance_scale_of(fit, result);
   auto points = scaled(found, variance_scale * fit.covariance_mm2, options, result);
   if (!points) return tl::unexpected<Failure>(points.error());
-  set_frame(*points, found, result.nominal);
+  if (auto placed = set_frame(*points, found, result); !placed) return placed;
   result.calibrator.scale_sigma = result.scale.relative_sigma;
   describe_balls(*points, found, result);
   describe_source(options, result);

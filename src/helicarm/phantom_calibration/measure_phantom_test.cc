@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/phantom_calibration/measure_phantom.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -70,6 +71,39 @@ PhantomResult measured_from_scratch(const simulation::SimulatedCase& simulated) 
   PhantomOptions options;
   options.from_scratch = true;
   return measured(folder.given, options);
+}
+
+const Warning* find_reason(const std::vector<Warning>& warnings, Reason reason) {
+  const auto found = std::ranges::find(warnings, reason, &Warning::reason);
+  return found == warnings.end() ? nullptr : &*found;
+}
+
+/// P1 to P3 as a caliper shows it over both balls, or its multiple.
+PhantomResult with_distance(const PhantomFolder& folder, double factor, bool outer) {
+  const auto& balls = folder.given.calibrator.balls;
+  const double centres_mm = (balls[0].centre_in_calibrator - balls[2].centre_in_calibrator).norm();
+  PhantomOptions options;
+  options.outer = outer;
+  options.distances = {{"P1", "P3", factor * (centres_mm + balls[0].diameter_mm)}};
+  return measured(folder.given, options);
+}
+
+TEST(MeasurePhantom, OuterDistanceTakenAsThatOfTheCentresIsWarnedOf) {
+  const PhantomFolder folder(five_views());
+  const PhantomResult right = with_distance(folder, 1, true);
+  EXPECT_FALSE(find_reason(right.warnings, Reason::scale_disagrees));
+  EXPECT_NEAR(right.pair.distance_mm,
+              (right.balls[right.pair.a].centre - right.balls[right.pair.b].centre).norm(), 1e-9);
+  const PhantomResult wrong = with_distance(folder, 1, false);
+  const Warning* warning = find_reason(wrong.warnings, Reason::scale_disagrees);
+  ASSERT_TRUE(warning);
+  EXPECT_NE(warning->message.find("the nominal file"), std::string::npos) << warning->message;
+}
+
+TEST(MeasurePhantom, DistanceInAnotherUnitIsRefused) {
+  const PhantomResult result = with_distance(PhantomFolder(five_views()), 0.1, true);
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::scale_disagrees);
 }
 
 TEST(MeasurePhantom, FromScratchNothingButTheDiameterIsNeeded) {

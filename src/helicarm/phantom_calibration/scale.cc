@@ -101,6 +101,23 @@ Expected<ScaledPoints> scaled_by(const std::vector<Vector3d>& centres, const Eig
   return scaled;
 }
 
+Expected<void> check_scale(double ratio, double sigma, const std::string& other,
+                           std::vector<Warning>& warnings) {
+  constexpr double warned_sigmas = 3, refused_sigmas = 10;
+  const double off = std::abs(ratio - 1) / sigma;
+  if (off <= warned_sigmas) return {};
+  const Failure failure{
+      Reason::scale_disagrees,
+      fmt::format("the distances measured by hand make the phantom {:.3g} times as large as {} (sigma {:.2g} "
+                  "%): check their unit and whether they are over both balls (--distance-is outer)",
+                  ratio, other, 100 * sigma),
+      {},
+      {{"ratio", ratio}, {"relative_sigma", sigma}}};
+  if (off > refused_sigmas) return tl::unexpected<Failure>(failure);
+  warnings.push_back(failure);
+  return {};
+}
+
 PairToMeasure best_pair(const std::vector<Vector3d>& centres, const Eigen::MatrixXd& covariance_mm2,
                         double sigma_mm) {
   PairToMeasure best;

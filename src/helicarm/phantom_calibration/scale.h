@@ -38,6 +38,11 @@ Expected<ScaledPoints> scaled_by(const std::vector<Eigen::Vector3d>& centres,
                                  const std::vector<CentreDistance>& distances,
                                  const std::vector<std::string>& labels);
 
+/// Compares the scale by distances with another one, `ratio` times smaller, whose relative error is `sigma`:
+/// `scale_disagrees` beyond ten sigma, a warning beyond three. `other` names it in the message.
+Expected<void> check_scale(double ratio, double sigma, const std::string& other,
+                           std::vector<Warning>& warnings);
+
 struct PairToMeasure {
   std::size_t a = 0, b = 0;
   double distance_mm = 0;
