@@ -169,9 +169,15 @@ phantom_calibration::PhantomResult measured(const PhantomArguments& arguments, c
 
 void print(const phantom_calibration::PhantomResult& result, const std::filesystem::path& out,
            Console& console) {
-  console.out << fmt::format(
-      "  {} balls, {} views, {:.3f} px rms per axis, scale from {}, sigma {:.2g} %\n\n", result.balls.size(),
-      result.views.size(), result.rms_px, result.scale.source, 100 * result.scale.relative_sigma);
+  double left_out_px = 0;
+  for (const phantom_calibration::MeasuredView& view : result.views)
+    left_out_px = std::max(left_out_px, view.left_out_rms_px.value_or(0));
+  console.out << fmt::format("  {} balls, {} views, {:.3f} px rms per axis, scale from {}, sigma {:.2g} %\n",
+                             result.balls.size(), result.views.size(), result.rms_px, result.scale.source,
+                             100 * result.scale.relative_sigma);
+  if (left_out_px > 0)
+    console.out << fmt::format("  a view left out of the measurement: up to {:.3f} px rms\n", left_out_px);
+  console.out << "\n";
   console.out << fmt::format("  {:<10}{:>10}{:>10}{:>10}{:>14}{:>16}\n", "ball", "x mm", "y mm", "z mm",
                              "sigma mm", "from nominal mm");
   for (const phantom_calibration::MeasuredBall& ball : result.balls)

@@ -276,7 +276,14 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
   const auto detected = detected_views(given, threads);
   if (!detected) return refuse(detected.error());
   const auto found = adjusted_views(*detected, given, false, least_views, threads, result.warnings);
-  if (!found) return refuse(found.error());
+  if (!found) {
+    Failure failure = found.error();
+    if (failure.reason == Reason::too_few_fiducials)
+      failure.message +=
+          ": several balls are not as in the calibrator file, or one lies more than a millimetre off; "
+          "`helicarm run` names a displaced ball, `helicarm phantom measure` measures all of them";
+    return refuse(failure);
+  }
   std::erase_if(result.warnings, [](const Warning& w) { return w.reason == Reason::not_seen; });
   describe(*found, given, *detected, threads, result);
   return result;
