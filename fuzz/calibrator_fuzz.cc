@@ -21,6 +21,7 @@ void run(std::string_view bytes) {
       check(std::abs(direction.norm() - 1) < 1e-9, "directions have unit length");
   const auto again = phantom::calibrator_from_json(written, "written.json");
   check(again.has_value() && phantom::same_places(*again, *calibrator), "written data read back equal");
+  check(phantom::joint_ball_covariance(*calibrator).allFinite(), "a joint covariance is finite");
 }
 
 std::vector<std::string> seeds() {
@@ -34,7 +35,16 @@ std::vector<std::string> seeds() {
                    {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY()},
                    20},
                   {"T3", {7, 8, 9}, phantom::TargetKind::line_end, 1, {Eigen::Vector3d::UnitZ()}}};
-  return {write(phantom::udcsc()).dump(), write(full).dump()};
+  phantom::Calibrator measured = phantom::udcsc();
+  measured.balls.resize(6);
+  measured.scale_sigma = 1e-3;
+  measured.joint_covariance.emplace();
+  measured.joint_covariance->mm2 = 1e-4 * Eigen::MatrixXd::Identity(18, 18);
+  for (phantom::CalibratorBall& ball : measured.balls) {
+    ball.covariance_mm2 = 1e-4 * Eigen::Matrix3d::Identity();
+    measured.joint_covariance->labels.push_back(ball.label);
+  }
+  return {write(phantom::udcsc()).dump(), write(full).dump(), write(measured).dump()};
 }
 
 }  // namespace helicarm::fuzz
