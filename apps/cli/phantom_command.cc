@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -129,8 +127,6 @@ void write(const Files& files, Console& console) {
   console.out << to_text(Json{{"written", written}}) << "\n";
 }
 
-std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
-
 void notify(const std::vector<Warning>& warnings, Console& console) {
   if (console.quiet) return;
   for (const Warning& warning : warnings)
@@ -142,15 +138,12 @@ phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments
   phantom_calibration::PhantomOptions options;
   options.from_scratch = arguments.from_scratch;
   if (arguments.distance_sigma_mm) options.distance_sigma_mm = *arguments.distance_sigma_mm;
-  if (arguments.distance_is != "centres" && arguments.distance_is != "outer")
-    throw BadInput(Reason::usage,
-                   fmt::format("--distance-is: \"{}\" is none of: centres, outer", arguments.distance_is));
-  options.outer = arguments.distance_is == "outer";
+  options.outer = value_or_throw(phantom_calibration::is_outer(arguments.distance_is));
   for (const std::string& distance : arguments.distances)
     options.distances.push_back(
         value_or_throw(phantom_calibration::hand_distance_from(distance, arguments.from_scratch)));
   options.threads = console.threads;
-  options.date = today();
+  options.date = phantom_calibration::today();
   return options;
 }
 
@@ -211,7 +204,7 @@ void verify(const PhantomArguments& arguments, Console& console) {
   const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.name_or_file));
   phantom_calibration::PhantomVerification result =
       value_or_throw(phantom_calibration::verify_phantom(given, console.threads));
-  result.date = today();
+  result.date = phantom_calibration::today();
   if (arguments.history && !result.balls.empty())
     value_or_throw(phantom_calibration::add_to_history(*arguments.history, result));
   if (arguments.out)

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <ctime>
 #include <tuple>
 #include <variant>
-
-#include <fmt/chrono.h>
 
 #include "arrays.h"
 #include "helicarm/phantom_calibration/measure_phantom.h"
@@ -19,8 +16,6 @@ using phantom_calibration::PhantomResult;
 using BallName = std::variant<std::string, std::pair<double, double>>;
 using Distance = std::tuple<BallName, BallName, double>;
 
-std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
-
 phantom_calibration::FiducialName fiducial(const BallName& name) {
   if (const auto* label = std::get_if<std::string>(&name)) return *label;
   const auto& [u, v] = std::get<std::pair<double, double>>(name);
@@ -31,15 +26,12 @@ PhantomResult measured(const std::filesystem::path& folder, const std::vector<Di
                        const std::string& distance_is, double distance_sigma_mm, bool from_scratch,
                        unsigned threads) {
   phantom_calibration::PhantomOptions options;
-  if (distance_is != "centres" && distance_is != "outer")
-    raise(
-        {Reason::usage, fmt::format("distance_is: \"{}\" is none of: centres, outer", distance_is), {}, {}});
-  options.outer = distance_is == "outer";
+  options.outer = value_or_raise(phantom_calibration::is_outer(distance_is));
   for (const auto& [a, b, mm] : distances) options.distances.push_back({fiducial(a), fiducial(b), mm});
   options.distance_sigma_mm = distance_sigma_mm;
   options.from_scratch = from_scratch;
   options.threads = threads;
-  options.date = today();
+  options.date = phantom_calibration::today();
   PhantomResult result = value_or_raise(without_gil([&] {
     return pipeline::read_phantom_case(folder).and_then(
         [&](const pipeline::Case& given) { return phantom_calibration::measure_phantom(given, options); });
@@ -54,7 +46,7 @@ py::object verified(const std::filesystem::path& folder, const std::optional<std
     return pipeline::read_case(folder).and_then(
         [&](const pipeline::Case& given) { return phantom_calibration::verify_phantom(given, threads); });
   }));
-  result.date = today();
+  result.date = phantom_calibration::today();
   if (history && !result.balls.empty()) value_or_raise(phantom_calibration::add_to_history(*history, result));
   py::object content = python_from(phantom_calibration::to_json(result));
   if (result.failure) raise(*result.failure, content);

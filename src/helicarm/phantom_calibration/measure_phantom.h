@@ -3,7 +3,6 @@
 
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include <Eigen/Core>
@@ -12,21 +11,14 @@
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom_calibration/hand_distance.h"
 #include "helicarm/phantom_calibration/scale.h"
 #include "helicarm/pipeline/case.h"
 
 namespace helicarm::phantom_calibration {
 
-/// A fiducial by its label, or by a raw pixel in the first view.
-using FiducialName = std::variant<std::string, Eigen::Vector2d>;
-
-struct HandDistance {
-  FiducialName a, b;
-  double mm;
-};
-
-/// A,B=MM with labels, or u1,v1;u2,v2=MM. `usage` where it is neither.
-Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixels);
+/// Today's date (UTC), YYYY-MM-DD, for what is measured or verified now.
+std::string today();
 
 struct PhantomOptions {
   bool from_scratch = false;

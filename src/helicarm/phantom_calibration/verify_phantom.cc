@@ -280,8 +280,9 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
     Failure failure = found.error();
     if (failure.reason == Reason::too_few_fiducials)
       failure.message +=
-          ": several balls are not as in the calibrator file, or one lies more than a millimetre off; "
-          "`helicarm run` names a displaced ball, `helicarm phantom measure` measures all of them";
+          ": balls may be hidden, several may be off the calibrator file's positions, or one by more than a "
+          "millimetre; `helicarm run` names a displaced ball, `helicarm phantom measure` measures all of "
+          "them";
     return refuse(failure);
   }
   std::erase_if(result.warnings, [](const Warning& w) { return w.reason == Reason::not_seen; });
