@@ -200,6 +200,23 @@ void measure(const PhantomArguments& arguments, Console& console) {
     print(result, out, console);
 }
 
+void print(const phantom_calibration::PhantomVerification& result, Console& console) {
+  std::size_t verified = 0;
+  for (const phantom_calibration::VerifiedBall& ball : result.balls) {
+    const std::string_view state = phantom_calibration::word(ball.state);
+    verified += ball.state == phantom_calibration::BallState::as_in_file;
+    if (ball.distance_mm)
+      console.out << fmt::format("  {:<10}{:>9.3f} mm from the file's position, 95 % limit {:.3f} mm   {}\n",
+                                 ball.label, *ball.distance_mm, ball.bound_mm, state);
+    else
+      console.out << fmt::format("  {:<10}{:>9}{:51}{}\n", ball.label, "-", "", state);
+  }
+  if (!result.failure && verified > 0)
+    console.out << fmt::format("\n  {} of {} balls are at the file's positions within {:.3f} mm{}\n",
+                               verified, result.balls.size(), result.within_mm,
+                               verified < result.balls.size() ? "; the others are not verified" : "");
+}
+
 void verify(const PhantomArguments& arguments, Console& console) {
   const pipeline::Case given = value_or_throw(pipeline::read_case(arguments.name_or_file));
   phantom_calibration::PhantomVerification result =
@@ -213,13 +230,7 @@ void verify(const PhantomArguments& arguments, Console& console) {
   notify(result.warnings, console);
   if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
   if (!console.json && !console.quiet) {
-    for (const phantom_calibration::VerifiedBall& ball : result.balls)
-      console.out << fmt::format("  {:<10}{:>9.3f} mm from the file's position, 95 % limit {:.3f} mm   {}\n",
-                                 ball.label, ball.distance_mm.value_or(0), ball.bound_mm,
-                                 phantom_calibration::word(ball.state));
-    if (!result.failure && !result.balls.empty())
-      console.out << fmt::format("\n  all balls are at the file's positions within {:.3f} mm\n",
-                                 result.within_mm);
+    print(result, console);
   }
   if (result.failure) throw BadInput(*result.failure);
 }

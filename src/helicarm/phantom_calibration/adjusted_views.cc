@@ -23,6 +23,19 @@ std::optional<bool> mirrored(const pipeline::DetectedView& detected, const pipel
   return std::nullopt;
 }
 
+std::vector<std::optional<geometry::View>> labelled_views(const std::vector<pipeline::DetectedView>& detected,
+                                                          const pipeline::Case& given) {
+  std::vector<std::optional<geometry::View>> views;
+  for (std::size_t v = 0; v < detected.size(); ++v) {
+    fiducials::FiducialOptions options;
+    options.mirrored = given.views[v].mirrored;
+    const auto labelled = fiducials::label_fiducials(*detected[v].xray_image, detected[v].rectification,
+                                                     detected[v].candidates, given.calibrator, options);
+    views.push_back(labelled ? std::optional(labelled->view) : std::nullopt);
+  }
+  return views;
+}
+
 /// A fiducial without a candidate at its place may have moved by more than the assignment's gate: its image
 /// is the nearest free candidate of its size, unless something else covers its place. The adjustment rejects
 /// it where it does not fit.
@@ -115,11 +128,22 @@ Expected<Observations> observe_twice(const std::vector<pipeline::DetectedView>& 
   const BundleProblem problem = problem_of(detected, views, r, observed, balls, used);
   BundleOptions robust;
   robust.robust = true;
+  robust.fixed_centres = r.fixed_centres;
   const auto fit = adjust(problem, robust);
   if (!fit) return tl::unexpected<Failure>(fit.error());
   for (std::size_t i = 0; i < balls.size(); ++i) r.centres[balls[i]] = fit->centres[i];
   for (std::size_t i = 0; i < used.size(); ++i) r.views[used[i]] = fit->views[i];
   return observe_all(detected, views, r, threads);
+}
+
+/// Single balls that moved do not disturb the views: their images' weights fall.
+Expected<ConsistentFit> adjust_views(BundleProblem problem) {
+  BundleOptions options;
+  options.robust = true;
+  options.fixed_centres = true;
+  auto fit = adjust(problem, options);
+  if (!fit) return tl::unexpected<Failure>(fit.error());
+  return ConsistentFit{std::move(problem), *std::move(fit), {}};
 }
 
 /// B1, B2, ... by descending diameter, then by u in the first view.
@@ -173,9 +197,10 @@ Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Cas
 }
 
 Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
-                                       const pipeline::Case& given, bool from_scratch,
+                                       const pipeline::Case& given, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings) {
+  const bool from_scratch = known == KnownCentres::none;
   std::vector<double> kinds = given.diameters_mm;
   if (!from_scratch)
     for (const phantom::CalibratorBall& ball : given.calibrator.balls) kinds.push_back(ball.diameter_mm);
@@ -187,8 +212,10 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
   std::vector<PhantomView> plain;
   for (const PreparedView& view : views) plain.push_back(view.view);
 
-  auto r =
-      from_scratch ? reconstruct_from_scratch(plain, kinds) : reconstruct_nominal(plain, given.calibrator);
+  auto r = from_scratch ? reconstruct_from_scratch(plain, kinds)
+           : known == KnownCentres::nominal
+               ? reconstruct_nominal(plain, given.calibrator)
+               : reconstruct_views(plain, given.calibrator, labelled_views(detected, given));
   if (!r) return tl::unexpected<Failure>(r.error());
   for (std::size_t v = 0; v < views.size(); ++v)
     if (r->views[v]) follow_moved(detected[v], views[v], *r, v);
@@ -202,7 +229,8 @@ Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>
                 fmt::format("the fiducials can be recognised in {} views only, at least {} are required",
                             used.size(), least_views),
                 {{"views", double(used.size())}, {"needed", double(least_views)}});
-  auto consistent = adjust_without_outliers(std::move(problem));
+  auto consistent =
+      r->fixed_centres ? adjust_views(std::move(problem)) : adjust_without_outliers(std::move(problem));
   if (!consistent) return tl::unexpected<Failure>(consistent.error());
 
   AdjustedViews found{*std::move(consistent), {}, {}, {}, {}, used, {}, {}};

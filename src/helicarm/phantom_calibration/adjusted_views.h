@@ -22,14 +22,21 @@ struct AdjustedViews {
   std::vector<std::string> digests;                            ///< of the images
 };
 
+/// What is known of the centres before the images are seen.
+enum class KnownCentres {
+  none,     ///< only the diameters
+  nominal,  ///< the calibrator file's, off by millimetres
+  file      ///< the calibrator file's; single balls may have moved
+};
+
 /// The case's images, rectified and searched.
 Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Case& given, unsigned threads);
 
-/// Labels (by the nominal file) or finds (from scratch) the fiducials, observes them in the pixels and
-/// adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
+/// Labels (by the calibrator file) or finds (`KnownCentres::none`) the fiducials, observes them in the pixels
+/// and adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
 /// `least_views` are.
 Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
-                                       const pipeline::Case& given, bool from_scratch,
+                                       const pipeline::Case& given, KnownCentres known,
                                        std::size_t least_views, unsigned threads,
                                        std::vector<Warning>& warnings);
 

@@ -39,6 +39,15 @@ std::size_t labelled_views(const Reconstruction& r) {
   return std::size_t(std::ranges::count_if(r.views, [](const auto& view) { return view.has_value(); }));
 }
 
+Reconstruction with_centres_of(const phantom::Calibrator& calibrator) {
+  Reconstruction r;
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
+    r.centres.push_back(ball.centre_in_calibrator);
+    r.diameters_mm.push_back(ball.diameter_mm);
+  }
+  return r;
+}
+
 Expected<fiducials::Labelling> label_tolerantly(const PhantomView& view, const phantom::Calibrator& nominal) {
   Expected<fiducials::Labelling> best = fail(Reason::too_few_fiducials, "no fiducial");
   for (const double tolerance : tolerances) {
@@ -238,6 +247,7 @@ Expected<void> readjust(Reconstruction& r, const std::vector<PhantomView>& views
                 {{"n", double(balls.size())}, {"views", double(used.size())}});
   BundleOptions options;
   options.robust = true;
+  options.fixed_centres = r.fixed_centres;
   const auto fit = adjust(problem, options);
   if (!fit) return tl::unexpected<Failure>(fit.error());
   for (std::size_t i = 0; i < balls.size(); ++i) r.centres[balls[i]] = fit->centres[i];
@@ -286,11 +296,7 @@ void add_fiducials(Reconstruction& r, const std::vector<PhantomView>& views,
 
 Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& views,
                                              const phantom::Calibrator& nominal) {
-  Reconstruction r;
-  for (const phantom::CalibratorBall& ball : nominal.balls) {
-    r.centres.push_back(ball.centre_in_calibrator);
-    r.diameters_mm.push_back(ball.diameter_mm);
-  }
+  Reconstruction r = with_centres_of(nominal);
   std::optional<Failure> failure;
   for (const PhantomView& view : views) {
     const auto labels = label_tolerantly(view, nominal);
@@ -301,6 +307,20 @@ Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& vie
   if (labelled_views(r) < 2)
     return tl::unexpected<Failure>(
         failure.value_or(Failure{Reason::too_few_fiducials, "no view can be labelled"}));
+  if (auto completed = complete(r, views); !completed) return tl::unexpected<Failure>(completed.error());
+  return r;
+}
+
+Expected<Reconstruction> reconstruct_views(const std::vector<PhantomView>& views,
+                                           const phantom::Calibrator& file,
+                                           std::vector<std::optional<geometry::View>> labelled) {
+  Reconstruction r = with_centres_of(file);
+  r.fixed_centres = true;
+  r.views = std::move(labelled);
+  for (std::size_t v = 0; v < views.size(); ++v)
+    r.candidate_of.push_back(r.views[v] ? assign(views[v], *r.views[v], r.centres, r.diameters_mm,
+                                                 limit_scale(views[v]) * gates_px[0])
+                                        : std::vector<int>(r.centres.size(), -1));
   if (auto completed = complete(r, views); !completed) return tl::unexpected<Failure>(completed.error());
   return r;
 }

@@ -19,6 +19,11 @@ inline constexpr std::ptrdiff_t least_images = 4;
 Expected<Reconstruction> reconstruct_nominal(const std::vector<PhantomView>& views,
                                              const phantom::Calibrator& nominal);
 
+/// Adjusts labelled views (nothing: not labelled) to the centres of a file, of which single ones may be off.
+Expected<Reconstruction> reconstruct_views(const std::vector<PhantomView>& views,
+                                           const phantom::Calibrator& file,
+                                           std::vector<std::optional<geometry::View>> labelled);
+
 /// Each fiducial's nearest candidate within `gate_px` and of a fitting radius, one to one.
 std::vector<int> assign(const PhantomView& view, const geometry::View& pose,
                         const std::vector<Eigen::Vector3d>& centres, const std::vector<double>& diameters_mm,

@@ -364,7 +364,8 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
   if (!detected) return refuse(detected.error());
   const auto begin = std::chrono::steady_clock::now();
   const auto found =
-      adjusted_views(*detected, given, options.from_scratch, least_views, options.threads, result.warnings);
+      adjusted_views(*detected, given, options.from_scratch ? KnownCentres::none : KnownCentres::nominal,
+                     least_views, options.threads, result.warnings);
   if (!found) return refuse(found.error());
   const auto concluded = conclude(*found, options, result);
   result.solve_ms =

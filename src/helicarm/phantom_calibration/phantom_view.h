@@ -33,6 +33,7 @@ struct Reconstruction {
   std::vector<std::optional<geometry::View>> views;  ///< nothing: not part of it
   std::vector<std::vector<int>> candidate_of;        ///< per view and fiducial; -1: not seen
   double rms_px = 0;                                 ///< per axis
+  bool fixed_centres = false;                        ///< only the views are adjusted
   /// Reconstructed from scratch: rms of the depth-reversed phantom, which affine views show alike.
   std::optional<double> reversed_rms_px = {};
 };

@@ -82,7 +82,35 @@ struct Place {
   Vector3d off;
   Eigen::Matrix3d covariance;
   double chi2;
+  double gap_px;  ///< largest residual of its images
+  bool is_moved;  ///< if chi2 is too large for an unmoved ball
 };
+
+constexpr double largest_gap_px = 2;  // beyond it the images are not those of one ball
+
+/// The ball's distances from its images in the views.
+std::vector<std::pair<double, const FiducialImage*>> residuals_of(const BundleProblem& problem,
+                                                                  const std::vector<geometry::View>& views,
+                                                                  std::size_t ball, const Vector3d& at) {
+  std::vector<std::pair<double, const FiducialImage*>> residuals;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    for (const FiducialImage& image : problem.views[v].images)
+      if (image.fiducial == ball) residuals.emplace_back((views[v].project(at) - image.uv).norm(), &image);
+  return residuals;
+}
+
+/// Whether a ball's images at its place in the file show a move: two views contradict it, or one by more than
+/// a partly hidden ball's image is off.
+bool shows_move(const BundleProblem& problem, const std::vector<geometry::View>& views, std::size_t ball) {
+  constexpr double largest_chi2 = 13.8;  // chi-square with 2 degrees of freedom, 0.1 %
+  constexpr double largest_hidden_px = 1;
+  int contradicting = 0;
+  for (const auto& [off, image] : residuals_of(problem, views, ball, problem.centres[ball])) {
+    if (off > largest_hidden_px) return true;
+    contradicting += off * off > largest_chi2 * image->sigma_px * image->sigma_px;
+  }
+  return contradicting >= 2;
+}
 
 /// A ball's place by views that the others (those not `out`) calibrate.
 std::optional<Place> place_of(const BundleProblem& problem, std::size_t ball, std::vector<bool> out,
@@ -95,30 +123,38 @@ std::optional<Place> place_of(const BundleProblem& problem, std::size_t ball, st
   if (!fit) return std::nullopt;
   const double inflation = fit->dof > 0 ? std::max(1.0, fit->chi2 / fit->dof) : 1;
   Place place{fit->centres[ball] - problem.centres[ball], inflation * fit->covariance_mm2 + file_covariance,
-              0};
+              0, 0, shows_move(problem, fit->views, ball)};
   place.chi2 = place.off.dot(place.covariance.ldlt().solve(place.off));
+  for (const auto& [gap, image] : residuals_of(problem, fit->views, ball, fit->centres[ball]))
+    place.gap_px = std::max(place.gap_px, gap);
   return place;
 }
 
-/// Balls that are off are found one by one, the farthest first, so that they do not disturb the others.
+/// Balls that are off, and those whose images are of something else, are taken out one by one, the farthest
+/// first, so that they do not disturb the others.
 std::vector<std::optional<Place>> places_of(const BundleProblem& problem, const AdjustedViews& found,
                                             const std::vector<Eigen::Matrix3d>& covariances,
-                                            std::vector<bool>& moved, unsigned threads) {
+                                            std::vector<bool>& out, unsigned threads) {
   const std::size_t n = problem.centres.size();
   std::vector<std::optional<Place>> places(n);
+  const auto contradiction = [&](std::size_t ball) {
+    const Place& place = *places[ball];
+    return std::pair(place.gap_px > largest_gap_px ? place.gap_px : 0.0,
+                     place.is_moved && place.chi2 > chi2_limit(n) ? place.chi2 : 0.0);
+  };
   for (std::size_t round = 0; round < n; ++round) {
     parallel_for(n, threads, [&](std::size_t ball) {
       const Eigen::Matrix3d of_file =
           covariances.empty() ? Eigen::Matrix3d::Zero() : covariances[found.ball_of_nominal[ball]];
-      places[ball] = place_of(problem, ball, moved, of_file);
+      places[ball] = place_of(problem, ball, out, of_file);
     });
     std::optional<std::size_t> worst;
     for (std::size_t ball = 0; ball < n; ++ball)
-      if (!moved[ball] && places[ball] && places[ball]->chi2 > chi2_limit(n) &&
-          (!worst || places[ball]->chi2 > places[*worst]->chi2))
+      if (!out[ball] && places[ball] && contradiction(ball) > std::pair(0.0, 0.0) &&
+          (!worst || contradiction(ball) > contradiction(*worst)))
         worst = ball;
-    if (!worst || n - std::size_t(std::ranges::count(moved, true)) <= least_kept) break;
-    moved[*worst] = true;
+    if (!worst || n - std::size_t(std::ranges::count(out, true)) <= least_kept) break;
+    out[*worst] = true;
   }
   return places;
 }
@@ -144,7 +180,7 @@ void judge(PhantomVerification& result) {
       message += fmt::format("{}{}: {}", message.empty() ? "" : "; ", verb, names);
   for (const VerifiedBall& ball : result.balls) {
     result.within_mm = std::max({result.within_mm, ball.distance_mm.value_or(0), ball.bound_mm});
-    off += ball.state != BallState::as_in_file;
+    off += ball.state != BallState::as_in_file && ball.state != BallState::not_verified;
   }
   if (!message.empty())
     result.failure = Failure{Reason::calibrator_mismatch,
@@ -198,17 +234,36 @@ bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline:
   return empty >= 2;
 }
 
+/// A ball of which no two images agree.
+BallState unlocated(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
+                    const std::vector<pipeline::DetectedView>& detected,
+                    const std::vector<geometry::View>& views, const std::vector<std::size_t>& view_of_case) {
+  if (is_swapped(ball, file, detected, views, view_of_case)) return BallState::swapped;
+  return is_missing(ball, detected, views, view_of_case) ? BallState::lost : BallState::not_verified;
+}
+
+Warning not_verified(const VerifiedBall& ball) {
+  if (!ball.distance_mm)
+    return {Reason::not_seen, fmt::format("{} is not seen in two images: not verified", ball.label), {}, {}};
+  return {
+      Reason::residual_too_large,
+      fmt::format("{} appears {:.3f} mm off in one view alone, as a partly hidden ball does: not verified",
+                  ball.label, *ball.distance_mm),
+      {},
+      {{"distance_mm", *ball.distance_mm}}};
+}
+
 void describe(const AdjustedViews& found, const pipeline::Case& given,
               const std::vector<pipeline::DetectedView>& detected, unsigned threads,
               PhantomVerification& result) {
   const auto covariances = phantom::ball_covariances(given.calibrator);
   BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
   start_in_file_frame(problem, found);
-  std::vector<bool> moved(problem.centres.size(), false);
-  const auto places = places_of(problem, found, covariances, moved, threads);
+  std::vector<bool> out(problem.centres.size(), false);
+  const auto places = places_of(problem, found, covariances, out, threads);
   BundleOptions fixed;
   fixed.fixed_centres = true;
-  const auto fit = adjust(without(problem, moved), fixed);
+  const auto fit = adjust(without(problem, out), fixed);
   if (!fit) {
     result.failure = fit.error();
     return;
@@ -218,26 +273,20 @@ void describe(const AdjustedViews& found, const pipeline::Case& given,
     const phantom::CalibratorBall& in_file = given.calibrator.balls[ball];
     VerifiedBall verified{in_file.label, {}, 0, BallState::as_in_file, 0};
     const auto at = std::ranges::find(found.ball_of_nominal, ball);
-    if (at == found.ball_of_nominal.end()) {
-      if (is_swapped(in_file, given.calibrator, detected, fit->views, found.view_of_case))
-        verified.state = BallState::swapped;
-      else if (is_missing(in_file, detected, fit->views, found.view_of_case))
-        verified.state = BallState::lost;
-      else
-        result.warnings.push_back({Reason::not_seen,
-                                   fmt::format("{} is not seen in two images: not verified", in_file.label),
-                                   {},
-                                   {}});
+    const std::size_t i = std::size_t(at - found.ball_of_nominal.begin());
+    if (at == found.ball_of_nominal.end() || !places[i] || places[i]->gap_px > largest_gap_px) {
+      verified.state = unlocated(in_file, given.calibrator, detected, fit->views, found.view_of_case);
     } else {
-      const std::size_t i = std::size_t(at - found.ball_of_nominal.begin());
       for (const BundleView& view : problem.views)
         verified.views += int(std::ranges::count(view.images, i, &FiducialImage::fiducial));
-      if (moved[i]) verified.state = BallState::moved;
-      if (places[i]) {
-        verified.distance_mm = places[i]->off.norm();
-        verified.bound_mm = localization::length_at_95(places[i]->covariance);
-      }
+      verified.distance_mm = places[i]->off.norm();
+      verified.bound_mm = localization::length_at_95(places[i]->covariance);
+      if (out[i])
+        verified.state = BallState::moved;
+      else if (places[i]->chi2 > chi2_limit(problem.centres.size()))
+        verified.state = BallState::not_verified;
     }
+    if (verified.state == BallState::not_verified) result.warnings.push_back(not_verified(verified));
     result.balls.push_back(std::move(verified));
   }
   judge(result);
@@ -255,6 +304,8 @@ std::string_view word(BallState state) {
       return "another size";
     case BallState::lost:
       return "lost";
+    case BallState::not_verified:
+      return "not verified";
   }
   return "";
 }
@@ -275,7 +326,8 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
                    {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
   const auto detected = detected_views(given, threads);
   if (!detected) return refuse(detected.error());
-  const auto found = adjusted_views(*detected, given, false, least_views, threads, result.warnings);
+  const auto found =
+      adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);
   if (!found) {
     Failure failure = found.error();
     if (failure.reason == Reason::too_few_fiducials)

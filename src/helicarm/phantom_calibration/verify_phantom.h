@@ -15,9 +15,11 @@ namespace helicarm::phantom_calibration {
 
 enum class BallState {
   as_in_file,
-  moved,    ///< off by more than its 95 % bound allows, corrected for the number of balls
-  swapped,  ///< it lies where another ball of another size should
-  lost      ///< fewer than two views show it
+  moved,        ///< off by more than its 95 % bound allows, corrected for the number of balls
+  swapped,      ///< it lies where another ball of another size should
+  lost,         ///< two views or more show its place without it
+  not_verified  ///< too few views show its place, or one alone shows it off by less than a hidden part
+                ///< explains
 };
 std::string_view word(BallState state);
 

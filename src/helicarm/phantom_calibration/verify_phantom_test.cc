@@ -51,6 +51,31 @@ TEST(VerifyPhantom, TwoDisplacedFiducialsAreBothNamed) {
   EXPECT_EQ(labels_of(*result, BallState::moved), (std::vector<std::string>{"P5", "P9"}));
 }
 
+TEST(VerifyPhantom, TwoViewsNameABallThreeMillimetresOff) {
+  PhantomFolder folder(simulated_phantom({0, 75}));
+  folder.ball("P4").centre_in_calibrator += Eigen::Vector3d(2, 1, -2);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::calibrator_mismatch) << result->failure->message;
+  EXPECT_EQ(labels_of(*result, BallState::moved), std::vector<std::string>{"P4"});
+  EXPECT_NEAR(*result->balls[3].distance_mm, 3, 0.1);
+}
+
+// A ball that another object hides in part looks the same in two views.
+TEST(VerifyPhantom, BallThatOneViewAloneShowsSlightlyOffIsNotVerified) {
+  const simulation::SimulatedCase simulated = simulated_phantom({0, 90});
+  PhantomFolder folder(simulated);
+  Eigen::Vector3d& centre = folder.ball("P4").centre_in_calibrator;
+  centre += 0.2 * (centre - simulated.views[0].true_view.view.source_in_world()).normalized();
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(result->failure) << result->failure->message;
+  EXPECT_EQ(labels_of(*result, BallState::not_verified), std::vector<std::string>{"P4"});
+  ASSERT_FALSE(result->warnings.empty());
+  EXPECT_EQ(result->warnings.back().reason, Reason::residual_too_large);
+}
+
 TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
   PhantomFolder folder(three_views());
   folder.ball("P8").diameter_mm = 6;
