@@ -56,7 +56,7 @@ BENCHMARK(search_blobs)->Unit(benchmark::kMillisecond);
 
 /// The final fit of the balls: from the detected centres, with the image's estimated blur.
 void fit_one_ball(benchmark::State& state) {
-  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification());
+  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification(), 0);
   const auto found = value_or_throw(
       fiducials::label_fiducials(xray_image(), rectification(), candidates, simulated_case().calibrator, {}));
   std::vector<detection::Dot> balls;
@@ -78,7 +78,7 @@ void rectify_view(benchmark::State& state) {
 BENCHMARK(rectify_view)->Unit(benchmark::kMillisecond);
 
 void label_candidates(benchmark::State& state) {
-  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification());
+  const fiducials::Candidates candidates = fiducials::detect_candidates(xray_image(), rectification(), 0);
   for (auto _ : state)
     benchmark::DoNotOptimize(fiducials::label_fiducials(xray_image(), rectification(), candidates,
                                                         simulated_case().calibrator, {}));

@@ -33,8 +33,8 @@ Expected<LabelledFiducials> label(const xray::XrayImage& xray_image,
                                   const rectification::Rectification& rectification,
                                   const phantom::Calibrator& calibrator,
                                   const FiducialOptions& options = {}) {
-  return label_fiducials(xray_image, rectification, detect_candidates(xray_image, rectification), calibrator,
-                         options);
+  return label_fiducials(xray_image, rectification, detect_candidates(xray_image, rectification, 0),
+                         calibrator, options);
 }
 
 LabelledFiducials found_in(const SimulatedCase& simulated_case, const SimulatedView& view,

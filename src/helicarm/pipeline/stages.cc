@@ -66,20 +66,31 @@ Expected<rectification::Rectification> rectify_view(const xray::XrayImage& xray_
   });
 }
 
+/// Of a fiducial's image, with a margin; 0 where the pixel size or the fiducials' sizes are unknown.
+double least_radius_px(const Case& given, const rectification::DistortionMap& map) {
+  constexpr double margin = 0.9;
+  if (!map.rectified_pixel_mm) return 0;
+  if (!given.calibrator.balls.empty())
+    return margin * fiducials::ball_radii_px(given.calibrator, *map.rectified_pixel_mm).low;
+  if (given.diameters_mm.empty()) return 0;
+  return margin * std::ranges::min(given.diameters_mm) / 2 / *map.rectified_pixel_mm;
+}
+
 bool is_ambiguous(const Expected<fiducials::LabelledFiducials>& labels) {
   return !labels && labels.error().reason == Reason::ambiguous_labels;
 }
 
 /// The plate's kind determines the polarity of metal: it is wrong if the opposite polarity gives labels.
-bool is_plate_of_other_kind(const DetectedView& view, const phantom::Calibrator& calibrator,
+bool is_plate_of_other_kind(const DetectedView& view, const Case& given,
                             const fiducials::FiducialOptions& options) {
   if (view.rectification.dots_found == 0) return false;
   rectification::Rectification inverted = view.rectification;
   inverted.metal = detection::opposite(inverted.metal);
   inverted.other_dots.reset();
-  const auto labels = fiducials::label_fiducials(*view.xray_image, inverted,
-                                                 fiducials::detect_candidates(*view.xray_image, inverted),
-                                                 calibrator, options);
+  const auto labels = fiducials::label_fiducials(
+      *view.xray_image, inverted,
+      fiducials::detect_candidates(*view.xray_image, inverted, least_radius_px(given, inverted.map)),
+      given.calibrator, options);
   return labels || is_ambiguous(labels);
 }
 
@@ -149,11 +160,12 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
   return joined<RectifiedView>(std::move(views), std::move(rectified));
 }
 
-OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case&,
+OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
                                                      const RunOptions& options) {
   auto candidates =
       of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<fiducials::Candidates> {
-        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification);
+        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
+                                            least_radius_px(given, views[i].rectification.map));
       });
   return joined<DetectedView>(std::move(views), std::move(candidates));
 }
@@ -173,7 +185,7 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
     const fiducials::FiducialOptions how{options.method, radius_bias, given.views[i].mirrored};
     auto labels = fiducials::label_fiducials(*views[i].xray_image, views[i].rectification,
                                              views[i].candidates, given.calibrator, how);
-    if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given.calibrator, how))
+    if (!labels && !is_ambiguous(labels) && is_plate_of_other_kind(views[i], given, how))
       labels = fail(Reason::plate_mismatch,
                     "the calibrator is found with the opposite polarity of metal: exchange \"holes\" and "
                     "\"balls\" in the "

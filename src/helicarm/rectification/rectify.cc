@@ -25,6 +25,7 @@ constexpr std::size_t least_dots = 10;
 /// outliers can form.
 constexpr std::size_t least_dots_of_any_plate = 20;
 const phantom::Plate any_plate{"", phantom::DotKind::balls, phantom::Lattice::square, {}, 2.5, {}, {}};
+constexpr double largest_radius_searched_from_px = 4.5;  // leaves out the search's first octave
 constexpr double max_ball_radius = 0.04;  // relative to the image width: no larger ball is accepted
 
 /// Pixels per plate millimetre at the image centre, if file and plate provide it.
@@ -137,12 +138,17 @@ void fit_missing_dots(const xray::XrayImage& xray_image, const phantom::Plate& p
   }
 }
 
+/// Of the dots that are searched for to find the plate, px.
+double smallest_radius(const phantom::Plate& plate, double scale) {
+  return std::max(detection::DotOptions{}.min_radius_px, 0.75 * 0.5 * plate.diameter_mm * scale);
+}
+
 std::vector<detection::Dot> search(const xray::XrayImage& xray_image, const phantom::Plate& plate,
                                    detection::Polarity polarity, Method method, std::optional<double> scale) {
   const double radius = scale ? 0.5 * plate.diameter_mm * *scale : 0.0055 * xray_image.pixels.width();
   if (method == Method::best) {
     detection::DotOptions options = metal_search(xray_image, polarity);
-    if (scale) options.min_radius_px = std::max(options.min_radius_px, 0.75 * radius);
+    if (scale) options.min_radius_px = smallest_radius(plate, *scale);
     return detection::find_dots(xray_image, options);
   }
   return find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.7 * radius,
@@ -249,8 +255,10 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
   if (!plate.dots_mm.empty()) result.dots_expected = static_cast<int>(plate.dots_mm.size());
   result.metal =
       plate.kind == phantom::DotKind::balls ? attempt.polarity : detection::opposite(attempt.polarity);
-  if (options.method == Method::best && plate.kind == phantom::DotKind::balls)
+  if (options.method == Method::best && plate.kind == phantom::DotKind::balls) {
     result.other_dots = detection::dots_except(attempt.all, result.plate_dots);
+    if (scale) result.other_dots_from_px = smallest_radius(plate, *scale);
+  }
   return result;
 }
 
@@ -277,11 +285,16 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
   Rectification result;
   result.map = map;
   result.noise = detection::noise_correlation(xray_image);
-  result.other_dots = detection::find_dots(xray_image, metal_search(xray_image, result.metal));
   const phantom::Plate sought = plate.value_or(any_plate);
+  const auto scale = expected_scale(xray_image, sought);
+  detection::DotOptions search = metal_search(xray_image, result.metal);
+  search.min_radius_px = std::clamp(scale ? 0.4 * sought.diameter_mm * *scale : 2, search.min_radius_px,
+                                    largest_radius_searched_from_px);
+  result.other_dots = detection::find_dots(xray_image, search);
+  result.other_dots_from_px = search.min_radius_px;
   if (sought.kind == phantom::DotKind::holes) return result;
   // A plate in the image verifies the map: rectified, its dots must form a lattice.
-  const SeenLattice seen = seen_lattice(*result.other_dots, sought, expected_scale(xray_image, sought));
+  const SeenLattice seen = seen_lattice(*result.other_dots, sought, scale);
   if (seen.lattice.dots.size() < (plate ? least_dots : least_dots_of_any_plate)) return result;
   std::vector<Correspondence> dots;
   std::vector<detection::Dot> members;

@@ -29,6 +29,7 @@ struct Rectification {
   detection::Polarity metal = detection::Polarity::dark;  ///< polarity of metal in this image
   /// Metal dots that are not the plate's; nothing if metal was not searched for.
   std::optional<std::vector<detection::Dot>> other_dots;
+  double other_dots_from_px = 2;      ///< smallest radius that was searched for them
   detection::NoiseCorrelation noise;  ///< of the image
   std::vector<Warning> warnings;
 };
@@ -44,7 +45,9 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
                                 const RectificationOptions& options);
 
 /// For a known map (from a separate plate image, a file, or `flat_panel_map`). plate_mismatch if it is for
-/// another image size, or if a plate in the image does not form a lattice after rectification.
+/// another image size, or if a plate in the image does not form a lattice after rectification. Dots are
+/// searched from 4.5 px radius or the plate's size on: the first octave takes most of the time and shows few
+/// balls.
 Expected<Rectification> with_map(const xray::XrayImage& xray_image, const DistortionMap& map,
                                  const std::optional<phantom::Plate>& plate);
 

@@ -224,7 +224,7 @@ std::array<CentreSums, 2> try_case(std::uint64_t seed) {
     const rectification::Rectification plain =
         value_or_throw(rectification::with_map(xray_image, rectification::flat_panel_map(xray_image), {}));
     const auto found = fiducials::label_fiducials(
-        xray_image, plain, fiducials::detect_candidates(xray_image, plain), simulated_case.calibrator, {});
+        xray_image, plain, fiducials::detect_candidates(xray_image, plain, 0), simulated_case.calibrator, {});
     for (std::size_t k = 0; k < view.balls.size(); ++k) {
       const simulation::TruePoint& truth = view.balls[k];
       if (truth.visibility == simulation::Visibility::outside) continue;
