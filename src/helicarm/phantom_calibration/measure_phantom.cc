@@ -98,8 +98,7 @@ Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedVie
   if (const auto* label = std::get_if<std::string>(&name)) {
     const auto at = std::ranges::find(found.labels, *label);
     if (at != found.labels.end()) return std::size_t(at - found.labels.begin());
-    return fail(Reason::bad_value,
-                fmt::format("--distance: \"{}\" is not one of the measured balls", *label));
+    return fail(Reason::bad_value, fmt::format("distance: \"{}\" is not one of the measured balls", *label));
   }
   constexpr double reach_px = 20;
   const auto& place = std::get<Eigen::Vector2d>(name);
@@ -115,7 +114,7 @@ Expected<std::size_t> fiducial_named(const FiducialName& name, const AdjustedVie
   }
   if (which) return *which;
   return fail(Reason::bad_value,
-              fmt::format("--distance: no ball within {:g} px of {:g},{:g} in the first view", reach_px,
+              fmt::format("distance: no ball within {:g} px of {:g},{:g} in the first view", reach_px,
                           place.x(), place.y()));
 }
 
@@ -130,7 +129,7 @@ Expected<std::vector<CentreDistance>> distances_of(const AdjustedViews& found,
     const double over = options.outer ? (found.diameters_mm[*a] + found.diameters_mm[*b]) / 2 : 0;
     if (*a == *b || !(given.mm - over > 0))
       return fail(Reason::bad_value,
-                  fmt::format("--distance: {:g} mm cannot be the distance of two different balls", given.mm));
+                  fmt::format("distance: {:g} mm cannot be the distance of two different balls", given.mm));
     distances.push_back({*a, *b, given.mm - over, options.distance_sigma_mm});
   }
   return distances;
@@ -162,7 +161,7 @@ Expected<ScaledPoints> scaled(const AdjustedViews& found, const Eigen::MatrixXd&
   result.warnings.push_back(
       {Reason::scale_weak,
        fmt::format("the scale is estimated from the diameters of the balls' images, with a sigma of {:.2g} "
-                   "%: measure {} to {} (about {:.1f} mm) and give it by --distance",
+                   "%: measure {} to {} (about {:.1f} mm) and give this distance",
                    100 * diameter_scale_sigma, found.labels[result.pair.a], found.labels[result.pair.b],
                    result.pair.distance_mm),
        {},
@@ -337,6 +336,18 @@ Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& option
   return {};
 }
 
+/// What the correspondences start from.
+Expected<void> check_balls_known(const pipeline::Case& given, bool from_scratch) {
+  if (from_scratch && given.diameters_mm.empty())
+    return fail(Reason::bad_value,
+                "case.json: \"diameters_mm\": is missing: a measurement from scratch requires the diameters "
+                "of the balls, such as [4]");
+  if (!from_scratch && given.calibrator.balls.empty())
+    return fail(Reason::bad_value,
+                "case.json: \"calibrator\": is null: name the nominal file, or measure from scratch");
+  return {};
+}
+
 }  // namespace
 
 std::string today() { return fmt::format("{:%Y-%m-%d}", fmt::gmtime(std::time(nullptr))); }
@@ -353,6 +364,7 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
     result.failure = failure;
     return result;
   };
+  if (const auto known = check_balls_known(given, options.from_scratch); !known) return refuse(known.error());
   constexpr std::size_t least_views = 3;
   if (given.views.size() < least_views)
     return refuse({Reason::too_few_views,

@@ -114,6 +114,25 @@ TEST(MeasurePhantom, FromScratchNothingButTheDiameterIsNeeded) {
   EXPECT_EQ(result.warnings.back().reason, Reason::scale_weak);
 }
 
+TEST(MeasurePhantom, FromScratchWithoutDiametersIsRefused) {
+  const PhantomFolder folder(five_views());
+  PhantomOptions options;
+  options.from_scratch = true;
+  const auto result = measure_phantom(folder.given, options);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::bad_value);
+  EXPECT_NE(result.error().message.find("diameters_mm"), std::string::npos) << result.error().message;
+}
+
+TEST(MeasurePhantom, NullCalibratorIsRefusedUnlessFromScratch) {
+  PhantomFolder folder(five_views());
+  folder.given.calibrator = {};
+  folder.given.diameters_mm = {4};
+  const auto result = measure_phantom(folder.given, {});
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().message.find("\"calibrator\""), std::string::npos) << result.error().message;
+}
+
 TEST(MeasurePhantom, FromScratchViewsOfSmallImagesMayBeTwentyDegreesApart) {
   const auto result = measured_from_scratch(simulated_phantom({0, 20, 40, 60, 80}));
   ASSERT_FALSE(result.failure) << result.failure->message;

@@ -109,7 +109,7 @@ Expected<void> check_scale(double ratio, double sigma, const std::string& other,
   const Failure failure{
       Reason::scale_disagrees,
       fmt::format("the distances measured by hand make the phantom {:.3g} times as large as {} (sigma {:.2g} "
-                  "%): check their unit and whether they are over both balls (--distance-is outer)",
+                  "%): check their unit and whether they are outer distances, over both balls",
                   ratio, other, 100 * sigma),
       {},
       {{"ratio", ratio}, {"relative_sigma", sigma}}};

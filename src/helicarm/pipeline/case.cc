@@ -205,8 +205,9 @@ std::vector<double> diameters_from(JsonReader& reader) {
 
 void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
   read.diameters_mm = diameters_from(reader);
-  if (purpose == Purpose::phantom && !reader.has("calibrator") && !read.diameters_mm.empty()) {
-    reader.raw("calibrator");
+  if (purpose == Purpose::phantom && reader.raw("calibrator").is_null()) {
+    if (read.diameters_mm.empty())
+      reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
     return;
   }
   read.calibrator = value_or_throw(phantom::calibrator_named(reader.text("calibrator", 1000), read.folder));

@@ -216,6 +216,18 @@ TEST_F(CaseFile, ToolLineOfAnUnknownTunnelIsRefused) {
   EXPECT_EQ(failure().reason, Reason::bad_value);
 }
 
+TEST_F(CaseFile, PhantomWithoutAFileNeedsItsDiameters) {
+  json_["calibrator"] = nullptr;
+  EXPECT_TRUE(write_file(folder_ / "case.json", json_.dump()).has_value());
+  const auto refused = read_phantom_case(folder_);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message,
+            "case.json: \"diameters_mm\": is missing: required where \"calibrator\" is null");
+  json_["diameters_mm"] = {4, 6};
+  EXPECT_TRUE(write_file(folder_ / "case.json", json_.dump()).has_value());
+  EXPECT_TRUE(read_phantom_case(folder_));
+}
+
 TEST_F(CaseFile, ToolLineNeedsTwoPlaces) {
   json_["tool_lines"][0]["p2_in_calibrator"] = Json::array({0, 0, 0});
   EXPECT_EQ(failure().reason, Reason::bad_value);
