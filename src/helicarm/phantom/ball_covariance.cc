@@ -20,18 +20,27 @@ Eigen::Index place_of(const JointCovariance& joint, const std::string& label) {
 
 }  // namespace
 
-Eigen::MatrixXd covariance_from(JsonReader& reader, const char* key, std::size_t size) {
-  const auto n = Eigen::Index(size);
-  const Eigen::MatrixXd given =
-      Eigen::Map<const Eigen::MatrixXd>(reader.matrix(key, size, size, variance_range).data(), n, n);
+Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& given) {
+  if (given.size() == 0) return given;
   const double largest = given.cwiseAbs().maxCoeff();
-  if ((given - given.transpose()).cwiseAbs().maxCoeff() > rounding * largest)
-    reader.refuse(Reason::bad_value, key, "is not symmetric");
+  const double asymmetry = (given - given.transpose()).cwiseAbs().maxCoeff();
+  if (asymmetry > rounding * largest)
+    return fail(Reason::bad_value, fmt::format("is not symmetric: elements differ by {:g}", asymmetry),
+                {{"value", asymmetry}, {"limit", rounding * largest}});
   const Eigen::MatrixXd symmetric = (given + given.transpose()) / 2;
   const double least = geometry::symmetric_eigen(symmetric).values[0];
   if (least < -rounding * largest)
-    reader.refuse(Reason::bad_value, key, fmt::format("has the negative eigenvalue {:g}", least));
+    return fail(Reason::bad_value, fmt::format("has the negative eigenvalue {:g}", least),
+                {{"value", least}, {"limit", 0}});
   return symmetric;
+}
+
+Eigen::MatrixXd covariance_from(JsonReader& reader, const char* key, std::size_t size) {
+  const auto n = Eigen::Index(size);
+  const auto checked = checked_covariance(
+      Eigen::Map<const Eigen::MatrixXd>(reader.matrix(key, size, size, variance_range).data(), n, n));
+  if (!checked) reader.refuse(checked.error().reason, key, checked.error().message);
+  return *checked;
 }
 
 JointCovariance joint_covariance_from(JsonReader reader, const std::vector<CalibratorBall>& balls) {

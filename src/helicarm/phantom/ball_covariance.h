@@ -12,6 +12,10 @@ namespace helicarm::phantom {
 
 inline constexpr std::size_t most_correlated_balls = 100;
 
+/// A covariance made exactly symmetric. Refuses (`bad_value`) one that is asymmetric or has a negative
+/// eigenvalue, beyond rounding.
+Expected<Eigen::MatrixXd> checked_covariance(const Eigen::MatrixXd& given);
+
 /// The size x size matrix (mm^2) under a key, which must be symmetric and without negative eigenvalues, to
 /// rounding.
 Eigen::MatrixXd covariance_from(JsonReader& reader, const char* key, std::size_t size);

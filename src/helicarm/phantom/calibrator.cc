@@ -13,6 +13,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/phantom/ball_covariance.h"
+#include "helicarm/phantom/calibrator_limits.h"
 #include "helicarm/phantom/conical_helix.h"
 
 namespace helicarm::phantom {
@@ -20,12 +21,6 @@ namespace {
 
 constexpr std::size_t least_balls = 6;
 constexpr std::size_t most_balls = 1000;
-constexpr Range coordinate_range{-1000, 1000};
-constexpr Range diameter_range{0.5, 30};
-constexpr Range tolerance_range{0, 1};
-constexpr Range scale_sigma_range{0, 0.1};
-constexpr double least_extent_mm = 10;
-constexpr double least_distance_mm = 0.1;
 constexpr double least_flatness = 0.01;
 
 Eigen::Vector3d vector3(const std::vector<double>& values, std::size_t first = 0) {
@@ -41,7 +36,8 @@ std::string name_of(JsonReader& reader, const char* key) {
 CalibratorBall ball_from(JsonReader reader) {
   CalibratorBall ball{name_of(reader, "label"), vector3(reader.numbers("xyz_mm", 3, coordinate_range)),
                       reader.number("diameter_mm", diameter_range)};
-  if (reader.has("covariance_mm2")) ball.covariance_mm2 = covariance_from(reader, "covariance_mm2", 3);
+  if (!reader.raw("covariance_mm2").is_null())
+    ball.covariance_mm2 = covariance_from(reader, "covariance_mm2", 3);
   reader.finish();
   return ball;
 }
@@ -91,18 +87,26 @@ void check_names(const Calibrator& calibrator, const std::string& origin) {
   for (const auto& target : calibrator.targets) take(target.name);
 }
 
+void check_distances(const std::vector<CalibratorBall>& balls, const std::string& origin) {
+  for (std::size_t i = 0; i < balls.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const double distance = (balls[i].centre_in_calibrator - balls[j].centre_in_calibrator).norm();
+      if (distance < least_distance_mm)
+        throw BadInput({Reason::bad_value,
+                        fmt::format("{}: balls {} and {} are {:.3g} mm apart, at least {:g} mm are required",
+                                    origin, balls[j].label, balls[i].label, distance, least_distance_mm),
+                        {},
+                        {{"distance_mm", distance}, {"limit_mm", least_distance_mm}}});
+    }
+}
+
 void check_places(const std::vector<CalibratorBall>& balls, const std::string& origin) {
   if (balls.size() < least_balls)
     throw BadInput(Reason::bad_value, fmt::format("{}: \"balls\": {} balls, at least {} are required", origin,
                                                   balls.size(), least_balls));
   Eigen::Matrix3Xd centres(3, balls.size());
-  for (std::size_t i = 0; i < balls.size(); ++i) {
+  for (std::size_t i = 0; i < balls.size(); ++i)
     centres.col(static_cast<Eigen::Index>(i)) = balls[i].centre_in_calibrator;
-    for (std::size_t j = 0; j < i; ++j)
-      if ((balls[i].centre_in_calibrator - balls[j].centre_in_calibrator).norm() < least_distance_mm)
-        throw BadInput(Reason::bad_value, fmt::format("{}: balls {} and {} have the same position", origin,
-                                                      balls[j].label, balls[i].label));
-  }
   const double extent = (centres.rowwise().maxCoeff() - centres.rowwise().minCoeff()).maxCoeff();
   if (extent < least_extent_mm)
     throw BadInput(
@@ -110,6 +114,7 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
         fmt::format(
             "{}: \"balls\": they extend over {} mm, at least {} mm are required; check the unit (metres?)",
             origin, extent, least_extent_mm));
+  check_distances(balls, origin);
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
   const Eigen::Vector3d variances =
       geometry::symmetric_eigen(spread * spread.transpose() / double(balls.size())).values;
@@ -145,10 +150,10 @@ Expected<Calibrator> calibrator_from_json(const Json& json, const std::string& o
       calibrator.balls.push_back(ball_from(ball));
     for (JsonReader& target : reader.objects("targets", false, most_balls))
       calibrator.targets.push_back(target_from(target));
-    if (reader.has("joint_covariance"))
+    if (!reader.raw("joint_covariance").is_null())
       calibrator.joint_covariance =
           joint_covariance_from(reader.object("joint_covariance"), calibrator.balls);
-    if (reader.has("tolerance_mm")) calibrator.tolerance_mm = reader.number("tolerance_mm", tolerance_range);
+    calibrator.tolerance_mm = reader.optional_number("tolerance_mm", tolerance_range).value_or(0);
     calibrator.scale_sigma = reader.optional_number("scale_sigma", scale_sigma_range).value_or(0);
     calibrator.measured = reader.raw("measured");
     if (!calibrator.measured.is_null() && !calibrator.measured.is_object())

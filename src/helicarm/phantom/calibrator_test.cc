@@ -65,6 +65,14 @@ TEST(ReadCalibrator, UnknownKeysAreRefused) {
   EXPECT_EQ(refusal(json).reason, Reason::unknown_key);
 }
 
+TEST(ReadCalibrator, MisspeltKeyIsAnsweredByAllKnownOnes) {
+  Json json = example();
+  json["tolerence_mm"] = 0.1;
+  const Failure failure = refusal(json);
+  for (const char* key : {"tolerance_mm", "joint_covariance", "scale_sigma"})
+    EXPECT_NE(failure.message.find(key), std::string::npos) << failure.message;
+}
+
 TEST(ReadCalibrator, DiameterInMicrometresIsRefusedWithItsLimit) {
   Json json = example();
   json["balls"][0]["diameter_mm"] = 4000;
@@ -74,10 +82,10 @@ TEST(ReadCalibrator, DiameterInMicrometresIsRefusedWithItsLimit) {
 TEST(ReadCalibrator, CoordinatesInMetresAreRefused) {
   Json json = example();
   for (Json& ball : json["balls"])
-    for (Json& value : ball["xyz_mm"]) value = value.get<double>() / 100;
+    for (Json& value : ball["xyz_mm"]) value = value.get<double>() / 1000;
   const Failure failure = refusal(json);
   EXPECT_EQ(failure.reason, Reason::bad_value);
-  EXPECT_NE(failure.message.find("metres?"), std::string::npos);
+  EXPECT_NE(failure.message.find("metres?"), std::string::npos) << failure.message;
 }
 
 TEST(ReadCalibrator, FiveBallsAreTooFew) {
@@ -101,7 +109,9 @@ TEST(ReadCalibrator, EqualNamesClash) {
 TEST(ReadCalibrator, BallsAtEqualPositionsAreRefused) {
   Json json = example();
   json["balls"][1]["xyz_mm"] = json["balls"][0]["xyz_mm"];
-  EXPECT_EQ(refusal(json).reason, Reason::bad_value);
+  const Failure failure = refusal(json);
+  EXPECT_EQ(failure.reason, Reason::bad_value);
+  EXPECT_EQ(failure.message, "c.json: balls P1 and P2 are 0 mm apart, at least 0.1 mm are required");
 }
 
 TEST(ReadCalibrator, BallsInOnePlaneAreCoplanarWithTheFigure) {
