@@ -310,11 +310,17 @@ Expected<ImagePoint> find_target(const xray::XrayImage& xray_image, const rectif
 
 Expected<ImagePoint> point_of_click(const rectification::DistortionMap& map, const Vector2d& click_raw,
                                     std::optional<double> sigma_px) {
-  const auto uv = map.rectified_from_raw(click_raw);
+  if (!map.shows(click_raw))
+    return fail(Reason::not_seen,
+                fmt::format("pick ({:.1f}, {:.1f}) px lies outside the image of {} x {} pixels",
+                            click_raw.x(), click_raw.y(), map.width, map.height),
+                {{"u", click_raw.x()}, {"v", click_raw.y()}});
+  const auto uv = rectification::rectified_in_image(map, click_raw);
   if (!uv)
     return fail(Reason::not_seen,
                 fmt::format("pick ({:.1f}, {:.1f}) px: the distortion map cannot be inverted there",
-                            click_raw.x(), click_raw.y()));
+                            click_raw.x(), click_raw.y()),
+                {{"u", click_raw.x()}, {"v", click_raw.y()}});
   return ImagePoint{click_raw, *uv, std::hypot(sigma_px.value_or(click_sigma_px), map.sigma_px(*uv))};
 }
 

@@ -170,6 +170,17 @@ phantom::CalibratorTarget target_of(phantom::TargetKind kind) {
   return {"T", {1, 2, 3}, kind, 2, {Vector3d::UnitX(), Vector3d::UnitY()}, 16};
 }
 
+TEST(PointOfClick, ClickOutsideTheImageIsNotSeen) {
+  const rectification::DistortionMap map = rectification::identity_map(640, 480, std::nullopt);
+  EXPECT_TRUE(point_of_click(map, {600, 470}, 0.5));
+  for (const Eigen::Vector2d& outside : {Eigen::Vector2d(-50, 3), Eigen::Vector2d(470, 600)}) {
+    const auto seen = point_of_click(map, outside, 0.5);
+    ASSERT_FALSE(seen);
+    EXPECT_EQ(seen.error().reason, Reason::not_seen);
+    EXPECT_EQ(seen.error().figures.at("u"), outside.x());
+  }
+}
+
 TEST(PathInTarget, BallsDiameterAndChord) {
   const phantom::CalibratorTarget ball = target_of(phantom::TargetKind::ball);
   EXPECT_NEAR(path_in_target(ball, {1, 2, -90}, Vector3d::UnitZ()), 2, 1e-12);
