@@ -53,10 +53,7 @@ void forget(const std::filesystem::path& out) {
 Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibration::CArmHistory history,
                                     const pipeline::Result& result, Console& console) {
   const std::size_t earlier = history.entries.size();
-  for (const calibration::HistoryEntry& entry : result.entries)
-    if (std::ranges::find(history.entries, entry.image, &calibration::HistoryEntry::image) ==
-        history.entries.end())
-      history.entries.push_back(entry);
+  const std::size_t added = calibration::add_entries(history, result.entries);
   if (!console.quiet)
     console.progress << (result.variance_scale > 1
                              ? fmt::format(
@@ -64,7 +61,7 @@ Expected<void> add_to_c_arm_history(const std::filesystem::path& path, calibrati
                                    "the noise model\n",
                                    path.string(), std::sqrt(result.variance_scale))
                              : fmt::format("helicarm: {}: {} earlier acquisitions, {} added\n", path.string(),
-                                           earlier, history.entries.size() - earlier));
+                                           earlier, added));
   return write_file(path, to_text(calibration::to_json(history)) + "\n");
 }
 
@@ -97,8 +94,7 @@ Expected<pipeline::Result> result_of(const std::filesystem::path& folder,
 Expected<std::optional<calibration::CArmHistory>> history_at(
     const std::optional<std::filesystem::path>& path) {
   if (!path) return std::optional<calibration::CArmHistory>();
-  if (!std::filesystem::exists(*path)) return std::optional(calibration::CArmHistory());
-  return calibration::read_history(*path).map(
+  return calibration::history_at(*path).map(
       [](calibration::CArmHistory history) { return std::optional(std::move(history)); });
 }
 

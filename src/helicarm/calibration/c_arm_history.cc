@@ -125,6 +125,19 @@ Expected<CArmHistory> read_history(const std::filesystem::path& path) {
       [&](const Json& json) { return history_from_json(json, path.filename().string()); });
 }
 
+Expected<CArmHistory> history_at(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) return CArmHistory();
+  return read_history(path);
+}
+
+std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries) {
+  const std::size_t earlier = history.entries.size();
+  for (const HistoryEntry& entry : entries)
+    if (std::ranges::find(history.entries, entry.image, &HistoryEntry::image) == history.entries.end())
+      history.entries.push_back(entry);
+  return history.entries.size() - earlier;
+}
+
 Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);

@@ -49,8 +49,13 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
 geometry::IntrinsicsPrior learned_prior(geometry::IntrinsicsPrior prior, const LearnedIntrinsics& knowledge,
                                         bool mirrored);
 
+/// Adds the entries of images that the history does not hold; returns how many.
+std::size_t add_entries(CArmHistory& history, std::span<const HistoryEntry> entries);
+
 /// machine.json (docs/formats.md).
 Expected<CArmHistory> read_history(const std::filesystem::path& path);
+/// Empty where there is no file.
+Expected<CArmHistory> history_at(const std::filesystem::path& path);
 Expected<CArmHistory> history_from_json(const Json& json, const std::string& origin);
 Json to_json(const CArmHistory& history);
 

@@ -11,13 +11,15 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/calibration/priors.h"
 #include "helicarm/core/failure.h"
+#include "helicarm/core/json.h"
 #include "helicarm/fiducials/fiducial.h"
 
 namespace helicarm::calibration {
 
 struct ViewFiducials {
   std::string name;
-  std::vector<fiducials::Fiducial> fiducials;  ///< only those `used` enter
+  /// Only those `used` enter. All views list the same fiducials in one order (`aligned_by_label`).
+  std::vector<fiducials::Fiducial> fiducials;
   geometry::IntrinsicsPrior prior = {};
   std::optional<geometry::View> start = {};  ///< else the homogeneous DLT
   /// Covariance of the map among the used fiducials, per axis (n x n, px^2); its diagonal is part of their
@@ -25,9 +27,12 @@ struct ViewFiducials {
   Eigen::MatrixXd map_covariance_px2 = {};
 };
 
+inline constexpr Range rejection_range{0, 0.1};     ///< of CalibrationOptions::rejection_probability
+inline constexpr double least_view_angle_deg = 30;  ///< between two views
+
 struct CalibrationOptions {
   CommonPrior common = {};
-  double rejection_probability = 1e-4;  ///< of rejecting an inlier, 0 to 0.1; 0: no rejection
+  double rejection_probability = 1e-4;  ///< of rejecting an inlier; 0: no rejection
   double largest_rms_px = 5;            ///< refused above it and 3 sigma
 };
 
@@ -62,6 +67,7 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
 /// Refuses `views_too_close` unless the rays of two views through a point (such as the fiducials' centre)
 /// differ, as lines, by at least `least_deg`.
 Expected<void> check_views_apart(std::span<const CalibratedView> views,
-                                 const Eigen::Vector3d& point_in_calibrator, double least_deg = 30);
+                                 const Eigen::Vector3d& point_in_calibrator,
+                                 double least_deg = least_view_angle_deg);
 
 }  // namespace helicarm::calibration

@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/calibration/saved_calibration.h"
 
+#include <algorithm>
+#include <array>
+
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
 
 namespace helicarm::calibration {
 namespace {
 
 constexpr Range any_number{-1e15, 1e15};
+constexpr const char* calibration_format = "helicarm-calibration/1";
+constexpr std::array<std::string_view, 5> status_words{"used", "occluded", "outside", "rejected",
+                                                       "not_found"};
 
 template <int Rows, int Columns>
 Eigen::Matrix<double, Rows, Columns> matrix_from(JsonReader& reader, const char* key) {
@@ -49,30 +56,109 @@ std::vector<phantom::CalibratorBall> balls_from(JsonReader calibrator) {
   return balls;
 }
 
+bool has_image(const fiducials::Fiducial& fiducial) {
+  return fiducial.status == fiducials::FiducialStatus::used ||
+         fiducial.status == fiducials::FiducialStatus::rejected;
+}
+
+/// A result's fiducials have their coordinates in `balls`.
+fiducials::Fiducial fiducial_from(JsonReader& reader, const std::vector<phantom::CalibratorBall>& balls) {
+  fiducials::Fiducial fiducial{reader.text("label"), Eigen::Vector3d::Zero()};
+  fiducial.status = fiducials::FiducialStatus(reader.choice(
+      "status", {status_words[0], status_words[1], status_words[2], status_words[3], status_words[4]}));
+  if (reader.has("xyz_mm")) {
+    fiducial.centre_in_calibrator = Eigen::Vector3d(reader.numbers("xyz_mm", 3, any_number).data());
+  } else {
+    const auto ball = std::ranges::find(balls, fiducial.label, &phantom::CalibratorBall::label);
+    if (ball == balls.end())
+      reader.refuse(Reason::bad_value, "label", "is not one of the calibrator's balls");
+    fiducial.centre_in_calibrator = ball->centre_in_calibrator;
+  }
+  if (!has_image(fiducial)) return fiducial;
+  fiducial.uv_raw = Eigen::Vector2d(reader.numbers("uv_raw", 2, any_number).data());
+  fiducial.uv = Eigen::Vector2d(reader.numbers("uv", 2, any_number).data());
+  fiducial.sigma_px = reader.number("sigma_px", any_number);
+  fiducial.residual_px = reader.number("residual_px", any_number);
+  return fiducial;
+}
+
+Json json_of(const fiducials::Fiducial& fiducial) {
+  Json json = {{"label", fiducial.label},
+               {"status", status_words[std::size_t(fiducial.status)]},
+               {"xyz_mm", geometry::json_list(fiducial.centre_in_calibrator)}};
+  if (!has_image(fiducial)) return json;
+  json["uv_raw"] = geometry::json_list(fiducial.uv_raw);
+  json["uv"] = geometry::json_list(fiducial.uv);
+  json["sigma_px"] = fiducial.sigma_px;
+  json["residual_px"] = fiducial.residual_px;
+  return json;
+}
+
+void read_figures(JsonReader calibration, SavedCalibration& saved) {
+  const auto n = view_parameters * saved.views.size();
+  if (calibration.has("joint_covariance")) {
+    saved.joint_covariance = Eigen::Map<const Eigen::MatrixXd>(
+        calibration.matrix("joint_covariance", n, n, any_number).data(), Eigen::Index(n), Eigen::Index(n));
+    for (std::size_t i = 0; i < saved.views.size(); ++i) {
+      const Eigen::Index at = view_parameters * Eigen::Index(i);
+      saved.views[i].covariance = saved.joint_covariance.block<view_parameters, view_parameters>(at, at);
+    }
+  }
+  saved.chi2 = calibration.optional_number("chi2", any_number);
+  saved.variance_scale = calibration.optional_number("variance_scale", any_number);
+  if (const auto dof = calibration.optional_number("dof", {0, 1e6})) saved.dof = int(*dof);
+}
+
 }  // namespace
 
 Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
-    reader.choice("format", {"helicarm-result/1"});
-    if (reader.choice("status", {"ok", "refused"}) != 0)
+    const bool is_result = reader.choice("format", {"helicarm-result/1", calibration_format}) == 0;
+    if (is_result && reader.choice("status", {"ok", "refused"}) != 0)
       reader.refuse(Reason::bad_value, "status", "this result was refused and has no calibration");
     SavedCalibration saved;
+    if (reader.has("calibrator")) saved.balls = balls_from(reader.object("calibrator"));
+    const bool has_places = !is_result || !saved.balls.empty();
     for (JsonReader& view : reader.objects("views", true, 100)) {
       saved.views.push_back(view_from(view));
       saved.maps.push_back(map_from(view));
+      auto& fiducials = saved.fiducials.emplace_back();
+      if (has_places)
+        for (JsonReader& fiducial : view.objects("fiducials", false))
+          fiducials.push_back(fiducial_from(fiducial, saved.balls));
     }
-    if (reader.has("calibrator")) saved.balls = balls_from(reader.object("calibrator"));
-    if (reader.has("calibration")) {
-      JsonReader calibration = reader.object("calibration");
-      const auto n = view_parameters * saved.views.size();
-      if (calibration.has("joint_covariance"))
-        saved.joint_covariance =
-            Eigen::Map<const Eigen::MatrixXd>(calibration.matrix("joint_covariance", n, n, any_number).data(),
-                                              Eigen::Index(n), Eigen::Index(n));
-    }
+    if (reader.has("calibration")) read_figures(reader.object("calibration"), saved);
     return saved;
   });
+}
+
+Json to_json(const SavedCalibration& calibration) {
+  const auto if_known = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
+  Json json = {{"format", calibration_format}, {"views", Json::array()}};
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    const CalibratedView& view = calibration.views[i];
+    Json entry = {{"name", view.name},
+                  {"projection", geometry::json_rows(view.view.projection())},
+                  {"camera_from_calibrator", geometry::json_rows(view.view.camera_from_world.matrix())},
+                  {"reprojection_rms_px", view.reprojection_rms_px},
+                  {"dof", view.dof},
+                  {"rectification", nullptr},
+                  {"fiducials", Json::array()}};
+    if (const auto& map = calibration.maps[i])
+      entry["rectification"] = {{"map", rectification::to_json(*map)}};
+    if (i < calibration.fiducials.size())
+      for (const fiducials::Fiducial& fiducial : calibration.fiducials[i])
+        entry["fiducials"].push_back(json_of(fiducial));
+    json["views"].push_back(std::move(entry));
+  }
+  json["calibration"] = {{"joint_covariance", calibration.joint_covariance.size() > 0
+                                                  ? geometry::json_rows(calibration.joint_covariance)
+                                                  : Json(nullptr)},
+                         {"chi2", if_known(calibration.chi2)},
+                         {"dof", if_known(calibration.dof)},
+                         {"variance_scale", if_known(calibration.variance_scale)}};
+  return json;
 }
 
 }  // namespace helicarm::calibration

@@ -7,21 +7,28 @@
 #include "helicarm/calibration/calibrated_view.h"
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
+#include "helicarm/fiducials/fiducial.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::calibration {
 
-/// A calibration read from a result file.
+/// A calibration from a file.
 struct SavedCalibration : Calibration {
   std::vector<std::optional<rectification::DistortionMap>>
       maps;                                    ///< per view; nothing if the image was not rectified
   std::vector<phantom::CalibratorBall> balls;  ///< empty in results of earlier versions
+  std::vector<std::vector<fiducials::Fiducial>> fiducials;  ///< per view; empty where the file has none
+  std::optional<double> chi2, variance_scale;
+  std::optional<int> dof;
 };
 
-/// From "views" (name, projection, camera_from_calibrator, rectification.map) and "calibration"
-/// (joint_covariance) of a helicarm-result/1. Fails with the codes of JsonReader; `bad_value` for a result
-/// that was refused.
+/// From "views" (name, projection, camera_from_calibrator, rectification.map, fiducials) and "calibration"
+/// of a helicarm-result/1 or a helicarm-calibration/1. Fails with the codes of JsonReader; `bad_value` for a
+/// result that was refused.
 Expected<SavedCalibration> saved_calibration_from_json(const Json& json, const std::string& origin);
+
+/// helicarm-calibration/1: those keys alone, with the fiducials' coordinates.
+Json to_json(const SavedCalibration& calibration);
 
 }  // namespace helicarm::calibration
