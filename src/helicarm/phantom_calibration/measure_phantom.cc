@@ -372,8 +372,13 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
                                given.views.size(), least_views),
                    {},
                    {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
-  auto detected = detected_views(given, options.threads);
-  if (!detected) return refuse(detected.error());
+  pipeline::RunOptions stages;
+  stages.threads = options.threads;
+  stages.on_stage = options.on_stage;
+  stages.on_view = options.on_view;
+  const auto detected = pipeline::detected_views(given, stages);
+  if (!detected) return refuse(detected.error().failure);
+  if (options.on_stage) options.on_stage("adjust");
   const auto begin = std::chrono::steady_clock::now();
   const auto found =
       adjusted_views(*detected, given, options.from_scratch ? KnownCentres::none : KnownCentres::nominal,

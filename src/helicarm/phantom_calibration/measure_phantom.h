@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,6 +29,9 @@ struct PhantomOptions {
   bool outer = false;  ///< the distances are over both balls, not between the centres
   unsigned threads = 0;
   std::string date;  ///< as the calibrator's file will state it
+  /// As RunOptions': read, rectify, detect, adjust.
+  std::function<void(std::string_view stage)> on_stage = {};
+  std::function<void()> on_view = {};
 };
 
 struct MeasuredBall {

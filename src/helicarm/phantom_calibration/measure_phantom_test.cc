@@ -133,6 +133,20 @@ TEST(MeasurePhantom, NullCalibratorIsRefusedUnlessFromScratch) {
   EXPECT_NE(result.error().message.find("\"calibrator\""), std::string::npos) << result.error().message;
 }
 
+TEST(MeasurePhantom, StagesAreAnnouncedAndAnExceptionBetweenViewsEndsIt) {
+  const PhantomFolder folder(five_views());
+  std::vector<std::string> stages;
+  PhantomOptions options;
+  options.threads = 1;
+  options.on_stage = [&](std::string_view stage) { stages.emplace_back(stage); };
+  int views = 0;
+  options.on_view = [&] {
+    if (++views > 7) throw std::runtime_error("stop");
+  };
+  EXPECT_THROW(measure_phantom(folder.given, options), std::runtime_error);
+  EXPECT_EQ(stages, (std::vector<std::string>{"read", "rectify"}));
+}
+
 TEST(MeasurePhantom, FromScratchViewsOfSmallImagesMayBeTwentyDegreesApart) {
   const auto result = measured_from_scratch(simulated_phantom({0, 20, 40, 60, 80}));
   ASSERT_FALSE(result.failure) << result.failure->message;

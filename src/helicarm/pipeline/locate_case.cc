@@ -54,6 +54,8 @@ Result initial_result(const Case& given, const CaseCalibration& calibration, con
   result.joint_covariance = calibration.joint_covariance;
   result.history = calibration.history;
   result.entries = calibration.entries;
+  result.chi2 = calibration.chi2;
+  result.dof = calibration.dof;
   result.variance_scale = calibration.variance_scale;
   result.timing_ms = calibration.timing_ms;
   return result;

@@ -271,9 +271,12 @@ Json to_json(const Result& result) {
       {"measured", result.calibrator.measured},
       {"balls", list_of(result.calibrator.balls)}};
   json["views"] = list_of(result.views);
-  json["calibration"] = {{"joint_covariance", result.joint_covariance.size() > 0
-                                                  ? matrix(result.joint_covariance)
-                                                  : Json(nullptr)}};
+  json["calibration"] = {
+      {"joint_covariance",
+       result.joint_covariance.size() > 0 ? matrix(result.joint_covariance) : Json(nullptr)},
+      {"chi2", result.dof > 0 ? number(result.chi2) : Json(nullptr)},
+      {"dof", result.dof > 0 ? Json(result.dof) : Json(nullptr)},
+      {"variance_scale", result.dof > 0 ? number(result.variance_scale) : Json(nullptr)}};
   json["machine"] = json_of(result.history);
   json["points"] = list_of(result.points, result.views);
   json["accuracy"] = json_of(result.accuracy);

@@ -36,6 +36,8 @@ struct RunOptions {
   double motion_sigma_mm = 0;
   /// Called before each stage, in the calling thread, with its name as in Timing. An exception ends the run.
   std::function<void(std::string_view stage)> on_stage = {};
+  /// Called before each view of a stage, in the thread that works on it. An exception ends the run.
+  std::function<void()> on_view = {};
 };
 
 /// Results of the stages for one view; absent if not reached.
@@ -89,6 +91,8 @@ struct Result {
   CalibratorSource calibrator;
   std::vector<ViewResult> views;
   Eigen::MatrixXd joint_covariance;  ///< of all views' parameters; as CalibratedView::covariance
+  double chi2 = 0;                   ///< of all views together
+  int dof = 0;                       ///< 0: not computed
   double variance_scale = 1;         ///< as CalibrationResult::variance_scale
   std::optional<calibration::LearnedIntrinsics> history;  ///< from the C-arm history, if given
   std::vector<calibration::HistoryEntry> entries;         ///< of this case, for the C-arm history

@@ -16,10 +16,13 @@ namespace {
 
 /// A stage's result for each view, or its failure.
 template <class Work>
-auto of_each(std::size_t count, unsigned threads, Work&& work) {
+auto of_each(std::size_t count, const RunOptions& options, Work&& work) {
   using Given = std::invoke_result_t<Work, std::size_t>;
   std::vector<Given> given(count, Given(tl::unexpect, Failure{Reason::interrupted, {}}));
-  parallel_for(count, threads, [&](std::size_t i) { given[i] = work(i); });
+  parallel_for(count, options.threads, [&](std::size_t i) {
+    if (options.on_view) options.on_view();
+    given[i] = work(i);
+  });
   return given;
 }
 
@@ -136,7 +139,7 @@ Expected<void> check_images_belong_together(const std::vector<ReadView>& views) 
 OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions& options) {
   std::vector<NamedView> views;
   for (const CaseView& view : given.views) views.push_back({view.name});
-  auto images = of_each(views.size(), options.threads, [&](std::size_t i) {
+  auto images = of_each(views.size(), options, [&](std::size_t i) {
     const CaseView& from = given.views[i];
     return xray::read_xray_image(from.image, from.name, from.frame).map([](xray::XrayImage xray_image) {
       return std::make_shared<const xray::XrayImage>(std::move(xray_image));
@@ -154,7 +157,7 @@ OrRefusal<std::vector<ReadView>> read_views(const Case& given, const RunOptions&
 
 OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views, const Case& given,
                                                     const RunOptions& options) {
-  auto rectified = of_each(views.size(), options.threads, [&](std::size_t i) {
+  auto rectified = of_each(views.size(), options, [&](std::size_t i) {
     return rectify_view(*views[i].xray_image, given.views[i], given.plate, options.method);
   });
   return joined<RectifiedView>(std::move(views), std::move(rectified));
@@ -162,12 +165,24 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
 
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
                                                      const RunOptions& options) {
-  auto candidates =
-      of_each(views.size(), options.threads, [&](std::size_t i) -> Expected<fiducials::Candidates> {
-        return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
-                                            least_radius_px(given, views[i].rectification.map));
-      });
+  auto candidates = of_each(views.size(), options, [&](std::size_t i) -> Expected<fiducials::Candidates> {
+    return fiducials::detect_candidates(*views[i].xray_image, views[i].rectification,
+                                        least_radius_px(given, views[i].rectification.map));
+  });
   return joined<DetectedView>(std::move(views), std::move(candidates));
+}
+
+OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options) {
+  const auto stage = [&](std::string_view name, auto work) {
+    return [&, name, work](auto views) {
+      if (options.on_stage) options.on_stage(name);
+      return work(std::move(views), given, options);
+    };
+  };
+  if (options.on_stage) options.on_stage("read");
+  return read_views(given, options)
+      .and_then(stage("rectify", rectify_views))
+      .and_then(stage("detect", detect_in_views));
 }
 
 calibration::ViewFiducials fiducials_of(const LabelledView& view) {
@@ -192,9 +207,9 @@ OrRefusal<std::vector<LabelledView>> label_views(std::vector<DetectedView> views
                     "plate's file");
     return labels;
   };
-  auto labels = of_each(views.size(), options.threads, [&](std::size_t i) { return label(i, {}); });
+  auto labels = of_each(views.size(), options, [&](std::size_t i) { return label(i, {}); });
   if (const auto radius_bias = common_radius_bias(labels))
-    labels = of_each(views.size(), options.threads, [&](std::size_t i) {
+    labels = of_each(views.size(), options, [&](std::size_t i) {
       return is_ambiguous(labels[i]) ? label(i, radius_bias) : std::move(labels[i]);
     });
   return joined<LabelledView>(std::move(views), std::move(labels));

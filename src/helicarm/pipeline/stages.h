@@ -60,6 +60,9 @@ OrRefusal<std::vector<RectifiedView>> rectify_views(std::vector<ReadView> views,
 OrRefusal<std::vector<DetectedView>> detect_in_views(std::vector<RectifiedView> views, const Case& given,
                                                      const RunOptions& options);
 
+/// These three stages, announced by `on_stage`.
+OrRefusal<std::vector<DetectedView>> detected_views(const Case& given, const RunOptions& options);
+
 /// The calibration's input from a labelled view.
 calibration::ViewFiducials fiducials_of(const LabelledView& view);
 
