@@ -24,19 +24,24 @@ inline std::string shape_of(const py::array& array) {
   return text + ")";
 }
 
-inline void check_finite(const Doubles& array, const char* name) {
+inline void check_finite(const Doubles& array, const std::string& name, const std::string& view = {}) {
   for (py::ssize_t i = 0; i < array.size(); ++i)
     if (!std::isfinite(array.data()[i]))
-      raise({Reason::not_finite, fmt::format("{}: element {} is not a finite number", name, i), {}, {}});
+      raise({Reason::not_finite,
+             fmt::format("{}: element {} is not a finite number", name, i),
+             view,
+             {{"element", double(i)}}});
 }
 
-/// Rows of an N x K array; a plain vector of K numbers is one row.
+/// Rows of an N x K array; a plain vector of K numbers is one row. `finite` false: NaN is accepted.
 template <int K>
-std::vector<Eigen::Vector<double, K>> rows_of(const Doubles& array, const char* name) {
+std::vector<Eigen::Vector<double, K>> rows_of(const Doubles& array, const std::string& name,
+                                              const std::string& view = {}, bool finite = true) {
   const bool one = array.ndim() == 1 && array.shape(0) == K;
   if (!one && !(array.ndim() == 2 && array.shape(1) == K))
-    raise({Reason::bad_value, fmt::format("{}: shape {} is not (N, {})", name, shape_of(array), K), {}, {}});
-  check_finite(array, name);
+    raise(
+        {Reason::bad_value, fmt::format("{}: shape {} is not (N, {})", name, shape_of(array), K), view, {}});
+  if (finite) check_finite(array, name, view);
   std::vector<Eigen::Vector<double, K>> rows(std::size_t(array.size() / K));
   for (std::size_t i = 0; i < rows.size(); ++i)
     rows[i] = Eigen::Map<const Eigen::Vector<double, K>>(array.data() + K * py::ssize_t(i));
@@ -53,6 +58,20 @@ py::array rows_array(const std::vector<Eigen::Vector<double, K>>& rows, bool one
   return array;
 }
 
+/// One row of K numbers.
+template <int K>
+Eigen::Vector<double, K> row_of(const Doubles& array, const std::string& name, const std::string& view = {}) {
+  const auto rows = rows_of<K>(array, name, view);
+  if (rows.size() == 1) return rows[0];
+  raise({Reason::bad_value, fmt::format("{}: shape {} is not ({},)", name, shape_of(array), K), view, {}});
+}
+
+/// An attribute's array: changing its elements would not change the object.
+inline py::array read_only(py::array array) {
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return array;
+}
+
 /// Row major, as NumPy's own.
 inline py::array matrix_array(const Eigen::MatrixXd& matrix) {
   py::array_t<double> array({matrix.rows(), matrix.cols()});
@@ -64,17 +83,17 @@ inline py::array matrix_array(const Eigen::MatrixXd& matrix) {
 template <int K>
 py::object vector_array(const std::optional<Eigen::Vector<double, K>>& vector) {
   if (!vector) return py::none();
-  return rows_array<K>({*vector}, true);
+  return read_only(rows_array<K>({*vector}, true));
 }
 
 inline Eigen::MatrixXd matrix_of(const Doubles& array, py::ssize_t rows, py::ssize_t columns,
-                                 const char* name) {
+                                 const std::string& name, const std::string& view = {}) {
   if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != columns)
     raise({Reason::bad_value,
            fmt::format("{}: shape {} is not ({}, {})", name, shape_of(array), rows, columns),
-           {},
+           view,
            {}});
-  check_finite(array, name);
+  check_finite(array, name, view);
   return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
       array.data(), rows, columns);
 }
@@ -85,8 +104,7 @@ template <class T>
 py::array view_of(const image::Image<T>& image, const py::handle& owner) {
   py::array_t<T> array({py::ssize_t(image.height()), py::ssize_t(image.width())}, image.pixels().data(),
                        owner);
-  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-  return array;
+  return read_only(array);
 }
 
 /// The same for an image that nothing else holds.

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "arrays.h"
+#include "checks.h"
 #include "held_calibration.h"
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/run_case.h"
@@ -14,11 +15,10 @@
 #include "helicarm/volume/read_volume.h"
 #include "module.h"
 #include "options.h"
+#include "signals.h"
 
 namespace helicarm::python {
 namespace {
-
-using ViewKey = std::variant<std::size_t, std::string>;
 
 std::size_t index_of(const pipeline::Result& result, const ViewKey& key) {
   for (std::size_t i = 0; i < result.views.size(); ++i)
@@ -27,35 +27,40 @@ std::size_t index_of(const pipeline::Result& result, const ViewKey& key) {
 }
 
 pipeline::Result run(const std::filesystem::path& folder, const std::string& method,
-                     std::optional<double> max_error_mm, unsigned threads,
+                     std::optional<double> max_error_mm, double motion_sigma_mm, unsigned threads,
                      const std::optional<std::filesystem::path>& history, const py::object& progress) {
   pipeline::RunOptions options;
   options.method = method_of(method);
-  options.max_error_mm = max_error_mm;
+  for (const auto& field : pipeline::run_fields) {
+    const auto given = field.name == "max_error_mm"      ? max_error_mm
+                       : field.name == "motion_sigma_mm" ? std::optional(motion_sigma_mm)
+                                                         : std::nullopt;
+    if (given) field.set(options, checked(*given, within(field.range), std::string(field.name)));
+  }
   options.threads = threads;
   value_or_raise(check_fields<pipeline::RunOptions>(pipeline::run_fields, options, "run_case"));
-  if (history) options.history = value_or_raise(calibration::read_history(*history));
-  if (!progress.is_none())
-    options.on_stage = [&](std::string_view stage) {
-      const py::gil_scoped_acquire acquire;
-      progress(std::string(stage));
-    };
-  else
-    options.on_stage = [](std::string_view) {
-      const py::gil_scoped_acquire acquire;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C ends the run between stages
-    };
+  if (history) options.history = value_or_raise(calibration::history_at(*history));
+  const RunHooks hooks = run_hooks(progress);
+  options.on_stage = hooks.on_stage;
+  options.on_view = hooks.on_view;
   pipeline::Result result = value_or_raise(without_gil([&] {
     return pipeline::read_case(folder).and_then(
         [&](const pipeline::Case& given) { return pipeline::run_case(given, options); });
   }));
   result.options.on_stage = nullptr;
+  result.options.on_view = nullptr;
   if (result.failure) raise(*result.failure, py::cast(result));
+  if (history) {
+    calibration::add_entries(*options.history, result.entries);
+    value_or_raise(write_file(*history, to_text(calibration::to_json(*options.history)) + "\n"));
+  }
   return result;
 }
 
 HeldCalibration calibration_of(const pipeline::Result& result) {
-  HeldCalibration held{{{}, result.joint_covariance}, {}, {}, {}, {}, {}, {}};
+  HeldCalibration held;
+  held.joint_covariance = result.joint_covariance;
+  held.warnings = result.warnings;
   for (const pipeline::ViewResult& view : result.views) {
     if (!view.calibrated || !view.rectification || !view.found)
       raise({result.failure ? result.failure->reason : Reason::too_few_fiducials,
@@ -66,6 +71,9 @@ HeldCalibration calibration_of(const pipeline::Result& result) {
     held.maps.emplace_back(view.rectification->map);
     held.fiducials.push_back(view.found->fiducials);
   }
+  held.chi2 = result.chi2;
+  held.dof = result.dof;
+  held.variance_scale = result.variance_scale;
   return held;
 }
 
@@ -91,7 +99,12 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   options.bits = bits;
   options.knee = knee;
   options.threads = threads;
-  for (const std::string& word : faults) options.faults.push_back(value_or_raise(fault(word)));
+  constexpr std::string_view lost = "lost:";
+  for (const std::string& word : faults)
+    if (word.starts_with(lost))
+      options.lost_balls.push_back(word.substr(lost.size()));
+    else
+      options.faults.push_back(value_or_raise(fault(word)));
   for (const std::string& word : views) options.views.push_back(value_or_raise(view_angles(word)));
   if (ct) {
     CtOptions body;
@@ -108,7 +121,7 @@ py::object simulate(const std::filesystem::path& folder, std::uint64_t seed, con
   return python_from(value_or_raise(simulated));
 }
 
-void add_points(py::module_& module) {
+void add_result_points(py::module_& module) {
   using Point = pipeline::PointResult;
   const auto of_place = [](auto get) {
     return [get](const Point& p) -> py::object { return p.place ? get(*p.place) : py::none(); };
@@ -121,18 +134,18 @@ void add_points(py::module_& module) {
           [](const Point& p) { return p.source == localization::PointSource::pick ? "pick" : "target"; })
       .def_property_readonly(
           "xyz_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
-            return rows_array<3>({g.in_calibrator}, true);
+            return read_only(rows_array<3>({g.in_calibrator}, true));
           }),
           "(3,) calibrator frame at the first view's moment, mm; None where it was not located.")
       .def_property_readonly("covariance_mm2", of_place([](const guidance::PointInFrames& g) -> py::object {
-                               return matrix_array(g.covariance_in_calibrator);
+                               return read_only(matrix_array(g.covariance_in_calibrator));
                              }),
-                             "(3, 3) mm^2, or None.")
+                             "(3, 3) mm^2, axes of the calibrator frame; or None.")
       .def_property_readonly(
           "error_95_mm", of_place([](const guidance::PointInFrames& g) -> py::object {
             return py::float_(localization::length_at_95(g.covariance_in_calibrator));
           }),
-          "Length that 95 % of the errors with this covariance do not exceed, mm; or None.")
+          "Distance from the true point that 95 % of such points do not exceed, mm; or None.")
       .def_property_readonly("in_femur_mm", of_place([](const guidance::PointInFrames& g) {
                                return vector_array<3>(g.in_femur);
                              }),
@@ -151,12 +164,20 @@ void add_points(py::module_& module) {
             return p.reason ? py::object(warning_dict(*p.reason)) : py::object(py::none());
           },
           "Why it was not located: {code, message, view, figures}; else None.")
+      .def_property_readonly(
+          "warnings", [](const Point& p) { return warning_list(p.warnings); },
+          "List of {code, message, view, figures}.")
       .def("__repr__", [](const Point& p) {
-        if (!p.place) return fmt::format("<ResultPoint {}: not located>", p.name);
+        if (!p.place)
+          return fmt::format("<ResultPoint {}: not located{}>", p.name,
+                             p.reason ? fmt::format(", {}", code(p.reason->reason)) : "");
         const Eigen::Vector3d& at = p.place->in_calibrator;
-        return fmt::format("<ResultPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %)>", p.name,
+        std::string warnings;
+        for (const Warning& warning : p.warnings)
+          warnings += fmt::format(", warning {}", code(warning.reason));
+        return fmt::format("<ResultPoint {}: {:.3f} {:.3f} {:.3f} mm, within {:.3f} mm (95 %){}>", p.name,
                            at.x(), at.y(), at.z(),
-                           localization::length_at_95(p.place->covariance_in_calibrator));
+                           localization::length_at_95(p.place->covariance_in_calibrator), warnings);
       });
 }
 
@@ -208,25 +229,36 @@ void add_result(py::module_& module) {
           "to_dict", [](const pipeline::Result& r) { return python_from(pipeline::to_json(r)); },
           "The content of result.json.")
       .def("write", &write, py::arg("folder"),
-           "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.");
+           "result.json, report.html and an overlay PNG for each view. Raises InputError: cannot_write.")
+      .def("__repr__", [](const pipeline::Result& r) {
+        if (r.failure) return fmt::format("<Result: refused, {}>", code(r.failure->reason));
+        const auto located = std::ranges::count_if(
+            r.points, [](const pipeline::PointResult& point) { return point.place.has_value(); });
+        std::string text = fmt::format("<Result: {} views, {} of {} points located", r.views.size(), located,
+                                       r.points.size());
+        for (const Warning& warning : r.warnings) text += fmt::format(", warning {}", code(warning.reason));
+        return text + ">";
+      });
 }
 
 }  // namespace
 
 void add_cases(py::module_& module) {
-  add_points(module);
+  add_result_points(module);
   add_result(module);
   const pipeline::RunOptions usual;
   module.def(
       "run_case", &run, py::arg("folder"), py::kw_only(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(usual.method)]),
-      py::arg("max_error_mm") = usual.max_error_mm, py::arg("threads") = usual.threads,
-      py::arg("history") = py::none(), py::arg("progress") = py::none(),
+      py::arg("max_error_mm") = usual.max_error_mm, py::arg("motion_sigma_mm") = usual.motion_sigma_mm,
+      py::arg("threads") = usual.threads, py::arg("history") = py::none(), py::arg("progress") = py::none(),
       R"(Measures a case: two or more X-ray images to points with confidence regions, tunnels and diagnostics.
 
-folder: holds case.json. max_error_mm: refuse (uncertain) where a point may be off by more (95 %). history: a C-arm's
-history file, which serves as prior. progress: called with the name of each stage (read, rectify, detect, label,
-calibrate, locate) before it begins; an exception from it ends the run. Releases the GIL. Returns a Result.
+folder: holds case.json. max_error_mm: refuse (uncertain) where a point may be off by more (95 %). motion_sigma_mm:
+standard deviation per axis of the motion of an untracked bone between the acquisitions. history: a C-arm's history
+file, which serves as prior and to which this case is added unless it is refused; made where there is none. progress:
+called with the name of each stage (read, rectify, detect, label, calibrate, locate) before it begins; an exception
+from it ends the run, and Ctrl-C does between two views. Releases the GIL. Returns a Result.
 Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
   const simulation::SimulationOptions made;
   module.def(
@@ -238,7 +270,8 @@ Raises InputError; RefusedError with .result, which holds all that was computed 
       R"(Writes a simulated case (images, case.json, calibrator.json, plate.json, truth.json) into a folder.
 
 The same seed gives the same bytes. kind: accuracy, tunnels, flat or grid; preset: paper-sim, ii-9in or flat-panel;
-faults, views (NAME:PRIMARY,SECONDARY in degrees) and ct as `helicarm simulate`. Releases the GIL.
+size: 512 or 1024 pixels; faults ("lost:P4": without this ball), views (NAME:PRIMARY,SECONDARY in degrees) and ct as
+`helicarm simulate`. Releases the GIL.
 Returns the content of truth.json. Raises InputError: usage, bad_value, cannot_write.)");
 }
 

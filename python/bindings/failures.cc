@@ -30,13 +30,19 @@ void raise(const Failure& failure, const py::object& result) {
 py::object python_from(const Json& json) { return py::module_::import("json").attr("loads")(to_text(json)); }
 
 Json json_from(const py::object& value) {
+  // NumPy's arrays and numbers as lists and numbers.
+  const py::cpp_function listed([](const py::object& other) {
+    if (py::hasattr(other, "tolist")) return py::object(other.attr("tolist")());
+    throw py::type_error("dict: holds a " + std::string(py::str(py::type::of(other).attr("__name__"))) +
+                         ", which JSON cannot express");
+  });
   py::dict how;
-  how["allow_nan"] = false;
+  how["default"] = listed;
   std::string text;
   try {
     text = py::module_::import("json").attr("dumps")(value, **how).cast<std::string>();
   } catch (py::error_already_set& error) {
-    raise({Reason::bad_json, std::string("not JSON: ") + error.what(), {}, {}});
+    raise({Reason::bad_json, std::string(py::str(error.value())), {}, {}});
   }
   return value_or_raise(parse_json(text, "dict"));
 }

@@ -3,8 +3,10 @@
 #include <memory>
 
 #include "arrays.h"
+#include "checks.h"
 #include "helicarm/detection/find_marks.h"
 #include "helicarm/image/grey_image.h"
+#include "helicarm/xray/dicom_acquisition.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "module.h"
 
@@ -16,12 +18,11 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 /// What the array's type can hold; of floating-point pixels the caller must say it.
 std::pair<float, float> range_of(const py::array& pixels,
                                  const std::optional<std::pair<float, float>>& given) {
-  if (given && given->first < given->second) return *given;
-  if (given)
-    raise({Reason::bad_value,
-           fmt::format("range: {:g} is not below {:g}", given->first, given->second),
-           {},
-           {}});
+  if (given) {
+    checked(given->first, any_number, "range: least");
+    checked(given->second, {given->first, std::numeric_limits<float>::max(), true}, "range: greatest");
+    return *given;
+  }
   const char kind = pixels.dtype().kind();
   if (kind == 'u' && pixels.itemsize() <= 2) return {0.f, pixels.itemsize() == 1 ? 255.f : 65535.f};
   raise({Reason::bad_value,
@@ -35,8 +36,8 @@ std::optional<Eigen::Vector2d> spacing_of(const py::object& pixel_mm) {
   const Doubles given = Doubles::ensure(pixel_mm);
   if (!given || (given.size() != 1 && given.size() != 2))
     raise({Reason::bad_value, "pixel_mm: is neither a number nor (column spacing, row spacing)", {}, {}});
-  const Eigen::Vector2d spacing(given.data()[0], given.data()[given.size() - 1]);
-  if (!(spacing.minCoeff() > 0)) raise({Reason::bad_value, "pixel_mm: is not positive", {}, {}});
+  Eigen::Vector2d spacing(given.data()[0], given.data()[given.size() - 1]);
+  for (const double mm : spacing) checked(mm, {xray::min_pixel_mm, xray::max_pixel_mm}, "pixel_mm");
   return spacing;
 }
 
@@ -57,11 +58,12 @@ xray::XrayImage image_from(const py::array& pixels, const py::object& pixel_mm,
   image.name = name;
   image.pixels = image::Image<float>(int(values.shape(1)), int(values.shape(0)));
   for (std::size_t i = 0; i < image.pixels.pixels().size(); ++i) {
-    if (!std::isfinite(values.data()[i])) raise({Reason::not_finite, "pixels: hold NaN or infinity", {}, {}});
+    checked(values.data()[i], {image.lowest, image.highest}, "pixels");
     image.pixels.pixels()[i] = values.data()[i];
   }
   image.acquisition.pixel_mm = spacing_of(pixel_mm);
-  image.acquisition.source_detector_mm = source_detector_mm;
+  image.acquisition.source_detector_mm = checked(
+      source_detector_mm, {xray::min_source_detector_mm, xray::max_source_detector_mm}, "source_detector_mm");
   return image;
 }
 
@@ -100,9 +102,9 @@ v (row) down. Points are always (u, v); arrays are indexed [v, u].
 
 XrayImage(pixels, *, pixel_mm, source_detector_mm, range=None, name="")
   pixels: (height, width), any numeric type; converted to float32 by one copy
-  pixel_mm: detector pixel spacing, mm: a number, (column, row), or None where unknown
-  source_detector_mm: mm, or None where unknown
-  range: least and greatest possible grey value; of uint8 and uint16 pixels that of the type
+  pixel_mm: detector pixel spacing, 0.01 to 2 mm: a number, (column, row), or None where unknown
+  source_detector_mm: 200 to 3000 mm, or None where unknown
+  range: least and greatest possible grey value, which no pixel exceeds; of uint8 and uint16 pixels that of the type
 Raises InputError: bad_size, bad_value, not_finite.)")
       .def(py::init(&image_from), py::arg("pixels"), py::kw_only(), py::arg("pixel_mm"),
            py::arg("source_detector_mm"), py::arg("range") = py::none(), py::arg("name") = "")
@@ -137,8 +139,9 @@ Raises InputError: missing_file, not_an_image, truncated, bad_size, bad_value, u
   module.def("detect", &marks, py::arg("image"), py::kw_only(), py::arg("kind"),
              R"(Balls, holes or crosses (kind) anywhere in an image, without plate or calibrator.
 
-Returns {"uv": (N, 2) raw pixels, "sigma_px": (N,) standard deviation per axis, "radius_px": (N,)}; of crosses the
-radius is half the wires' width. Releases the GIL. Raises InputError: usage for another kind.)");
+Returns {"uv": (N, 2) raw pixels, "sigma_px": (N,) standard deviation per axis by image noise alone, "radius_px": (N,)};
+of crosses the radius is half the wires' width. A ball's "uv" is the centre of its shadow; label gives the image of its
+centre, with the error of the shadow's model. Releases the GIL. Raises InputError: usage for another kind.)");
 }
 
 }  // namespace helicarm::python

@@ -11,7 +11,11 @@ void add_images(py::module_& module);
 void add_phantom(py::module_& module);
 /// DistortionMap, Rectification, rectify.
 void add_rectification(py::module_& module);
-/// calibrate, Calibration, LocatedPoint.
+/// IntrinsicsPrior, CArmPrior, ViewPoints, label.
+void add_view_points(py::module_& module);
+/// LocatedPoint.
+void add_points(py::module_& module);
+/// calibrate, Calibration.
 void add_calibration(py::module_& module);
 /// run_case, Result, simulate_case.
 void add_cases(py::module_& module);

@@ -3,10 +3,12 @@
 #include <variant>
 
 #include "arrays.h"
+#include "checks.h"
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
 #include "module.h"
+#include "signals.h"
 
 namespace helicarm::python {
 namespace {
@@ -24,14 +26,19 @@ phantom_calibration::FiducialName fiducial(const BallName& name) {
 
 PhantomResult measured(const std::filesystem::path& folder, const std::vector<Distance>& distances,
                        const std::string& distance_is, double distance_sigma_mm, bool from_scratch,
-                       unsigned threads) {
+                       unsigned threads, const py::object& progress) {
+  static constexpr std::array<std::string_view, 2> kinds{"centres", "outer"};
   phantom_calibration::PhantomOptions options;
-  options.outer = value_or_raise(phantom_calibration::is_outer(distance_is));
-  for (const auto& [a, b, mm] : distances) options.distances.push_back({fiducial(a), fiducial(b), mm});
-  options.distance_sigma_mm = distance_sigma_mm;
+  options.outer = checked_word(distance_is, kinds, "distance_is") == 1;
+  for (const auto& [a, b, mm] : distances)
+    options.distances.push_back({fiducial(a), fiducial(b), checked(mm, positive, "distances: mm")});
+  options.distance_sigma_mm = checked(distance_sigma_mm, positive, "distance_sigma_mm");
   options.from_scratch = from_scratch;
   options.threads = threads;
   options.date = phantom_calibration::today();
+  const RunHooks hooks = run_hooks(progress);
+  options.on_stage = hooks.on_stage;
+  options.on_view = hooks.on_view;
   PhantomResult result = value_or_raise(without_gil([&] {
     return pipeline::read_phantom_case(folder).and_then(
         [&](const pipeline::Case& given) { return phantom_calibration::measure_phantom(given, options); });
@@ -81,17 +88,21 @@ void add_measured_phantom(py::module_& module) {
       .def_property_readonly(
           "xyz_mm",
           [](const PhantomResult& r) {
-            return rows_array<3>(of_balls(r, [](const MeasuredBall& ball) { return ball.centre; }));
+            return read_only(
+                rows_array<3>(of_balls(r, [](const MeasuredBall& ball) { return ball.centre; })));
           },
           "(N, 3) centres, mm, in the nominal calibrator frame; from scratch: in their principal axes.")
-      .def_property_readonly("covariance_mm2", &covariances, "(N, 3, 3) mm^2, with the scale's error.")
+      .def_property_readonly(
+          "covariance_mm2", [](const PhantomResult& r) { return read_only(covariances(r)); },
+          "(N, 3, 3) mm^2, with the scale's error: not for calibrate, which takes "
+          "calibrator.ball_covariance_mm2 and calibrator.scale_sigma.")
       .def_property_readonly(
           "from_nominal_mm",
           [](const PhantomResult& r) {
-            return rows_array<3>(of_balls(r, [](const MeasuredBall& ball) {
+            return read_only(rows_array<3>(of_balls(r, [](const MeasuredBall& ball) {
               return ball.from_nominal.value_or(
                   Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
-            }));
+            })));
           },
           "(N, 3) differences from the nominal file, mm; NaN from scratch.")
       .def_property_readonly(
@@ -112,8 +123,15 @@ void add_measured_phantom(py::module_& module) {
           [](const PhantomResult& r, const std::filesystem::path& folder) {
             value_or_raise(without_gil([&] { return phantom_calibration::write_phantom(r, folder); }));
           },
-          py::arg("folder"),
-          "calibrator.json, result.json and report.html. Raises InputError: cannot_write.");
+          py::arg("folder"), "calibrator.json, result.json and report.html. Raises InputError: cannot_write.")
+      .def("__repr__", [](const PhantomResult& r) {
+        if (r.failure) return fmt::format("<MeasuredPhantom: refused, {}>", code(r.failure->reason));
+        std::string text = fmt::format(
+            "<MeasuredPhantom: {} balls, {} views, {:.3f} px rms, scale from {}, sigma {:.2g} %",
+            r.balls.size(), r.views.size(), r.rms_px, r.scale.source, 100 * r.scale.relative_sigma);
+        for (const Warning& warning : r.warnings) text += fmt::format(", warning {}", code(warning.reason));
+        return text + ">";
+      });
 }
 
 }  // namespace
@@ -125,11 +143,14 @@ void add_phantom_calibration(py::module_& module) {
              py::arg("distances") = std::vector<Distance>(), py::arg("distance_is") = "centres",
              py::arg("distance_sigma_mm") = usual.distance_sigma_mm,
              py::arg("from_scratch") = usual.from_scratch, py::arg("threads") = usual.threads,
+             py::arg("progress") = py::none(),
              R"(Measures the balls of a phantom by bundle adjustment of three or more X-ray images of it.
 
 folder: holds case.json; its calibrator is the nominal file. distances: (a, b, mm) measured by hand, which give the
 scale, between two labels or, from_scratch, two raw (u, v) in the first view; distance_is: "centres", or "outer" for a
-caliper over both balls. from_scratch: only the balls' diameters are known. Releases the GIL. Returns a
+caliper over both balls; distance_sigma_mm: of each. from_scratch: only the balls' diameters are known, which case.json
+states as diameters_mm. progress: called with the name of each stage (read, rectify, detect, adjust) before it begins;
+an exception from it ends the measurement, and Ctrl-C does between two views before adjust. Releases the GIL. Returns a
 MeasuredPhantom. Raises InputError; RefusedError with .result, which holds all that was computed until then.)");
   module.def("verify_phantom", &verified, py::arg("folder"), py::kw_only(), py::arg("history") = py::none(),
              py::arg("threads") = usual.threads,

@@ -3,9 +3,13 @@
 #include <memory>
 
 #include "arrays.h"
+#include "checks.h"
 #include "helicarm/core/files.h"
+#include "helicarm/core/parallel.h"
+#include "helicarm/image/grey_image.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/rectification/rectify.h"
+#include "helicarm/xray/dicom_acquisition.h"
 #include "module.h"
 #include "options.h"
 
@@ -17,15 +21,19 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 /// NaN where the map leads off the image.
 template <class Carry>
 py::array carried(const rectification::DistortionMap& map, const Doubles& points, Carry carry) {
+  constexpr std::size_t worth_threads = 1000;
   auto rows = rows_of<2>(points, "uv");
   without_gil([&] {
-    for (Eigen::Vector2d& row : rows) row = carry(map, row).value_or(Eigen::Vector2d::Constant(nan));
+    parallel_for(rows.size(), rows.size() < worth_threads ? 1 : 0, [&](std::size_t i) {
+      rows[i] = carry(map, rows[i]).value_or(Eigen::Vector2d::Constant(nan));
+    });
   });
   return rows_array<2>(rows, points.ndim() == 1);
 }
 
-py::array sigmas(const rectification::DistortionMap& map, const Doubles& points) {
+py::object sigmas(const rectification::DistortionMap& map, const Doubles& points) {
   const auto rows = rows_of<2>(points, "uv");
+  if (points.ndim() == 1) return py::float_(map.sigma_px(rows[0]));
   py::array_t<double> sigma(py::ssize_t(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) sigma.mutable_at(i) = map.sigma_px(rows[i]);
   return sigma;
@@ -41,37 +49,47 @@ py::array rectified_pixels(const rectification::DistortionMap& map, const xray::
   return moved_to_array(without_gil([&] { return rectification::resample(image, map); }));
 }
 
+rectification::DistortionMap identity(int width, int height, std::optional<double> pixel_mm) {
+  constexpr Limits sides{1, image::max_image_side};
+  checked(double(width), sides, "width");
+  checked(double(height), sides, "height");
+  return rectification::identity_map(width, height,
+                                     checked(pixel_mm, {xray::min_pixel_mm, xray::max_pixel_mm}, "pixel_mm"));
+}
+
+using GivenPlate = std::variant<phantom::Plate, std::filesystem::path>;
+
+phantom::Plate plate_of(const GivenPlate& given) {
+  if (const auto* plate = std::get_if<phantom::Plate>(&given)) return *plate;
+  const auto& path = std::get<std::filesystem::path>(given);
+  if (phantom::Plate built_in = phantom::plate48(); path == built_in.name) return built_in;
+  return value_or_raise(phantom::read_plate(path));
+}
+
 rectification::DistortionMap loaded(const std::filesystem::path& path) {
   return value_or_raise(
       rectification::distortion_map_from_json(value_or_raise(read_json(path)), path.filename().string()));
 }
 
-rectification::Rectification rectified(const xray::XrayImage& image,
-                                       const std::variant<phantom::Plate, std::string>& plate,
+rectification::Rectification rectified(const xray::XrayImage& image, const GivenPlate& plate,
                                        const std::string& method) {
   const rectification::RectificationOptions options{method_of(method), {}};
-  const phantom::Plate given = std::holds_alternative<phantom::Plate>(plate)
-                                   ? std::get<phantom::Plate>(plate)
-                                   : value_or_raise(phantom::plate_named(std::get<std::string>(plate), "."));
-  return value_or_raise(without_gil([&] { return rectification::rectify(image, given, options); }));
+  const phantom::Plate given = plate_of(plate);
+  auto found = without_gil([&] { return rectification::rectify(image, given, options); });
+  if (!found) found.error().view = image.name;
+  return value_or_raise(std::move(found));
 }
 
 py::array dots(const rectification::Rectification& r) {
   std::vector<Eigen::Vector2d> rows;
   for (const detection::Dot& dot : r.plate_dots) rows.push_back(dot.centre_px);
-  return rows_array<2>(rows);
+  return read_only(rows_array<2>(rows));
 }
 
 }  // namespace
 
 rectification::Method method_of(const std::string& word) {
-  const auto found = std::ranges::find(pipeline::method_words, word);
-  if (found == pipeline::method_words.end())
-    raise({Reason::usage,
-           fmt::format("method: \"{}\" is none of: {}", word, fmt::join(pipeline::method_words, ", ")),
-           {},
-           {}});
-  return rectification::Method(found - pipeline::method_words.begin());
+  return rectification::Method(checked_word(word, pipeline::method_words, "method"));
 }
 
 namespace {
@@ -108,12 +126,8 @@ Both directions agree: one is the numerical inverse of the other. Rectified pixe
 the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-left pixel.)");
   map_class
       .def_static(
-          "identity",
-          [](int width, int height, std::optional<double> pixel_mm) {
-            return rectification::identity_map(width, height, pixel_mm);
-          },
-          py::arg("width"), py::arg("height"), py::arg("pixel_mm") = py::none(),
-          "The map of a flat panel, without distortion. pixel_mm: detector pixel, mm, or None.")
+          "identity", &identity, py::arg("width"), py::arg("height"), py::arg("pixel_mm") = py::none(),
+          "The map of a flat panel, without distortion. pixel_mm: detector pixel, 0.01 to 2 mm, or None.")
       .def_static("load", &loaded, py::arg("path"), "Reads map.json. Raises InputError.")
       .def_static(
           "from_dict",
@@ -137,7 +151,7 @@ the image centre. Points are (u, v) in pixels; (0, 0) is the centre of the top-l
           [](const rectification::DistortionMap& map, const Doubles& uv) {
             return carried(map, uv, rectification::rectified_in_image);
           },
-          py::arg("uv"), R"((N, 2) or (2,) raw pixels to rectified ones, same shape.
+          py::arg("uv"), R"((N, 2) or (2,) raw pixels to rectified ones, same shape; many points on all cores.
 
 NaN for points off the image and where the map folds: it is not extrapolated. Releases the GIL.
 Raises InputError: bad_value for another shape, not_finite.)")
@@ -155,7 +169,18 @@ Raises InputError: bad_value for another shape, not_finite.)")
 Outside the raw image it holds the lowest grey value. The array owns its pixels. Releases the GIL.
 Raises InputError: bad_size where the map is for another image size.)")
       .def("sigma_px", &sigmas, py::arg("uv"),
-           "(N,) standard deviation per axis of the map itself at rectified pixels.");
+           "Standard deviation per axis of the map itself at rectified pixels: (N,) of (N, 2), a number of "
+           "(2,).")
+      .def(
+          "covariance_px2",
+          [](const rectification::DistortionMap& map, const Doubles& uv) {
+            const auto rows = rows_of<2>(uv, "uv");
+            return matrix_array(without_gil([&] { return map.covariance_px2(rows); }));
+          },
+          py::arg("uv"),
+          R"((N, N) covariance per axis (px^2) of the map among (N, 2) rectified pixels: neighbours err alike.
+
+Its diagonal is sigma_px squared. For ViewPoints(map_covariance_px2=...). Releases the GIL.)");
   add_attributes(map_class);
 }
 
@@ -170,7 +195,7 @@ void add_rectification(py::module_& module) {
       .def_property_readonly(
           "residual_px",
           [](const rectification::Rectification& r) {
-            return py::array_t<double>(py::ssize_t(r.residual_px.size()), r.residual_px.data());
+            return read_only(py::array_t<double>(py::ssize_t(r.residual_px.size()), r.residual_px.data()));
           },
           "(N,) residual of each plate dot to the fitted map, raw pixels.")
       .def_readonly("dots_found", &rectification::Rectification::dots_found)
@@ -180,14 +205,21 @@ void add_rectification(py::module_& module) {
                     "Mean distance from raw to rectified: the distortion.")
       .def_readonly("raw_max_px", &rectification::Rectification::raw_max_px)
       .def_property_readonly("warnings",
-                             [](const rectification::Rectification& r) { return warning_list(r.warnings); });
+                             [](const rectification::Rectification& r) { return warning_list(r.warnings); })
+      .def("__repr__", [](const rectification::Rectification& r) {
+        const std::string expected = r.dots_expected ? fmt::format(" of {}", *r.dots_expected) : "";
+        std::string text = fmt::format("<Rectification: {}{} dots, {:.3f} px rms", r.dots_found, expected,
+                                       r.map.residual_rms_px);
+        for (const Warning& warning : r.warnings) text += fmt::format(", warning {}", code(warning.reason));
+        return text + ">";
+      });
   module.def(
       "rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(pipeline::RunOptions{}.method)]),
       R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
 
-plate: a Plate, a built-in's name ("plate48") or a path of a plate.json below the current folder. method: "best" or
-"paper". Releases the GIL. Raises RefusedError: blank_image, saturated, plate_not_found, plate_mismatch.)");
+plate: a Plate, a built-in's name ("plate48") or the path of a plate.json. method: "best" or "paper". Releases the GIL.
+Returns a Rectification. Raises InputError; RefusedError: blank_image, saturated, plate_not_found, plate_mismatch.)");
 }
 
 }  // namespace helicarm::python

@@ -6,8 +6,8 @@ class HelicarmError(Exception):
     """Base class.
 
     code: machine-readable reason, such as "too_few_fiducials"; "internal" for a fault of helicarm itself.
-    message: a sentence. view: name of the view it concerns, or None. figures: numbers that led to it.
-    result: what had been computed until then (run_case), or None.
+    message: a sentence. view: name of the view it concerns, or None. figures: numbers that led to it, such as
+    {"value": -1.0, "limit": 0.0}. result: what had been computed until then (run_case), or None.
     """
 
     def __init__(self, code, message, view=None, figures=None, result=None):

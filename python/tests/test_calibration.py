@@ -117,6 +117,154 @@ def test_joint_covariance_of_independent_balls_is_that_of_each(pair):
         helicarm.calibrate(views, ball_covariance_mm2=each[:11])
 
 
+def permuted(view, order, pair, uv):
+    labels = [f"P{i + 1}" for i in order]
+    return helicarm.ViewPoints(view, pair.xyz[order], uv[order], sigma_px=0.1, labels=labels)
+
+
+def noisy_pixels(pair, covariance, seed=7):
+    """Of balls displaced by this covariance, the same in both views."""
+    random = np.random.default_rng(seed)
+    xyz = pair.xyz + np.array([random.multivariate_normal(np.zeros(3), c) for c in covariance])
+    return {name: pair.pixels(name, xyz) + 0.1 * random.standard_normal((12, 2)) for name in pair.pose}
+
+
+COVARIANCE = np.array([np.diag([k + 1.0, 2 * k + 1, 1]) * 0.003 for k in range(12)])
+
+
+@pytest.mark.parametrize("joint", [False, True])
+def test_order_of_a_views_points_does_not_matter(pair, joint):
+    uv = noisy_pixels(pair, COVARIANCE)
+    mm2 = np.zeros((36, 36))
+    for k in range(12):
+        mm2[3 * k:3 * k + 3, 3 * k:3 * k + 3] = COVARIANCE[k]
+    given = mm2 if joint else COVARIANCE
+    rows, mixed = np.arange(12), np.random.default_rng(8).permutation(12)
+    expected, found = (
+        helicarm.calibrate([permuted("AP", rows, pair, uv["AP"]), permuted("LAT", order, pair, uv["LAT"])],
+                           ball_covariance_mm2=given, rejection_probability=0) for order in (rows, mixed))
+    assert found.chi2 == pytest.approx(expected.chi2, rel=1e-6)
+    assert found.covariance("LAT") == pytest.approx(expected.covariance("LAT"), rel=1e-6, abs=1e-12)
+
+
+def test_view_may_lack_a_ball(pair):
+    uv = noisy_pixels(pair, COVARIANCE)
+    rows, fewer = np.arange(12), np.delete(np.arange(12), 3)
+    for first, second in ((rows, fewer), (fewer, rows)):
+        views = [permuted("AP", first, pair, uv["AP"]), permuted("LAT", second, pair, uv["LAT"])]
+        calibration = helicarm.calibrate(views, ball_covariance_mm2=COVARIANCE, rejection_probability=0,
+                                         ball_labels=[f"P{i + 1}" for i in range(12)])
+        assert 0.4 < calibration.chi2 / calibration.dof < 2
+        lacking = {f["label"]: f["status"] for f in calibration.fiducials("AP" if len(first) < 12 else "LAT")}
+        assert lacking["P4"] == "not_found" and len(lacking) == 12
+    with pytest.raises(helicarm.InputError, match="usage: AP: .*lacks P4: give ball_labels"):
+        helicarm.calibrate(views, ball_covariance_mm2=COVARIANCE)
+    with pytest.raises(helicarm.InputError, match='bad_value: ball_labels: "P12" is missing'):
+        helicarm.calibrate(views, ball_covariance_mm2=COVARIANCE[:11], ball_labels=[f"P{i + 1}" for i in range(11)])
+
+
+def test_labels_and_names_must_agree(pair):
+    uv = {name: pair.pixels(name, pair.xyz) for name in pair.pose}
+    rows = np.arange(12)
+    with pytest.raises(helicarm.InputError, match="name_clash"):
+        helicarm.calibrate([permuted("A", rows, pair, uv["AP"]), permuted("A", rows, pair, uv["LAT"])])
+    other = helicarm.ViewPoints("LAT", pair.xyz + [0, 0, 1], uv["LAT"], sigma_px=0.1)
+    with pytest.raises(helicarm.InputError, match="P1 is 1 mm from its coordinates in another view") as error:
+        helicarm.calibrate([permuted("AP", rows, pair, uv["AP"]), other])
+    assert error.value.view == "LAT" and error.value.figures["distance_mm"] == pytest.approx(1)
+
+
+def test_views_a_few_degrees_apart_are_refused_unless_wanted(pair):
+    uv = pair.pixels("AP", pair.xyz)
+    views = [helicarm.ViewPoints(name, pair.xyz, uv, sigma_px=0.1) for name in "AB"]
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.calibrate(views)
+    assert error.value.code == "views_too_close" and error.value.figures["limit_deg"] == 30
+    assert len(helicarm.calibrate(views, least_angle_deg=0)) == 2
+
+
+def test_exchanged_axes_are_ambiguous_handedness(pair):
+    uv = {name: pair.pixels(name, pair.xyz) for name in pair.pose}
+    swapped = {name: points[:, ::-1] for name, points in uv.items()}
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.calibrate([helicarm.ViewPoints(n, pair.xyz, p, sigma_px=0.1) for n, p in swapped.items()])
+    assert error.value.code == "ambiguous_handedness"
+    stated = [helicarm.ViewPoints(n, pair.xyz, p, sigma_px=0.1, mirrored=True) for n, p in swapped.items()]
+    assert helicarm.calibrate(stated).warnings == []
+    one = helicarm.calibrate([helicarm.ViewPoints("AP", pair.xyz, uv["AP"], sigma_px=0.1),
+                              helicarm.ViewPoints("LAT", pair.xyz, swapped["LAT"], sigma_px=0.1)])
+    assert [(w["code"], w["view"]) for w in one.warnings] == [("ambiguous_handedness", "LAT")]
+    assert "ambiguous_handedness" in repr(one)
+
+
+def test_raw_needs_a_map_and_a_place_in_the_image(pair):
+    flat = pair.calibration()
+    for call in (lambda: flat.locate({"AP": (300, 200), "LAT": (300, 200)}, raw=True),
+                 lambda: flat.project(POINT, "AP", raw=True)):
+        with pytest.raises(helicarm.InputError, match="usage") as error:
+            call()
+        assert error.value.view == "AP"
+    panel = helicarm.DistortionMap.identity(640, 480)
+    calibration = helicarm.calibrate([
+        helicarm.ViewPoints(name, pair.xyz, pair.pixels(name, pair.xyz), sigma_px=0.1, map=panel)
+        for name in pair.pose])
+    raw = {name: calibration.project(POINT, name, raw=True) for name in calibration.names}
+    assert calibration.locate(raw, raw=True).xyz_mm == pytest.approx(POINT, abs=1e-6)
+    for outside in ((-50, 3), (300, 600), (-500, -500)):
+        with pytest.raises(helicarm.RefusedError) as error:
+            calibration.locate({**raw, "AP": outside}, raw=True)
+        assert (error.value.code, error.value.view) == ("not_seen", "AP")
+        assert error.value.figures == {"u": outside[0], "v": outside[1]}
+    with pytest.raises(helicarm.RefusedError, match="not_seen"):
+        helicarm.ViewPoints("AP", pair.xyz, pair.pixels("AP", pair.xyz) + 500, sigma_px=0.1, map=panel)
+
+
+def test_points_located_at_once_are_those_of_each(pair):
+    calibration = pair.calibration()
+    points = POINT + np.random.default_rng(3).uniform(-20, 20, (40, 3))
+    seen = {name: calibration.project(points, name) for name in calibration.names}
+    seen["AP"][7] = np.nan
+    together = calibration.locate_all(seen, sigma_px=0.4)
+    assert together["xyz_mm"].shape == (40, 3) and together["covariance_mm2"].shape == (40, 3, 3)
+    for i in (0, 39):
+        one = calibration.locate({name: uv[i] for name, uv in seen.items()}, sigma_px=0.4)
+        assert together["xyz_mm"][i] == pytest.approx(one.xyz_mm)
+        assert together["covariance_mm2"][i] == pytest.approx(one.covariance_mm2)
+        assert together["error_95_mm"][i] == pytest.approx(one.error_95_mm)
+    assert np.isnan(together["xyz_mm"][7]).all() and together["reasons"][7]["code"] == "not_seen"
+    assert together["reasons"][0] is None
+    with pytest.raises(helicarm.InputError, match="another view has 40"):
+        calibration.locate_all({"AP": seen["AP"], "LAT": seen["LAT"][:5]})
+
+
+def test_own_calibration_is_saved_whole(pair, tmp_path):
+    calibration = pair.calibration(noise=0.1, seed=2)
+    calibration.save(tmp_path / "calibration.json")
+    loaded = helicarm.Calibration.load(tmp_path / "calibration.json")
+    seen = {name: calibration.project(POINT, name) for name in calibration.names}
+    a, b = calibration.locate(seen), loaded.locate(seen)
+    assert a.xyz_mm == pytest.approx(b.xyz_mm, abs=1e-7)
+    assert a.covariance_mm2 == pytest.approx(b.covariance_mm2, rel=1e-6)
+    assert loaded.covariance("LAT") == pytest.approx(calibration.covariance("LAT"))
+    assert (loaded.chi2, loaded.dof, loaded.variance_scale) == (calibration.chi2, calibration.dof,
+                                                                calibration.variance_scale)
+    assert [f["label"] for f in loaded.fiducials("AP")] == [f["label"] for f in calibration.fiducials("AP")]
+    assert helicarm.figures.residuals(loaded, "AP").get_title().startswith("residuals")
+
+
+def test_representations_say_what_matters(pair):
+    calibration = pair.calibration()
+    assert repr(calibration).startswith("<Calibration of AP, LAT: chi2 / dof ")
+    prior = helicarm.IntrinsicsPrior(focal_px=3400, principal_px=(320, 240), unit_px=3.4, aspect=(1, 0.001))
+    assert repr(prior) == ("IntrinsicsPrior(focal_px=3400, principal_px=(320, 240), unit_px=3.4, aspect=(1, 0.001), "
+                           "skew=(0, 1e-12))")
+    assert repr(helicarm.CArmPrior(focal=(10, 1.4))) == "CArmPrior(focal=(10, 1.4), principal=None)"
+    seen = {name: calibration.project(POINT, name) for name in calibration.names}
+    seen["AP"] = seen["AP"] + [0, 40]
+    point = calibration.locate(seen, sigma_px=0.5)
+    assert point.warning["code"] == "residual_too_large" and "warning residual_too_large" in repr(point)
+
+
 def test_one_view_places_nothing(pair):
     with pytest.raises(helicarm.RefusedError) as error:
         pair.calibration().locate({"AP": (300, 200)})

@@ -153,6 +153,111 @@ def test_figures_draw(result):
     figures.tre_map(result.calibration, centre, half_mm=20, step_mm=5, sigma_px=0.5)
 
 
+@pytest.fixture(scope="module")
+def labelled(case):
+    calibrator, plate = (kind.load(case[0] / f"{kind.__name__.lower()}.json") for kind in (helicarm.Calibrator, helicarm.Plate))
+    images = [helicarm.read_image(case[0] / f"{name}.dcm") for name in ("AP", "LAT")]
+    return calibrator, [helicarm.label(image, calibrator, helicarm.rectify(image, plate)) for image in images]
+
+
+def test_labelled_images_calibrate_as_the_run_did(result, labelled):
+    calibrator, views = labelled
+    calibration = helicarm.calibrate(views, c_arm=helicarm.CArmPrior.unknown(),
+                                     ball_covariance_mm2=calibrator.ball_covariance_mm2,
+                                     scale_sigma=calibrator.scale_sigma)
+    expected = result.calibration
+    assert calibration.names == expected.names
+    assert calibration.projection("LAT") == pytest.approx(expected.projection("LAT"), rel=1e-9)
+    assert calibration.joint_covariance == pytest.approx(expected.joint_covariance, rel=1e-6, abs=1e-12)
+    assert (calibration.chi2, calibration.dof) == (pytest.approx(expected.chi2), expected.dof)
+    point = next(p for p in result.points if p.xyz_mm is not None)
+    raw = {name: calibration.project(point.xyz_mm, name, raw=True) for name in calibration.names}
+    assert calibration.locate(raw, raw=True).xyz_mm == pytest.approx(point.xyz_mm, abs=1e-4)
+
+
+def test_own_points_through_the_map_have_the_maps_covariance(labelled):
+    view = labelled[1][0]
+    used = [f for f in view.fiducials if f["status"] == "used"]
+    uv = np.array([f["uv"] for f in used])
+    covariance = view.map.covariance_px2(uv)
+    sigma = view.map.sigma_px(uv)
+    assert np.diag(covariance) == pytest.approx(sigma ** 2) and np.linalg.eigvalsh(covariance)[0] > -1e-12
+    assert view.map.sigma_px(uv[0]) == pytest.approx(sigma[0]) and isinstance(view.map.sigma_px(uv[0]), float)
+    own = helicarm.ViewPoints("AP", [f["xyz_mm"] for f in used], [f["uv_raw"] for f in used], sigma_px=0.03, map=view.map)
+    assert np.array([f["uv"] for f in own.fiducials]) == pytest.approx(uv, abs=1e-9)
+    assert np.array([f["sigma_px"] for f in own.fiducials]) == pytest.approx(np.hypot(0.03, sigma))
+
+
+def test_label_names_the_image_it_refuses(case):
+    blank = helicarm.XrayImage(np.full((300, 400), 7, np.uint8), pixel_mm=0.2, source_detector_mm=1000, name="blank")
+    for call in (lambda: helicarm.label(blank, helicarm.Calibrator.udcsc()), lambda: helicarm.rectify(blank, "plate48")):
+        with pytest.raises(helicarm.RefusedError) as error:
+            call()
+        assert error.value.view == "blank"
+
+
+def test_history_is_made_and_added_to_once(case, tmp_path):
+    history = tmp_path / "arm.json"
+    helicarm.run_case(case[0], history=history)
+    entries = json.loads(history.read_text())["shots"]
+    assert len(entries) == 2
+    helicarm.run_case(case[0], history=history)
+    assert json.loads(history.read_text())["shots"] == entries
+
+
+def test_motion_enlarges_the_covariance(tmp_path):
+    helicarm.simulate_case(tmp_path, seed=3, size=512, kind="tunnels")
+    given = json.loads((tmp_path / "case.json").read_text())
+    for view in given["views"]:
+        view.pop("poses", None)  # the bones are not tracked
+    (tmp_path / "case.json").write_text(json.dumps(given))
+    still, moving = (helicarm.run_case(tmp_path, motion_sigma_mm=mm).points[0] for mm in (0, 1))
+    assert moving.error_95_mm > 1 > still.error_95_mm
+
+
+def test_lost_ball_is_a_fault_as_of_the_program(tmp_path):
+    truth = helicarm.simulate_case(tmp_path, seed=3, size=512, faults=["lost:P4"])
+    assert truth
+    status = {f["label"]: f["status"] for f in helicarm.run_case(tmp_path).calibration.fiducials("AP")}
+    assert status["P4"] != "used" and status["P5"] == "used"
+
+
+def test_plate_may_be_anywhere(case, tmp_path):
+    image = helicarm.read_image(case[0] / "AP.dcm")
+    helicarm.Plate.plate48().save(tmp_path / "plate.json")
+    for path in (tmp_path / "plate.json", str(tmp_path / "plate.json")):
+        assert helicarm.rectify(image, path).dots_found > 20
+    with pytest.raises(helicarm.InputError, match="missing_file"):
+        helicarm.rectify(image, tmp_path / "none.json")
+
+
+def test_calibration_of_a_run_has_its_figures(result, tmp_path):
+    result.write(tmp_path)
+    held, loaded = result.calibration, helicarm.Calibration.load(tmp_path / "result.json")
+    assert held.dof > 10 and 0.2 < held.chi2 / held.dof < 5 and held.variance_scale >= 1
+    assert (loaded.chi2, loaded.dof) == (held.chi2, held.dof)
+    assert loaded.fiducials("AP")[3]["uv"] == pytest.approx(held.fiducials("AP")[3]["uv"])
+    assert repr(result).startswith("<Result: 2 views, ")
+
+
+def test_phantoms_and_plates_come_from_arrays():
+    given = helicarm.Calibrator.udcsc()
+    covariance = np.array([0.01 * np.eye(3)] * 12)
+    made = helicarm.Calibrator.from_arrays(given.labels, given.xyz_mm, 4, name="mine", tolerance_mm=0.1,
+                                           covariance_mm2=covariance)
+    assert np.array_equal(made.xyz_mm, given.xyz_mm) and made.diameters_mm.tolist() == [4] * 12
+    assert made.ball_covariance_mm2 == pytest.approx(covariance + 0.01 * np.eye(3))
+    joint = helicarm.Calibrator.from_arrays(given.labels, given.xyz_mm, given.diameters_mm, covariance_mm2=0.01 * np.eye(36))
+    assert joint.ball_covariance_mm2.shape == (36, 36) and given.ball_covariance_mm2 is None
+    plate = helicarm.Plate.plate48()
+    again = helicarm.Plate.from_arrays(plate.xy_mm, diameter_mm=2.5, pitch_mm=25, height_above_receiver_mm=15, name="plate48")
+    assert again.to_dict() == plate.to_dict()
+    with pytest.raises(helicarm.InputError, match="differ in length: 12, 11 and 1"):
+        helicarm.Calibrator.from_arrays(given.labels, given.xyz_mm[:11], 4)
+    with pytest.raises(helicarm.InputError, match="metres"):
+        helicarm.Calibrator.from_arrays(given.labels, given.xyz_mm / 1000, 4)
+
+
 def test_stubs_name_what_the_module_has():
     import inspect
     from helicarm import _helicarm

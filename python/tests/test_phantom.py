@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import _thread
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,35 @@ def test_two_distances_that_contradict_each_other_are_refused_with_a_result(view
     with pytest.raises(helicarm.RefusedError, match="distances_disagree") as refusal:
         helicarm.measure_phantom(views, distances=[("P1", "P12", 100.0), ("P1", "P6", 100.0)])
     assert refusal.value.result.warnings is not None
+
+
+def test_phantom_without_diameters_is_refused_from_scratch(views):
+    with pytest.raises(helicarm.InputError, match="bad_value: .*diameters_mm"):
+        helicarm.measure_phantom(views, from_scratch=True)
+
+
+def test_progress_names_the_stages_and_ends_the_measurement(views):
+    stages = []
+
+    def progress(stage):
+        stages.append(stage)
+        if stage == "adjust":
+            raise StopIteration(stage)
+
+    with pytest.raises(StopIteration):
+        helicarm.measure_phantom(views, progress=progress)
+    assert stages == ["read", "rectify", "detect", "adjust"]
+
+
+def test_ctrl_c_ends_the_measurement(views):
+    with pytest.raises(KeyboardInterrupt):
+        helicarm.measure_phantom(views, progress=lambda stage: stage == "rectify" and _thread.interrupt_main())
+
+
+def test_measured_covariance_serves_calibrate_without_the_scale(measured):
+    mm2 = measured.calibrator.ball_covariance_mm2
+    assert mm2.shape == (36, 36) and np.trace(mm2) < np.trace(measured.covariance_mm2, axis1=1, axis2=2).sum()
+    assert repr(measured).startswith("<MeasuredPhantom: 12 balls, 4 views, ")
 
 
 def test_bad_distances_are_input_errors(views):

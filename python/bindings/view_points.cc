@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include "arrays.h"
+#include "checks.h"
+#include "held_calibration.h"
+#include "helicarm/fiducials/find_target.h"
+#include "helicarm/phantom/calibrator_limits.h"
+#include "helicarm/pipeline/prior.h"
+#include "helicarm/pipeline/run_fields.h"
+#include "helicarm/pipeline/stages.h"
+#include "module.h"
+#include "options.h"
+
+namespace helicarm::python {
+namespace {
+
+using Pair = std::optional<std::pair<double, double>>;
+using fiducials::FiducialStatus;
+
+std::optional<geometry::NormalPrior> normal_prior(const Pair& pair, const Limits& limits,
+                                                  const std::string& argument) {
+  if (!pair) return std::nullopt;
+  return geometry::NormalPrior{checked(pair->first, limits, argument + ": value"),
+                               checked(pair->second, positive, argument + ": sigma")};
+}
+
+geometry::IntrinsicsPrior intrinsics_prior(std::optional<double> focal_px,
+                                           const std::optional<Doubles>& principal_px, double unit_px,
+                                           const Pair& aspect, const Pair& skew) {
+  geometry::IntrinsicsPrior prior;
+  prior.focal_px = checked(focal_px, positive, "focal_px");
+  if (principal_px) prior.principal_px = row_of<2>(*principal_px, "principal_px");
+  prior.unit_px = checked(unit_px, positive, "unit_px");
+  prior.aspect = normal_prior(aspect, positive, "aspect");
+  prior.skew = normal_prior(skew, any_number, "skew");
+  return prior;
+}
+
+std::optional<calibration::IntrinsicsVariation> variation(const Pair& pair, const std::string& argument) {
+  if (!pair) return std::nullopt;
+  return calibration::IntrinsicsVariation{checked(pair->first, not_negative, argument + ": common"),
+                                          checked(pair->second, positive, argument + ": of each view")};
+}
+
+std::string words_of(const std::optional<geometry::NormalPrior>& prior) {
+  return prior ? fmt::format("({:g}, {:g})", prior->value, prior->sigma) : "None";
+}
+std::string words_of(const std::optional<calibration::IntrinsicsVariation>& variation) {
+  return variation ? fmt::format("({:g}, {:g})", variation->common, variation->of_view) : "None";
+}
+std::string words_of(const geometry::IntrinsicsPrior& prior) {
+  const std::string focal = prior.focal_px ? fmt::format("{:g}", *prior.focal_px) : "None";
+  const std::string principal =
+      prior.principal_px ? fmt::format("({:g}, {:g})", prior.principal_px->x(), prior.principal_px->y())
+                         : "None";
+  return fmt::format("IntrinsicsPrior(focal_px={}, principal_px={}, unit_px={:g}, aspect={}, skew={})", focal,
+                     principal, prior.unit_px, words_of(prior.aspect), words_of(prior.skew));
+}
+
+void check_extent(const std::vector<Eigen::Vector3d>& points, const std::string& view) {
+  if (points.size() < 2) return;
+  Eigen::Vector3d low = points[0], high = points[0];
+  for (const Eigen::Vector3d& point : points) low = low.cwiseMin(point), high = high.cwiseMax(point);
+  const double extent = (high - low).maxCoeff();
+  if (extent < phantom::least_extent_mm)
+    raise(
+        {Reason::bad_value,
+         fmt::format("xyz_mm: the points extend over {:g} mm, at least {:g} mm are required; check the unit "
+                     "(metres?)",
+                     extent, phantom::least_extent_mm),
+         view,
+         {{"value", extent}, {"limit", phantom::least_extent_mm}}});
+}
+
+/// One number, or one for each point.
+std::vector<double> sigmas_of(const Doubles& sigma_px, std::size_t count, const std::string& view) {
+  if (sigma_px.ndim() != 0 && (sigma_px.ndim() != 1 || std::size_t(sigma_px.size()) != count))
+    raise({Reason::bad_value,
+           fmt::format("sigma_px: shape {} is neither () nor ({},)", shape_of(sigma_px), count),
+           view,
+           {}});
+  std::vector<double> sigmas;
+  for (std::size_t i = 0; i < count; ++i)
+    sigmas.push_back(checked(sigma_px.data()[sigma_px.ndim() == 0 ? 0 : i], positive, "sigma_px", view));
+  return sigmas;
+}
+
+/// Free of distortion, or raw and carried through the map, whose error is added.
+fiducials::ImagePoint image_point(const Eigen::Vector2d& uv, double sigma_px,
+                                  const std::optional<rectification::DistortionMap>& map,
+                                  const std::string& view) {
+  if (!map) return {uv, uv, sigma_px};
+  auto seen = fiducials::point_of_click(*map, uv, sigma_px);
+  if (seen) return *seen;
+  Failure failure = std::move(seen).error();
+  failure.view = view;
+  raise(failure);
+}
+
+void check_map_share(const ViewPoints& view) {
+  for (std::size_t i = 0; i < view.fiducials.size(); ++i) {
+    constexpr double rounding = 1e-6;
+    const double variance = view.fiducials[i].sigma_px * view.fiducials[i].sigma_px;
+    const double by_map = view.map_covariance_px2(Eigen::Index(i), Eigen::Index(i));
+    if (by_map > (1 + rounding) * variance)
+      raise({Reason::bad_value,
+             fmt::format("map_covariance_px2: the variance of {} is {:g} px^2, more than sigma_px^2 of {:g}: "
+                         "sigma_px must contain the map's error",
+                         view.fiducials[i].label, by_map, variance),
+             view.name,
+             {{"value", by_map}, {"limit", variance}}});
+  }
+}
+
+ViewPoints view_points(const std::string& name, const Doubles& xyz_mm, const Doubles& uv,
+                       const Doubles& sigma_px, const std::optional<std::vector<std::string>>& labels,
+                       const geometry::IntrinsicsPrior& prior,
+                       const std::optional<Doubles>& map_covariance_px2,
+                       const std::optional<rectification::DistortionMap>& map, std::optional<bool> mirrored) {
+  const auto points = rows_of<3>(xyz_mm, "xyz_mm", name);
+  const auto pixels = rows_of<2>(uv, "uv", name);
+  const std::size_t n = points.size();
+  if (pixels.size() != n || (labels && labels->size() != n))
+    raise({Reason::bad_value,
+           fmt::format("xyz_mm, uv and labels differ in length: {}, {} and {}", n, pixels.size(),
+                       labels ? labels->size() : n),
+           name,
+           {}});
+  if (map && map_covariance_px2)
+    raise({Reason::usage, "map_covariance_px2: is computed from the map; give one of them", name, {}});
+  const std::vector<double> sigmas = sigmas_of(sigma_px, n, name);
+  check_extent(points, name);
+  ViewPoints view{{name, {}, prior, {}, {}}, mirrored, map};
+  std::vector<Eigen::Vector2d> places;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto [raw, rectified, sigma] = image_point(pixels[i], sigmas[i], map, name);
+    fiducials::Fiducial fiducial{labels ? (*labels)[i] : fmt::format("P{}", i + 1), points[i],
+                                 FiducialStatus::used, raw, rectified};
+    fiducial.sigma_px = sigma;
+    view.fiducials.push_back(fiducial);
+    places.push_back(rectified);
+  }
+  if (map) view.map_covariance_px2 = map->covariance_px2(places);
+  if (!map_covariance_px2) return view;
+  const auto size = py::ssize_t(n);
+  view.map_covariance_px2 = checked_covariance(
+      matrix_of(*map_covariance_px2, size, size, "map_covariance_px2", name), "map_covariance_px2", name);
+  check_map_share(view);
+  return view;
+}
+
+using GivenMap = std::variant<std::monostate, rectification::Rectification, rectification::DistortionMap>;
+
+Expected<rectification::Rectification> rectification_of(const xray::XrayImage& image, const GivenMap& given) {
+  if (const auto* whole = std::get_if<rectification::Rectification>(&given)) return *whole;
+  const auto* map = std::get_if<rectification::DistortionMap>(&given);
+  return rectification::with_map(image, map ? *map : rectification::flat_panel_map(image), std::nullopt);
+}
+
+ViewPoints labelled(const std::shared_ptr<xray::XrayImage>& image, const phantom::Calibrator& calibrator,
+                    const GivenMap& map, std::optional<bool> mirrored, const std::string& method) {
+  const fiducials::FiducialOptions options{method_of(method), {}, mirrored};
+  auto view = without_gil([&]() -> Expected<ViewPoints> {
+    pipeline::LabelledView labelled;
+    labelled.name = image->name;
+    labelled.xray_image = image;
+    auto rectification = rectification_of(*image, map);
+    if (!rectification) return tl::unexpected<Failure>(rectification.error());
+    labelled.rectification = *std::move(rectification);
+    labelled.candidates = fiducials::detect_candidates(*image, labelled.rectification);
+    auto found =
+        fiducials::label_fiducials(*image, labelled.rectification, labelled.candidates, calibrator, options);
+    if (!found) return tl::unexpected<Failure>(found.error());
+    labelled.fiducials = *std::move(found);
+    const bool explained = labelled.fiducials.mirrored && image->acquisition.flip_hint;
+    return ViewPoints{pipeline::fiducials_of(labelled),
+                      explained && !mirrored ? std::optional(true) : mirrored, labelled.rectification.map};
+  });
+  if (view) return *std::move(view);
+  Failure failure = std::move(view).error();
+  failure.view = image->name;
+  raise(failure);
+}
+
+void add_priors(py::module_& module) {
+  const geometry::IntrinsicsPrior usual;
+  const auto pair_of = [](const std::optional<geometry::NormalPrior>& prior) -> Pair {
+    if (!prior) return std::nullopt;
+    return std::pair(prior->value, prior->sigma);
+  };
+  py::class_<geometry::IntrinsicsPrior>(
+      module, "IntrinsicsPrior",
+      R"(What is known of one view's intrinsics beforehand, rectified pixels.
+
+focal_px: nominal mean of |fx| and fy: source distance (mm) / pixel (mm); principal_px: (u, v), such as the image's
+centre; unit_px: the unit of CArmPrior in this view: px per mm on the receiver (1 / pixel), or 1 for a CArmPrior in
+pixels; aspect: (value, sigma) of |fx| / fy; skew: (value, sigma) over fy, None: free.
+Raises InputError: bad_value, not_finite.)")
+      .def(py::init(&intrinsics_prior), py::kw_only(), py::arg("focal_px") = usual.focal_px,
+           py::arg("principal_px") = py::none(), py::arg("unit_px") = usual.unit_px,
+           py::arg("aspect") = pair_of(usual.aspect), py::arg("skew") = pair_of(usual.skew))
+      .def("__repr__", [](const geometry::IntrinsicsPrior& prior) { return words_of(prior); });
+  py::class_<calibration::CArmPrior>(module, "CArmPrior",
+                                     R"(How far a C-arm's intrinsics may be from nominal: standard deviations.
+
+focal, principal: (common to all views, of each view: sag), in units of IntrinsicsPrior.unit_px; None: not known.
+Raises InputError: bad_value, not_finite.)")
+      .def(py::init([](const Pair& focal, const Pair& principal) {
+             return calibration::CArmPrior{variation(focal, "focal"), variation(principal, "principal")};
+           }),
+           py::kw_only(), py::arg("focal") = py::none(), py::arg("principal") = py::none())
+      .def_static("unknown", &pipeline::unknown_c_arm,
+                  "Of a C-arm without history, in mm on the receiver, as run_case assumes it.")
+      .def("__repr__", [](const calibration::CArmPrior& prior) {
+        return fmt::format("CArmPrior(focal={}, principal={})", words_of(prior.focal),
+                           words_of(prior.principal));
+      });
+}
+
+}  // namespace
+
+py::list fiducial_list(const std::vector<fiducials::Fiducial>& fiducials) {
+  static constexpr std::array<const char*, 5> words{"used", "occluded", "outside", "rejected", "not_found"};
+  py::list list;
+  for (const fiducials::Fiducial& fiducial : fiducials) {
+    const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
+    const auto pixel = [&](const Eigen::Vector2d& uv) {
+      return seen ? py::object(rows_array<2>({uv}, true)) : py::object(py::none());
+    };
+    py::dict one;
+    one["label"] = fiducial.label;
+    one["status"] = words[std::size_t(fiducial.status)];
+    one["xyz_mm"] = rows_array<3>({fiducial.centre_in_calibrator}, true);
+    one["uv_raw"] = pixel(fiducial.uv_raw);
+    one["uv"] = pixel(fiducial.uv);
+    one["sigma_px"] = seen ? py::object(py::float_(fiducial.sigma_px)) : py::none();
+    one["residual_px"] = seen ? py::object(py::float_(fiducial.residual_px)) : py::none();
+    list.append(one);
+  }
+  return list;
+}
+
+void add_view_points(py::module_& module) {
+  add_priors(module);
+  const auto count_used = [](const ViewPoints& view) {
+    return std::size_t(
+        std::ranges::count(view.fiducials, FiducialStatus::used, &fiducials::Fiducial::status));
+  };
+  py::class_<ViewPoints>(module, "ViewPoints",
+                         R"(Labelled image points of one view, for calibrate.
+
+ViewPoints(name, xyz_mm, uv, *, sigma_px, labels=None, prior=IntrinsicsPrior(), map_covariance_px2=None, map=None,
+           mirrored=None)
+  xyz_mm: (N, 3) world, mm; uv: (N, 2) pixels free of distortion, or raw ones with map
+  sigma_px: per axis, one number or (N,), above 0; without map it contains the map's error
+  labels: N names, which say what is the same ball in several views; not given: P1, P2, ... by row
+  prior: IntrinsicsPrior; map_covariance_px2: (N, N) covariance per axis that the points share, already in sigma_px
+  map: DistortionMap of the image: rectifies uv, adds its own error and covariance, and serves raw=True of Calibration
+  mirrored: whether the image is mirrored, where it is known
+Raises InputError: bad_value, not_finite, usage; RefusedError: not_seen for raw points off the image.)")
+      .def(py::init(&view_points), py::arg("name"), py::arg("xyz_mm"), py::arg("uv"), py::kw_only(),
+           py::arg("sigma_px"), py::arg("labels") = py::none(),
+           py::arg("prior") = geometry::IntrinsicsPrior(), py::arg("map_covariance_px2") = py::none(),
+           py::arg("map") = py::none(), py::arg("mirrored") = py::none())
+      .def_readonly("name", &ViewPoints::name)
+      .def_readonly("map", &ViewPoints::map, "DistortionMap, or None.")
+      .def_readonly("mirrored", &ViewPoints::mirrored, "As stated, or None.")
+      .def_readonly("prior", &ViewPoints::prior, "IntrinsicsPrior")
+      .def_property_readonly(
+          "fiducials", [](const ViewPoints& view) { return fiducial_list(view.fiducials); },
+          "List of {label, status, xyz_mm, uv_raw, uv, sigma_px, residual_px}; only those \"used\" enter.")
+      .def("__len__", count_used)
+      .def("__repr__", [=](const ViewPoints& view) {
+        return fmt::format("<ViewPoints {}: {} points{}>", view.name, count_used(view),
+                           view.map ? ", with map" : "");
+      });
+  module.def(
+      "label", &labelled, py::arg("image"), py::arg("calibrator"), py::arg("map") = py::none(), py::kw_only(),
+      py::arg("mirrored") = py::none(), py::arg("method") = std::string(pipeline::method_words[0]),
+      R"(Finds a calibrator's balls in an image, labels them and measures their centres, as run_case does (2.3.4).
+
+map: the Rectification of this image, a DistortionMap, or None for a flat panel. mirrored: whether the image is
+mirrored, where it is known. Returns ViewPoints under the image's name, with the prior from its file; calibrate then
+takes c_arm=CArmPrior.unknown(). Releases the GIL. Raises RefusedError: too_few_fiducials, ambiguous_labels,
+calibrator_mismatch, blank_image, saturated, plate_mismatch.)");
+}
+
+}  // namespace helicarm::python
