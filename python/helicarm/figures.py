@@ -10,6 +10,13 @@ def _axes(ax):
     return plt.subplots(figsize=(6, 6))[1]
 
 
+def _show_all(ax, points):
+    """Axes that hold all points, which quiver's arrows do not extend by themselves."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.05 * (high - low).max()
+    ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+
+
 def overlay(result, view=0, ax=None):
     """Rectified image of a view with its fiducials, their labels and the located points.
 
@@ -35,27 +42,32 @@ def overlay(result, view=0, ax=None):
 
 
 def residuals(calibration, view=0, ax=None, scale=None):
-    """Arrows from each used fiducial towards its projection, enlarged.
+    """Arrows from each fiducial's image towards its projection, enlarged; rejected ones by a cross, in gray.
 
-    calibration: Calibration with fiducials (of calibrate or run_case). scale: enlargement; chosen from the largest
-    residual where None. Axes in rectified pixels.
+    calibration: Calibration with fiducials. scale: enlargement; chosen from the largest residual of a used fiducial
+    where None. Axes in rectified pixels.
     """
     ax = _axes(ax)
-    used = [f for f in calibration.fiducials(view) if f["status"] == "used"]
-    if not used:
+    seen = [f for f in calibration.fiducials(view) if f["uv"] is not None]
+    used = np.array([f["status"] == "used" for f in seen], bool)
+    if not used.any():
         raise ValueError("the calibration holds no fiducials of this view")
-    uv = np.array([f["uv"] for f in used])
-    off = calibration.project(np.array([f["xyz_mm"] for f in used]), view) - uv
-    largest = np.linalg.norm(off, axis=1).max()
+    uv = np.array([f["uv"] for f in seen])
+    off = calibration.project(np.array([f["xyz_mm"] for f in seen]), view) - uv
+    largest = np.linalg.norm(off[used], axis=1).max()
     if scale is None:
         scale = 0.1 * np.ptp(uv, axis=0).max() / max(largest, 1e-12)
-    ax.quiver(uv[:, 0], uv[:, 1], scale * off[:, 0], scale * off[:, 1], angles="xy", scale_units="xy", scale=1,
-              color="tab:red", width=0.004)
-    ax.plot(uv[:, 0], uv[:, 1], "k.")
-    for fiducial in used:
+    for which, arrow, mark in ((used, "tab:red", "k."), (~used, "gray", "kx")):
+        ax.quiver(uv[which, 0], uv[which, 1], scale * off[which, 0], scale * off[which, 1], angles="xy",
+                  scale_units="xy", scale=1, color=arrow, width=0.004)
+        ax.plot(uv[which, 0], uv[which, 1], mark)
+    for fiducial in seen:
         ax.annotate(fiducial["label"], fiducial["uv"], xytext=(4, 4), textcoords="offset points", fontsize=9)
-    rms = np.sqrt(np.mean(np.sum(off ** 2, axis=1)))
-    ax.set(xlabel="u (px)", ylabel="v (px)", title=f"residuals {rms:.3f} px rms, arrows x {scale:.0f}", aspect="equal")
+    rms = np.sqrt(np.mean(np.sum(off[used] ** 2, axis=1)))
+    rejected = f", {np.count_nonzero(~used)} rejected" if not used.all() else ""
+    ax.set(xlabel="u (px)", ylabel="v (px)", aspect="equal",
+           title=f"residuals {rms:.3f} px rms, arrows x {scale:.0f}{rejected}")
+    _show_all(ax, np.vstack([uv, (uv + scale * off)[used]]))
     ax.invert_yaxis()
     return ax
 
@@ -91,12 +103,15 @@ def tre_map(calibration, centre_mm, *, half_mm, step_mm, sigma_px, z_mm=None, ax
     """Predicted TRE (rms, mm) over x and y of the calibrator frame, in the lattice plane nearest to z_mm.
 
     centre_mm: (3,); half_mm, step_mm: extent and step of the lattice; sigma_px: noise of a pick per axis; z_mm: the
-    centre's where None.
+    centre's where None, else within the lattice (ValueError).
     """
     ax = _axes(ax)
     volume = calibration.tre_map(centre_mm, half_mm=half_mm, step_mm=step_mm, sigma_px=sigma_px)
     first, step, rms = volume["first_mm"], volume["step_mm"], volume["rms_mm"]
-    k = int(np.clip(round(((centre_mm[2] if z_mm is None else z_mm) - first[2]) / step), 0, rms.shape[2] - 1))
+    z = centre_mm[2] if z_mm is None else z_mm
+    k = round((z - first[2]) / step)
+    if not 0 <= k < rms.shape[2]:
+        raise ValueError(f"z_mm: {z:g} is outside the lattice, {first[2]:g} to {first[2] + step * (rms.shape[2] - 1):g}")
     x, y = (first[i] + step * np.arange(rms.shape[i]) for i in (0, 1))
     filled = ax.contourf(x, y, rms[:, :, k].T, levels=12, cmap="viridis")  # contourf takes rows along y
     ax.figure.colorbar(filled, ax=ax, label="predicted TRE (mm rms)")

@@ -265,6 +265,26 @@ def test_representations_say_what_matters(pair):
     assert point.warning["code"] == "residual_too_large" and "warning residual_too_large" in repr(point)
 
 
+def test_residual_figure_holds_every_arrow_and_the_rejected_fiducial(pair):
+    views = []
+    for name in pair.pose:
+        uv = pair.pixels(name, pair.xyz) + 0.2 * np.random.default_rng(9).standard_normal((12, 2))
+        uv[4] += 12 if name == "AP" else 0
+        views.append(helicarm.ViewPoints(name, pair.xyz, uv, sigma_px=0.2))
+    calibration = helicarm.calibrate(views)
+    ax = helicarm.figures.residuals(calibration, "AP")
+    assert "1 rejected" in ax.get_title() and len(ax.texts) == 12
+    (left, right), (bottom, top) = ax.get_xlim(), sorted(ax.get_ylim())
+    for arrows in ax.collections[:1]:
+        ends = arrows.get_offsets() + np.c_[arrows.U, arrows.V]
+        assert ((left < ends[:, 0]) & (ends[:, 0] < right) & (bottom < ends[:, 1]) & (ends[:, 1] < top)).all()
+
+
+def test_tre_figure_refuses_a_plane_outside_its_lattice(pair):
+    with pytest.raises(ValueError, match="z_mm: 400 is outside the lattice"):
+        helicarm.figures.tre_map(pair.calibration(), POINT, half_mm=20, step_mm=10, sigma_px=0.5, z_mm=400)
+
+
 def test_one_view_places_nothing(pair):
     with pytest.raises(helicarm.RefusedError) as error:
         pair.calibration().locate({"AP": (300, 200)})
