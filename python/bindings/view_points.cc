@@ -160,29 +160,37 @@ Expected<rectification::Rectification> rectification_of(const xray::XrayImage& i
   return rectification::with_map(image, map ? *map : rectification::flat_panel_map(image), std::nullopt);
 }
 
+/// The stages of a run for one image.
+pipeline::OrRefusal<std::vector<pipeline::LabelledView>> labelled_views(
+    const std::shared_ptr<xray::XrayImage>& image, const GivenMap& map, const pipeline::Case& given,
+    const pipeline::RunOptions& options) {
+  auto rectification = rectification_of(*image, map);
+  if (!rectification) {
+    rectification.error().view = image->name;
+    return tl::unexpected(pipeline::Refusal{rectification.error(), {}});
+  }
+  pipeline::RectifiedView view;
+  view.name = image->name;
+  view.xray_image = image;
+  view.rectification = *std::move(rectification);
+  return pipeline::detect_in_views({view}, given, options).and_then([&](auto detected) {
+    return pipeline::label_views(std::move(detected), given, options);
+  });
+}
+
 ViewPoints labelled(const std::shared_ptr<xray::XrayImage>& image, const phantom::Calibrator& calibrator,
                     const GivenMap& map, std::optional<bool> mirrored, const std::string& method) {
-  const fiducials::FiducialOptions options{method_of(method), {}, mirrored};
-  auto view = without_gil([&]() -> Expected<ViewPoints> {
-    pipeline::LabelledView labelled;
-    labelled.name = image->name;
-    labelled.xray_image = image;
-    auto rectification = rectification_of(*image, map);
-    if (!rectification) return tl::unexpected<Failure>(rectification.error());
-    labelled.rectification = *std::move(rectification);
-    labelled.candidates = fiducials::detect_candidates(*image, labelled.rectification);
-    auto found =
-        fiducials::label_fiducials(*image, labelled.rectification, labelled.candidates, calibrator, options);
-    if (!found) return tl::unexpected<Failure>(found.error());
-    labelled.fiducials = *std::move(found);
-    const bool explained = labelled.fiducials.mirrored && image->acquisition.flip_hint;
-    return ViewPoints{pipeline::fiducials_of(labelled),
-                      explained && !mirrored ? std::optional(true) : mirrored, labelled.rectification.map};
-  });
-  if (view) return *std::move(view);
-  Failure failure = std::move(view).error();
-  failure.view = image->name;
-  raise(failure);
+  pipeline::RunOptions options;
+  options.method = method_of(method);
+  pipeline::Case given;
+  given.calibrator = calibrator;
+  given.views.emplace_back().mirrored = mirrored;
+  const auto views = without_gil([&] { return labelled_views(image, map, given, options); });
+  if (!views) raise(views.error().failure);
+  const pipeline::LabelledView& view = views->front();
+  const bool explained = view.fiducials.mirrored && image->acquisition.flip_hint;
+  return {pipeline::fiducials_of(view), explained && !mirrored ? std::optional(true) : mirrored,
+          view.rectification.map};
 }
 
 void add_priors(py::module_& module) {
@@ -282,10 +290,10 @@ Raises InputError: bad_value, not_finite, usage; RefusedError: not_seen for raw 
       py::arg("mirrored") = py::none(), py::arg("method") = std::string(pipeline::method_words[0]),
       R"(Finds a calibrator's balls in an image, labels them and measures their centres, as run_case does (2.3.4).
 
-map: the Rectification of this image, a DistortionMap, or None for a flat panel. mirrored: whether the image is
-mirrored, where it is known. Returns ViewPoints under the image's name, with the prior from its file; calibrate then
-takes c_arm=CArmPrior.unknown(). Releases the GIL. Raises RefusedError: too_few_fiducials, ambiguous_labels,
-calibrator_mismatch, blank_image, saturated, plate_mismatch.)");
+map: the Rectification of this image, the DistortionMap of a plate's own image, or None for a flat panel. mirrored:
+whether the image is mirrored, where it is known. Returns ViewPoints under the image's name, with the prior from its
+file; calibrate then takes c_arm=CArmPrior.unknown(). Releases the GIL. Raises RefusedError: too_few_fiducials,
+ambiguous_labels, calibrator_mismatch, blank_image, saturated, plate_mismatch (also for a plate of the other kind).)");
 }
 
 }  // namespace helicarm::python

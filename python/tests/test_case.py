@@ -196,6 +196,14 @@ def test_label_names_the_image_it_refuses(case):
         assert error.value.view == "blank"
 
 
+def test_plate_of_the_other_kind_is_refused_where_the_calibrator_shows_it(case):
+    image, calibrator = helicarm.read_image(case[0] / "AP.dcm"), helicarm.Calibrator.load(case[0] / "calibrator.json")
+    other = helicarm.Plate.from_dict({**helicarm.Plate.plate48().to_dict(), "kind": "holes"})
+    with pytest.raises(helicarm.RefusedError) as error:
+        helicarm.label(image, calibrator, helicarm.rectify(image, other))
+    assert error.value.code == "plate_mismatch" and error.value.view == "AP"
+
+
 def test_history_is_made_and_added_to_once(case, tmp_path):
     history = tmp_path / "arm.json"
     helicarm.run_case(case[0], history=history)
