@@ -148,7 +148,11 @@ double JsonReader::checked(const Json& value, const char* key, Range range) cons
   const double number = value.get<double>();
   if (!std::isfinite(number)) refuse(Reason::not_finite, key, "is not finite");
   if (number < range.low || number > range.high)
-    refuse(Reason::bad_value, key, fmt::format("{} is outside {} to {}", number, range.low, range.high));
+    throw BadInput(
+        {Reason::bad_value,
+         fmt::format("{}: \"{}\": {} is outside {} to {}", where_, key, number, range.low, range.high),
+         {},
+         {{"value", number}, {"limit", number < range.low ? range.low : range.high}}});
   return number;
 }
 

@@ -96,7 +96,7 @@ void check_distances(const std::vector<CalibratorBall>& balls, const std::string
                         fmt::format("{}: balls {} and {} are {:.3g} mm apart, at least {:g} mm are required",
                                     origin, balls[j].label, balls[i].label, distance, least_distance_mm),
                         {},
-                        {{"distance_mm", distance}, {"limit_mm", least_distance_mm}}});
+                        {{"value", distance}, {"limit", least_distance_mm}}});
     }
 }
 
@@ -109,11 +109,12 @@ void check_places(const std::vector<CalibratorBall>& balls, const std::string& o
     centres.col(static_cast<Eigen::Index>(i)) = balls[i].centre_in_calibrator;
   const double extent = (centres.rowwise().maxCoeff() - centres.rowwise().minCoeff()).maxCoeff();
   if (extent < least_extent_mm)
-    throw BadInput(
-        Reason::bad_value,
-        fmt::format(
-            "{}: \"balls\": they extend over {} mm, at least {} mm are required; check the unit (metres?)",
-            origin, extent, least_extent_mm));
+    throw BadInput({Reason::bad_value,
+                    fmt::format("{}: \"balls\": they extend over {:.3g} mm, at least {:g} mm are required; "
+                                "check the unit (metres?)",
+                                origin, extent, least_extent_mm),
+                    {},
+                    {{"value", extent}, {"limit", least_extent_mm}}});
   check_distances(balls, origin);
   const Eigen::Matrix3Xd spread = centres.colwise() - centres.rowwise().mean();
   const Eigen::Vector3d variances =

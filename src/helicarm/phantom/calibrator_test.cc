@@ -77,6 +77,7 @@ TEST(ReadCalibrator, DiameterInMicrometresIsRefusedWithItsLimit) {
   Json json = example();
   json["balls"][0]["diameter_mm"] = 4000;
   EXPECT_EQ(refusal(json).message, "c.json: balls[0]: \"diameter_mm\": 4000 is outside 0.5 to 30");
+  EXPECT_EQ(refusal(json).figures, (std::map<std::string, double>{{"value", 4000}, {"limit", 30}}));
 }
 
 TEST(ReadCalibrator, CoordinatesInMetresAreRefused) {
