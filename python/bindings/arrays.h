@@ -61,8 +61,7 @@ py::array rows_array(const std::vector<Eigen::Vector<double, K>>& rows, bool one
 /// One row of K numbers.
 template <int K>
 Eigen::Vector<double, K> row_of(const Doubles& array, const std::string& name, const std::string& view = {}) {
-  const auto rows = rows_of<K>(array, name, view);
-  if (rows.size() == 1) return rows[0];
+  if (array.size() == K) return rows_of<K>(array, name, view).at(0);
   raise({Reason::bad_value, fmt::format("{}: shape {} is not ({},)", name, shape_of(array), K), view, {}});
 }
 

@@ -23,7 +23,9 @@ namespace {
 std::size_t index_of(const pipeline::Result& result, const ViewKey& key) {
   for (std::size_t i = 0; i < result.views.size(); ++i)
     if (key == ViewKey(i) || key == ViewKey(result.views[i].name)) return i;
-  raise({Reason::bad_value, "view: the result has no such view", {}, {}});
+  std::vector<std::string> names;
+  for (const pipeline::ViewResult& view : result.views) names.push_back(view.name);
+  raise({Reason::bad_value, fmt::format("view: the result has only {}", fmt::join(names, ", ")), {}, {}});
 }
 
 pipeline::Result run(const std::filesystem::path& folder, const std::string& method,

@@ -63,7 +63,11 @@ phantom::Plate plate_of(const GivenPlate& given) {
   if (const auto* plate = std::get_if<phantom::Plate>(&given)) return *plate;
   const auto& path = std::get<std::filesystem::path>(given);
   if (phantom::Plate built_in = phantom::plate48(); path == built_in.name) return built_in;
-  return value_or_raise(phantom::read_plate(path));
+  return value_or_raise(phantom::read_plate(path).map_error([](Failure failure) {
+    if (failure.reason == Reason::missing_file)
+      failure.message += fmt::format("; the built-in plate is \"{}\"", phantom::plate48().name);
+    return failure;
+  }));
 }
 
 rectification::DistortionMap loaded(const std::filesystem::path& path) {

@@ -126,6 +126,12 @@ def test_attributes_are_read_only(pair):
             array[...] = 5
 
 
+def test_limits_of_files_are_figures():
+    given = helicarm.Calibrator.udcsc()
+    error = refused(lambda: helicarm.Calibrator.from_arrays(given.labels, given.xyz_mm, 4000), "diameter_mm")
+    assert error.figures == {"value": 4000.0, "limit": 30.0}
+
+
 def test_dicts_may_hold_arrays_and_refuse_what_json_lacks():
     calibrator = helicarm.Calibrator.udcsc().to_dict()
     calibrator["balls"] = [{**ball, "xyz_mm": np.array(ball["xyz_mm"])} for ball in calibrator["balls"]]
