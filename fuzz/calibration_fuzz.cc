@@ -21,6 +21,10 @@ void run(std::string_view bytes) {
           "focal lengths are finite");
   }
   check(saved->joint_covariance.allFinite(), "the covariance is finite");
+  check(saved->fiducials.size() == saved->views.size(), "each view has a list of fiducials");
+  for (const auto& of_view : saved->fiducials)
+    for (const fiducials::Fiducial& fiducial : of_view)
+      check(fiducial.centre_in_calibrator.allFinite() && fiducial.uv.allFinite(), "the fiducials are finite");
 }
 
 std::vector<std::string> seeds() {
@@ -39,7 +43,18 @@ std::vector<std::string> seeds() {
       {"status", "ok"},
       {"views", views},
       {"calibration", {{"joint_covariance", geometry::json_rows(Eigen::MatrixXd::Identity(n, n))}}}};
-  return {result.dump()};
+  Json calibration = result;
+  calibration["format"] = "helicarm-calibration/1";
+  calibration["calibration"].update({{"chi2", 20.5}, {"dof", 24}, {"variance_scale", 1}});
+  calibration["views"][0]["fiducials"] = {{{"label", "P1"},
+                                           {"status", "used"},
+                                           {"xyz_mm", {1, 2, 3}},
+                                           {"uv_raw", {10, 20}},
+                                           {"uv", {10.5, 20.5}},
+                                           {"sigma_px", 0.1},
+                                           {"residual_px", 0.2}},
+                                          {{"label", "P2"}, {"status", "not_found"}, {"xyz_mm", {4, 5, 6}}}};
+  return {result.dump(), calibration.dump()};
 }
 
 }  // namespace helicarm::fuzz
