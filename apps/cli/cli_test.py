@@ -168,6 +168,17 @@ class CommandLine(unittest.TestCase):
         for name in ("report.html", "AP_overlay.png", "LAT_overlay.png"):
             self.assertTrue((self.root / "out" / name).stat().st_size > 1000, name)
 
+    def test_run_of_several_cases_goes_on_after_an_unusable_one(self):
+        broken = self.root / "broken"
+        broken.mkdir()
+        (broken / "case.json").write_text("{")
+        done = run("run", broken, self.root / "case", "--out", self.root / "both")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("1 of 2 cases", done.stderr)
+        lines = (self.root / "both/summary.csv").read_text().splitlines()
+        self.assertEqual([line.split(",")[:3] for line in lines[1:]], [["broken", "failed", "bad_json"], ["case", "ok", ""]])
+        self.assertTrue((self.root / "both/case/report.html").exists())
+
     def test_export_writes_what_other_programs_read(self):
         out = self.root / "exported"
         done = run("export", self.root / "case", "--out", out, "--json")

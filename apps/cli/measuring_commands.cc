@@ -8,7 +8,7 @@
 #include "locate_command.h"
 #include "predict_command.h"
 #include "rectify_command.h"
-#include "run_command.h"
+#include "run_cases_command.h"
 #include "solve_command.h"
 
 namespace helicarm::cli {
@@ -25,10 +25,15 @@ void add_motion(CLI::App* command, double& motion_sigma_mm) {
 void add_run(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "run", "Measure a case: points and tunnels with covariances from two or more X-ray images",
-      "helicarm run my-case --out my-result");
-  auto& a = arguments_of(command, action, run_command);
-  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
-  command->add_option("--out", a.out, "Folder for result.json, report.html and the overlays")
+      "helicarm run my-case --out my-result\n"
+      "  helicarm run study/* --out results    each case in results/NAME, all in results/summary.csv");
+  auto& [cases, a] = arguments_of(command, action, run_cases_command);
+  command->add_option("CASE", cases, "Folder that holds case.json; several are run one after the other")
+      ->required();
+  command
+      ->add_option("--out", a.out,
+                   "Folder for result.json, report.html and the overlays; with several cases for a folder of "
+                   "each and summary.csv")
       ->capture_default_str();
   add_fields(command, a.options, pipeline::run_fields);
   command->add_option("--machine", a.history,

@@ -140,8 +140,7 @@ phantom_calibration::PhantomOptions options_of(const PhantomArguments& arguments
   if (arguments.distance_sigma_mm) options.distance_sigma_mm = *arguments.distance_sigma_mm;
   options.outer = value_or_throw(phantom_calibration::is_outer(arguments.distance_is));
   for (const std::string& distance : arguments.distances)
-    options.distances.push_back(
-        value_or_throw(phantom_calibration::hand_distance_from(distance, arguments.from_scratch)));
+    options.distances.push_back(value_or_throw(phantom_calibration::hand_distance_from(distance)));
   options.threads = console.threads;
   options.date = phantom_calibration::today();
   return options;

@@ -203,8 +203,10 @@ void add_phantom(CLI::App& app, Action& action) {
   command
       ->add_option(
           "--distance", a.distances,
-          "measure: distance of two balls by caliper, A,B=MM with labels; from scratch u1,v1;u2,v2=MM with "
-          "raw pixels in the first view; repeatable. Without it the scale has a sigma of 3 %")
+          "measure: distance of two balls by caliper, A,B=MM with labels (from scratch those that a first "
+          "measurement gives, see its report) or u1,v1;u2,v2=MM with raw pixels in the first view; "
+          "repeatable. "
+          "Without it the scale has a sigma of 3 %")
       ->allow_extra_args(false);
   command
       ->add_option("--distance-sigma", a.distance_sigma_mm,

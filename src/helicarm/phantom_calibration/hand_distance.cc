@@ -9,10 +9,12 @@
 
 namespace helicarm::phantom_calibration {
 
-Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixels) {
+Expected<HandDistance> hand_distance_from(const std::string& text) {
   const auto wrong = [&] {
     return fail(Reason::usage,
-                fmt::format("--distance: \"{}\" is not {}", text, by_pixels ? "u1,v1;u2,v2=MM" : "A,B=MM"));
+                fmt::format("--distance: \"{}\" is neither A,B=MM (labels) nor u1,v1;u2,v2=MM (pixels of the "
+                            "first view), with MM over 0 and up to 2000",
+                            text));
   };
   const std::size_t equals = text.rfind('=');
   if (equals == std::string::npos) return wrong();
@@ -25,15 +27,14 @@ Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixel
   if (!number(text.substr(equals + 1), distance.mm) || !(distance.mm > 0) || distance.mm > 2000)
     return wrong();
   const std::string pair = text.substr(0, equals);
-  if (!by_pixels) {
+  const std::size_t semicolon = pair.find(';');
+  if (semicolon == std::string::npos) {
     const std::size_t comma = pair.find(',');
     if (comma == std::string::npos || pair.find(',', comma + 1) != std::string::npos) return wrong();
     distance.a = pair.substr(0, comma);
     distance.b = pair.substr(comma + 1);
     return distance;
   }
-  const std::size_t semicolon = pair.find(';');
-  if (semicolon == std::string::npos) return wrong();
   const auto place = [&](const std::string& words, FiducialName& name) {
     const std::size_t comma = words.find(',');
     Eigen::Vector2d uv;

@@ -19,7 +19,7 @@ struct HandDistance {
 };
 
 /// A,B=MM with labels, or u1,v1;u2,v2=MM. `usage` where it is neither.
-Expected<HandDistance> hand_distance_from(const std::string& text, bool by_pixels);
+Expected<HandDistance> hand_distance_from(const std::string& text);
 
 /// Whether the word for a distance's kind is "outer" (over both balls) and not "centres"; `usage` for
 /// another.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/view.h"
+#include "helicarm/image/image.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom_calibration/hand_distance.h"
 #include "helicarm/phantom_calibration/scale.h"
@@ -51,6 +53,8 @@ struct MeasuredView {
   std::vector<std::pair<std::size_t, Eigen::Vector2d>> residuals_px;  ///< ball, projection less image
   std::vector<Eigen::Vector2d> images_px;                             ///< rectified, in the same order
   std::vector<double> sigmas_px;                                      ///< per axis, without the map's
+  int width = 0, height = 0;                                          ///< of the image, px
+  image::Image<std::uint8_t> shown;  ///< the rectified image for display, of half the size if it is large
 };
 
 struct PhantomScale {

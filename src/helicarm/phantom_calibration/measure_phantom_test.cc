@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/phantom_calibration/gauge.h"
+#include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/simulated_phantom_test.h"
 
 namespace helicarm::phantom_calibration {
@@ -192,21 +193,34 @@ TEST(MeasurePhantom, UnknownLabelOfADistanceIsUnusableInput) {
   EXPECT_EQ(result.error().reason, Reason::bad_value);
 }
 
+TEST(MeasurePhantom, ReportShowsTheImagesWithTheBallsLabels) {
+  PhantomFolder folder(five_views());
+  const auto result = measured(folder.given);
+  ASSERT_FALSE(result.failure) << result.failure->message;
+  const std::string html = phantom_report_html(result);
+  const auto count = [&](const std::string& text) {
+    int found = 0;
+    for (std::size_t at = html.find(text); at != std::string::npos; at = html.find(text, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("data:image/png"), 5);
+  EXPECT_GE(count(">P7</text>"), 5);
+}
+
 TEST(HandDistance, LabelsAndPixelsAreRead) {
-  const auto labels = hand_distance_from("P1,P7=83.42", false);
+  const auto labels = hand_distance_from("P1,P7=83.42");
   ASSERT_TRUE(labels) << labels.error().message;
   EXPECT_EQ(std::get<std::string>(labels->b), "P7");
   EXPECT_EQ(labels->mm, 83.42);
-  const auto pixels = hand_distance_from("174.5,373;812,366=110.3", true);
+  const auto pixels = hand_distance_from("174.5,373;812,366=110.3");
   ASSERT_TRUE(pixels) << pixels.error().message;
   EXPECT_EQ(std::get<Eigen::Vector2d>(pixels->a), Eigen::Vector2d(174.5, 373));
 }
 
 TEST(HandDistance, WrongOnesAreRefused) {
-  for (const char* text : {"P1,P7", "P1=83", "P1,P7,P8=83", "P1,P7=-3", "P1,P7=nan", "P1,P7=1e9", "P1,P7=8x"})
-    EXPECT_FALSE(hand_distance_from(text, false)) << text;
-  for (const char* text : {"P1,P7=83", "1,2;3=4", "1;2,3=4", "1,2;3,4="})
-    EXPECT_FALSE(hand_distance_from(text, true)) << text;
+  for (const char* text : {"P1,P7", "P1=83", "P1,P7,P8=83", "P1,P7=-3", "P1,P7=nan", "P1,P7=1e9", "P1,P7=8x",
+                           "1,2;3=4", "1;2,3=4", "1,2;3,4="})
+    EXPECT_FALSE(hand_distance_from(text)) << text;
 }
 
 }  // namespace

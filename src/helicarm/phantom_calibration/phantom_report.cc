@@ -9,6 +9,7 @@
 
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/image/png.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/style.h"
 
@@ -82,8 +83,8 @@ std::string warnings(const PhantomResult& result) {
   return html + "</ul>\n";
 }
 
-/// Residuals of a view as arrows, 300 times enlarged.
-std::string residual_figure(const MeasuredView& view) {
+/// A view's image with its balls, whose residuals are arrows, 300 times enlarged.
+std::string view_figure(const MeasuredView& view, const std::vector<MeasuredBall>& balls) {
   constexpr double enlarged = 300;
   std::vector<std::pair<Vector2d, Vector2d>> arrows;
   Vector2d low = Vector2d::Constant(1e300), high = -low;
@@ -96,14 +97,22 @@ std::string residual_figure(const MeasuredView& view) {
   const Vector2d margin = 0.12 * (high - low) + Vector2d(30, 30);
   low -= margin;
   high += margin;
-  std::string svg = fmt::format("<figure class=\"plain\"><svg viewBox=\"{:.0f} {:.0f} {:.0f} {:.0f}\">",
-                                low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
-  for (const auto& [at, residual] : arrows) {
+  std::string svg = fmt::format(
+      "<figure><svg viewBox=\"{:.0f} {:.0f} {:.0f} {:.0f}\"><image x=\"-0.5\" y=\"-0.5\" width=\"{}\" "
+      "height=\"{}\" href=\"data:image/png;base64,{}\"/>",
+      low.x(), low.y(), high.x() - low.x(), high.y() - low.y(), view.width, view.height,
+      report::base64(image::encode_png(view.shown)));
+  const double unit = (high - low).maxCoeff() / 600;
+  for (std::size_t i = 0; i < arrows.size(); ++i) {
+    const auto& [at, residual] = arrows[i];
     const Vector2d tip = at + enlarged * residual;
+    const std::size_t ball = view.residuals_px[i].first;
     svg += fmt::format(
-        "<circle class=\"field\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"6\"/><path class=\"residual\" "
-        "d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/>",
-        at.x(), at.y(), at.x(), at.y(), tip.x(), tip.y());
+        "<circle class=\"ball\" stroke-width=\"{:.2f}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{:.1f}\"/><path "
+        "class=\"residual\" d=\"M{:.1f} {:.1f}L{:.1f} {:.1f}\"/><text font-size=\"{:.1f}\" x=\"{:.1f}\" "
+        "y=\"{:.1f}\">{}</text>",
+        unit, at.x(), at.y(), 9 * unit, at.x(), at.y(), tip.x(), tip.y(), 14 * unit, at.x() + 11 * unit,
+        at.y() - 7 * unit, ball < balls.size() ? report::escaped(balls[ball].label) : "");
   }
   return svg + fmt::format(
                    "</svg><figcaption>{}: residuals, magnified {:g} times; {:.3f} px rms per axis{}"
@@ -121,7 +130,7 @@ std::string views_section(const PhantomResult& result) {
   for (const MeasuredView& view : result.views) {
     table.row({report::escaped(view.name), std::to_string(view.residuals_px.size()),
                report::fixed(view.rms_px, 3), report::fixed(view.left_out_rms_px, 3)});
-    figures += residual_figure(view);
+    figures += view_figure(view, result.balls);
   }
   return "<h2>Views</h2>\n" + table.html() +
          "<p class=\"soft\">left out: the phantom is measured by the other views, which then predict this "

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_cases_command.h"
+
+#include <algorithm>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/pipeline/result.h"
+
+namespace helicarm::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A line of summary.csv.
+struct CaseSummary {
+  std::string name;
+  std::optional<Failure> failure;
+  std::size_t points = 0, located = 0, warnings = 0;
+  std::optional<double> worst_error_mm, fre_mm, tre_mm;
+};
+
+CaseSummary summary_of(const std::string& name, const Expected<pipeline::Result>& result) {
+  CaseSummary summary;
+  summary.name = name;
+  summary.failure = result ? result->failure : result.error();
+  if (summary.failure && !summary.failure->view.empty())
+    summary.failure->message = summary.failure->view + ": " + summary.failure->message;
+  if (!result) return summary;
+  summary.warnings = result->warnings.size();
+  summary.points = result->points.size();
+  for (const pipeline::PointResult& point : result->points)
+    if (point.place) {
+      ++summary.located;
+      summary.worst_error_mm = std::max(summary.worst_error_mm.value_or(0),
+                                        localization::length_at_95(point.place->covariance_in_calibrator));
+    }
+  if (result->accuracy.fre_mm.n > 0) summary.fre_mm = result->accuracy.fre_mm.mean;
+  if (result->accuracy.tre_mm.n > 0) summary.tre_mm = result->accuracy.tre_mm.mean;
+  return summary;
+}
+
+std::string_view status_of(const CaseSummary& summary) {
+  if (!summary.failure) return "ok";
+  return exit_code(summary.failure->reason) == 2 ? "failed" : "refused";
+}
+
+std::string quoted(std::string text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
+  return '"' + text + '"';
+}
+
+std::string csv_of(const std::vector<CaseSummary>& cases) {
+  const auto number = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.4f}", *value) : std::string();
+  };
+  std::string csv =
+      "case,status,code,message,points,located,worst_error_95_mm,fre_mean_mm,tre_mean_mm,warnings\n";
+  for (const CaseSummary& c : cases)
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", quoted(c.name), status_of(c),
+                       c.failure ? code(c.failure->reason) : "", c.failure ? quoted(c.failure->message) : "",
+                       c.points, c.located, number(c.worst_error_mm), number(c.fre_mm), number(c.tre_mm),
+                       c.warnings);
+  return csv;
+}
+
+/// What went wrong with the cases, by the gravest of them.
+Failure gravest(const std::vector<CaseSummary>& cases, const fs::path& csv) {
+  std::size_t failed = 0;
+  const CaseSummary* worst = nullptr;
+  for (const CaseSummary& c : cases) {
+    if (!c.failure) continue;
+    ++failed;
+    if (!worst || exit_code(c.failure->reason) < exit_code(worst->failure->reason)) worst = &c;
+  }
+  Failure failure = *worst->failure;
+  failure.view.clear();
+  failure.message = fmt::format("{} of {} cases give no result, {} for example: {} ({} lists all)", failed,
+                                cases.size(), worst->name, failure.message, csv.string());
+  failure.figures = {{"cases", double(cases.size())}, {"without_result", double(failed)}};
+  return failure;
+}
+
+CommandResult run_several(const RunCasesArguments& arguments, Console& console) {
+  const std::vector<std::string> names = names_of(arguments.cases);
+  const fs::path csv = arguments.run.out / "summary.csv";
+  std::vector<CaseSummary> done;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    RunArguments run = arguments.run;
+    run.folder = arguments.cases[i];
+    run.out = arguments.run.out / names[i];
+    Console silent = console;
+    silent.quiet = true;
+    done.push_back(summary_of(names[i], run_and_write(run, silent)));
+    const CaseSummary& c = done.back();
+    if (auto written = write_file(csv, csv_of(done)); !written) return written;
+    if (console.quiet) continue;
+    console.progress << fmt::format(
+        "[{}/{}] {}: {}\n", i + 1, names.size(), c.name,
+        c.failure ? fmt::format("{}: {}", code(c.failure->reason), c.failure->message)
+                  : fmt::format("{} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.located,
+                                c.points, c.worst_error_mm.value_or(0), c.warnings));
+  }
+  if (std::ranges::any_of(done, [](const CaseSummary& c) { return c.failure.has_value(); }))
+    return tl::unexpected<Failure>(gravest(done, csv));
+  if (console.json)
+    console.out << to_text(Json{{"cases", done.size()}, {"summary", csv.string()}}) << '\n';
+  else if (!console.quiet)
+    console.out << fmt::format("\n  {} cases, written to {}\n", done.size(), csv.string());
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
+  std::vector<std::string> names;
+  const auto is_taken = [&](const std::string& name) {
+    return std::ranges::find(names, name) != names.end();
+  };
+  for (const fs::path& given : cases) {
+    const fs::path whole = fs::absolute(given).lexically_normal();
+    const fs::path folder =
+        whole.extension() == ".json" || !whole.has_filename() ? whole.parent_path() : whole;
+    std::string name = folder.filename().string();
+    if (name.empty()) name = "case";
+    std::string own = name;
+    for (int n = 2; is_taken(own); ++n) own = fmt::format("{}_{}", name, n);
+    names.push_back(own);
+  }
+  return names;
+}
+
+CommandResult run_cases_command(const RunCasesArguments& arguments, Console& console) {
+  if (arguments.cases.size() > 1) return run_several(arguments, console);
+  RunArguments run = arguments.run;
+  run.folder = arguments.cases.front();
+  return run_command(run, console);
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "run_command.h"
+
+namespace helicarm::cli {
+
+struct RunCasesArguments {
+  std::vector<std::filesystem::path> cases;  ///< folders that hold case.json, or case files
+  RunArguments run = {};                     ///< without its folder
+};
+
+/// Measures one case as `run_command`. Of several, each writes to a folder of its own under `run.out`, and
+/// summary.csv there has a line for each, written anew after each case. A refused or unusable case does not
+/// stop the others; the command then fails with `Reason::cases_failed`.
+CommandResult run_cases_command(const RunCasesArguments& arguments, Console& console);
+
+/// A different name for each case: that of its folder, numbered where it repeats.
+std::vector<std::string> names_of(const std::vector<std::filesystem::path>& cases);
+
+}  // namespace helicarm::cli
