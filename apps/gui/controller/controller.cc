@@ -274,8 +274,14 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
     forget_measurement(state);
     state.result = result;
     ++state.measurements;
-    state.measured = !result->failure;
-    if (result->failure) state.refusals.insert_or_assign(phase_of(*result->failure), *result->failure);
+    // A refused tunnel leaves the calibration: its ends can be picked again.
+    state.measured =
+        !result->views.empty() && std::ranges::all_of(result->views, [](const pipeline::ViewResult& view) {
+          return view.calibrated.has_value();
+        });
+    if (result->failure)
+      state.refusals.insert_or_assign(state.measured ? Phase::plan : phase_of(*result->failure),
+                                      *result->failure);
     live_tool_ = live;
   };
 }

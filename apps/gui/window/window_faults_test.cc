@@ -102,6 +102,29 @@ TEST_F(Window, CancelEndsTheWaitForAnImage) {
   EXPECT_FALSE(cancel->isVisible());
 }
 
+TEST_F(Window, WrongPickRefusesThePlanUntilItIsPickedAgain) {
+  simulation::SimulationOptions options;
+  options.kind = simulation::CaseKind::tunnels;
+  ASSERT_TRUE(simulation::write_case(folder_ / "tunnels", simulation::simulate_case(options).value()));
+  drop(*window_, {folder_ / "tunnels"});
+  ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
+  const std::vector<pipeline::Pick> picks = state().picks;
+  const auto pick_end_at = [&](const std::string& point) {
+    for (pipeline::Pick pick : picks)
+      if (pick.name == point) {
+        pick.name = "FE";
+        window_->controller().pick(pick);
+        ASSERT_TRUE(wait_idle());
+      }
+  };
+  pick_end_at("FS");
+  EXPECT_EQ(card(Phase::plan).status, StepStatus::refused);
+  EXPECT_THAT(card(Phase::plan).why.toStdString(), HasSubstr("bad_tunnel"));
+  EXPECT_TRUE(state().measured);
+  pick_end_at("FE");
+  EXPECT_EQ(card(Phase::plan).status, StepStatus::good) << card(Phase::plan).why.toStdString();
+}
+
 TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNoNextStep) {
   simulation::SimulationOptions options;
   options.size = 512;

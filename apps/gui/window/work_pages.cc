@@ -208,6 +208,8 @@ QString NavigatePage::next_step() const {
   if (!state.measured) return tr("Acquire the X-ray images first (Alt+1).");
   if (!state.hand_eye_rms_mm) return tr("Hold button 2 to register the robot.");
   if (next_pick(state)) return tr("Place the tunnels' ends first (Alt+4).");
+  if (const auto refusal = state.refusals.find(Phase::plan); refusal != state.refusals.end())
+    return sentence_of(refusal->second) + tr(". Pick its ends again (Alt+4).");
   if (const auto refusal = state.refusals.find(Phase::navigate);
       refusal != state.refusals.end() && refusal->second.reason == Reason::plan_stale)
     return sentence_of(refusal->second) +
@@ -219,7 +221,7 @@ void NavigatePage::allow() {
   const ApplicationState& state = controller_.state();
   const bool free = !state.busy && state.source != Source::files && state.source != Source::none;
   const bool ready = free && phase_ == robot::LinkPhase::ready;
-  const bool placed = state.measured && !next_pick(state);
+  const bool placed = state.measured && !next_pick(state) && !state.refusals.contains(Phase::plan);
   says_->setText(next_step());
   unlock_->setEnabled(free && (phase_ == robot::LinkPhase::idle || phase_ == robot::LinkPhase::stopped));
   register_->setEnabled(ready && !state.tool_is_out);

@@ -56,6 +56,7 @@ TEST_F(ReceiverCrowd, AssociationReceivingAnImageIsKept) {
   RawClient c_arm = associated();
   c_arm.send(peer::echo() + half_an_image());
   EXPECT_EQ(c_arm.receive_status(), 0);
+  ASSERT_TRUE(eventually([&] { return receiver_->counters().bytes_on_the_way > 0; }));  // of the image
   EXPECT_EQ(answer_to(peer::Request().bytes()), rejected);
   c_arm.send(other_half());
   EXPECT_EQ(c_arm.receive_status(), 0);
