@@ -282,6 +282,18 @@ class CommandLine(unittest.TestCase):
             self.assertAlmostEqual(point["u"], u, 6)
             self.assertAlmostEqual(point["v"], v, 6)
 
+    def test_rectify_applies_a_map_to_the_images_of_a_folder(self):
+        out, series = self.root / "fitted", self.root / "series"
+        series.mkdir()
+        for name in ("a", "b"):
+            shutil.copy(self.root / "case/AP.dcm", series / f"{name}.dcm")
+        run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out)
+        done = run("rectify", series, "--map", out / "map.json", "--out", self.root / "straight", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        names = [self.root / "straight" / f"{name}_rectified.dcm" for name in ("a", "b")]
+        self.assertEqual(json.loads(done.stdout)["written"], [str(name) for name in names])
+        self.assertEqual(names[0].stat().st_size, (out / "rectified.dcm").stat().st_size)
+
     def test_rectify_returns_null_for_points_outside_the_image(self):
         out = self.root / "rectified_twice"
         run("rectify", self.root / "case/AP.dcm", "--plate", self.root / "case/plate.json", "--out", out, "--quiet")

@@ -106,10 +106,11 @@ void add_rectify(CLI::App& app, Action& action) {
   auto* command = add_command(app, "rectify",
                               "Correct an intensifier's distortion by its plate, or apply a known map (2.1)",
                               "helicarm rectify AP.dcm --plate plate48 --out rectified\n"
+                              "  helicarm rectify series/ --map rectified/map.json --out straight\n"
                               "  helicarm rectify --map rectified/map.json --points raw.csv --json\n"
                               "  helicarm rectify GRID.dcm --map rectified/map.json --test-grid 20 --json");
   auto& a = arguments_of(command, action, rectify_command);
-  command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF");
+  command->add_option("IMAGE", a.images, "DICOM, PNG or TIFF; with --map several, and folders of images");
   command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
       ->check(within(1, 100000));
   command->add_option("--plate", a.plate, "plate.json, or plate48");
@@ -118,7 +119,10 @@ void add_rectify(CLI::App& app, Action& action) {
   command->add_flag("--inverse", a.inverse, "The points are rectified pixels; return raw ones");
   command->add_option("--test-grid", a.test_grid_mm, "Pitch of the test grid, mm: report Eq. 14-15")
       ->check(within(0.1, 1000));
-  command->add_option("--out", a.out, "Folder for rectified.dcm, inpainted.dcm, map.json and residuals.csv")
+  command
+      ->add_option("--out", a.out,
+                   "Folder for rectified.dcm (of several images NAME_rectified.dcm), inpainted.dcm, "
+                   "map.json and residuals.csv")
       ->capture_default_str();
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
       ->capture_default_str();

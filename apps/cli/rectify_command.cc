@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "distinct_names.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/rectification/inpaint.h"
@@ -19,9 +20,28 @@
 namespace helicarm::cli {
 namespace {
 
-xray::XrayImage image_of(const RectifyArguments& arguments) {
-  return value_or_throw(
-      xray::read_xray_image(*arguments.image, arguments.image->filename().string(), arguments.frame));
+xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments) {
+  return value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
+}
+
+/// The files, and in their name's order those of the folders.
+std::vector<std::filesystem::path> files_of(const std::vector<std::filesystem::path>& images) {
+  std::vector<std::filesystem::path> files;
+  for (const std::filesystem::path& image : images) {
+    if (!std::filesystem::is_directory(image)) {
+      files.push_back(image);
+      continue;
+    }
+    std::vector<std::filesystem::path> inside;
+    for (const auto& entry : std::filesystem::directory_iterator(image))
+      if (entry.is_regular_file() && !entry.path().filename().string().starts_with('.'))
+        inside.push_back(entry.path());
+    if (inside.empty())
+      throw BadInput(Reason::missing_file, fmt::format("{}: the folder holds no file", image.string()));
+    std::ranges::sort(inside);
+    files.insert(files.end(), inside.begin(), inside.end());
+  }
+  return files;
 }
 
 rectification::DistortionMap map_of(const RectifyArguments& arguments) {
@@ -63,7 +83,7 @@ Json figures_of(const rectification::Rectification& r) {
 }
 
 void rectify_image(const RectifyArguments& arguments, Console& console) {
-  const xray::XrayImage xray_image = image_of(arguments);
+  const xray::XrayImage xray_image = read(arguments.images.front(), arguments);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
       xray_image, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
   std::string residuals = "u_px,v_px,residual_px\n";
@@ -87,6 +107,30 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
         arguments.out.string());
 }
 
+/// Refuses an image that the map is not for, or whose plate it does not make straight.
+void map_images(const RectifyArguments& arguments, Console& console) {
+  const rectification::DistortionMap map = map_of(arguments);
+  const std::vector<std::filesystem::path> files = files_of(arguments.images);
+  std::vector<std::string> names;
+  for (const std::filesystem::path& file : files) names.push_back(file.stem().string());
+  names = distinct(names);
+  Json written = Json::array();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const xray::XrayImage xray_image = read(files[i], arguments);
+    value_or_throw(rectification::with_map(xray_image, map, {}).map_error([&](Failure failure) {
+      failure.message = fmt::format("{}: {}", files[i].filename().string(), failure.message);
+      return failure;
+    }));
+    const std::filesystem::path to =
+        arguments.out / (files.size() == 1 ? "rectified.dcm" : names[i] + "_rectified.dcm");
+    value_or_throw(xray::write_dicom(to, rectified_image(xray_image, map, "rectified")));
+    written.push_back(to.string());
+    if (!console.quiet && !console.json)
+      console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());
+  }
+  if (console.json) console.out << to_text(Json{{"written", std::move(written)}}) << '\n';
+}
+
 void map_points(const RectifyArguments& arguments, Console& console) {
   const rectification::DistortionMap map = map_of(arguments);
   const CsvTable table = value_or_throw(read_csv(*arguments.points, {"u_px", "v_px"}, {}));
@@ -108,8 +152,8 @@ void map_points(const RectifyArguments& arguments, Console& console) {
 
 void measure_grid(const RectifyArguments& arguments, Console& console) {
   const rectification::DistortionMap map = map_of(arguments);
-  const rectification::TestGrid grid =
-      value_or_throw(rectification::measure_test_grid(rectification::find_grid(image_of(arguments)), map));
+  const rectification::TestGrid grid = value_or_throw(rectification::measure_test_grid(
+      rectification::find_grid(read(arguments.images.front(), arguments)), map));
   const auto json_of = [](const rectification::GridError& error) {
     return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
   };
@@ -128,12 +172,14 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
 
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console) {
   return guarded([&] {
-    if (arguments.points && arguments.map && !arguments.image) return map_points(arguments, console);
-    if (arguments.image && arguments.test_grid_mm && arguments.map) return measure_grid(arguments, console);
-    if (arguments.image && arguments.plate && !arguments.map && !arguments.points)
-      return rectify_image(arguments, console);
+    const RectifyArguments& a = arguments;
+    if (a.points && a.map && a.images.empty()) return map_points(a, console);
+    if (a.images.size() == 1 && a.test_grid_mm && a.map) return measure_grid(a, console);
+    if (!a.images.empty() && a.map && !a.plate && !a.points && !a.test_grid_mm) return map_images(a, console);
+    if (a.images.size() == 1 && a.plate && !a.map && !a.points) return rectify_image(a, console);
     throw BadInput(Reason::usage,
-                   "rectify: give IMAGE --plate, or --map --points, or IMAGE --map --test-grid (see --help)");
+                   "rectify: give IMAGE --plate, or IMAGE... --map, or --map --points, or IMAGE --map "
+                   "--test-grid (see --help)");
   });
 }
 

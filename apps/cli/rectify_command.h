@@ -4,14 +4,15 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "command.h"
 
 namespace helicarm::cli {
 
-/// One of: an image with a plate; points with a map; an image of the test grid with a map.
+/// One of: an image with a plate; images, points or an image of the test grid with a map.
 struct RectifyArguments {
-  std::optional<std::filesystem::path> image;
+  std::vector<std::filesystem::path> images;  ///< with a map several, and folders of images
   std::optional<int> frame;
   std::optional<std::string> plate;  ///< plate.json or plate48
   std::optional<std::filesystem::path> map;
@@ -23,7 +24,8 @@ struct RectifyArguments {
 };
 
 /// Fits the distortion of an image and writes rectified.dcm, map.json and residuals.csv; or applies a map to
-/// points; or measures the residual errors of a map on the test grid (Eq. 14-15).
+/// images (rectified.dcm, of several NAME_rectified.dcm) or points; or measures the residual errors of a map
+/// on the test grid (Eq. 14-15).
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

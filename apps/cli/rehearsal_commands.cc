@@ -181,11 +181,13 @@ void add_phantom(CLI::App& app, Action& action) {
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
       ->transform(CLI::CheckedTransformer(
-          std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
-                                               {"check", PhantomAction::check},
-                                               {"export", PhantomAction::export_files},
-                                               {"measure", PhantomAction::measure},
-                                               {"verify", PhantomAction::verify}}))
+                      std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
+                                                           {"check", PhantomAction::check},
+                                                           {"export", PhantomAction::export_files},
+                                                           {"measure", PhantomAction::measure},
+                                                           {"verify", PhantomAction::verify}})
+                      .description("{show, check, export, measure, verify}"))
+      ->type_name("WORD")
       ->required();
   command->add_option(
       "NAME_OR_FILE", a.name_or_file,

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "distinct_names.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/pipeline/result.h"
@@ -118,20 +119,13 @@ CommandResult run_several(const RunCasesArguments& arguments, Console& console) 
 
 std::vector<std::string> names_of(const std::vector<fs::path>& cases) {
   std::vector<std::string> names;
-  const auto is_taken = [&](const std::string& name) {
-    return std::ranges::find(names, name) != names.end();
-  };
   for (const fs::path& given : cases) {
     const fs::path whole = fs::absolute(given).lexically_normal();
-    const fs::path folder =
-        whole.extension() == ".json" || !whole.has_filename() ? whole.parent_path() : whole;
-    std::string name = folder.filename().string();
-    if (name.empty()) name = "case";
-    std::string own = name;
-    for (int n = 2; is_taken(own); ++n) own = fmt::format("{}_{}", name, n);
-    names.push_back(own);
+    const bool is_folder = whole.has_filename() && whole.extension() != ".json";
+    const std::string name = (is_folder ? whole : whole.parent_path()).filename().string();
+    names.push_back(name.empty() ? "case" : name);
   }
-  return names;
+  return distinct(names);
 }
 
 CommandResult run_cases_command(const RunCasesArguments& arguments, Console& console) {

@@ -183,19 +183,6 @@ void warn_of_missing(const Reconstruction& r, const std::vector<std::size_t>& ba
 
 }  // namespace
 
-Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Case& given, unsigned threads) {
-  pipeline::RunOptions options;
-  options.threads = threads;
-  const auto stage = [&](auto work) {
-    return [&, work](auto views) { return work(std::move(views), given, options); };
-  };
-  auto views = pipeline::read_views(given, options)
-                   .and_then(stage(pipeline::rectify_views))
-                   .and_then(stage(pipeline::detect_in_views));
-  if (!views) return tl::unexpected<Failure>(views.error().failure);
-  return *std::move(views);
-}
-
 Expected<AdjustedViews> adjusted_views(const std::vector<pipeline::DetectedView>& detected,
                                        const pipeline::Case& given, KnownCentres known,
                                        std::size_t least_views, unsigned threads,

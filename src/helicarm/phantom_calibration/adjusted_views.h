@@ -29,9 +29,6 @@ enum class KnownCentres {
   file      ///< the calibrator file's; single balls may have moved
 };
 
-/// The case's images, rectified and searched.
-Expected<std::vector<pipeline::DetectedView>> detected_views(const pipeline::Case& given, unsigned threads);
-
 /// Labels (by the calibrator file) or finds (`KnownCentres::none`) the fiducials, observes them in the pixels
 /// and adjusts them. Warns of views and balls that are not part of it; `too_few_views` where fewer than
 /// `least_views` are.

@@ -324,8 +324,10 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
                    "at least two views are required to verify a phantom",
                    {},
                    {{"views", double(given.views.size())}, {"needed", double(least_views)}}});
-  const auto detected = detected_views(given, threads);
-  if (!detected) return refuse(detected.error());
+  pipeline::RunOptions stages;
+  stages.threads = threads;
+  const auto detected = pipeline::detected_views(given, stages);
+  if (!detected) return refuse(detected.error().failure);
   const auto found =
       adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);
   if (!found) {
