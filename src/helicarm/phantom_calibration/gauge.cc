@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 
 #include "helicarm/geometry/rotation.h"
 
@@ -40,18 +39,18 @@ Eigen::MatrixXd similarity_motions(std::span<const Vector3d> points) {
 
 std::optional<Eigen::MatrixXd> inner_constraint_covariance(const Eigen::MatrixXd& normal,
                                                            const Eigen::MatrixXd& motions) {
-  // With orthonormal G of the null space, (N + k G G')^-1 = N^+ + G G' / k.
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(motions, Eigen::ComputeThinU);
-  const Eigen::MatrixXd& null = svd.matrixU();
+  // With the projection P onto the null space, (N + k P)^-1 = N^+ + P / k.
+  const Eigen::MatrixXd unit = motions.colwise().normalized();
+  const Eigen::MatrixXd gram = unit.transpose() * unit;
+  const Eigen::MatrixXd null = unit * gram.ldlt().solve(Eigen::MatrixXd(unit.transpose()));
   const double k = normal.trace() / double(normal.rows());
-  const Eigen::LDLT<Eigen::MatrixXd> solver(normal + k * null * null.transpose());
+  const Eigen::LDLT<Eigen::MatrixXd> solver(normal + k * null);
   if (solver.info() != Eigen::Success || !solver.isPositive() || !(solver.rcond() > 1e-14))
     return std::nullopt;
   const Eigen::MatrixXd inverse =
-      solver.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols())) - null * null.transpose() / k;
+      solver.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols())) - null / k;
   // The normal equations' own rounding leaves something along the null space.
-  const Eigen::MatrixXd keep =
-      Eigen::MatrixXd::Identity(normal.rows(), normal.cols()) - null * null.transpose();
+  const Eigen::MatrixXd keep = Eigen::MatrixXd::Identity(normal.rows(), normal.cols()) - null;
   return keep * ((inverse + inverse.transpose()) / 2) * keep;
 }
 
