@@ -47,6 +47,10 @@ void print_notes(const std::vector<Warning>& notes, std::ostream& out) {
 void forget(const std::filesystem::path& out) {
   std::error_code ignored;
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
+  std::vector<std::filesystem::path> overlays;
+  for (const auto& entry : std::filesystem::directory_iterator(out, ignored))
+    if (entry.path().filename().string().ends_with("_overlay.png")) overlays.push_back(entry.path());
+  for (const std::filesystem::path& overlay : overlays) std::filesystem::remove(overlay, ignored);
 }
 
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
@@ -71,9 +75,6 @@ Expected<void> write(const pipeline::Result& result, const RunArguments& argumen
   if (written) written = write_file(arguments.out / "result.json", to_text(pipeline::to_json(result)) + "\n");
   if (written) return written;
   forget(arguments.out);
-  std::error_code ignored;
-  for (std::size_t i = 0; i < result.views.size(); ++i)
-    std::filesystem::remove(arguments.out / report::overlay_name(result.views[i].name, i), ignored);
   return written;
 }
 

@@ -234,6 +234,18 @@ bool is_missing(const phantom::CalibratorBall& ball, const std::vector<pipeline:
   return empty >= 2;
 }
 
+/// Whether every image is mirrored, and neither the case nor a tag says so.
+bool looks_mirrored(const AdjustedViews& found, const pipeline::Case& given,
+                    const std::vector<pipeline::DetectedView>& detected) {
+  for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
+    const std::size_t i = found.view_of_case[v];
+    if (found.consistent.fit.views[v].intrinsics.fx > 0 || given.views[i].mirrored.value_or(false) ||
+        detected[i].xray_image->acquisition.flip_hint)
+      return false;
+  }
+  return true;
+}
+
 /// A ball of which no two images agree.
 BallState unlocated(const phantom::CalibratorBall& ball, const phantom::Calibrator& file,
                     const std::vector<pipeline::DetectedView>& detected,
@@ -281,10 +293,9 @@ void describe(const AdjustedViews& found, const pipeline::Case& given,
         verified.views += int(std::ranges::count(view.images, i, &FiducialImage::fiducial));
       verified.distance_mm = places[i]->off.norm();
       verified.bound_mm = localization::length_at_95(places[i]->covariance);
-      if (out[i])
-        verified.state = BallState::moved;
-      else if (places[i]->chi2 > chi2_limit(problem.centres.size()))
-        verified.state = BallState::not_verified;
+      // A ball that a farther one had pushed out may fit once that one is out.
+      if (places[i]->chi2 > chi2_limit(problem.centres.size()))
+        verified.state = out[i] && places[i]->is_moved ? BallState::moved : BallState::not_verified;
     }
     if (verified.state == BallState::not_verified) result.warnings.push_back(not_verified(verified));
     result.balls.push_back(std::move(verified));
@@ -330,6 +341,13 @@ Expected<PhantomVerification> verify_phantom(const pipeline::Case& given, unsign
   if (!detected) return refuse(detected.error().failure);
   const auto found =
       adjusted_views(*detected, given, KnownCentres::file, least_views, threads, result.warnings);
+  if (found && looks_mirrored(*found, given, *detected))
+    return refuse(
+        {Reason::ambiguous_handedness,
+         "the balls fit mirrored images only: an axis of the calibrator file has the wrong sign, or "
+         "the images are mirrored, which \"mirrored\" of the views must state",
+         {},
+         {{"views", double(found->view_of_case.size())}}});
   if (!found) {
     Failure failure = found.error();
     if (failure.reason == Reason::too_few_fiducials)

@@ -76,6 +76,23 @@ TEST(VerifyPhantom, BallThatOneViewAloneShowsSlightlyOffIsNotVerified) {
   EXPECT_EQ(result->warnings.back().reason, Reason::residual_too_large);
 }
 
+TEST(VerifyPhantom, BallFarOffDoesNotTakeOthersWithIt) {
+  PhantomFolder folder(three_views());
+  folder.ball("P9").centre_in_calibrator += Eigen::Vector3d(0, 4, 0);
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(labels_of(*result, BallState::moved), std::vector<std::string>{"P9"});
+}
+
+TEST(VerifyPhantom, MirroredFileIsRefused) {
+  PhantomFolder folder(three_views());
+  for (phantom::CalibratorBall& ball : folder.given.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  const auto result = verify_phantom(folder.given, 2);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_TRUE(result->failure);
+  EXPECT_EQ(result->failure->reason, Reason::ambiguous_handedness) << result->failure->message;
+}
+
 TEST(VerifyPhantom, BallOfAnotherSizeIsNamedAsSwapped) {
   PhantomFolder folder(three_views());
   folder.ball("P8").diameter_mm = 6;
