@@ -168,6 +168,15 @@ class CommandLine(unittest.TestCase):
         for name in ("report.html", "AP_overlay.png", "LAT_overlay.png"):
             self.assertTrue((self.root / "out" / name).stat().st_size > 1000, name)
 
+    def test_run_that_fails_leaves_no_overlay_of_an_earlier_result(self):
+        out, broken = self.root / "again", self.root / "unreadable"
+        run("run", self.root / "case", "--out", out, "--quiet")
+        (out / "my_overlay.png").write_text("the user's own")
+        broken.mkdir()
+        (broken / "case.json").write_text("{")
+        self.assertEqual(run("run", broken, "--out", out).returncode, 2)
+        self.assertEqual([path.name for path in out.iterdir()], ["my_overlay.png"])
+
     def test_run_of_several_cases_goes_on_after_an_unusable_one(self):
         broken = self.root / "broken"
         broken.mkdir()

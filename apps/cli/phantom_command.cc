@@ -228,9 +228,7 @@ void verify(const PhantomArguments& arguments, Console& console) {
         write_file(*arguments.out / "result.json", to_text(phantom_calibration::to_json(result)) + "\n"));
   notify(result.warnings, console);
   if (console.json && !result.failure) console.out << to_text(phantom_calibration::to_json(result)) << "\n";
-  if (!console.json && !console.quiet) {
-    print(result, console);
-  }
+  if (!console.json && !console.quiet) print(result, console);
   if (result.failure) throw BadInput(*result.failure);
 }
 

@@ -43,14 +43,23 @@ void print_notes(const std::vector<Warning>& notes, std::ostream& out) {
                          of_kind.mapped() > 1 ? fmt::format(" (and {} more)", of_kind.mapped() - 1) : "");
 }
 
+/// The views of an earlier result in the folder, if any.
+std::vector<std::string> earlier_views(const std::filesystem::path& out) {
+  std::vector<std::string> names;
+  const auto json = read_json(out / "result.json");
+  if (!json || !json->is_object() || !json->contains("views") || !(*json)["views"].is_array()) return names;
+  for (const Json& view : (*json)["views"])
+    if (view.is_object() && view.contains("name") && view["name"].is_string())
+      names.push_back(view["name"].get<std::string>());
+  return names;
+}
+
 /// Removes files of an earlier or incomplete run, which could be taken for an answer.
-void forget(const std::filesystem::path& out) {
+void forget(const std::filesystem::path& out, const std::vector<std::string>& views) {
   std::error_code ignored;
   for (const char* file : {"result.json", "report.html"}) std::filesystem::remove(out / file, ignored);
-  std::vector<std::filesystem::path> overlays;
-  for (const auto& entry : std::filesystem::directory_iterator(out, ignored))
-    if (entry.path().filename().string().ends_with("_overlay.png")) overlays.push_back(entry.path());
-  for (const std::filesystem::path& overlay : overlays) std::filesystem::remove(overlay, ignored);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    std::filesystem::remove(out / report::overlay_name(views[i], i), ignored);
 }
 
 /// Adds each image once; nothing if the residuals are inconsistent with the noise model.
@@ -74,7 +83,9 @@ Expected<void> write(const pipeline::Result& result, const RunArguments& argumen
   auto written = arguments.no_report ? Expected<void>() : report::write_report(result, arguments.out);
   if (written) written = write_file(arguments.out / "result.json", to_text(pipeline::to_json(result)) + "\n");
   if (written) return written;
-  forget(arguments.out);
+  std::vector<std::string> views;
+  for (const pipeline::ViewResult& view : result.views) views.push_back(view.name);
+  forget(arguments.out, views);
   return written;
 }
 
@@ -152,7 +163,7 @@ Expected<pipeline::Result> measure(const RunArguments& arguments, Console& conso
 
 Expected<pipeline::Result> run_and_write(const RunArguments& arguments, Console& console) {
   return guarded([&] {
-    forget(arguments.out);
+    forget(arguments.out, earlier_views(arguments.out));
     const pipeline::Result result = value_or_throw(measure(arguments, console));
     value_or_throw(write(result, arguments));
     if (arguments.history && !result.failure)

@@ -9,16 +9,14 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/geometry/symmetric_eigen.h"
-#include "helicarm/image/opencv.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"
-#include "helicarm/report/rectified_image.h"
+#include "helicarm/phantom_calibration/shown_images.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
@@ -337,24 +335,6 @@ Expected<void> conclude(const AdjustedViews& found, const PhantomOptions& option
   describe_balls(*points, found, result);
   describe_source(options, result);
   return {};
-}
-
-void add_images(const std::vector<pipeline::DetectedView>& detected,
-                const std::vector<std::size_t>& view_of_case, unsigned threads, PhantomResult& result) {
-  constexpr int largest_width = 800;
-  parallel_for(result.views.size(), threads, [&](std::size_t v) {
-    image::Image<std::uint8_t> full = report::rectified_image(pipeline::reported(detected[view_of_case[v]]));
-    MeasuredView& view = result.views[v];
-    view.width = full.width();
-    view.height = full.height();
-    if (view.width <= largest_width) {
-      view.shown = std::move(full);
-      return;
-    }
-    view.shown = image::Image<std::uint8_t>((view.width + 1) / 2, (view.height + 1) / 2);
-    cv::Mat half = image::as_mat(view.shown);
-    cv::resize(image::as_mat(full), half, half.size(), 0, 0, cv::INTER_AREA);
-  });
 }
 
 /// What the correspondences start from.

@@ -10,7 +10,6 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
-#include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::phantom_calibration {
@@ -35,8 +34,8 @@ double chi2_limit(std::size_t count) {
 BundleProblem with_file_centres(const AdjustedViews& found, const phantom::Calibrator& file,
                                 const std::vector<Eigen::Matrix3d>& covariances) {
   BundleProblem problem = found.consistent.problem;
-  for (const RejectedImage& rejected : found.consistent.rejected)
-    problem.views[rejected.view].images.push_back(rejected.image);
+  for (std::size_t v = 0; v < problem.views.size(); ++v)
+    problem.views[v].start = found.consistent.fit.views[v];
   for (std::size_t i = 0; i < problem.centres.size(); ++i)
     problem.centres[i] = file.balls[found.ball_of_nominal[i]].centre_in_calibrator;
   for (BundleView& view : problem.views) {
@@ -55,20 +54,6 @@ BundleProblem with_file_centres(const AdjustedViews& found, const phantom::Calib
     }
   }
   return problem;
-}
-
-/// Poses in the file's frame: those of the free adjustment, carried by the balls.
-void start_in_file_frame(BundleProblem& problem, const AdjustedViews& found) {
-  const RobustFit fit = robust_similarity(found.consistent.fit.centres, problem.centres, true);
-  for (std::size_t v = 0; v < problem.views.size(); ++v) {
-    geometry::View view = found.consistent.fit.views[v];
-    const geometry::RigidTransform& by = fit.a_from_b.a_from_b;
-    geometry::RigidTransform& pose = view.camera_from_world;
-    // camera = pose * b and a = scale * R b + t, so scale * camera = (pose.R R') (a - t) + scale * pose.t
-    pose.rotation = pose.rotation * by.rotation.transpose();
-    pose.translation = fit.a_from_b.scale * pose.translation - pose.rotation * by.translation;
-    problem.views[v].start = view;
-  }
 }
 
 BundleProblem without(const BundleProblem& problem, const std::vector<bool>& out) {
@@ -270,7 +255,6 @@ void describe(const AdjustedViews& found, const pipeline::Case& given,
               PhantomVerification& result) {
   const auto covariances = phantom::ball_covariances(given.calibrator);
   BundleProblem problem = with_file_centres(found, given.calibrator, covariances);
-  start_in_file_frame(problem, found);
   std::vector<bool> out(problem.centres.size(), false);
   const auto places = places_of(problem, found, covariances, out, threads);
   BundleOptions fixed;
