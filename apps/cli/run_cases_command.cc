@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "distinct_names.h"
+#include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/pipeline/result.h"
@@ -49,12 +50,6 @@ std::string_view status_of(const CaseSummary& summary) {
   return exit_code(summary.failure->reason) == 2 ? "failed" : "refused";
 }
 
-std::string quoted(std::string text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  for (std::size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2) text.insert(at, 1, '"');
-  return '"' + text + '"';
-}
-
 std::string csv_of(const std::vector<CaseSummary>& cases) {
   const auto number = [](const std::optional<double>& value) {
     return value ? fmt::format("{:.4f}", *value) : std::string();
@@ -62,10 +57,10 @@ std::string csv_of(const std::vector<CaseSummary>& cases) {
   std::string csv =
       "case,status,code,message,points,located,worst_error_95_mm,fre_mean_mm,tre_mean_mm,warnings\n";
   for (const CaseSummary& c : cases)
-    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", quoted(c.name), status_of(c),
-                       c.failure ? code(c.failure->reason) : "", c.failure ? quoted(c.failure->message) : "",
-                       c.points, c.located, number(c.worst_error_mm), number(c.fre_mm), number(c.tre_mm),
-                       c.warnings);
+    csv += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", csv_field(c.name), status_of(c),
+                       c.failure ? code(c.failure->reason) : "",
+                       c.failure ? csv_field(c.failure->message) : "", c.points, c.located,
+                       number(c.worst_error_mm), number(c.fre_mm), number(c.tre_mm), c.warnings);
   return csv;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
 #include <memory>
 
 #include "arrays.h"
 #include "checks.h"
 #include "held_calibration.h"
 #include "helicarm/fiducials/find_target.h"
+#include "helicarm/fiducials/status_words.h"
 #include "helicarm/phantom/calibrator_limits.h"
 #include "helicarm/pipeline/prior.h"
 #include "helicarm/pipeline/run_fields.h"
@@ -231,7 +231,6 @@ Raises InputError: bad_value, not_finite.)")
 }  // namespace
 
 py::list fiducial_list(const std::vector<fiducials::Fiducial>& fiducials) {
-  static constexpr std::array<const char*, 5> words{"used", "occluded", "outside", "rejected", "not_found"};
   py::list list;
   for (const fiducials::Fiducial& fiducial : fiducials) {
     const bool seen = fiducial.status == FiducialStatus::used || fiducial.status == FiducialStatus::rejected;
@@ -240,7 +239,7 @@ py::list fiducial_list(const std::vector<fiducials::Fiducial>& fiducials) {
     };
     py::dict one;
     one["label"] = fiducial.label;
-    one["status"] = words[std::size_t(fiducial.status)];
+    one["status"] = fiducials::word(fiducial.status);
     one["xyz_mm"] = rows_array<3>({fiducial.centre_in_calibrator}, true);
     one["uv_raw"] = pixel(fiducial.uv_raw);
     one["uv"] = pixel(fiducial.uv);

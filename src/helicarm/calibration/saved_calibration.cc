@@ -2,8 +2,8 @@
 #include "helicarm/calibration/saved_calibration.h"
 
 #include <algorithm>
-#include <array>
 
+#include "helicarm/fiducials/status_words.h"
 #include "helicarm/geometry/decomposition.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
@@ -13,8 +13,6 @@ namespace {
 
 constexpr Range any_number{-1e15, 1e15};
 constexpr const char* calibration_format = "helicarm-calibration/1";
-constexpr std::array<std::string_view, 5> status_words{"used", "occluded", "outside", "rejected",
-                                                       "not_found"};
 
 template <int Rows, int Columns>
 Eigen::Matrix<double, Rows, Columns> matrix_from(JsonReader& reader, const char* key) {
@@ -64,8 +62,9 @@ bool has_image(const fiducials::Fiducial& fiducial) {
 /// A result's fiducials have their coordinates in `balls`.
 fiducials::Fiducial fiducial_from(JsonReader& reader, const std::vector<phantom::CalibratorBall>& balls) {
   fiducials::Fiducial fiducial{reader.text("label"), Eigen::Vector3d::Zero()};
-  fiducial.status = fiducials::FiducialStatus(reader.choice(
-      "status", {status_words[0], status_words[1], status_words[2], status_words[3], status_words[4]}));
+  constexpr auto& words = fiducials::status_words;
+  fiducial.status =
+      fiducials::FiducialStatus(reader.choice("status", {words[0], words[1], words[2], words[3], words[4]}));
   if (reader.has("xyz_mm")) {
     fiducial.centre_in_calibrator = Eigen::Vector3d(reader.numbers("xyz_mm", 3, any_number).data());
   } else {
@@ -84,7 +83,7 @@ fiducials::Fiducial fiducial_from(JsonReader& reader, const std::vector<phantom:
 
 Json json_of(const fiducials::Fiducial& fiducial) {
   Json json = {{"label", fiducial.label},
-               {"status", status_words[std::size_t(fiducial.status)]},
+               {"status", fiducials::word(fiducial.status)},
                {"xyz_mm", geometry::json_list(fiducial.centre_in_calibrator)}};
   if (!has_image(fiducial)) return json;
   json["uv_raw"] = geometry::json_list(fiducial.uv_raw);

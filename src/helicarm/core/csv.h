@@ -35,4 +35,7 @@ class CsvTable {
 Expected<CsvTable> read_csv(const std::filesystem::path& path, std::initializer_list<const char*> required,
                             std::initializer_list<const char*> optional);
 
+/// A field in the form of RFC 4180: with commas, quotes or line ends in quotes.
+std::string csv_field(const std::string& text);
+
 }  // namespace helicarm

@@ -10,6 +10,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
+#include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/result.h"
 
 namespace helicarm::phantom_calibration {
@@ -224,8 +225,8 @@ bool looks_mirrored(const AdjustedViews& found, const pipeline::Case& given,
                     const std::vector<pipeline::DetectedView>& detected) {
   for (std::size_t v = 0; v < found.view_of_case.size(); ++v) {
     const std::size_t i = found.view_of_case[v];
-    if (found.consistent.fit.views[v].intrinsics.fx > 0 || given.views[i].mirrored.value_or(false) ||
-        detected[i].xray_image->acquisition.flip_hint)
+    if (!pipeline::is_mirrored_without_statement(found.consistent.fit.views[v].intrinsics.fx < 0,
+                                                 *detected[i].xray_image, given.views[i]))
       return false;
   }
   return true;

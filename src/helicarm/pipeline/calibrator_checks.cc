@@ -20,13 +20,10 @@ constexpr double warn_sigmas = 3, refuse_sigmas = 10;
 constexpr double displaced_reach_mm = 6;  // search radius around a fiducial's coordinates
 constexpr double displaced_gap_mm = 0.4;  // ray gap of a displaced fiducial
 
-bool is_mirrored_without_statement(const LabelledView& image, const CaseView& view) {
-  return image.fiducials.mirrored && !view.mirrored && !image.xray_image->acquisition.flip_hint;
-}
-
 std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
   for (std::size_t i = 0; i < images.size(); ++i)
-    if (!is_mirrored_without_statement(images[i], given.views[i])) return std::nullopt;
+    if (!is_mirrored_without_statement(images[i].fiducials.mirrored, *images[i].xray_image, given.views[i]))
+      return std::nullopt;
   return Failure{
       Reason::ambiguous_handedness,
       "every image is labelled as mirrored, without a tag or \"mirrored\" in the case. If the C-arm stores "
@@ -162,6 +159,11 @@ std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
 }
 
 }  // namespace
+
+bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray_image,
+                                   const CaseView& view) {
+  return is_mirrored && !view.mirrored && !xray_image.acquisition.flip_hint;
+}
 
 ScaleEvidence scale_evidence(const calibration::CalibrationResult& calibration,
                              const std::vector<LabelledView>& images, const phantom::Calibrator& calibrator) {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/result.h"
 
-#include <array>
 #include <cmath>
+
+#include "helicarm/fiducials/status_words.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -35,11 +36,6 @@ Json matrix(const Eigen::MatrixBase<Derived>& values) {
 Json optional_vector(const auto& values) { return values ? vector(*values) : Json(nullptr); }
 Json optional_matrix(const auto& values) { return values ? matrix(*values) : Json(nullptr); }
 
-std::string_view name_of(fiducials::FiducialStatus status) {
-  constexpr std::array names = {"used", "occluded", "outside", "rejected", "not_found"};
-  return names[static_cast<std::size_t>(status)];
-}
-
 Json json_of(const rectification::Rectification& rectification) {
   const rectification::DistortionMap& map = rectification.map;
   const bool fitted = !map.is_identity();
@@ -65,7 +61,7 @@ Json json_of(const fiducials::Fiducial& fiducial) {
                     fiducial.status == fiducials::FiducialStatus::rejected;
   const auto if_seen = [&](Json value) { return seen ? std::move(value) : Json(nullptr); };
   return {{"label", fiducial.label},
-          {"status", name_of(fiducial.status)},
+          {"status", fiducials::word(fiducial.status)},
           {"uv_raw", if_seen(vector(fiducial.uv_raw))},
           {"uv", if_seen(vector(fiducial.uv))},
           {"sigma_px", if_seen(number(fiducial.sigma_px))},

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/report/overlay.h"
@@ -15,14 +16,6 @@ namespace helicarm::report {
 namespace {
 
 using Files = std::map<std::string, std::string>;
-
-/// A field with commas and quotes in the form of RFC 4180.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + '"';
-}
 
 std::string csv_row(const pipeline::PointResult& point, std::string_view frame, const Eigen::Vector3d& place,
                     const Eigen::Matrix3d& covariance) {
