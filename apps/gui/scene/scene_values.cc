@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
-#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/simulation/calibrator_body.h"
 
 namespace helicarm::gui {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -108,7 +108,7 @@ std::optional<HistoryEntry> history_entry_of(const ViewFiducials& view, const st
   const auto [values, vectors] = geometry::symmetric_eigen(information - assumed);
   const Matrix3d own = vectors * values.cwiseMax(least_information).asDiagonal() * vectors.transpose();
   // The posterior is the mean of estimate and nominal values, weighted by `own` and `assumed`.
-  const Vector3d estimate = posterior + own.ldlt().solve(assumed * (posterior - nominal));
+  const Vector3d estimate = posterior + own.inverse() * (assumed * (posterior - nominal));
   return HistoryEntry{image, view.name, estimate, own};
 }
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
 namespace {

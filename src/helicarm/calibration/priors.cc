@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::calibration {
@@ -62,9 +61,9 @@ class Rows {
     }
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, variation.common * variation.common);
     covariance.diagonal().array() += variation.of_view * variation.of_view;
-    const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-    root.matrixL().solveInPlace(residuals);
-    root.matrixL().solveInPlace(rows);
+    const Eigen::MatrixXd whitens = geometry::whitening(covariance).value();
+    residuals = (whitens * residuals).eval();
+    rows = (whitens * rows).eval();
     for (Eigen::Index i = 0; i < count; ++i) {
       residuals_.push_back(residuals(i));
       rows_.emplace_back(rows.row(i));

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 
 namespace helicarm::calibration {
@@ -101,12 +101,12 @@ Expected<Eigen::MatrixXd> covariance_of(const Refinement& at) {
   const Eigen::MatrixXd& jacobian = at.jacobian;
   const Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
   const Eigen::VectorXd root = normal.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> scaled(root.asDiagonal() * normal * root.asDiagonal());
-  if (scaled.info() != Eigen::Success || !(scaled.rcond() > least_rcond))
-    return unconstrained(at,
-                         fmt::format("reciprocal condition number {:.1g} of the normal equations, limit {:g}",
-                                     scaled.rcond(), least_rcond));
-  const Eigen::MatrixXd inverse = scaled.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+  const auto [inverse, rcond] = geometry::solve_spd(root.asDiagonal() * normal * root.asDiagonal(),
+                                                    Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+  if (!(rcond > least_rcond))
+    return unconstrained(
+        at, fmt::format("reciprocal condition number {:.1g} of the normal equations, limit {:g}", rcond,
+                        least_rcond));
   return Eigen::MatrixXd(root.asDiagonal() * (inverse + inverse.transpose()) / 2 * root.asDiagonal());
 }
 

@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::calibration {
 namespace {
@@ -58,7 +56,7 @@ Strain strain_of(const std::vector<ViewProblem>& problems, const Refinement& fit
   Eigen::Matrix<double, 5, 5> information = by_strain.transpose() * own;
   information.diagonal().array() += 1 / (prior_sigma * prior_sigma);
   const Eigen::Vector<double, 5> slope = own.transpose() * fit.residuals;
-  const Eigen::Vector<double, 5> amounts = -information.ldlt().solve(slope);
+  const Eigen::Vector<double, 5> amounts = -geometry::solve_spd(information, slope).solution;
   Strain result;
   for (std::size_t k = 0; k < modes.size(); ++k) result.strain += amounts[Eigen::Index(k)] * modes[k];
   result.chi2_gain = -slope.dot(amounts);

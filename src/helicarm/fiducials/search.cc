@@ -8,7 +8,7 @@
 
 #include "helicarm/core/random.h"
 #include "helicarm/fiducials/three_point.h"
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::fiducials {
 namespace {

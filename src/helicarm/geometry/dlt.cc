@@ -4,11 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "helicarm/geometry/decomposition.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::geometry {
 namespace {
@@ -16,9 +16,6 @@ namespace {
 constexpr double largest_condition = 1e3;  // thickness 0.4 % of the width; the udcsc has 5
 constexpr double least_pivot = 1e-11;
 constexpr double least_tz = 1e-8;  // relative to the norm of the projection's third row
-
-using Design = Eigen::Matrix<double, Eigen::Dynamic, 12>;
-using Square = Eigen::Matrix<double, 12, 12>;
 
 /// Centroid and scale for zero mean and unit rms coordinate (Hartley 1997).
 template <int N>
@@ -49,7 +46,7 @@ Normalisation<N> normalisation_of(std::span<const PointPair> points, Member memb
 struct NormalisedSystem {
   Normalisation<3> world;
   Normalisation<2> pixels;
-  Eigen::JacobiSVD<Square> svd;  ///< of the homogeneous design matrix
+  RightSingular singular;  ///< of the homogeneous design matrix
   double condition;
 };
 
@@ -60,7 +57,7 @@ NormalisedSystem normalised_system(std::span<const PointPair> points) {
                           {},
                           std::numeric_limits<double>::infinity()};
   if (!(system.world.scale > 0 && system.pixels.scale > 0)) return system;
-  Design design = Design::Zero(2 * Eigen::Index(points.size()), 12);
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(2 * Eigen::Index(points.size()), 12);
   for (Eigen::Index i = 0; i < Eigen::Index(points.size()); ++i) {
     const PointPair& p = points[std::size_t(i)];
     const Eigen::RowVector4d x = system.world(p.point_in_world).transpose();
@@ -68,10 +65,8 @@ NormalisedSystem normalised_system(std::span<const PointPair> points) {
     design.row(2 * i) << x, Eigen::RowVector4d::Zero(), -u.x() * x;
     design.row(2 * i + 1) << Eigen::RowVector4d::Zero(), x, -u.y() * x;
   }
-  const Square r =
-      Eigen::HouseholderQR<Design>(design).matrixQR().topRows<12>().triangularView<Eigen::Upper>();
-  system.svd.compute(r, Eigen::ComputeFullV);
-  const auto& values = system.svd.singularValues();
+  system.singular = right_singular(design);
+  const Eigen::VectorXd& values = system.singular.values;
   if (values(10) > 0) system.condition = values(0) / values(10);
   return system;
 }
@@ -93,18 +88,17 @@ Expected<NormalisedSystem> checked_system(std::span<const PointPair> points) {
   return system;
 }
 
-using FactorDesign = Eigen::Matrix<double, Eigen::Dynamic, 11>;
-struct ScaledSystem {
-  Eigen::ColPivHouseholderQR<FactorDesign> qr;
-  DltFactors solution;
+struct ScaledSolution {
+  DltFactors factors;
+  double last_pivot;  ///< over the largest
 };
 
 /// Eq. 7 with centred pixels and columns of unit length: same residuals and minimiser, better conditioned
 /// than E'E.
-ScaledSystem solve_scaled(std::span<const PointPair> points) {
+ScaledSolution solve_scaled(std::span<const PointPair> points) {
   const auto n = Eigen::Index(points.size());
   const Eigen::Vector2d centre = normalisation_of<2>(points, &PointPair::pixel).centre;
-  FactorDesign e = FactorDesign::Zero(2 * n, 11);
+  Eigen::MatrixXd e = Eigen::MatrixXd::Zero(2 * n, 11);
   Eigen::VectorXd c(2 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto& [x, pixel] = points[std::size_t(i)];
@@ -115,14 +109,13 @@ ScaledSystem solve_scaled(std::span<const PointPair> points) {
     c(n + i) = u.y();
   }
   const DltFactors scale = e.colwise().norm().cwiseMax(std::numeric_limits<double>::min()).cwiseInverse();
-  ScaledSystem system{Eigen::ColPivHouseholderQR<FactorDesign>(e * scale.asDiagonal()), {}};
-  DltFactors& a = system.solution;
-  a = scale.cwiseProduct(system.qr.solve(c));
+  const LinearLeastSquares fit = linear_least_squares(e * scale.asDiagonal(), c);
+  DltFactors a = scale.cwiseProduct(fit.solution);
   a.segment<3>(0) += centre.x() * a.segment<3>(4);
   a.segment<3>(7) += centre.y() * a.segment<3>(4);
   a(3) += centre.x();
   a(10) += centre.y();
-  return system;
+  return {a, fit.last_pivot};
 }
 
 Expected<DltResult> result_of(const Projection& projection, const NormalisedSystem& system,
@@ -156,25 +149,24 @@ Expected<double> dlt_condition(std::span<const PointPair> points) {
   return checked_system(points).map([](const NormalisedSystem& system) { return system.condition; });
 }
 
-DltFactors solve_dlt(std::span<const PointPair> points) { return solve_scaled(points).solution; }
+DltFactors solve_dlt(std::span<const PointPair> points) { return solve_scaled(points).factors; }
 
 Expected<DltResult> dlt_least_squares(std::span<const PointPair> points) {
   const auto system = checked_system(points);
   if (!system) return tl::unexpected<Failure>(system.error());
-  const ScaledSystem scaled = solve_scaled(points);
-  const double pivot = std::abs(scaled.qr.matrixR()(10, 10)) / scaled.qr.maxPivot();
-  if (!(pivot > least_pivot))
+  const ScaledSolution scaled = solve_scaled(points);
+  if (!(scaled.last_pivot > least_pivot))
     return fail(Reason::point_at_infinity,
                 "Eq. 7 is singular: the world's origin lies in the plane of the X-ray source (t_z = 0); "
                 "use the homogeneous form",
-                {{"pivot", pivot}, {"condition", system->condition}});
-  return result_of(projection_from_factors(scaled.solution), *system, points);
+                {{"pivot", scaled.last_pivot}, {"condition", system->condition}});
+  return result_of(projection_from_factors(scaled.factors), *system, points);
 }
 
 Expected<DltResult> dlt_homogeneous(std::span<const PointPair> points) {
   const auto system = checked_system(points);
   if (!system) return tl::unexpected<Failure>(system.error());
-  const Eigen::Matrix<double, 12, 1> p = system->svd.matrixV().col(11);
+  const Eigen::Matrix<double, 12, 1> p = system->singular.vectors.col(11);
   Projection normalised;
   normalised << p.segment<4>(0).transpose(), p.segment<4>(4).transpose(), p.segment<4>(8).transpose();
   return result_of(system->pixels.matrix().inverse() * normalised * system->world.matrix(), *system, points);

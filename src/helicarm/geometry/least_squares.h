@@ -8,6 +8,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "helicarm/geometry/dense_matrix.h"
+
 namespace helicarm::geometry {
 
 /// A least-squares problem linearised at one state, with residual r = observed - predicted, Jacobian J =
@@ -32,6 +34,15 @@ struct LeastSquaresFit {
   bool converged = false;
 };
 
+template <int n>
+Eigen::Matrix<double, n, 1> step_of(const Eigen::Matrix<double, n, n>& information,
+                                    const Eigen::Matrix<double, n, 1>& gradient) {
+  if constexpr (n == Eigen::Dynamic)
+    return solve_spd(information, gradient).solution;
+  else
+    return information.ldlt().solve(gradient);
+}
+
 /// Levenberg-Marquardt (Marquardt 1963: the diagonal is scaled), ended by an undamped step.
 /// `linearise`: State& -> optional<NormalEquations<n>>, nothing where the state is not allowed, which rejects
 /// the step; it may store what it computes in the state. `moved`: (const State&, step) -> State. Nothing
@@ -48,14 +59,14 @@ std::optional<LeastSquaresFit<State, n>> fit_least_squares(State start, const Li
   LeastSquaresFit<State, n> fit{std::move(start), *std::move(equations)};
   double damping = options.initial_damping;
   for (int i = 0; i < options.max_iterations && !fit.converged && damping < max_damping; ++i) {
-    const Step newton = fit.equations.information.ldlt().solve(fit.equations.gradient);
+    const Step newton = step_of<n>(fit.equations.information, fit.equations.gradient);
     fit.converged = newton.allFinite() &&
                     fit.equations.gradient.dot(newton) <= options.min_gain * (1 + fit.equations.chi2);
     for (bool lower = false; !lower && damping < max_damping;) {
       auto damped = fit.equations.information;
       damped.diagonal() *= 1 + damping;
       State next = moved(std::as_const(fit.state),
-                         fit.converged ? newton : Step(damped.ldlt().solve(fit.equations.gradient)));
+                         fit.converged ? newton : step_of<n>(damped, fit.equations.gradient));
       std::optional<NormalEquations<n>> there = linearise(next);
       lower = there && there->chi2 < fit.equations.chi2;
       if (lower) {

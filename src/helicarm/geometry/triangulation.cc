@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/ray.h"
 
@@ -52,7 +52,7 @@ Expected<void> check_place(std::span<const RayObservation> ray_observations, con
 
 Expected<Eigen::Vector3d> intersect_linear(std::span<const Projection> projections,
                                            std::span<const Eigen::Vector2d> pixels) {
-  Eigen::MatrixX3d left(2 * Eigen::Index(projections.size()), 3);
+  Eigen::MatrixXd left(2 * Eigen::Index(projections.size()), 3);
   Eigen::VectorXd right(left.rows());
   for (std::size_t i = 0; i < projections.size(); ++i)
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
@@ -60,10 +60,10 @@ Expected<Eigen::Vector3d> intersect_linear(std::span<const Projection> projectio
       left.row(2 * Eigen::Index(i) + axis) = equation.head<3>();
       right(2 * Eigen::Index(i) + axis) = -equation(3);
     }
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixX3d> qr(left);
-  if (projections.size() < 2 || qr.rank() < 3)
-    return fail(Reason::parallel_rays, "the rays do not determine a point", {{"rank", double(qr.rank())}});
-  return qr.solve(right).eval();
+  const LinearLeastSquares fit = linear_least_squares(left, right);
+  if (projections.size() < 2 || fit.rank < 3)
+    return fail(Reason::parallel_rays, "the rays do not determine a point", {{"rank", double(fit.rank)}});
+  return Eigen::Vector3d(fit.solution);
 }
 
 Eigen::Matrix<double, 2, 3> projection_jacobian(const View& view, const Eigen::Vector3d& point_in_world) {
@@ -107,10 +107,10 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   if (auto placed = check_place(ray_observations, *start); !placed)
     return tl::unexpected<Failure>(placed.error());
 
-  const Eigen::MatrixXd floor = least_sigma_px * least_sigma_px * Eigen::MatrixXd::Identity(2 * n, 2 * n);
-  const Eigen::LLT<Eigen::MatrixXd> root(covariance_px2 + floor);
-  if (root.info() != Eigen::Success)
-    return fail(Reason::bad_value, "the covariance of the pixels is not positive definite");
+  Eigen::MatrixXd covariance = covariance_px2;
+  covariance.diagonal().array() += least_sigma_px * least_sigma_px;
+  const auto whitens = whitening(covariance);
+  if (!whitens) return fail(Reason::bad_value, "the covariance of the pixels is not positive definite");
   Eigen::MatrixX3d jacobian(2 * n, 3);
   Eigen::VectorXd residual(2 * n);
   const auto linearise = [&](const Eigen::Vector3d& point) -> std::optional<NormalEquations<3>> {
@@ -120,10 +120,10 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
       jacobian.middleRows<2>(2 * k) = projection_jacobian(ray.view, point);
       residual.segment<2>(2 * k) = ray.pixel - ray.view.project(point);
     }
-    root.matrixL().solveInPlace(jacobian);
-    root.matrixL().solveInPlace(residual);
-    return NormalEquations<3>{jacobian.transpose() * jacobian, jacobian.transpose() * residual,
-                              residual.squaredNorm()};
+    jacobian = whitens->lazyProduct(jacobian).eval();
+    residual = whitens->lazyProduct(residual).eval();
+    return NormalEquations<3>{jacobian.transpose().lazyProduct(jacobian),
+                              jacobian.transpose().lazyProduct(residual), residual.squaredNorm()};
   };
   const auto fit = fit_least_squares<3>(
       *start, linearise,
@@ -133,7 +133,7 @@ Expected<Intersection> intersect(std::span<const RayObservation> ray_observation
   Intersection result{fit->state, fit->equations.information.inverse(), largest_gap(ray_observations),
                       fit->equations.chi2};
   linearise(result.point);  // the last trial may have been rejected: its Jacobian is of another point
-  result.by_pixels = result.covariance * root.matrixU().solve(jacobian).transpose();
+  result.by_pixels = result.covariance.lazyProduct(jacobian.transpose()).lazyProduct(*whitens);
   return result;
 }
 

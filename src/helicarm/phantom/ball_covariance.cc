@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::phantom {
 namespace {

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom/calibrator_limits.h"
 #include "helicarm/phantom/conical_helix.h"

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::phantom {
 namespace {

@@ -6,12 +6,11 @@
 #include <cmath>
 #include <memory>
 
-#include <Eigen/Cholesky>
 #include <Eigen/SparseCore>
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/phantom_calibration/gauge.h"
 #include "helicarm/phantom_calibration/image_cost.h"
 
@@ -72,8 +71,7 @@ Eigen::MatrixXd whitening_of(const BundleView& view, bool robust) {
     covariance(i, i) +=
         std::max(std::pow(view.images[std::size_t(i)].sigma_px, 2), least_own_share * covariance(i, i));
   if (robust) covariance = Eigen::MatrixXd(covariance.diagonal().asDiagonal());
-  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-  return root.matrixL().solve(Eigen::MatrixXd::Identity(n, n));
+  return geometry::whitening(covariance).value();
 }
 
 void add_images(Blocks& blocks, const BundleProblem& given, std::size_t v, const BundleOptions& options) {
@@ -199,15 +197,16 @@ std::optional<Eigen::MatrixXd> covariance_of(const Linear& linear, std::span<con
   const Eigen::VectorXd unit = linear.jacobian.colwise().norm().cwiseMax(1e-300).cwiseInverse().transpose();
   const Eigen::Index c = linear.of_centres, others = linear.jacobian.cols() - c;
   const Eigen::MatrixXd of_others = linear.jacobian.rightCols(others) * unit.tail(others).asDiagonal();
-  const Eigen::LDLT<Eigen::MatrixXd> inner(of_others.transpose() * of_others);
-  if (inner.info() != Eigen::Success || !(inner.rcond() > 1e-15)) return std::nullopt;
+  const auto by_centres = linear.jacobian.leftCols(c);
+  const Eigen::MatrixXd cross = of_others.transpose() * by_centres;
+  Eigen::MatrixXd right(others, others + c);
+  right << Eigen::MatrixXd::Identity(others, others), cross;
+  const auto [inner, rcond] = geometry::solve_spd(of_others.transpose() * of_others, right);
+  if (!(rcond > 1e-15)) return std::nullopt;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(linear.jacobian.cols(), linear.jacobian.cols());
-  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(others, others);
-  Eigen::MatrixXd corner = inner.solve(identity);
+  Eigen::MatrixXd corner = inner.leftCols(others);
   if (c > 0) {
-    const auto by_centres = linear.jacobian.leftCols(c);
-    const Eigen::MatrixXd cross = of_others.transpose() * by_centres;
-    const Eigen::MatrixXd carried = inner.solve(cross);
+    const Eigen::MatrixXd carried = inner.rightCols(c);
     Eigen::MatrixXd normal = by_centres.transpose() * by_centres - cross.transpose() * carried;
     normal = (normal + normal.transpose()).eval() / 2;
     const auto covariance = inner_constraint_covariance(normal, similarity_motions(centres));

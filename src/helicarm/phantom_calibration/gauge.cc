@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::phantom_calibration {
@@ -42,15 +41,14 @@ std::optional<Eigen::MatrixXd> inner_constraint_covariance(const Eigen::MatrixXd
   // With the projection P onto the null space, (N + k P)^-1 = N^+ + P / k.
   const Eigen::MatrixXd unit = motions.colwise().normalized();
   const Eigen::MatrixXd gram = unit.transpose() * unit;
-  const Eigen::MatrixXd null = unit * gram.ldlt().solve(Eigen::MatrixXd(unit.transpose()));
+  const Eigen::MatrixXd null = unit * geometry::solve_spd(gram, unit.transpose()).solution;
   const double k = normal.trace() / double(normal.rows());
-  const Eigen::LDLT<Eigen::MatrixXd> solver(normal + k * null);
-  if (solver.info() != Eigen::Success || !solver.isPositive() || !(solver.rcond() > 1e-14))
-    return std::nullopt;
-  const Eigen::MatrixXd inverse =
-      solver.solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols())) - null / k;
+  const Eigen::MatrixXd identity = Eigen::MatrixXd::Identity(normal.rows(), normal.cols());
+  const auto [solution, rcond] = geometry::solve_spd(normal + k * null, identity);
+  if (!(rcond > 1e-14)) return std::nullopt;
+  const Eigen::MatrixXd inverse = solution - null / k;
   // The normal equations' own rounding leaves something along the null space.
-  const Eigen::MatrixXd keep = Eigen::MatrixXd::Identity(normal.rows(), normal.cols()) - null;
+  const Eigen::MatrixXd keep = identity - null;
   return keep * ((inverse + inverse.transpose()) / 2) * keep;
 }
 
@@ -61,7 +59,7 @@ Eigen::MatrixXd in_frame_of(const Eigen::MatrixXd& covariance, const Eigen::Matr
   const Eigen::MatrixXd weighted = of_row.asDiagonal() * motions;
   const Eigen::MatrixXd removal =
       Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()) -
-      motions * (motions.transpose() * weighted).ldlt().solve(weighted.transpose());
+      motions * geometry::solve_spd(motions.transpose() * weighted, weighted.transpose()).solution;
   return removal * covariance * removal.transpose();
 }
 

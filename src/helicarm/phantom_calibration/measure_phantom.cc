@@ -11,8 +11,8 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
-#include "helicarm/geometry/symmetric_eigen.h"
 #include "helicarm/phantom/ball_covariance.h"
 #include "helicarm/phantom_calibration/adjusted_views.h"
 #include "helicarm/phantom_calibration/gauge.h"

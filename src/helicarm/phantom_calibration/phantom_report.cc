@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/image/png.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/style.h"

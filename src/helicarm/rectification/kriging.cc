@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
-#include "helicarm/geometry/symmetric_eigen.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/rectification/basis.h"
 
 namespace helicarm::rectification {
@@ -24,11 +24,14 @@ LinearFit solve(const KrigingData& data, const MatrixXd& rows, const MatrixXd& p
   const MatrixXd weighted = weights.asDiagonal() * rows;
   MatrixXd system = rows.transpose() * weighted;
   system.bottomRightCorner(penalty.rows(), penalty.cols()) += penalty;
-  const Eigen::LDLT<MatrixXd> factor(system);
+  const Index size = system.rows();
+  MatrixXd right(size, size + 2);
+  right << MatrixXd::Identity(size, size), weighted.transpose() * raw;
+  const geometry::SpdSolution solved = geometry::solve_spd(system, right);
   LinearFit solution;
-  if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-15)) return solution;
-  const MatrixXd inverse = factor.solve(MatrixXd::Identity(system.rows(), system.cols()));
-  solution.coefficients = factor.solve(weighted.transpose() * raw);
+  if (!(solved.rcond > 1e-15)) return solution;
+  const MatrixXd inverse = solved.solution.leftCols(size);
+  solution.coefficients = solved.solution.rightCols(2);
   solution.residuals = raw - rows * solution.coefficients;
   const MatrixXd spread = rows * inverse;
   solution.held_out.resize(raw.rows());
@@ -85,9 +88,10 @@ Roughness roughness_of(const KrigingData& data, const MatrixXd& rows, const Matr
   const VectorXd root = data.weights.cwiseSqrt();
   const MatrixXd weighted = root.asDiagonal() * rows;
   const Index terms = rows.cols() - knots;
-  const MatrixXd trend = Eigen::HouseholderQR<MatrixXd>(weighted.leftCols(terms)).householderQ() *
-                         MatrixXd::Identity(rows.rows(), terms);
-  MatrixXd kernels = gram.llt().matrixL().solve(weighted.rightCols(knots).transpose()).transpose();
+  const MatrixXd trend = geometry::orthonormal_columns(weighted.leftCols(terms));
+  const auto whitens = geometry::whitening(gram);
+  if (!whitens) return {};
+  MatrixXd kernels = weighted.rightCols(knots) * whitens->transpose();
   kernels -= trend * (trend.transpose() * kernels);
   MatrixX2d raw = root.asDiagonal() * data.raw;
   raw -= trend * (trend.transpose() * raw);
@@ -145,7 +149,8 @@ KrigingModel smooth_model(const KrigingData& data, int order, const MatrixX2d& k
   MatrixXd& covariance = model.fit.covariance;
   covariance *= best.variance;
   covariance.bottomRightCorner(gram.rows(), gram.cols()) -=
-      best.gain * best.variance * gram.llt().solve(MatrixXd::Identity(gram.rows(), gram.cols()));
+      best.gain * best.variance *
+      geometry::solve_spd(gram, MatrixXd::Identity(gram.rows(), gram.cols())).solution;
   return model;
 }
 

@@ -7,8 +7,11 @@
 #include <numbers>
 #include <set>
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <fmt/format.h>
+
+#include "helicarm/geometry/dense_matrix.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -90,14 +93,14 @@ Expected<std::vector<PlateDot>> match_plate(const IndexedLattice& lattice,
   for (const IndexedDot& d : lattice.dots)
     seen_middle += d.index.cast<double>() / double(lattice.dots.size());
   // Position of the plate's centre in the image: an affine map from index to pixel.
-  Eigen::Matrix<double, Eigen::Dynamic, 3> design(lattice.dots.size(), 3);
-  Eigen::MatrixX2d pixels(lattice.dots.size(), 2);
+  Eigen::MatrixXd design(lattice.dots.size(), 3);
+  Eigen::MatrixXd pixels(lattice.dots.size(), 2);
   for (Eigen::Index r = 0; r < design.rows(); ++r) {
     const auto& d = lattice.dots[static_cast<std::size_t>(r)];
     design.row(r) << 1, d.index.x(), d.index.y();
     pixels.row(r) = dots[d.dot].centre_px.transpose();
   }
-  const Eigen::Matrix<double, 3, 2> affine = design.colPivHouseholderQr().solve(pixels);
+  const Eigen::Matrix<double, 3, 2> affine = geometry::linear_least_squares(design, pixels).solution;
 
   int best_score = std::numeric_limits<int>::min();
   double best_distance = 0;

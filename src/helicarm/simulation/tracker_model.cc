@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "helicarm/core/random.h"
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/simulation/random_pose.h"
 
@@ -49,7 +50,7 @@ Eigen::MatrixXd pose_from_marker_errors(const std::vector<const MarkerFacet*>& f
   for (std::size_t i = 0; i < arms.size(); ++i)
     a.middleRows<3>(3 * static_cast<Eigen::Index>(i)) << -geometry::cross_matrix(arms[i]),
         Matrix3d::Identity();
-  return (a.transpose() * a).ldlt().solve(a.transpose());
+  return geometry::solve_spd(a.transpose() * a, a.transpose()).solution;
 }
 
 /// Sum of waves with random frequencies and phases: normal and smooth, and each time can be evaluated alone.

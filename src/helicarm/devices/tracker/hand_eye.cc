@@ -10,10 +10,10 @@
 #include <Eigen/QR>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
 #include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::tracker {
 namespace {

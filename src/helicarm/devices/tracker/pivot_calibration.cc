@@ -8,8 +8,8 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
-#include "helicarm/geometry/symmetric_eigen.h"
 
 namespace helicarm::tracker {
 namespace {
