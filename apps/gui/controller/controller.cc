@@ -118,6 +118,8 @@ void Controller::open(Source source, const fs::path& folder, std::string doing,
   if (state_.busy) return;
   auto old = std::exchange(equipment_, nullptr);
   live_tool_.reset();
+  earlier_picks_.clear();
+  later_picks_.clear();
   state_ = ApplicationState{};
   begin(Phase::acquire, std::move(doing),
         [this, source, folder, work = std::move(work), old = std::move(old),
@@ -259,9 +261,7 @@ Controller::Change Controller::came(Images images) {
     live_tool_.reset();  // its lines belong to the previous images
     state.result = only(images);
     state.next_view = first_missing(state);
-    if (std::ranges::all_of(state.result->views,
-                            [](const pipeline::ViewResult& v) { return v.xray_image != nullptr; }))
-      QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
+    if (has_all_images()) QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
   };
 }
 
@@ -296,6 +296,25 @@ void Controller::measure() {
         });
 }
 
+void Controller::change_picks(Picks picks, bool measurable) {
+  earlier_picks_.push_back(std::exchange(state_.picks, std::move(picks)));
+  later_picks_.clear();
+  picks_changed(measurable);
+}
+
+void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
+  if (!takes_picks() || from.empty()) return;
+  to.push_back(std::exchange(state_.picks, std::move(from.back())));
+  from.pop_back();
+  picks_changed(has_all_images());
+}
+
+bool Controller::has_all_images() const {
+  return state_.result && std::ranges::all_of(state_.result->views, [](const pipeline::ViewResult& view) {
+           return view.xray_image != nullptr;
+         });
+}
+
 void Controller::picks_changed(bool measurable) {
   state_.order.reset();
   state_.path = {};
@@ -303,32 +322,34 @@ void Controller::picks_changed(bool measurable) {
   if (measurable) measure();
 }
 
-bool Controller::is_whole(const std::string& point) const {
-  return std::ranges::all_of(state_.views,
-                             [&](const std::string& view) { return pick_of(state_, point, view); });
-}
-
 bool Controller::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
 
 void Controller::pick(pipeline::Pick pick) {
   if (!takes_picks()) return;
-  std::erase_if(state_.picks,
+  Picks picks = state_.picks;
+  std::erase_if(picks,
                 [&](const pipeline::Pick& old) { return old.name == pick.name && old.view == pick.view; });
   const std::string point = pick.name;
-  state_.picks.push_back(std::move(pick));
-  picks_changed(is_whole(point));  // shows its position and ray gap immediately
+  picks.push_back(std::move(pick));
+  const bool completes = std::ranges::all_of(state_.views, [&](const std::string& view) {
+    return std::ranges::any_of(
+        picks, [&](const pipeline::Pick& other) { return other.name == point && other.view == view; });
+  });
+  change_picks(std::move(picks), completes);  // shows its position and ray gap immediately
 }
 
 void Controller::take_offered_picks() {
-  if (state_.busy) return;
-  state_.picks = state_.offered_picks;
-  picks_changed(!next_pick(state_));
+  if (takes_picks()) change_picks(state_.offered_picks, has_all_images());
+}
+
+void Controller::erase_picks(const std::string& point) {
+  Picks picks = state_.picks;
+  const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
+  if (takes_picks() && erased > 0) change_picks(std::move(picks), has_all_images());
 }
 
 void Controller::clear_picks() {
-  if (state_.busy) return;
-  state_.picks.clear();
-  picks_changed(!next_pick(state_));
+  if (takes_picks() && !state_.picks.empty()) change_picks({}, has_all_images());
 }
 
 void Controller::cancel() {

@@ -62,7 +62,13 @@ class Controller : public QObject {
   void pick(pipeline::Pick pick);
   bool takes_picks() const;
   void take_offered_picks();
+  /// Removes an end's picks in all views.
+  void erase_picks(const std::string& point);
   void clear_picks();
+  bool can_undo_picks() const { return !earlier_picks_.empty(); }
+  bool can_redo_picks() const { return !later_picks_.empty(); }
+  void undo_picks() { step_picks(earlier_picks_, later_picks_); }
+  void redo_picks() { step_picks(later_picks_, earlier_picks_); }
   void measure();
 
   void unlock(const std::string& who);
@@ -95,6 +101,7 @@ class Controller : public QObject {
 
  private:
   using Change = std::function<void(ApplicationState&)>;
+  using Picks = std::vector<pipeline::Pick>;
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
   void open(Source source, const std::filesystem::path& folder, std::string doing,
@@ -104,8 +111,10 @@ class Controller : public QObject {
   /// From any thread: a state change during the work.
   void meanwhile(Change change);
   void take_waiting_image();
+  void change_picks(Picks picks, bool measurable);
+  void step_picks(std::vector<Picks>& from, std::vector<Picks>& to);
   void picks_changed(bool measurable);
-  bool is_whole(const std::string& point) const;
+  bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
   static Change with_plan(const operation::OperationPlan& plan, const Json& offered);
   Change with_case(pipeline::Case given, Equipment& equipment);
@@ -116,7 +125,8 @@ class Controller : public QObject {
   std::optional<operation::LiveTool> live_tool_;
   std::optional<operation::PlanWatch> plan_watch_;  ///< of the displayed path
   std::string followed_;
-  bool picks_came_ = false;  ///< during the measurement
+  std::vector<Picks> earlier_picks_, later_picks_;  ///< for undo and redo, the last is the next
+  bool picks_came_ = false;                         ///< during the measurement
   pipeline::RunOptions options_;
   operation::FreshnessLimits freshness_;
   QTimer images_;

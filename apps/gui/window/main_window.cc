@@ -77,6 +77,8 @@ void MainWindow::build() {
     sides->addWidget(xrays_[i]);
     sides->setStretchFactor(int(i), 3);
     connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
+    connect(xrays_[i], &XrayView::pick_moved, this,
+            [this, i](const QString& name, const QPointF& raw) { move_pick(i, name, raw); });
   }
   sides->addWidget(build_right());
   sides->setStretchFactor(2, 3);
@@ -196,6 +198,8 @@ void MainWindow::show_state() {
     statusBar()->showMessage(text(state.doing));
   else if (state.refusals.empty())
     statusBar()->clearMessage();
+  undo_->setEnabled(controller_.can_undo_picks() && controller_.takes_picks());
+  redo_->setEnabled(controller_.can_redo_picks() && controller_.takes_picks());
   show_images();
   show_picks();
 }
@@ -231,7 +235,10 @@ void MainWindow::show_picks() {
     const pipeline::ViewResult& view = shown_->views[i];
     std::vector<FreshPick> picks;
     for (const pipeline::Pick& pick : state.picks)
-      if (pick.view == view.name && next_pick(state)) picks.push_back({text(pick.name), pick.uv_raw});
+      if (pick.view == view.name) picks.push_back({text(pick.name), pick.uv_raw});
+    xrays_[i]->set_movable_picks(
+        phase_ == Phase::plan && controller_.takes_picks() ? picks : std::vector<FreshPick>{});
+    if (!next_pick(state)) picks.clear();  // the result shows them
     xrays_[i]->set_picks(std::move(picks));
     xrays_[i]->set_picking(wanted.has_value() && controller_.takes_picks());
     const auto path = state.path.by_view.find(view.name);
@@ -270,6 +277,15 @@ void MainWindow::place_pick(std::size_t view, const QPointF& raw) {
   if (controller_.state().source != Source::files) pick.moves_with = wanted->bone;
   controller_.pick(std::move(pick));
   plan_->placed(wanted->point);
+}
+
+void MainWindow::move_pick(std::size_t view, const QString& name, const QPointF& raw) {
+  const std::string view_name = shown_->views[view].name;
+  for (pipeline::Pick pick : controller_.state().picks) {
+    if (pick.name != name.toStdString() || pick.view != view_name) continue;
+    pick.uv_raw = {raw.x(), raw.y()};
+    return controller_.pick(std::move(pick));
+  }
 }
 
 void MainWindow::show_live() {

@@ -70,6 +70,7 @@ class MainWindow : public QMainWindow {
   void show_picks();
   void show_phase(Phase phase);
   void place_pick(std::size_t view, const QPointF& raw);
+  void move_pick(std::size_t view, const QString& name, const QPointF& raw);
   void show_tre();
   void show_moment(int index);
   void show_recorded();
@@ -96,6 +97,8 @@ class MainWindow : public QMainWindow {
   NavigatePage* navigate_ = nullptr;
   ReplayPanel* replay_ = nullptr;
   QDockWidget* replay_dock_ = nullptr;
+  QAction* undo_ = nullptr;
+  QAction* redo_ = nullptr;
   QMenu* recent_menu_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
 

@@ -82,6 +82,10 @@ void MainWindow::build_menus() {
   file->addSeparator();
   file->addAction(tr("&Quit"), QKeySequence(tr("Ctrl+Q")), this, &QWidget::close);
 
+  QMenu* edit = menuBar()->addMenu(tr("&Edit"));
+  undo_ = edit->addAction(tr("&Undo pick"), QKeySequence::Undo, &controller_, &Controller::undo_picks);
+  redo_ = edit->addAction(tr("&Redo pick"), QKeySequence::Redo, &controller_, &Controller::redo_picks);
+
   QMenu* view = menuBar()->addMenu(tr("&View"));
   using Preset = SceneView::Preset;
   for (const auto& [words, preset, key] : {std::tuple(tr("Scene as in the &AP view"), Preset::ap, "Ctrl+1"),
@@ -101,9 +105,10 @@ void MainWindow::build_menus() {
         tr("Keys"),
         tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: next control\n"
            "Enter: press; hold it on a yellow button\n"
-           "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n\n"
-           "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, L layer, "
-           "M magnifier, W contrast, H marks\n\n"
+           "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n"
+           "Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete removes the end chosen in the table\n\n"
+           "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, dragging "
+           "moves a placed end, L layer, M magnifier, W contrast, H marks\n\n"
            "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R resets\n\n"
            "Replay: J and L step, K plays"));
   });

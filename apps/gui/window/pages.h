@@ -99,7 +99,11 @@ class PlanPage : public Page {
   void map_wanted(std::optional<helicarm::gui::TreCut> cut);
   void target_changed();
 
+ protected:
+  bool eventFilter(QObject* watched, QEvent* event) override;
+
  private:
+  void delete_chosen();
   void add_map();
   void tell_next();
 
@@ -107,6 +111,7 @@ class PlanPage : public Page {
   QTableWidget* ends_;
   QCheckBox* snap_;
   QPushButton* offered_;
+  QPushButton* delete_;
   std::optional<std::string> chosen_;
   std::size_t placed_of_chosen_ = 0;
 };

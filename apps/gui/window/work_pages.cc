@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages of the planning, navigation and verification steps.
 #include <QHBoxLayout>
+#include <QKeyEvent>
 #include <QVBoxLayout>
 #include <algorithm>
 
@@ -37,13 +38,30 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   auto* row = new QHBoxLayout;
   offered_ =
       add_button(tr("Use the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
+  delete_ = add_button(tr("Delete selecte&d end"), "deletePick", [this] { delete_chosen(); });
+  delete_->setToolTip(tr("Removes the picks of the end selected in the table (Delete key)"));
+  ends_->installEventFilter(this);  // Delete
   auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
     ends_->clearSelection();
     controller_.clear_picks();
   });
-  for (QWidget* button : {offered_, clear}) row->addWidget(button);
+  for (QWidget* button : {offered_, delete_, clear}) row->addWidget(button);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
   add_map();
+}
+
+bool PlanPage::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() != QEvent::KeyPress || static_cast<QKeyEvent*>(event)->key() != Qt::Key_Delete)
+    return Page::eventFilter(watched, event);
+  delete_chosen();
+  return true;
+}
+
+void PlanPage::delete_chosen() {
+  if (!chosen_) return;
+  const std::string point = *chosen_;
+  ends_->clearSelection();
+  controller_.erase_picks(point);
 }
 
 void PlanPage::add_map() {
@@ -111,6 +129,7 @@ void PlanPage::show_state(const ApplicationState& state) {
 
 void PlanPage::tell_next() {
   const ApplicationState& state = controller_.state();
+  delete_->setEnabled(chosen_.has_value() && controller_.takes_picks());
   if (!state.measured) return next_->setText(tr("Acquire the X-ray images first."));
   if (chosen_)
     return next_->setText(
@@ -118,8 +137,8 @@ void PlanPage::tell_next() {
   const auto wanted = next_pick(state);
   if (!wanted)
     return next_->setText(
-        tr("All ends are placed. To move one, select it in the table and click its new position in both "
-           "X-ray images."));
+        tr("All ends are placed. To move one, drag it, or select it in the table and click its new position "
+           "in both X-ray images."));
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
       const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);

@@ -7,6 +7,19 @@
 #include "gui/xray/mark_painter.h"
 
 namespace helicarm::gui {
+namespace {
+
+void paint_pick(QPainter& painter, const QPointF& at, const QString& name) {
+  for (const QPen& pen : {QPen(QColor(0, 0, 0, 170), 3.6), QPen(ink::point, 1.6)}) {
+    painter.setPen(pen);
+    painter.drawEllipse(at, 9, 9);
+    for (const QPointF& arm : {QPointF(1, 0), QPointF(0, 1), QPointF(-1, 0), QPointF(0, -1)})
+      painter.drawLine(at + 5 * arm, at + 13 * arm);
+  }
+  outlined_text(painter, at + QPointF(13, -9), name, ink::point);
+}
+
+}  // namespace
 
 void LiveMarks::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
   tool_ = {rectified ? rectification::PixelPath{rectified->back, rectified->tip}
@@ -17,6 +30,11 @@ void LiveMarks::set_tool(const std::optional<verification::ImageLine>& rectified
 void LiveMarks::set_picks(std::vector<FreshPick> raw) {
   picks_.clear();
   for (FreshPick& pick : raw) picks_.push_back({std::move(pick), {}});
+}
+
+void LiveMarks::set_moved(std::optional<FreshPick> raw) {
+  moved_.reset();
+  if (raw) moved_ = CarriedPick{*std::move(raw), {}};
 }
 
 void LiveMarks::forget_layer() {
@@ -32,6 +50,7 @@ void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
   }
   for (CarriedPick& pick : picks_)
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
+  if (moved_) moved_->in_layer = layer_from_raw(view, layer, moved_->given.raw);
 }
 
 void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
@@ -53,17 +72,10 @@ void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
     }
     if (!note_.isEmpty()) outlined_text(painter, at + QPointF(12, 18), note_, QColor(255, 255, 255));
   }
-  for (const auto& [pick, place] : picks_) {
-    if (!place) continue;
-    const QPointF at = frame.to_widget(*place);
-    for (const QPen& pen : {QPen(QColor(0, 0, 0, 170), 3.6), QPen(ink::point, 1.6)}) {
-      painter.setPen(pen);
-      painter.drawEllipse(at, 9, 9);
-      for (const QPointF& arm : {QPointF(1, 0), QPointF(0, 1), QPointF(-1, 0), QPointF(0, -1)})
-        painter.drawLine(at + 5 * arm, at + 13 * arm);
-    }
-    outlined_text(painter, at + QPointF(13, -9), pick.name, ink::point);
-  }
+  for (const auto& [pick, place] : picks_)
+    if (place && !(moved_ && moved_->given.name == pick.name))
+      paint_pick(painter, frame.to_widget(*place), pick.name);
+  if (moved_ && moved_->in_layer) paint_pick(painter, frame.to_widget(*moved_->in_layer), moved_->given.name);
 }
 
 }  // namespace helicarm::gui

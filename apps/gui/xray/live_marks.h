@@ -23,6 +23,8 @@ class LiveMarks {
   bool has_tool() const { return !tool_.given.empty(); }
   void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
+  /// The pick that is being dragged, in place of the one of its name.
+  void set_moved(std::optional<FreshPick> raw);
 
   /// Changes the layer; converted positions become invalid.
   void forget_layer();
@@ -44,6 +46,7 @@ class LiveMarks {
   Carried epipolar_, path_, tool_;
   QString note_;
   std::vector<CarriedPick> picks_;
+  std::optional<CarriedPick> moved_;
 };
 
 }  // namespace helicarm::gui

@@ -119,8 +119,7 @@ void XrayView::set_usual_window() {
 }
 
 void XrayView::set_picking(bool picking) {
-  picking_ = picking;
-  drag_ = {};
+  if (std::exchange(picking_, picking) != picking) drag_ = {};
   setCursor(picking ? Qt::CrossCursor : Qt::ArrowCursor);
   update();
 }

@@ -45,6 +45,8 @@ class XrayView : public QWidget {
   void set_path(std::vector<Eigen::Vector2d> rectified);
   void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
+  /// Those that the left button can drag, drawn or not.
+  void set_movable_picks(std::vector<FreshPick> raw) { movable_ = std::move(raw); }
 
   /// Whether the requested layer is still being computed; until then the previous one is displayed.
   bool is_computing() const { return computing_; }
@@ -58,6 +60,8 @@ class XrayView : public QWidget {
  Q_SIGNALS:
   /// A click or Enter while picking: always raw pixels (docs/frames.md).
   void picked(QPointF raw_pixel);
+  /// A movable pick was dropped at a raw pixel.
+  void pick_moved(const QString& name, QPointF raw_pixel);
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
   void layer_changed(helicarm::gui::Layer layer);
   void window_changed(helicarm::image::GreyWindow window);
@@ -82,6 +86,7 @@ class XrayView : public QWidget {
     QPointF from, last;
     bool moved = false;
     bool may_pick = false;
+    QString pick = {};  ///< name of the movable pick under the press
   };
 
   const pipeline::ViewResult& view() const { return result_->views[view_]; }
@@ -95,6 +100,8 @@ class XrayView : public QWidget {
   void adjust_window(const QPointF& by);
   void move_cursor(const QPointF& by);
   void pick_at(const QPointF& place);
+  QString movable_at(const QPointF& place) const;
+  void show_moved(const std::optional<QPointF>& raw);
   void hover_at(const QPointF& place);
   void hover_over(const std::optional<MarkUnderCursor>& mark);
   void paint_still();
@@ -117,6 +124,7 @@ class XrayView : public QWidget {
   QPixmap still_;  ///< image and marks; null: to be redrawn
 
   Drag drag_;
+  std::vector<FreshPick> movable_;
   std::optional<QPointF> mouse_;
   std::optional<Eigen::Vector2d> cursor_;  ///< moved by the keyboard, in the layer's pixels
   std::optional<MarkUnderCursor> under_;

@@ -63,8 +63,9 @@ void XrayView::wheelEvent(QWheelEvent* event) {
 
 void XrayView::mousePressEvent(QMouseEvent* event) {
   cursor_.reset();
-  drag_ = {event->button(), event->position(), event->position(), false,
-           picking_ && event->button() == Qt::LeftButton};
+  const bool left = event->button() == Qt::LeftButton;
+  drag_ = {event->button(), event->position(), event->position(),
+           false,           picking_ && left,  left ? movable_at(event->position()) : QString()};
   update();
 }
 
@@ -76,6 +77,7 @@ void XrayView::mouseMoveEvent(QMouseEvent* event) {
   if ((at - drag_.from).manhattanLength() >= threshold) drag_.moved = true;
   if (drag_.button != Qt::NoButton && drag_.moved) {
     drag_.last = at;
+    if (!drag_.pick.isEmpty()) return show_moved(raw_at(at));
     if (drag_.button == Qt::RightButton) return adjust_window(by);
     if (drag_.button == Qt::MiddleButton || !picking_) return pan(by);
   }
@@ -85,11 +87,32 @@ void XrayView::mouseMoveEvent(QMouseEvent* event) {
 
 void XrayView::mouseReleaseEvent(QMouseEvent* event) {
   if (event->button() != drag_.button) return;
-  const bool picks = drag_.may_pick && !drag_.moved;
-  drag_ = {};
+  const Drag ended = std::exchange(drag_, {});
   // Centre of the screen pixel under the cursor.
   const double half = 0.5 / devicePixelRatioF();
-  if (picks) pick_at(event->position() + QPointF(half, half));
+  const QPointF at = event->position() + QPointF(half, half);
+  show_moved({});
+  if (ended.may_pick && !ended.moved) pick_at(at);
+  if (!ended.pick.isEmpty() && ended.moved)
+    if (const auto raw = raw_at(at)) Q_EMIT pick_moved(ended.pick, *raw);
+}
+
+QString XrayView::movable_at(const QPointF& place) const {
+  constexpr double reach = 12;  // screen px
+  QString nearest;
+  double least = reach;
+  for (const FreshPick& pick : movable_)
+    if (const auto at = place_of({pick.raw.x(), pick.raw.y()}))
+      if (const double distance = std::hypot(at->x() - place.x(), at->y() - place.y()); distance < least) {
+        least = distance;
+        nearest = pick.name;
+      }
+  return nearest;
+}
+
+void XrayView::show_moved(const std::optional<QPointF>& raw) {
+  live_.set_moved(raw ? std::optional(FreshPick{drag_.pick, {raw->x(), raw->y()}}) : std::nullopt);
+  carry_live();
 }
 
 void XrayView::mouseDoubleClickEvent(QMouseEvent* event) {

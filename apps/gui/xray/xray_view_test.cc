@@ -99,6 +99,32 @@ TEST_F(XrayViewTest, DragIsNotAPickAndAClickOnlyWhilePicking) {
   EXPECT_EQ(spy.count(), 0);
 }
 
+TEST_F(XrayViewTest, DraggedMovablePickIsDroppedAtItsNewPixel) {
+  const Eigen::Vector2d raw = shown().found->fiducials[3].uv_raw;
+  view.set_movable_picks({{"FS", raw}});
+  QSignalSpy moved(&view, &XrayView::pick_moved), picked(&view, &XrayView::picked);
+  view.set_picking(true);
+  const QPoint from = view.place_of({raw.x(), raw.y()})->toPoint();
+  drag(from, from + QPoint(40, 20), Qt::LeftButton);
+  ASSERT_EQ(moved.count(), 1);
+  EXPECT_EQ(moved[0][0].toString(), "FS");
+  const QPointF off = *view.place_of(moved[0][1].toPointF()) - QPointF(from + QPoint(40, 20));
+  EXPECT_LT(std::hypot(off.x(), off.y()), 1);
+  EXPECT_EQ(picked.count(), 0);
+  EXPECT_EQ(view.place_of({raw.x(), raw.y()})->toPoint(), from);  // the image has not moved
+}
+
+TEST_F(XrayViewTest, DragFarFromAMovablePickPans) {
+  const Eigen::Vector2d raw = shown().found->fiducials[3].uv_raw;
+  view.set_movable_picks({{"FS", raw}});
+  QSignalSpy moved(&view, &XrayView::pick_moved);
+  for (int i = 0; i < 3; ++i) key(Qt::Key_Plus);
+  const QPoint from = view.place_of({raw.x(), raw.y()})->toPoint();
+  drag(from + QPoint(30, 0), from + QPoint(50, 10), Qt::LeftButton);
+  EXPECT_EQ(moved.count(), 0);
+  EXPECT_NE(view.place_of({raw.x(), raw.y()})->toPoint(), from);
+}
+
 TEST_F(XrayViewTest, DoubleClickWhilePickingIsOnePick) {
   QSignalSpy spy(&view, &XrayView::picked);
   view.set_picking(true);
