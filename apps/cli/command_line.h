@@ -78,6 +78,8 @@ Arguments& arguments_of(CLI::App* command, Action& action, CommandResult (*run)(
   return *arguments;
 }
 
+/// Cases: made of files, picked in.
+void add_case_commands(CLI::App& app, Action& action);
 /// From images to points with confidence regions.
 void add_measuring_commands(CLI::App& app, Action& action);
 /// Commands without hardware: simulations, studies, the phantom.

@@ -240,12 +240,8 @@ void warn_of_name(Case& read) {
          {}});
 }
 
-Case case_from(const fs::path& path, Purpose purpose) {
-  const bool is_file = fs::is_regular_file(path);
-  const fs::path folder = is_file ? fs::absolute(path).parent_path() : path;
-  const fs::path file = is_file ? path : folder / "case.json";
-  const Json json = value_or_throw(read_json(file));
-  JsonReader reader(json, file.filename().string());
+Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
+  JsonReader reader(json, origin);
   reader.choice("format", {"helicarm-case/1"});
   reader.optional_text("notes", most_note_characters);
   Case read;
@@ -265,6 +261,11 @@ Case case_from(const fs::path& path, Purpose purpose) {
   return read;
 }
 
+Case case_from(const fs::path& path, Purpose purpose) {
+  const fs::path file = case_file(path);
+  return case_of(value_or_throw(read_json(file)), file.filename().string(), folder_of_case(path), purpose);
+}
+
 }  // namespace
 
 Json to_json(const Pick& pick) {
@@ -282,6 +283,18 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
     JsonReader reader(json, origin);
     return picks_of(reader, views, {});
   });
+}
+
+fs::path case_file(const fs::path& path) {
+  return fs::is_regular_file(path) ? path : path / "case.json";
+}
+
+fs::path folder_of_case(const fs::path& path) {
+  return fs::is_regular_file(path) ? fs::absolute(path).parent_path() : path;
+}
+
+Expected<Case> case_from_json(const Json& json, const std::string& origin, const fs::path& folder) {
+  return guarded([&] { return case_of(json, origin, folder, Purpose::run); });
 }
 
 Expected<Case> read_case(const fs::path& path) {

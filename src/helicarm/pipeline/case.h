@@ -73,6 +73,14 @@ struct Case {
 /// read. Fails with missing_file, bad_json, not_finite, unknown_key, path_outside, name_clash or bad_value.
 Expected<Case> read_case(const std::filesystem::path& path);
 
+/// The case.json of a case given by its folder or by that file, and its folder.
+std::filesystem::path case_file(const std::filesystem::path& path);
+std::filesystem::path folder_of_case(const std::filesystem::path& path);
+
+/// As `read_case`, from the content of case.json.
+Expected<Case> case_from_json(const Json& json, const std::string& origin,
+                              const std::filesystem::path& folder);
+
 /// As `read_case`, for the measurement of a phantom: one view is enough, and the calibrator may be null if
 /// "diameters_mm" is given (`calibrator` then has no balls).
 Expected<Case> read_phantom_case(const std::filesystem::path& path);

@@ -8,6 +8,7 @@
 #include "helicarm/image/png.h"
 #include "helicarm/image/tiff.h"
 #include "helicarm/xray/dicom_acquisition.h"
+#include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::xray {
@@ -48,10 +49,18 @@ XrayImage xray_image_of_png(const image::GreyImage& grey_image, const fs::path& 
   return xray_image;
 }
 
+bool is_dicom(std::string_view bytes) { return bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0; }
+
+BadInput not_an_image(std::string_view bytes, const std::string& origin) {
+  return {Reason::not_an_image,
+          fmt::format("{}: {}, neither DICOM with a preamble nor PNG nor TIFF", origin,
+                      bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size()))};
+}
+
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
   const std::string origin = path.filename().string();
-  if (bytes.size() >= 132 && bytes.compare(128, 4, "DICM") == 0)
+  if (is_dicom(bytes))
     return value_or_throw(read_dicom(bytes, origin, frame));
   if (image::is_png(bytes)) {
     value_or_throw(choose_frame(origin, 1, frame));
@@ -62,9 +71,7 @@ XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
     const int page = value_or_throw(choose_frame(origin, pages, frame));
     return xray_image_of_png(value_or_throw(image::decode_tiff(bytes, page, origin)), path);
   }
-  throw BadInput(Reason::not_an_image,
-                 fmt::format("{}: {}, neither DICOM with a preamble nor PNG nor TIFF", origin,
-                             bytes.empty() ? "zero bytes" : fmt::format("{} bytes", bytes.size())));
+  throw not_an_image(bytes, origin);
 }
 
 }  // namespace
@@ -77,6 +84,17 @@ std::optional<fs::path> sidecar_of(const fs::path& image) {
   for (const fs::path& sidecar : {full, plain})
     if (fs::exists(sidecar)) return sidecar;
   return std::nullopt;
+}
+
+Expected<int> count_frames(const fs::path& path) {
+  return guarded([&] {
+    const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
+    const std::string origin = path.filename().string();
+    if (is_dicom(bytes)) return value_or_throw(check_dicom(bytes, origin)).frames;
+    if (image::is_png(bytes)) return 1;
+    if (image::is_tiff(bytes)) return value_or_throw(image::count_tiff_pages(bytes, origin));
+    throw not_an_image(bytes, origin);
+  });
 }
 
 Expected<XrayImage> read_xray_image(const fs::path& path, const std::string& view_name,

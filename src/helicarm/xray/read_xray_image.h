@@ -18,6 +18,9 @@ namespace helicarm::xray {
 Expected<XrayImage> read_xray_image(const std::filesystem::path& path, const std::string& view_name,
                                     std::optional<int> frame);
 
+/// Frames or pages of an image file; fails as `read_xray_image`.
+Expected<int> count_frames(const std::filesystem::path& path);
+
 /// The sidecar beside a PNG or TIFF, where there is one.
 std::optional<std::filesystem::path> sidecar_of(const std::filesystem::path& image);
 

@@ -45,6 +45,13 @@ std::string view_of(const Acquisition& shown, const std::string& wanted, std::sp
   return better == views.end() ? wanted : *better;
 }
 
+std::optional<std::string> kind_of_view(const Acquisition& shown) {
+  const auto direction = beam(shown);
+  const Kind kind = direction ? kind_of(*direction) : Kind::other;
+  if (kind == Kind::other) return std::nullopt;
+  return kind == Kind::frontal ? "AP" : "LAT";
+}
+
 std::optional<double> degrees_apart(const Acquisition& a, const Acquisition& b) {
   const auto one = beam(a), other = beam(b);
   if (!one || !other || *one == *other) return std::nullopt;

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "new_command.h"
+
+#include <iostream>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "helicarm/pipeline/new_case.h"
+
+namespace helicarm::cli {
+namespace {
+
+bool may_ask(const Console& console) {
+  return !console.json && !console.quiet && ::isatty(STDIN_FILENO) != 0 && ::isatty(STDERR_FILENO) != 0;
+}
+
+/// The line typed at the terminal; empty at the end of the input.
+std::string answer_to(const std::string& question, Console& console) {
+  console.progress << question << std::flush;
+  std::string line;
+  std::getline(std::cin, line);
+  return line;
+}
+
+std::vector<std::pair<std::string, std::filesystem::path>> files_by_view(
+    const std::vector<std::string>& words, const char* option) {
+  std::vector<std::pair<std::string, std::filesystem::path>> files;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    if (equals == word.npos || equals == 0 || equals + 1 == word.size())
+      throw BadInput(Reason::usage, fmt::format("{}: \"{}\" is not VIEW=FILE", option, word));
+    files.emplace_back(word.substr(0, equals), word.substr(equals + 1));
+  }
+  return files;
+}
+
+pipeline::InspectedImage inspected(pipeline::NewImage image, Console& console) {
+  auto seen = pipeline::inspect_image(image);
+  if (!seen && seen.error().figures.count("frames") && may_ask(console)) {
+    const std::string line = answer_to(seen.error().message + "\nFrame: ", console);
+    image = pipeline::new_image_from(image.file.string() + ":" + line);
+    seen = pipeline::inspect_image(image);
+  }
+  return value_or_throw(std::move(seen));
+}
+
+/// Asks at a terminal for what the images leave open.
+void ask(pipeline::NewCaseOptions& options, const std::vector<pipeline::InspectedImage>& images,
+         Console& console) {
+  if (!may_ask(console)) return;
+  if (options.calibrator.empty())
+    options.calibrator =
+        answer_to("Calibrator (a calibrator.json, or udcsc for the built-in one): ", console);
+  if (options.plate || options.maps.size() == images.size()) return;
+  const pipeline::PlateChoice choice = pipeline::choose_plate(images);
+  options.plate = choice.plate;
+  if (options.plate) return;
+  const std::string line = answer_to(
+      fmt::format("{}.\nPlate (a plate.json, plate48, or none if the images are free of distortion): ",
+                  choice.why),
+      console);
+  if (!line.empty()) options.plate = line;
+}
+
+void print(const pipeline::NewCase& made, const std::filesystem::path& out, Console& console) {
+  const std::string file = (out / "case.json").string();
+  const std::vector<std::string> next{fmt::format("helicarm pick {}", out.string()),
+                                      fmt::format("helicarm run {}", out.string())};
+  if (console.json) {
+    Json json = {{"case", file}, {"findings", made.findings}, {"warnings", Json::array()}, {"next", next}};
+    for (const Warning& warning : made.warnings)
+      json["warnings"].push_back(
+          {{"code", code(warning.reason)}, {"view", warning.view}, {"message", warning.message}});
+    console.out << to_text(json) << '\n';
+    return;
+  }
+  for (const std::string& finding : made.findings) console.out << "  " << finding << '\n';
+  console.out << fmt::format(
+      "\n  written to {}{}\n  Next:\n    {}    picks points; --csv FILE takes them from a table\n    {}    "
+      "measures the case\n",
+      file, made.copies.empty() ? "" : " with copies of the files, patient data included", next[0], next[1]);
+}
+
+}  // namespace
+
+CommandResult new_command(const NewArguments& arguments, Console& console) {
+  return guarded([&] {
+    pipeline::NewCaseOptions options{arguments.calibrator, arguments.plate,
+                                     files_by_view(arguments.maps, "--map"),
+                                     files_by_view(arguments.plate_images, "--plate-image")};
+    std::vector<pipeline::InspectedImage> images;
+    for (const std::string& word : arguments.images)
+      images.push_back(inspected(pipeline::new_image_from(word), console));
+    pipeline::name_views(images);
+    ask(options, images, console);
+    const pipeline::NewCase made =
+        value_or_throw(pipeline::new_case(std::move(images), options, arguments.out));
+    value_or_throw(pipeline::write_new_case(made, arguments.out));
+    if (!console.quiet)
+      for (const Warning& warning : made.warnings)
+        console.progress << fmt::format("helicarm: warning: {}: {}{}{}\n", code(warning.reason), warning.view,
+                                        warning.view.empty() ? "" : ": ", warning.message);
+    print(made, arguments.out, console);
+  });
+}
+
+}  // namespace helicarm::cli

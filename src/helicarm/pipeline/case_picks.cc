@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/case_picks.h"
+
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/pipeline/case.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+bool is_named(const Json& pick, const std::string& name) {
+  return pick.is_object() && pick.value("name", Json()) == Json(name);
+}
+
+/// The picks of a case.json; null and absent are an empty list.
+Json& picks_of(Json& json) {
+  if (!json.contains("picks") || json["picks"].is_null()) json["picks"] = Json::array();
+  return json["picks"];
+}
+
+Json new_pick(const Json& picks, const std::string& name, const std::string& view) {
+  Json pick = {{"name", name}, {"view", view}, {"uv", nullptr}};
+  for (const Json& other : picks)
+    if (is_named(other, name) && other.contains("moves_with")) pick["moves_with"] = other["moves_with"];
+  return pick;
+}
+
+}  // namespace
+
+Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::filesystem::path& folder) {
+  return guarded([&] {
+    value_or_throw(case_from_json(json, "case.json", folder));
+    if (table.rows() == 0) throw BadInput(Reason::bad_value, "picks: the table has no rows");
+    PickedCase picked{std::move(json)};
+    Json& picks = picks_of(picked.json);
+    std::set<std::pair<std::string, std::string>> given;
+    for (std::size_t row = 0; row < table.rows(); ++row) {
+      const std::string &name = table.text(row, "name"), &view = table.text(row, "view");
+      if (!given.emplace(name, view).second)
+        throw BadInput(Reason::name_clash,
+                       fmt::format("picks: row {}: \"{}\" is given twice in \"{}\"", row + 1, name, view));
+      auto pick = std::find_if(picks.begin(), picks.end(), [&](const Json& other) {
+        return is_named(other, name) && other.value("view", Json()) == Json(view);
+      });
+      const bool known = pick != picks.end();
+      ++(known ? picked.replaced : picked.added);
+      if (!known) {
+        picks.push_back(new_pick(picks, name, view));
+        pick = picks.end() - 1;
+      }
+      (*pick)["uv"] = {table.number(row, "u_px"), table.number(row, "v_px")};
+      if (const auto sigma = table.optional_number(row, "sigma_px")) (*pick)["sigma_px"] = *sigma;
+    }
+    value_or_throw(case_from_json(picked.json, "case.json", folder));
+    return picked;
+  });
+}
+
+}  // namespace helicarm::pipeline

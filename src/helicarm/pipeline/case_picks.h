@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "helicarm/core/csv.h"
+#include "helicarm/core/json.h"
+
+namespace helicarm::pipeline {
+
+/// case.json with further picks.
+struct PickedCase {
+  Json json;
+  std::size_t added = 0, replaced = 0;
+};
+
+/// Adds the picks of a table name, view, u_px, v_px[, sigma_px] (raw px) to a case.json. A pick of the same
+/// name and view takes the table's pixel and keeps its other keys; a new one takes `moves_with` from the
+/// picks of its name. Refuses what `case_from_json` refuses of the result, and a table without rows or that
+/// gives a pick twice.
+Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::filesystem::path& folder);
+
+}  // namespace helicarm::pipeline

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/case_picks.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+class CasePicks : public testing::Test {
+ protected:
+  Expected<PickedCase> picked(const std::string& rows) {
+    const auto path = folder_.path() / "picks.csv";
+    EXPECT_TRUE(write_file(path, "name,view,u_px,v_px,sigma_px\n" + rows));
+    return with_picks(json_, *read_csv(path, {"name", "view", "u_px", "v_px"}, {"sigma_px"}), folder_.path());
+  }
+
+  TemporaryFolder folder_;
+  Json json_ = *parse_json(R"({"format": "helicarm-case/1", "notes": "left", "calibrator": "udcsc",
+    "views": [{"name": "AP", "image": "AP.dcm"}, {"name": "LAT", "image": "LAT.dcm"}],
+    "picks": [{"name": "entry", "view": "AP", "uv": [1, 2], "snap": "ball", "moves_with": "femur"}]})",
+                           "test");
+};
+
+TEST_F(CasePicks, AreAddedAndReplaced) {
+  const auto made = picked("entry,AP,300.5,40,0.2\nentry,LAT,512,7,\n");
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->added, 1u);
+  EXPECT_EQ(made->replaced, 1u);
+  EXPECT_EQ(made->json["notes"], "left");
+  EXPECT_EQ(made->json["picks"],
+            *parse_json(R"([{"name": "entry", "view": "AP", "uv": [300.5, 40.0], "snap": "ball",
+                             "moves_with": "femur", "sigma_px": 0.2},
+                            {"name": "entry", "view": "LAT", "uv": [512.0, 7.0], "moves_with": "femur"}])",
+                        "test"));
+}
+
+TEST_F(CasePicks, OfAnUnknownViewAreRefused) {
+  EXPECT_EQ(picked("entry,OBL,1,2,\n").error().reason, Reason::bad_value);
+}
+
+TEST_F(CasePicks, GivenTwiceAreRefused) {
+  EXPECT_EQ(picked("exit,AP,1,2,\nexit,AP,3,4,\n").error().reason, Reason::name_clash);
+}
+
+TEST_F(CasePicks, AreNotTakenFromAnEmptyTable) { EXPECT_EQ(picked("").error().reason, Reason::bad_value); }
+
+}  // namespace
+}  // namespace helicarm::pipeline
