@@ -20,4 +20,22 @@ std::optional<WantedPick> next_pick(const ApplicationState& state) {
   return std::nullopt;
 }
 
+std::optional<WantedPick> next_landmark(const ApplicationState& state) {
+  for (const std::string& point : state.landmarks)
+    for (const std::string& view : state.views)
+      if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, {}};
+  return std::nullopt;
+}
+
+void complete_landmarks(ApplicationState& state) {
+  const auto is_end = [&](const std::string& point) {
+    return std::ranges::any_of(state.tunnels, [&](const operation::PlannedTunnel& tunnel) {
+      return tunnel.start == point || tunnel.end == point;
+    });
+  };
+  for (const pipeline::Pick& pick : state.picks)
+    if (!is_end(pick.name) && std::ranges::find(state.landmarks, pick.name) == state.landmarks.end())
+      state.landmarks.push_back(pick.name);
+}
+
 }  // namespace helicarm::gui

@@ -41,8 +41,13 @@ struct ApplicationState {
   std::map<std::string, double> touched_mm;  ///< deviation at the last touch
 
   std::vector<operation::PlannedTunnel> tunnels;
+  std::vector<std::string> landmarks;  ///< other points to pick; of files only
   std::vector<pipeline::Pick> picks;
-  std::vector<pipeline::Pick> offered_picks;  ///< picks of the plan
+  std::optional<std::filesystem::path> case_folder =
+      {};                                      ///< where picks are kept; none for replays and images
+  bool has_unsaved_picks = false;              ///< not in the case.json of `case_folder`
+  std::optional<Failure> picks_not_kept = {};  ///< why changed picks are not kept or saved
+  std::vector<pipeline::Pick> offered_picks;   ///< picks of the plan
 
   QString tour;  ///< description of the registration moves
   std::optional<double> hand_eye_rms_mm;
@@ -64,8 +69,12 @@ const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& 
 struct WantedPick {
   std::string point;
   std::string view;
-  guidance::Bone bone;
+  std::optional<guidance::Bone> bone;
 };
 std::optional<WantedPick> next_pick(const ApplicationState& state);
+/// The next landmark and view to pick.
+std::optional<WantedPick> next_landmark(const ApplicationState& state);
+/// Adds the points that are picked and are no tunnel's end to the landmarks.
+void complete_landmarks(ApplicationState& state);
 
 }  // namespace helicarm::gui

@@ -7,6 +7,7 @@
 
 #include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
+#include "gui/controller/unsaved_picks.h"
 #include "gui/replay/pdf_report.h"
 #include "helicarm/core/files.h"
 #include "helicarm/operation/plan_fields.h"
@@ -206,10 +207,21 @@ Controller::Change Controller::with_plan(const operation::OperationPlan& plan, c
   };
 }
 
-void Controller::open_case(const fs::path& folder) {
-  open(Source::files, folder, "reading " + folder.filename().string(), [=, this](Equipment& equipment) {
-    return with_case(value_or_throw(pipeline::read_case(folder)), equipment);
-  });
+void Controller::open_case(const fs::path& folder, bool keeps_picks) {
+  open(Source::files, folder, "reading " + folder.filename().string(),
+       [=, this](Equipment& equipment) -> Change {
+         pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+         if (!keeps_picks) return with_case(std::move(given), equipment);
+         const auto unsaved = unsaved_picks(folder, given.views);
+         return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
+                 unsaved](ApplicationState& state) {
+           change(state);
+           if (unsaved)
+             state.case_folder = folder;
+           else
+             state.picks_not_kept = unsaved.error();
+         };
+       });
 }
 
 void Controller::open_images(const std::vector<fs::path>& images) {
@@ -219,14 +231,18 @@ void Controller::open_images(const std::vector<fs::path>& images) {
   });
 }
 
-Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment) {
+Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment,
+                                         std::optional<Picks> unsaved) {
   equipment.given = given;
-  const Change found = measured(equipment, given.picks);
-  return [given = std::move(given), found](ApplicationState& state) {
+  const Change found = measured(equipment, unsaved.value_or(given.picks));
+  return [this, given = std::move(given), unsaved = std::move(unsaved), found](ApplicationState& state) {
     for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
     state.calibrator = given.calibrator;
     state.tunnels = tunnels_of(given);
-    state.picks = given.picks;
+    state.picks = unsaved.value_or(given.picks);
+    state.has_unsaved_picks = unsaved.has_value();
+    if (unsaved) earlier_picks_.push_back(given.picks);
+    complete_landmarks(state);
     found(state);
   };
 }
@@ -299,6 +315,7 @@ void Controller::measure() {
 void Controller::change_picks(Picks picks, bool measurable) {
   earlier_picks_.push_back(std::exchange(state_.picks, std::move(picks)));
   later_picks_.clear();
+  keep_unsaved_picks();
   picks_changed(measurable);
 }
 
@@ -306,7 +323,44 @@ void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
   if (!takes_picks() || from.empty()) return;
   to.push_back(std::exchange(state_.picks, std::move(from.back())));
   from.pop_back();
+  keep_unsaved_picks();
   picks_changed(has_all_images());
+}
+
+void Controller::keep_unsaved_picks() {
+  complete_landmarks(state_);
+  if (!state_.case_folder) return;
+  state_.has_unsaved_picks = true;
+  const auto kept = keep_unsaved(*state_.case_folder, state_.picks);
+  state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
+}
+
+void Controller::save_picks() {
+  if (!state_.case_folder || !takes_picks()) return;
+  std::vector<pipeline::TunnelPlan> tunnels;
+  for (const operation::PlannedTunnel& tunnel : state_.tunnels)
+    tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
+  state_.has_unsaved_picks = !saved;
+  state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
+  emit changed();
+}
+
+void Controller::add_landmark(const std::string& name) {
+  if (state_.source != Source::files) return;
+  const bool is_taken =
+      std::ranges::find(state_.landmarks, name) != state_.landmarks.end() ||
+      std::ranges::any_of(state_.tunnels,
+                          [&](const operation::PlannedTunnel& tunnel) {
+                            return tunnel.start == name || tunnel.end == name;
+                          }) ||
+      std::ranges::find(state_.calibrator.targets, name, &phantom::CalibratorTarget::name) !=
+          state_.calibrator.targets.end();
+  if (name.empty() || is_taken)
+    return emit refused(Phase::plan, name.empty() ? tr("A landmark needs a name.")
+                                                  : tr("There is a point of this name already."));
+  state_.landmarks.push_back(name);
+  emit changed();
 }
 
 bool Controller::has_all_images() const {
@@ -327,6 +381,8 @@ bool Controller::takes_picks() const { return !state_.busy || state_.busy == Pha
 void Controller::pick(pipeline::Pick pick) {
   if (!takes_picks()) return;
   Picks picks = state_.picks;
+  for (const pipeline::Pick& other : picks)
+    if (other.name == pick.name) pick.moves_with = other.moves_with;
   std::erase_if(picks,
                 [&](const pipeline::Pick& old) { return old.name == pick.name && old.view == pick.view; });
   const std::string point = pick.name;
@@ -345,7 +401,10 @@ void Controller::take_offered_picks() {
 void Controller::erase_picks(const std::string& point) {
   Picks picks = state_.picks;
   const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
-  if (takes_picks() && erased > 0) change_picks(std::move(picks), has_all_images());
+  if (!takes_picks()) return;
+  const auto forgotten = std::erase(state_.landmarks, point);
+  if (forgotten > 0 && erased == 0) emit changed();
+  if (erased > 0) change_picks(std::move(picks), has_all_images());
 }
 
 void Controller::clear_picks() {

@@ -47,7 +47,8 @@ class Controller : public QObject {
   void open_devices(const std::filesystem::path& plan, const receiver::ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
   /// A case folder, or X-ray images without tracker and robot.
-  void open_case(const std::filesystem::path& folder);
+  /// `keeps_picks`: changed picks are kept beside case.json, and those kept are taken.
+  void open_case(const std::filesystem::path& folder, bool keeps_picks = true);
   void open_images(const std::vector<std::filesystem::path>& images);
 
   /// For virtual devices opened from now on, never for real ones: tests on a busy machine set longer limits.
@@ -58,11 +59,16 @@ class Controller : public QObject {
   void expect(const std::string& view);        ///< view of the next image
   void shoot(const std::string& view);         ///< with the virtual C-arm
   void touch(const std::string& check_point);  ///< with the pointer
-  /// Also during a measurement with earlier picks, which is then repeated.
+  /// Also during a measurement with earlier picks, which is then repeated. Moves with the bone of its other
+  /// picks.
   void pick(pipeline::Pick pick);
   bool takes_picks() const;
   void take_offered_picks();
-  /// Removes an end's picks in all views.
+  /// Another point to pick, in a case of files. Refused if the name is empty or taken.
+  void add_landmark(const std::string& name);
+  /// Into case.json.
+  void save_picks();
+  /// Removes a point's picks in all views, and the point if it is a landmark.
   void erase_picks(const std::string& point);
   void clear_picks();
   bool can_undo_picks() const { return !earlier_picks_.empty(); }
@@ -117,7 +123,8 @@ class Controller : public QObject {
   bool has_all_images() const;
   Change measured(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
   static Change with_plan(const operation::OperationPlan& plan, const Json& offered);
-  Change with_case(pipeline::Case given, Equipment& equipment);
+  Change with_case(pipeline::Case given, Equipment& equipment, std::optional<Picks> unsaved = {});
+  void keep_unsaved_picks();
   Change came(std::vector<pipeline::ViewResult> images);
 
   ApplicationState state_;

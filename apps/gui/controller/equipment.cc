@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/controller/equipment.h"
 
+#include <algorithm>
 #include <thread>
 
 #include <fmt/format.h>
@@ -60,9 +61,27 @@ Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view) {
   return taken;
 }
 
+namespace {
+
+/// The case with other picks; without the tunnels that have lost an end, and their tool lines.
+pipeline::Case with_picks(pipeline::Case given, const std::vector<pipeline::Pick>& picks) {
+  given.picks = picks;
+  const auto is_picked = [&](const std::string& point) {
+    return std::ranges::find(picks, point, &pipeline::Pick::name) != picks.end();
+  };
+  std::erase_if(given.tunnels, [&](const pipeline::TunnelPlan& tunnel) {
+    return !is_picked(tunnel.start) || !is_picked(tunnel.end);
+  });
+  std::erase_if(given.tool_lines, [&](const auto& line) {
+    return std::ranges::find(given.tunnels, line.tunnel, &pipeline::TunnelPlan::name) == given.tunnels.end();
+  });
+  return given;
+}
+
+}  // namespace
+
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks) {
   if (equipment.given) {
-    equipment.given->picks = picks;
     if (!equipment.calibration || equipment.calibrated_by != equipment.options.method) {
       auto calibration = pipeline::calibrate_case(*equipment.given, equipment.options);
       if (!calibration)
@@ -71,7 +90,8 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
       equipment.calibration = *std::move(calibration);
       equipment.calibrated_by = equipment.options.method;
     }
-    return pipeline::locate_case(*equipment.given, *equipment.calibration, equipment.options);
+    return pipeline::locate_case(with_picks(*equipment.given, picks), *equipment.calibration,
+                                 equipment.options);
   }
   Json json = Json::array();
   for (const pipeline::Pick& pick : picks) json.push_back(helicarm::pipeline::to_json(pick));

@@ -76,7 +76,9 @@ void calibrate(StepCard& card, const ApplicationState& state) {
 }
 
 void plan(StepCard& card, const ApplicationState& state) {
-  if (const auto wanted = next_pick(state)) {
+  auto wanted = next_pick(state);
+  if (!wanted) wanted = next_landmark(state);
+  if (wanted) {
     card.why = tr("click %1 in %2").arg(text(wanted->point), text(wanted->view));
     return;
   }

@@ -198,6 +198,7 @@ void MainWindow::show_state() {
     statusBar()->showMessage(text(state.doing));
   else if (state.refusals.empty())
     statusBar()->clearMessage();
+  save_->setEnabled(state.has_unsaved_picks);
   undo_->setEnabled(controller_.can_undo_picks() && controller_.takes_picks());
   redo_->setEnabled(controller_.can_redo_picks() && controller_.takes_picks());
   show_images();

@@ -97,6 +97,7 @@ class MainWindow : public QMainWindow {
   NavigatePage* navigate_ = nullptr;
   ReplayPanel* replay_ = nullptr;
   QDockWidget* replay_dock_ = nullptr;
+  QAction* save_ = nullptr;
   QAction* undo_ = nullptr;
   QAction* redo_ = nullptr;
   QMenu* recent_menu_ = nullptr;

@@ -75,6 +75,8 @@ void MainWindow::build_menus() {
   recent_menu_ = file->addMenu(tr("&Recent"));
   build_recent();
   file->addSeparator();
+  save_ = file->addAction(tr("&Save the picks in the case"), QKeySequence::Save, &controller_,
+                          &Controller::save_picks);
   file->addAction(tr("&Export report and results..."), QKeySequence(tr("Ctrl+E")), this,
                   &MainWindow::ask_and_export);
   file->addAction(tr("Save &screenshot..."), QKeySequence(tr("Ctrl+P")), this, &MainWindow::save_screenshot);
@@ -106,7 +108,8 @@ void MainWindow::build_menus() {
         tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: next control\n"
            "Enter: press; hold it on a yellow button\n"
            "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n"
-           "Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete removes the end chosen in the table\n\n"
+           "Ctrl+S saves the picks, Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete removes the end "
+           "chosen in the table\n\n"
            "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, dragging "
            "moves a placed end, L layer, M magnifier, W contrast, H marks\n\n"
            "In 3-D: 1 AP, 2 lateral, 3 outside, 4 near, arrows turn, + - zoom, R resets\n\n"
@@ -213,7 +216,7 @@ void MainWindow::show_moment(int index) {
   const auto then = state_at(*replay_->timeline(), std::size_t(index));
   if (!then) return say(then.error());
   if (then->case_folder && then->measured && controller_.state().folder != *then->case_folder)
-    controller_.open_case(*then->case_folder);
+    controller_.open_case(*then->case_folder, false);
   show_recorded();
 }
 

@@ -104,6 +104,7 @@ class PlanPage : public Page {
 
  private:
   void delete_chosen();
+  void add_landmark_row();
   void add_map();
   void tell_next();
 
@@ -112,6 +113,8 @@ class PlanPage : public Page {
   QCheckBox* snap_;
   QPushButton* offered_;
   QPushButton* delete_;
+  QWidget* landmark_row_;
+  QLabel* unsaved_;
   std::optional<std::string> chosen_;
   std::size_t placed_of_chosen_ = 0;
 };

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <QDropEvent>
 #include <QMenu>
-#include <QMimeData>
 #include <fstream>
 #include <random>
 
@@ -10,17 +8,6 @@
 
 namespace helicarm::gui {
 namespace {
-
-void drop(QWidget& onto, const std::vector<fs::path>& paths) {
-  QMimeData data;
-  QList<QUrl> urls;
-  for (const fs::path& path : paths) urls << QUrl::fromLocalFile(QString::fromStdString(path.string()));
-  data.setUrls(urls);
-  QDragEnterEvent enter(QPoint(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(&onto, &enter);
-  QDropEvent event(QPointF(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
-  QApplication::sendEvent(&onto, &event);
-}
 
 TEST_F(Window, SilentTrackerIsShownUntilItSendsAgain) {
   open_rehearsal();
@@ -100,90 +87,6 @@ TEST_F(Window, CancelEndsTheWaitForAnImage) {
   QTest::mouseClick(cancel, Qt::LeftButton);
   ASSERT_TRUE(wait_idle());
   EXPECT_FALSE(cancel->isVisible());
-}
-
-class WindowWithTunnels : public Window {
- protected:
-  void open_tunnels() {
-    simulation::SimulationOptions options;
-    options.kind = simulation::CaseKind::tunnels;
-    ASSERT_TRUE(simulation::write_case(folder_ / "tunnels", simulation::simulate_case(options).value()));
-    drop(*window_, {folder_ / "tunnels"});
-    ASSERT_TRUE(wait("the case is measured", [&] { return state().measured && !state().busy; }));
-    picks_ = state().picks;
-  }
-  /// Picks the end FE where the case has another point.
-  void pick_end_at(const std::string& point) {
-    for (pipeline::Pick pick : picks_)
-      if (pick.name == point) {
-        pick.name = "FE";
-        window_->controller().pick(pick);
-        ASSERT_TRUE(wait_idle());
-      }
-  }
-  StepStatus plan() { return card(Phase::plan).status; }
-
-  std::vector<pipeline::Pick> picks_;
-};
-
-TEST_F(WindowWithTunnels, WrongPickIsUndoneAndRedone) {
-  open_tunnels();
-  pick_end_at("FS");
-  ASSERT_EQ(plan(), StepStatus::refused);
-  const auto press = [&](Qt::KeyboardModifiers with) {
-    QTest::keyClick(window_.get(), Qt::Key_Z, with);
-    EXPECT_TRUE(wait_idle());
-  };
-  press(Qt::ControlModifier);
-  press(Qt::ControlModifier);
-  EXPECT_EQ(plan(), StepStatus::good) << card(Phase::plan).why.toStdString();
-  press(Qt::ControlModifier | Qt::ShiftModifier);
-  press(Qt::ControlModifier | Qt::ShiftModifier);
-  EXPECT_EQ(plan(), StepStatus::refused);
-}
-
-TEST_F(WindowWithTunnels, DeletedEndIsAskedForAgainAndUndone) {
-  open_tunnels();
-  window_->strip().chosen(Phase::plan);
-  auto* table = window_->findChild<QTableWidget*>("endTable");
-  ASSERT_EQ(table->item(0, 0)->text(), "FS");
-  table->setCurrentCell(0, 0, QItemSelectionModel::ClearAndSelect | QItemSelectionModel::Rows);
-  QTest::keyClick(table, Qt::Key_Delete);
-  ASSERT_TRUE(wait_idle());
-  EXPECT_EQ(next_pick(state())->point, "FS");
-  EXPECT_TRUE(state().measured);
-  EXPECT_NE(plan(), StepStatus::good);
-  QTest::keyClick(window_.get(), Qt::Key_Z, Qt::ControlModifier);
-  ASSERT_TRUE(wait_idle());
-  EXPECT_EQ(plan(), StepStatus::good) << card(Phase::plan).why.toStdString();
-}
-
-TEST_F(WindowWithTunnels, DraggedPickMovesItsPoint) {
-  open_tunnels();
-  window_->strip().chosen(Phase::plan);
-  const Eigen::Vector2d before = pick_of(state(), "FS", state().views[0])->uv_raw;
-  XrayView& view = window_->xray(0);
-  ASSERT_TRUE(wait("the image is shown", [&] {
-    return view.place_of({before.x(), before.y()}).has_value();
-  }));
-  const QPoint from = view.place_of({before.x(), before.y()})->toPoint(), to = from + QPoint(25, 0);
-  QTest::mousePress(&view, Qt::LeftButton, {}, from);
-  QMouseEvent move(QEvent::MouseMove, to, view.mapToGlobal(QPointF(to)), Qt::NoButton, Qt::LeftButton, {});
-  QApplication::sendEvent(&view, &move);
-  QTest::mouseRelease(&view, Qt::LeftButton, {}, to);
-  ASSERT_TRUE(wait_idle());
-  EXPECT_GT((pick_of(state(), "FS", state().views[0])->uv_raw - before).norm(), 5);
-  EXPECT_TRUE(window_->controller().can_undo_picks());
-}
-
-TEST_F(WindowWithTunnels, WrongPickRefusesThePlanUntilItIsPickedAgain) {
-  open_tunnels();
-  pick_end_at("FS");
-  EXPECT_EQ(card(Phase::plan).status, StepStatus::refused);
-  EXPECT_THAT(card(Phase::plan).why.toStdString(), HasSubstr("bad_tunnel"));
-  EXPECT_TRUE(state().measured);
-  pick_end_at("FE");
-  EXPECT_EQ(card(Phase::plan).status, StepStatus::good) << card(Phase::plan).why.toStdString();
 }
 
 TEST_F(Window, RefusedCalibrationIsShownWithItsReasonAndNoNextStep) {

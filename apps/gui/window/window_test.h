@@ -2,6 +2,8 @@
 #pragma once
 
 #include <QApplication>
+#include <QDropEvent>
+#include <QMimeData>
 #include <QTest>
 
 #include <gmock/gmock.h>
@@ -47,6 +49,17 @@ class WatchedApplication : public QApplication {
   static inline qint64 longest_ms = 0;
   static inline std::string longest_what;
 };
+
+inline void drop(QWidget& onto, const std::vector<fs::path>& paths) {
+  QMimeData data;
+  QList<QUrl> urls;
+  for (const fs::path& path : paths) urls << QUrl::fromLocalFile(QString::fromStdString(path.string()));
+  data.setUrls(urls);
+  QDragEnterEvent enter(QPoint(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(&onto, &enter);
+  QDropEvent event(QPointF(10, 10), Qt::CopyAction, &data, Qt::LeftButton, Qt::NoModifier);
+  QApplication::sendEvent(&onto, &event);
+}
 
 /// A window on the screen with a folder.
 class Window : public testing::Test {

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages of the planning, navigation and verification steps.
 #include <QHBoxLayout>
+#include <QHeaderView>
 #include <QKeyEvent>
+#include <QLineEdit>
 #include <QVBoxLayout>
 #include <algorithm>
 
@@ -21,8 +23,13 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   next_->setWordWrap(true);
   next_->setStyleSheet("color: #ffc400; font-weight: bold;");
   layout()->addWidget(next_);
-  ends_ =
-      add_table({tr("End"), tr("Drill"), tr("Clicked in"), tr("±mm (95 %)"), tr("Ray gap mm")}, "endTable");
+  ends_ = add_table(
+      {tr("Point"), tr("Is"), tr("Clicked in"), tr("x, y, z mm"), tr("±mm (95 %)"), tr("Ray gap mm")},
+      "endTable");
+  ends_->horizontalHeaderItem(3)->setToolTip(tr("In the calibrator's frame, at the first view's exposure"));
+  ends_->horizontalHeaderItem(4)->setToolTip(tr(
+      "Longest semi-axis of the 95 % confidence ellipsoid; of a target its error (TRE) and the 95 % bound"));
+  ends_->horizontalHeaderItem(5)->setToolTip(tr("Largest distance between two of the point's rays"));
   connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
     const int row = ends_->currentRow();
     chosen_.reset();
@@ -47,7 +54,37 @@ PlanPage::PlanPage(Controller& controller, QWidget* parent)
   });
   for (QWidget* button : {offered_, delete_, clear}) row->addWidget(button);
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  add_landmark_row();
+  unsaved_ = new QLabel;
+  unsaved_->setObjectName("unsavedPicks");
+  unsaved_->setWordWrap(true);
+  layout()->addWidget(unsaved_);
   add_map();
+}
+
+void PlanPage::add_landmark_row() {
+  landmark_row_ = new QWidget;
+  auto* row = new QHBoxLayout(landmark_row_);
+  row->setContentsMargins(0, 0, 0, 0);
+  auto* name = new QLineEdit;
+  name->setObjectName("landmarkName");
+  name->setPlaceholderText(tr("name of another point"));
+  name->setAccessibleName(tr("Name of the landmark"));
+  name->setMaxLength(64);
+  auto* add = new QPushButton(tr("&Add landmark"));
+  add->setObjectName("addLandmark");
+  const auto take = [this, name] {
+    controller_.add_landmark(name->text().trimmed().toStdString());
+    for (int i = 0; i < ends_->rowCount(); ++i)
+      if (ends_->item(i, 0)->text() == name->text().trimmed())
+        ends_->setCurrentCell(i, 0, QItemSelectionModel::ClearAndSelect | QItemSelectionModel::Rows);
+    name->clear();
+  };
+  connect(add, &QPushButton::clicked, this, take);
+  connect(name, &QLineEdit::returnPressed, this, take);
+  row->addWidget(name, 1);
+  row->addWidget(add);
+  layout()->addWidget(landmark_row_);
 }
 
 bool PlanPage::eventFilter(QObject* watched, QEvent* event) {
@@ -95,35 +132,63 @@ void PlanPage::add_map() {
 
 std::optional<WantedPick> PlanPage::target() const {
   const ApplicationState& state = controller_.state();
-  if (!chosen_) return next_pick(state);
+  if (!chosen_) {
+    const auto end = next_pick(state);
+    return end ? end : next_landmark(state);
+  }
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
+  if (std::ranges::find(state.landmarks, *chosen_) != state.landmarks.end())
+    return WantedPick{*chosen_, "", {}};
   return std::nullopt;
 }
+
+namespace {
+
+/// Columns of a point: where it is clicked, its place, 95 % error and ray gap, or why it is not located.
+QStringList columns_of(const ApplicationState& state, const std::string& name, const QString& kind) {
+  QStringList in;
+  for (const std::string& view : state.views)
+    if (pick_of(state, name, view) != nullptr) in << text(view);
+  QString place, within, gap;
+  if (state.result)
+    for (const pipeline::PointResult& point : state.result->points) {
+      if (point.name != name) continue;
+      if (point.reason) within = sentence_of(*point.reason);
+      if (!point.place) continue;
+      const Eigen::Vector3d& at = point.place->in_calibrator;
+      place = QString("%1, %2, %3").arg(number(at.x(), 2), number(at.y(), 2), number(at.z(), 2));
+      within = number(localization::length_at_95(point.place->covariance_in_calibrator), 2);
+      gap = number(point.ray_gap_mm, 2);
+    }
+  return {text(name), kind, in.join(", "), place, within, gap};
+}
+
+}  // namespace
 
 void PlanPage::show_state(const ApplicationState& state) {
   std::vector<QStringList> rows;
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& end : {tunnel.start, tunnel.end}) {
-      QStringList in;
-      for (const std::string& view : state.views)
-        if (pick_of(state, end, view) != nullptr) in << text(view);
-      QString within, gap;
-      if (state.result)
-        for (const pipeline::PointResult& point : state.result->points)
-          if (point.name == end) {
-            if (point.place) {
-              within = number(localization::length_at_95(point.place->covariance_in_calibrator), 2);
-              gap = number(point.ray_gap_mm, 2);
-            } else if (point.reason) {
-              within = sentence_of(*point.reason);
-            }
-          }
       const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
-      rows.push_back({text(end), enters ? tr("enters") : tr("ends"), in.join(", "), within, gap});
+      rows.push_back(columns_of(state, end, enters ? tr("enters") : tr("ends")));
+    }
+  for (const std::string& landmark : state.landmarks)
+    rows.push_back(columns_of(state, landmark, tr("landmark")));
+  if (state.result)
+    for (const localization::TargetError& target : state.result->accuracy.targets) {
+      rows.push_back(columns_of(state, target.name, tr("target")));
+      rows.back()[4] =
+          tr("error %1 of %2").arg(number(target.error_mm, 3), number(target.predicted_95_mm, 3));
     }
   fill(ends_, rows);
   offered_->setVisible(!state.offered_picks.empty());
+  landmark_row_->setVisible(state.source == Source::files);
+  unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);
+  unsaved_->setText(
+      state.picks_not_kept
+          ? tr("The picks are not kept in the case: %1").arg(sentence_of(*state.picks_not_kept))
+          : tr("These picks are not in case.json yet: Ctrl+S saves them. They are kept until then."));
   tell_next();
 }
 
@@ -135,10 +200,12 @@ void PlanPage::tell_next() {
     return next_->setText(
         tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_)));
   const auto wanted = next_pick(state);
+  if (const auto landmark = next_landmark(state); !wanted && landmark)
+    return next_->setText(tr("Click %1 in %2.").arg(text(landmark->point), text(landmark->view)));
   if (!wanted)
-    return next_->setText(
-        tr("All ends are placed. To move one, drag it, or select it in the table and click its new position "
-           "in both X-ray images."));
+    return next_->setText(tr(
+        "All points are placed. To move one, drag it, or select it in the table and click its new position "
+        "in both X-ray images."));
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
       const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);

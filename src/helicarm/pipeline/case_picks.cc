@@ -6,8 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/pipeline/case.h"
-
 namespace helicarm::pipeline {
 namespace {
 
@@ -56,6 +54,26 @@ Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::fil
     }
     value_or_throw(case_from_json(picked.json, "case.json", folder));
     return picked;
+  });
+}
+
+Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
+                              const std::vector<TunnelPlan>& tunnels, const std::filesystem::path& folder) {
+  return guarded([&] {
+    const Case before = value_or_throw(case_from_json(json, "case.json", folder));
+    json["picks"] = Json::array();
+    for (const Pick& pick : picks) json["picks"].push_back(to_json(pick));
+    if (!json.contains("tunnels") || json["tunnels"].is_null()) json["tunnels"] = Json::array();
+    const auto is_picked = [&](const std::string& name) {
+      return std::ranges::find(picks, name, &Pick::name) != picks.end();
+    };
+    for (const TunnelPlan& tunnel : tunnels)
+      if (is_picked(tunnel.start) && is_picked(tunnel.end) &&
+          std::ranges::find(before.tunnels, tunnel.name, &TunnelPlan::name) == before.tunnels.end())
+        json["tunnels"].push_back({{"name", tunnel.name}, {"start", tunnel.start}, {"end", tunnel.end}});
+    if (json["tunnels"].empty()) json.erase("tunnels");
+    value_or_throw(case_from_json(json, "case.json", folder));
+    return json;
   });
 }
 

@@ -5,6 +5,7 @@
 
 #include "helicarm/core/csv.h"
 #include "helicarm/core/json.h"
+#include "helicarm/pipeline/case.h"
 
 namespace helicarm::pipeline {
 
@@ -19,5 +20,10 @@ struct PickedCase {
 /// picks of its name. Refuses what `case_from_json` refuses of the result, and a table without rows or that
 /// gives a pick twice.
 Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::filesystem::path& folder);
+
+/// A case.json with these picks in place of its own, and with those tunnels that it does not name and whose
+/// ends are picked. Fails as `case_from_json` of the result: a tunnel of the case must keep its ends.
+Expected<Json> with_all_picks(Json json, const std::vector<Pick>& picks,
+                              const std::vector<TunnelPlan>& tunnels, const std::filesystem::path& folder);
 
 }  // namespace helicarm::pipeline

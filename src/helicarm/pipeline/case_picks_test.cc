@@ -9,6 +9,14 @@
 namespace helicarm::pipeline {
 namespace {
 
+Pick pick_at(const std::string& name, const std::string& view, const Eigen::Vector2d& uv_raw) {
+  Pick pick;
+  pick.name = name;
+  pick.view = view;
+  pick.uv_raw = uv_raw;
+  return pick;
+}
+
 class CasePicks : public testing::Test {
  protected:
   Expected<PickedCase> picked(const std::string& rows) {
@@ -35,6 +43,25 @@ TEST_F(CasePicks, AreAddedAndReplaced) {
                              "moves_with": "femur", "sigma_px": 0.2},
                             {"name": "entry", "view": "LAT", "uv": [512.0, 7.0], "moves_with": "femur"}])",
                         "test"));
+}
+
+TEST_F(CasePicks, AllAreReplacedAndPickedTunnelsAdded) {
+  const Pick start = pick_at("in", "AP", {3, 4}), end = pick_at("out", "LAT", {5, 6});
+  const auto made =
+      with_all_picks(json_, {start, end}, {{"femur", "in", "out"}, {"tibia", "TS", "TE"}}, folder_.path());
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ((*made)["picks"].size(), 2u);
+  EXPECT_EQ((*made)["picks"][0]["name"], "in");
+  EXPECT_EQ((*made)["tunnels"], *parse_json(R"([{"name": "femur", "start": "in", "end": "out"}])", "test"));
+  EXPECT_EQ((*made)["notes"], "left");
+}
+
+TEST_F(CasePicks, WithoutAnEndOfTheCasesTunnelAreRefused) {
+  json_["tunnels"] = *parse_json(R"([{"name": "femur", "start": "entry", "end": "exit"}])", "test");
+  json_["picks"].push_back(*parse_json(R"({"name": "exit", "view": "LAT", "uv": [1, 2]})", "test"));
+  const auto made = with_all_picks(json_, {pick_at("entry", "AP", {3, 4})}, {}, folder_.path());
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().reason, Reason::bad_value);
 }
 
 TEST_F(CasePicks, OfAnUnknownViewAreRefused) {

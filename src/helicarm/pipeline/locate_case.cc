@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/pipeline/locate_case.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 #include "helicarm/pipeline/calibrator_checks.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/points.h"
@@ -61,10 +65,21 @@ Result initial_result(const Case& given, const CaseCalibration& calibration, con
   return result;
 }
 
+/// `read_case` refuses such a case; picks may have changed since.
+Expected<void> check_tunnel_ends(const Case& given) {
+  for (const TunnelPlan& tunnel : given.tunnels)
+    for (const std::string& end : {tunnel.start, tunnel.end})
+      if (std::ranges::find(given.picks, end, &Pick::name) == given.picks.end())
+        return fail(Reason::bad_value,
+                    fmt::format("tunnel \"{}\": \"{}\" is not a pick of the case", tunnel.name, end));
+  return {};
+}
+
 }  // namespace
 
 Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
                              const RunOptions& options) {
+  if (auto valid = check_tunnel_ends(given); !valid) return tl::unexpected<Failure>(std::move(valid).error());
   if (options.on_stage) options.on_stage("locate");
   Result result = initial_result(given, calibration, options);
   const auto located = timed(result.timing_ms.locate, [&] {

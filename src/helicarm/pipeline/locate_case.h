@@ -7,7 +7,8 @@ namespace helicarm::pipeline {
 
 /// From calibrated views to points, tunnels and the verification of tool lines (Eq. 8, 10-12, 16, 17). Uses
 /// from `given` what may differ from the calibrated case: picks, tunnels, tool lines, poses and the tracker's
-/// noise. Fails with `bad_value` for a pick outside its image; a refusal is in `Result::failure`.
+/// noise. Fails with `bad_value` for a pick outside its image and a tunnel's end without picks; a refusal is
+/// in `Result::failure`.
 Expected<Result> locate_case(const Case& given, const CaseCalibration& calibration,
                              const RunOptions& options);
 

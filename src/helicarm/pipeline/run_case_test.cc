@@ -8,6 +8,7 @@
 
 #include "helicarm/pipeline/calibration_cache.h"
 #include "helicarm/pipeline/causes.h"
+#include "helicarm/pipeline/locate_case.h"
 #include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/stages.h"
 #include "helicarm/simulation/write_case.h"
@@ -38,6 +39,15 @@ class SimulatedNavigation : public testing::Test {
 
 std::filesystem::path SimulatedNavigation::folder_;
 simulation::SimulatedCase SimulatedNavigation::truth_;
+
+TEST_F(SimulatedNavigation, TunnelThatHasLostAnEndsPicksIsRefused) {
+  const auto calibration = calibrate_case(given_, {});
+  ASSERT_TRUE(calibration);
+  std::erase_if(given_.picks, [&](const Pick& pick) { return pick.name == given_.tunnels.front().end; });
+  const auto located = locate_case(given_, *calibration, {});
+  ASSERT_FALSE(located);
+  EXPECT_EQ(located.error().reason, Reason::bad_value);
+}
 
 TEST_F(SimulatedNavigation, TunnelsAreMeasuredWithinTheirConfidenceRegions) {
   const auto result = run_case(given_, {});
