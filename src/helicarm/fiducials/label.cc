@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/fiducials/covered.h"
 #include "helicarm/fiducials/rivals.h"
 #include "helicarm/fiducials/search.h"
 
@@ -65,28 +66,6 @@ bool is_certain(const Hypothesis& h, const LabellingOptions& options) {
 int count_labelled(const Hypothesis& h) {
   return static_cast<int>(
       std::count_if(h.candidate_of_ball.begin(), h.candidate_of_ball.end(), [](int i) { return i >= 0; }));
-}
-
-/// Removes the label of a fiducial that an unlabelled one may cover, or with two candidates in reach.
-void drop_covered(const Scene& scene, Hypothesis& h) {
-  const std::vector<int> labelled = h.candidate_of_ball;
-  for (std::size_t k = 0; k < labelled.size(); ++k) {
-    if (labelled[k] < 0) continue;
-    const auto& own = scene.candidates[labelled[k]];
-    bool uncertain = false;
-    for (std::size_t other = 0; other < labelled.size(); ++other) {
-      if (labelled[other] >= 0) continue;
-      const Eigen::Vector2d uv = h.fit.view.project(scene.balls[other].centre);
-      uncertain |= (uv - own.uv).norm() < 0.5 * own.radius_px;
-    }
-    const Eigen::Vector2d uv = h.fit.view.project(scene.balls[k].centre);
-    for (std::size_t i = 0; i < scene.candidates.size(); ++i) {
-      const auto& other = scene.candidates[i];
-      uncertain |= static_cast<int>(i) != labelled[k] &&
-                   (other.uv - uv).norm() < 5 * match_sigma_px(scene, h.fit.view, k, i);
-    }
-    if (uncertain) h.candidate_of_ball[k] = -1;
-  }
 }
 
 /// Removes from `h` each pair that `rival` lacks, if `rival` assigns another candidate to any fiducial.
@@ -211,8 +190,20 @@ Hypothesis best_by_own_errors(const LabelSearch& search, const LabellingOptions&
   return *best;
 }
 
+/// Whether `rival` labels more fiducials and is almost as good if the source distance is wrong, for which the
+/// prior odds are 1 to 1000: then labels of a helix shifted by one may fit better than the true ones.
+bool explains_more(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
+  constexpr double wrong_focal_sigma = 0.1;  // relative
+  constexpr double wrong_log_odds = -6.9;
+  if (rival.matched <= h.matched) return false;
+  Scene wrong = scene;
+  wrong.camera.focal_sigma = std::max(wrong_focal_sigma, scene.camera.focal_sigma);
+  return refitted(wrong, rival).log_odds + wrong_log_odds > h.log_odds - required;
+}
+
 /// Whether `h` does not exceed `rival` by the required log odds.
 bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
+  if (explains_more(scene, h, rival, required)) return true;
   const double margin = h.log_odds - rival.log_odds;
   if (margin >= comparison_width * required) return false;
   const auto fine = fine_margin(scene, h, rival);
@@ -243,7 +234,6 @@ Expected<Hypothesis> unambiguous(LabelSearch& search, const LabellingOptions& op
   drop_covered(scene, best);
   if (count_labelled(best) < least_balls) return too_few(count_labelled(best), n);
   for (const auto& rival : search.ranking()) {
-    if (full.log_odds - rival.log_odds >= comparison_width * required) break;
     if (!contradicts(rival, best) || !is_close(scene, full, rival, required)) continue;
     if (rival.mirrored() == best.mirrored()) keep_agreed(best, rival);
     if (rival.mirrored() != best.mirrored() || count_labelled(best) < least_balls) {

@@ -2,6 +2,7 @@
 // Random synthetic images of a calibrator for the tests of labelling.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -55,6 +56,53 @@ inline SyntheticImage image_of(const phantom::Calibrator& calibrator,
     view_image.candidates.push_back(
         {detection.uv, detection.sigma_px, detection.radius_px, detection.radius_sigma_px});
   return view_image;
+}
+
+enum class Shape { flat, symmetric, helical };
+
+/// Balls at random in a slab, in pairs (exact reflections or half turns), or on the conical helix.
+inline phantom::Calibrator shaped(Shape shape, int balls, RandomStream& random) {
+  phantom::Calibrator calibrator{"shaped", {}, {}};
+  const Eigen::Vector3d twin =
+      random.uniform() < 0.5 ? Eigen::Vector3d(-1, 1, 1) : Eigen::Vector3d(-1, -1, 1);
+  for (int k = 0; k < balls; ++k) {
+    Eigen::Vector3d centre(random.uniform(-53, 53), random.uniform(-35, 35), random.uniform(-4, 4));
+    if (shape == Shape::symmetric && k % 2 == 0)
+      centre = {random.uniform(5, 50), random.uniform(-45, 45), random.uniform(-30, 30)};
+    if (shape == Shape::symmetric && k % 2 == 1)
+      centre = calibrator.balls.back().centre_in_calibrator.cwiseProduct(twin);
+    if (shape == Shape::helical) {
+      const double t = pi / 6 + k * pi / 2;
+      const double radius = 60 * std::exp(-t / 31.529);
+      centre = {radius * std::cos(t), radius * std::sin(t), 87.5 * t / (7 * pi)};
+    }
+    calibrator.balls.push_back({fmt::format("B{}", k), centre, 4.0});
+  }
+  return calibrator;
+}
+
+struct ShapedView {
+  Shape shape;
+  phantom::Calibrator calibrator;
+  LabellingPrior prior;
+  double noise_px;
+  SyntheticImage image;
+};
+
+/// 6 to 18 balls of which at most three are hidden, up to eight false candidates, centres with noise of 0.05
+/// to 0.5 px. The handedness is known in one view of three.
+inline ShapedView shaped_view(std::uint64_t seed, std::uint64_t number) {
+  RandomStream random(seed, 90, number);
+  const auto shape = static_cast<Shape>(number % 3);
+  const int balls = 6 + static_cast<int>(random.index(13));
+  ShapedView view{shape, shaped(shape, balls, random), nominal, 0.05 * std::pow(10, random.uniform()), {}};
+  const int hidden = static_cast<int>(random.index(static_cast<std::uint32_t>(std::min(4, balls - 5))));
+  const int outliers = static_cast<int>(random.index(9));
+  view.image =
+      image_of(view.calibrator, {.hidden = hidden, .outliers = outliers, .noise_px = view.noise_px}, random);
+  for (BallCandidate& candidate : view.image.candidates) candidate.own_sigma_px = view.noise_px;
+  if (random.index(3) == 0) view.prior.mirrored = view.image.mirrored();
+  return view;
 }
 
 /// Whether the mirroring is right and each labelled ball's candidate is its detection, or lies at its image.
