@@ -145,6 +145,25 @@ tl::unexpected<Failure> with_view(const std::vector<ViewFiducials>& views,
   return tl::unexpected<Failure>(failure);
 }
 
+/// Few fiducials that agree with the other views do not constrain theirs: not the calibrator's shape is the
+/// cause, but what made the others disagree.
+tl::unexpected<Failure> after_rejection(const Failure& failure,
+                                        const std::vector<fiducials::Fiducial>& fiducials) {
+  const auto count = [&](fiducials::FiducialStatus status) {
+    return std::ranges::count(fiducials, status, &fiducials::Fiducial::status);
+  };
+  const auto rejected = count(fiducials::FiducialStatus::rejected);
+  if (failure.reason != Reason::coplanar_fiducials || rejected == 0) return tl::unexpected<Failure>(failure);
+  const auto all = rejected + count(fiducials::FiducialStatus::used);
+  return in_view(
+      {Reason::calibrator_mismatch,
+       fmt::format("{} of {} fiducials do not agree with the other views and the calibrator's file", rejected,
+                   all),
+       {},
+       {{"rejected", double(rejected)}, {"n", double(all)}}},
+      failure.view);
+}
+
 }  // namespace
 
 Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
@@ -173,7 +192,7 @@ Expected<CalibrationResult> calibrate(const std::vector<ViewFiducials>& views,
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto view = described(views[i].name, uncentred(fit.views[i]), result.fiducials[i], options);
-    if (!view) return tl::unexpected<Failure>(view.error());
+    if (!view) return after_rejection(view.error(), result.fiducials[i]);
     const double rho = fit.views[i].rho;
     if (!(rho > least_rho))
       return in_view(

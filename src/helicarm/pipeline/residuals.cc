@@ -86,6 +86,26 @@ std::optional<ImageChange> fitted(ImageChange change, const std::vector<calibrat
   return change;
 }
 
+/// All images are magnified alike: the source distance or pixel size of all views is wrong.
+Warning wrong_distance(const ImageChange& change, const std::vector<LabelledView>& views,
+                       std::map<std::string, double> figures) {
+  const auto& stated_mm = views.front().xray_image->acquisition.source_detector_mm;
+  std::string distance;
+  if (stated_mm) {
+    const double fitting_mm = *stated_mm * (1 + change.amount);
+    figures["file_source_detector_mm"] = *stated_mm;
+    figures["fitting_source_detector_mm"] = fitting_mm;
+    distance =
+        fmt::format(" (a source distance of {:.0f} mm fits, the file has {:.0f} mm)", fitting_mm, *stated_mm);
+  }
+  return {Reason::intrinsics_inconsistent,
+          fmt::format("the fiducials imply that all images are magnified by {:.4g} (sigma {:.1g}) against "
+                      "their source distance and pixel size{}: correct them",
+                      1 + change.amount, change.sigma, distance),
+          {},
+          std::move(figures)};
+}
+
 Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& views) {
   const std::string view = change.view ? views[*change.view].name : std::string();
   const std::map<std::string, double> figures{{"amount", change.amount},
@@ -109,6 +129,7 @@ Warning warning_of(const ImageChange& change, const std::vector<LabelledView>& v
             "check the pixel spacing",
             percent, sigma),
         view, figures};
+  if (!change.view) return wrong_distance(change, views, figures);
   return {
       Reason::intrinsics_inconsistent,
       fmt::format("the fiducials imply an image magnified by {:.4g} (sigma {:.1g}) against the other views: "
@@ -125,7 +146,7 @@ std::optional<ImageChange> best_image_change(const std::vector<calibration::View
   constexpr double least_fall = 25;
   const auto plain = fit_of(views, common);
   if (!plain || !is_excessive(plain->chi2, plain->dof)) return std::nullopt;
-  std::vector<ImageChange> changes{{Kind::radial, {}}, {Kind::aspect, {}}};
+  std::vector<ImageChange> changes{{Kind::radial, {}}, {Kind::aspect, {}}, {Kind::scale, {}}};
   for (std::size_t i = 0; i < views.size(); ++i) changes.push_back({Kind::scale, i});
   std::optional<ImageChange> best;
   for (const ImageChange& change : changes) {

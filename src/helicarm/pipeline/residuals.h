@@ -26,8 +26,8 @@ std::optional<ImageChange> best_image_change(const std::vector<calibration::View
                                              const std::vector<Eigen::Vector2d>& size_px,
                                              const calibration::CommonPrior& common);
 
-/// Warnings `residual_distortion` (radial distortion, aspect) and `intrinsics_inconsistent` (magnifications
-/// of two views) if the residuals imply them.
+/// Warnings `residual_distortion` (radial distortion, aspect) and `intrinsics_inconsistent` (magnification of
+/// one view, or of all by a wrong source distance) if the residuals imply them.
 std::vector<Warning> explain_residuals(const std::vector<LabelledView>& views,
                                        const calibration::CalibrationResult& calibration,
                                        const calibration::CommonPrior& common);

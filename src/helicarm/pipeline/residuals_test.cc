@@ -84,6 +84,18 @@ TEST(ImageChange, ScaleOfOneViewIsFound) {
   }
 }
 
+TEST(ImageChange, WrongSourceDistanceOfAllViewsIsOneOfAll) {
+  for (const double factor : {0.9, 1.1}) {
+    auto views = helix_views(4);
+    for (calibration::ViewFiducials& view : views) *view.prior.focal_px *= factor;
+    const auto change = change_of(views);
+    ASSERT_TRUE(change) << factor;
+    EXPECT_EQ(change->kind, Kind::scale);
+    EXPECT_FALSE(change->view) << factor;
+    EXPECT_NEAR((1 + change->amount) * factor, 1, 0.02);
+  }
+}
+
 TEST(ImageChange, RowsFartherApartAreFound) {
   auto views = helix_views(5);
   for (calibration::ViewFiducials& view : views)
