@@ -84,19 +84,23 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
     const double motion = arguments.motion_sigma_mm;
     const auto point =
         localization::locate(name, localization::PointSource::pick, images, calibration, motion);
-    const auto why = point ? point->missing_rays : unseen ? unseen : std::optional(point.error());
-    points.push_back(point ? localization::point_json(*point)
-                           : localization::point_json(name, localization::PointSource::pick, why->reason));
-    if (why) progress << fmt::format("{}: {}\n", name, why->message);
+    auto why = point ? point->missing_rays : unseen ? unseen : std::optional(point.error());
     std::vector<Warning> own_warnings, own_notes;
     if (point && why) own_warnings.push_back(*why);
-    if (const auto on_ball = point ? localization::pick_on_fiducial(name, images, calibration,
-                                                                    calibration.balls, why.has_value())
-                                   : std::nullopt) {
+    if (why) progress << fmt::format("{}: {}\n", name, why->message);
+    const auto on_ball =
+        point ? localization::pick_on_fiducial(name, images, calibration, calibration.balls, why.has_value())
+              : std::nullopt;
+    if (on_ball) {
       progress << fmt::format("{}\n", on_ball->message);
       own_warnings.push_back(*on_ball);
+      why = on_ball;
     }
-    if (point)
+    const bool is_located = point && !on_ball;
+    points.push_back(is_located
+                         ? localization::point_json(*point)
+                         : localization::point_json(name, localization::PointSource::pick, why->reason));
+    if (is_located)
       own_notes.push_back(localization::unobservable_motion(name, point->point_in_anchor,
                                                             calibration.views[images.front().view], motion));
     points.back()["warnings"] = pipeline::json_list_of(own_warnings);

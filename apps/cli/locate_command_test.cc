@@ -84,10 +84,13 @@ TEST(LocateCommand, RaysThatMissAreWarnedOfAtThePointAlsoWithImportedCameras) {
   EXPECT_GE(point["error_95_mm"].get<double>(), 0.5 * point["ray_gap_mm"].get<double>());
 }
 
-TEST(LocateCommand, PickOnABallOfTheResultsCalibratorIsWarnedOf) {
+TEST(LocateCommand, PickOnABallOfTheResultsCalibratorIsNotLocated) {
   Json result = result_json();
   result["calibrator"] = {{"balls", {{{"label", "P7"}, {"xyz_mm", {10, 20, 30}}, {"diameter_mm", 4}}}}};
-  const Json on_ball = locate_in(result, picks_of({10.5, 20, 30})).json["warnings"];
+  const Json answer = locate_in(result, picks_of({10.5, 20, 30})).json;
+  const Json& on_ball = answer["warnings"];
+  EXPECT_TRUE(answer["points"][0]["xyz_mm"].is_null());
+  EXPECT_EQ(answer["points"][0]["reason"], "pick_on_fiducial");
   ASSERT_EQ(on_ball.size(), 1u);
   EXPECT_EQ(on_ball[0]["code"], "pick_on_fiducial");
   EXPECT_NE(on_ball[0]["message"].get<std::string>().find("P7 in AP"), std::string::npos);

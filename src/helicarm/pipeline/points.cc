@@ -222,7 +222,10 @@ std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Ca
       if (point.seen[i]) observations.push_back({i, point.seen[i]->uv, Eigen::Matrix2d::Zero()});
     const auto warning = localization::pick_on_fiducial(point.name, observations, calibration,
                                                         given.calibrator.balls, point.rays_miss);
-    if (warning) add_warning(point, warnings, *warning);
+    if (!warning) continue;
+    add_warning(point, warnings, *warning);
+    point.reason = warning;
+    point.place.reset();
   }
   return warnings;
 }

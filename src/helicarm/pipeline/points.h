@@ -25,7 +25,8 @@ std::vector<Warning> locate_points(const Case& given, const calibration::Calibra
 std::vector<Warning> note_motion(const Case& given, const calibration::Calibration& calibration,
                                  std::vector<PointResult>& points, double motion_sigma_mm);
 
-/// Picks on fiducials in all their views, or in some while the rays miss each other (pick_on_fiducial).
+/// Picks on fiducials in all their views, or in some while the rays miss each other, are not located
+/// (pick_on_fiducial).
 std::vector<Warning> picks_on_fiducials(const Case& given, const calibration::Calibration& calibration,
                                         std::vector<PointResult>& points);
 

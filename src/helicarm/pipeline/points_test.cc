@@ -126,7 +126,7 @@ TEST_F(TwoViews, WarningsAreAlsoInThePoint) {
   EXPECT_TRUE(points[0].rays_miss);
 }
 
-TEST_F(TwoViews, PickOnAFiducialInAllViewsIsWarnedOf) {
+TEST_F(TwoViews, PickOnAFiducialInAllViewsIsNotLocated) {
   given.views[1].poses = given.views[0].poses;
   const Eigen::Vector3d place = in_calibrator(0);
   given.calibrator.balls = {{"P1", place + Eigen::Vector3d(40, 0, 0), 4}, {"P2", place, 4}};
@@ -136,6 +136,9 @@ TEST_F(TwoViews, PickOnAFiducialInAllViewsIsWarnedOf) {
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_EQ(warnings[0].reason, Reason::pick_on_fiducial);
   EXPECT_NE(warnings[0].message.find("P2"), std::string::npos);
+  EXPECT_FALSE(points[0].place);
+  ASSERT_TRUE(points[0].reason);
+  EXPECT_EQ(points[0].reason->reason, Reason::pick_on_fiducial);
 }
 
 TEST_F(TwoViews, PickOnAFiducialsImageInOneViewIsAllowed) {
@@ -146,6 +149,7 @@ TEST_F(TwoViews, PickOnAFiducialsImageInOneViewIsAllowed) {
   std::vector<PointResult> points = {image_point(std::nullopt)};
   locate_points(given, calibration, points);
   EXPECT_TRUE(picks_on_fiducials(given, calibration, points).empty());
+  EXPECT_TRUE(points[0].place);
 }
 
 TEST_F(TwoViews, PointObservedOnceIsNotLocated) {
