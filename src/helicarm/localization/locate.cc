@@ -61,7 +61,8 @@ Eigen::MatrixXd noise_of_motion(const Eigen::Vector3d& point_in_anchor,
 }
 
 /// Approximation for a calibration without covariance: the residuals at the fiducials, corrected for degrees
-/// of freedom. Imported views have no residuals.
+/// of freedom, and the mean effect of the parameters' errors at the fiducials. Imported views have no
+/// residuals.
 Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
                                const calibration::Calibration& calibration) {
   constexpr double least_px = 0.05;  // rounding of a matrix or a pixel in a text file
@@ -69,7 +70,7 @@ Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
   Eigen::MatrixXd noise = least_px * least_px * Eigen::MatrixXd::Identity(n, n);
   for (Eigen::Index i = 0; 2 * i < n; ++i) {
     const calibration::CalibratedView& view = calibration.views[observations[std::size_t(i)].view];
-    const double share = view.dof > 0 ? (view.dof + calibration::view_parameters) / double(view.dof) : 1;
+    const double share = view.dof > 0 ? (view.dof + 2.0 * calibration::view_parameters) / view.dof : 1;
     const double variance = share * view.reprojection_rms_px * view.reprojection_rms_px / 2;
     noise.block<2, 2>(2 * i, 2 * i) += variance * Eigen::Matrix2d::Identity();
   }
