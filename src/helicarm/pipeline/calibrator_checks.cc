@@ -2,12 +2,11 @@
 #include "helicarm/pipeline/calibrator_checks.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "helicarm/geometry/triangulation.h"
+#include "helicarm/pipeline/displaced_balls.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -17,8 +16,6 @@ using Eigen::Vector3d;
 constexpr double diameter_sigma = 0.01;  // common to all diameters: edge model, tolerance
 constexpr double patient_sigma_mm = 60;  // the calibrator is not at the patient's position
 constexpr double warn_sigmas = 3, refuse_sigmas = 10;
-constexpr double displaced_reach_mm = 6;  // search radius around a fiducial's coordinates
-constexpr double displaced_gap_mm = 0.4;  // ray gap of a displaced fiducial
 
 std::optional<Failure> check_handedness(const std::vector<LabelledView>& images, const Case& given) {
   for (std::size_t i = 0; i < images.size(); ++i)
@@ -92,72 +89,6 @@ std::optional<double> mean_log_radius(const calibration::CalibrationResult& cali
   return count > 0 ? std::optional(sum / count) : std::nullopt;
 }
 
-/// Position of a displaced fiducial, from unlabelled candidates near its projections in two views.
-struct DisplacedBall {
-  Vector3d place;
-  double gap_mm;
-};
-
-std::optional<DisplacedBall> displaced_ball(const CaseCalibration& calibration,
-                                            const std::vector<LabelledView>& images,
-                                            const phantom::CalibratorBall& ball) {
-  struct Near {
-    std::size_t view;
-    Eigen::Vector2d uv;
-  };
-  std::vector<Near> near;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const geometry::View& view = calibration.views[i].view;
-    const double per_mm = view.intrinsics.fy / view.depth(ball.centre_in_calibrator);
-    const Eigen::Vector2d expected = view.project(ball.centre_in_calibrator);
-    for (const detection::Dot& dot : images[i].fiducials.false_blobs) {
-      const auto uv = images[i].rectification.map.rectified_from_raw(dot.centre_px);
-      if (uv && (*uv - expected).norm() < displaced_reach_mm * per_mm) near.push_back({i, *uv});
-    }
-  }
-  std::optional<DisplacedBall> best;
-  for (const Near& a : near)
-    for (const Near& b : near) {
-      if (a.view >= b.view) continue;
-      const std::array<geometry::RayObservation, 2> ray_observations{
-          geometry::RayObservation{calibration.views[a.view].view, a.uv},
-          geometry::RayObservation{calibration.views[b.view].view, b.uv}};
-      const auto met = geometry::intersect(ray_observations, Eigen::MatrixXd::Identity(4, 4));
-      if (!met || met->ray_gap_mm > displaced_gap_mm) continue;
-      if ((met->point - ball.centre_in_calibrator).norm() > displaced_reach_mm) continue;
-      if (!best || met->ray_gap_mm < best->gap_mm) best = DisplacedBall{met->point, met->ray_gap_mm};
-    }
-  return best;
-}
-
-/// Fiducials that no view uses, but two views show nearby.
-std::vector<Warning> warn_of_displaced(const CaseCalibration& calibration,
-                                       const std::vector<LabelledView>& images,
-                                       const phantom::Calibrator& calibrator) {
-  std::vector<Warning> warnings;
-  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
-    const bool used = std::ranges::any_of(calibration.fiducials, [&](const auto& of_view) {
-      return of_view[k].status == fiducials::FiducialStatus::used;
-    });
-    if (used) continue;
-    const phantom::CalibratorBall& ball = calibrator.balls[k];
-    const auto seen = displaced_ball(calibration, images, ball);
-    if (!seen) continue;
-    const double off = (seen->place - ball.centre_in_calibrator).norm();
-    warnings.push_back(
-        {Reason::ball_displaced,
-         fmt::format("fiducial {} is displaced by {:.2g} mm from the calibrator's file, to ({:.2f}, {:.2f}, "
-                     "{:.2f}). It is not used; measure the calibrator with `helicarm phantom measure`",
-                     ball.label, off, seen->place.x(), seen->place.y(), seen->place.z()),
-         {},
-         {{"distance_mm", off},
-          {"x_mm", seen->place.x()},
-          {"y_mm", seen->place.y()},
-          {"z_mm", seen->place.z()}}});
-  }
-  return warnings;
-}
-
 }  // namespace
 
 bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray_image,
@@ -208,9 +139,21 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
       return tl::unexpected<Failure>(std::move(disagreement));
     calibration.warnings.push_back(std::move(disagreement));
   }
-  for (Warning& warning : warn_of_displaced(calibration, images, given.calibrator))
+  for (Warning& warning : displaced_balls(calibration, images, given.calibrator))
     calibration.warnings.push_back(std::move(warning));
   return calibration;
+}
+
+std::vector<Warning> handedness_notes(const CaseCalibration& calibration) {
+  for (const LabelledView& image : calibration.images)
+    if (!image.fiducials.mirrored) return {};
+  return {
+      {Reason::ambiguous_handedness,
+       "every image is mirrored, as its tag or the case states. Images do not show whether the statement "
+       "is true: if it is wrong, the calibrator's file is a mirror image of the calibrator, and all points "
+       "are mirrored. Check by a view that is not mirrored, or by a point whose side is known",
+       {},
+       {}}};
 }
 
 std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calibration,

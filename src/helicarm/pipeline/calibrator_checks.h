@@ -25,9 +25,13 @@ bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray
 /// and as many candidates are unexplained, `ambiguous_handedness` if every image is mirrored without a tag or
 /// `mirrored` in the case, `scale_disagrees` if the scale deviates by ten sigma, `calibrator_mismatch` if
 /// labels required an assumed tolerance and the offsets differ between views. Warns if the scale deviates by
-/// three sigma, and of displaced fiducials.
+/// three sigma, and of displaced or exchanged fiducials.
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given);
+
+/// Note `ambiguous_handedness` if every image is mirrored: that the calibrator's file is not rests on a tag or
+/// the case alone.
+std::vector<Warning> handedness_notes(const CaseCalibration& calibration);
 
 /// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
 /// point, and the source distances for a comparison by tape measure. Empty if the file states scale_sigma.

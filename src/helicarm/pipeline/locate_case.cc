@@ -94,6 +94,7 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   if (!located) return tl::unexpected<Failure>(located.error());
   result.accuracy = measure_accuracy(given.calibrator, calibration, result.points);  // Eq. 10-12
   append(result.warnings, diagnose(given, result));
+  append(result.notes, handedness_notes(calibration));
   append(result.notes, scale_notes(given, calibration, result.points));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   const auto done =

@@ -80,6 +80,21 @@ TEST_F(SimulatedNavigation, MirroredCalibratorFileIsRefused) {
   EXPECT_NE(result->failure->message.find("\"mirrored\": true"), std::string::npos);
 }
 
+TEST_F(SimulatedNavigation, MirroredCalibratorFileThatACaseStatesToBeMirroredImagesIsNoted) {
+  for (phantom::CalibratorBall& ball : given_.calibrator.balls) ball.centre_in_calibrator.x() *= -1;
+  for (CaseView& view : given_.views) view.mirrored = true;
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  ASSERT_FALSE(result->failure) << result->failure->message;
+  EXPECT_TRUE(find_reason(result->notes, Reason::ambiguous_handedness));
+}
+
+TEST_F(SimulatedNavigation, ImagesThatAreNotMirroredHaveNoNoteOfHandedness) {
+  const auto result = run_case(given_, {});
+  ASSERT_TRUE(result.has_value());
+  EXPECT_FALSE(find_reason(result->notes, Reason::ambiguous_handedness));
+}
+
 TEST_F(SimulatedNavigation, ScaledCalibratorIsWarnedOf) {
   const auto untouched = run_case(given_, {});
   ASSERT_TRUE(untouched.has_value());
