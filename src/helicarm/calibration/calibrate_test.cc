@@ -344,6 +344,23 @@ TEST(Calibrate, CoplanarBallsWrongLabelsAndZeroSigmaAreRefused) {
   EXPECT_EQ(calibrate(without_sigma, {}).error().reason, Reason::bad_value);
 }
 
+TEST(Calibrate, FiducialsInAPlaneAfterRejectionAreAMismatch) {
+  auto views = pair_of_views(0.1, 4);
+  for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t k = 0; k < 7; ++k) {  // seven in a plane; the others of the second view are displaced
+      fiducials::Fiducial& ball = views[i].fiducials[k];
+      ball.centre_in_calibrator.z() = 30;
+      ball.uv = paper_view(i == 0 ? 0 : std::numbers::pi / 2).project(ball.centre_in_calibrator);
+    }
+  for (std::size_t k = 7; k < 12; ++k)
+    views[1].fiducials[k].uv += Eigen::Vector2d(12, 9) * (k % 2 == 0 ? 1 : -1);
+  const auto refused = calibrate(views, {});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().reason, Reason::calibrator_mismatch) << refused.error().message;
+  EXPECT_EQ(refused.error().view, "LAT");
+  EXPECT_GE(refused.error().figures.at("rejected"), 4);
+}
+
 TEST(CalibratePaper, IsTheDltOfEachView) {
   const auto views = pair_of_views(0.5, 3);
   const auto result = calibrate_paper(views, {});

@@ -26,7 +26,7 @@ const std::vector<geometry::View> truth{paper_view(0), paper_view(std::numbers::
 const Eigen::Vector3d target(12, -20, 55);
 
 /// Twelve balls in each view, as in 2.3.3, with the nominal intrinsics as prior.
-Expected<calibration::CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
+std::vector<calibration::ViewFiducials> noisy_fiducials(double sigma, RandomStream& random) {
   std::vector<calibration::ViewFiducials> views;
   for (const geometry::View& view : truth) {
     calibration::ViewFiducials seen{fmt::format("V{}", views.size()), {}};
@@ -41,10 +41,14 @@ Expected<calibration::CalibrationResult> noisy_calibration(double sigma, RandomS
     }
     views.push_back(seen);
   }
+  return views;
+}
+
+Expected<calibration::CalibrationResult> noisy_calibration(double sigma, RandomStream& random) {
   calibration::CalibrationOptions options;
   options.rejection_probability = 0;
   options.common.c_arm.principal = calibration::IntrinsicsVariation{1000, 0.7};
-  return calibration::calibrate(views, options);
+  return calibration::calibrate(noisy_fiducials(sigma, random), options);
 }
 
 std::vector<PointObservation> images_of(const Eigen::Vector3d& point, double sigma, RandomStream& random) {
@@ -153,6 +157,22 @@ TEST(Locate, ResidualsOfAPaperCalibrationChangeOnlyTheCovariance) {
   ASSERT_TRUE(before && after);
   EXPECT_EQ(before->point_in_anchor, after->point_in_anchor);
   EXPECT_GT(after->predicted_rms_mm(), 2 * before->predicted_rms_mm());
+}
+
+TEST(Locate, RayGapsOfPaperCalibrationsAreWhatTheirErrorsExplain) {
+  constexpr int trials = 400;
+  double chi2 = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    RandomStream random(28, 0, std::uint64_t(trial));
+    const auto paper = calibration::calibrate_paper(noisy_fiducials(0.5, random), {});
+    ASSERT_TRUE(paper.has_value());
+    auto observations = images_of(target, 0.5, random);
+    for (PointObservation& observation : observations) observation.covariance_px2.setZero();
+    const auto point = locate("T", PointSource::pick, observations, *paper);
+    ASSERT_TRUE(point.has_value());
+    chi2 += point->chi2 / trials;
+  }
+  EXPECT_NEAR(chi2, 1, 0.2);  // 1.26 without the effect of the parameters
 }
 
 TEST(Locate, MotionAlongTheFirstRayLeavesNoGapAndIsInTheCovariance) {
