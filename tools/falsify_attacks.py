@@ -249,10 +249,14 @@ def _(case):
 
 for kind in ("flat", "accuracy"):
     suffix = ", with plate" if kind == "accuracy" else ""
-    for factor in (0.8, 1.05, 1.3):
+    for factor in (0.8, 0.93, 1.05, 1.3):
         @attack(f"source distance {factor:g} times as large{suffix}", kind)
         def _(case, factor=factor):
             case.change_images(lambda image: image.scale_text(DISTANCE, factor))
+    for factor in (0.97, 1.05):
+        @attack(f"source distance of the lateral image {factor:g} times as large{suffix}", kind)
+        def _(case, factor=factor):
+            case.change_images(lambda image: image.scale_text(DISTANCE, factor), [case.views()[1]])
     for factor in (0.9, 1.3):
         @attack(f"pixel size {factor:g} times as large{suffix}", kind)
         def _(case, factor=factor):

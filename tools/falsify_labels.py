@@ -69,10 +69,20 @@ def relabelled(calibrator, seed):
     a["diameter_mm"], b["diameter_mm"] = b["diameter_mm"], a["diameter_mm"]
 
 
+def stated_mirrored(change):
+    """The case also states that all images are mirrored."""
+    def both(calibrator, seed):
+        change(calibrator, seed)
+    both.of_views = {"mirrored": True}
+    return both
+
+
 # Name, change, and the note that states what no data can show.
 ATTACKS = [
     ("calibrator's file mirrored (x to -x)", moved([-1, 1, 1])),
     ("calibrator's file mirrored (z to -z)", moved([1, 1, -1])),
+    ("calibrator's file mirrored (x to -x), and the case states mirrored images", stated_mirrored(moved([-1, 1, 1])),
+     "ambiguous_handedness"),
     ("coordinates times 1.02, diameters true", moved([1.02] * 3), "scale_unverified"),
     ("coordinates times 1.1, diameters true", moved([1.1] * 3)),
     ("coordinates times 0.9, diameters true", moved([0.9] * 3)),
@@ -106,6 +116,9 @@ def attacked(case, target, change, seed):
     described = json.loads((case / "case.json").read_text())
     calibrator = json.loads((case / described["calibrator"]).read_text())
     change(calibrator, seed)
+    for view in described["views"]:
+        view.update(getattr(change, "of_views", {}))
+    (target / "case.json").write_text(json.dumps(described))
     calibrator["name"] = "attacked"  # a built-in's name with other coordinates is warned of anyway
     (target / described["calibrator"]).write_text(json.dumps(calibrator))
     return target
