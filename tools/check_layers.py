@@ -26,6 +26,7 @@ MODULES = {
     "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
     "volume": "core geometry image xray",
+    "registration": "core geometry image phantom xray detection rectification fiducials calibration localization volume",
     "simulation": "core geometry image phantom xray volume",
     "devices": "core geometry image xray",
     "virtual_devices": "core geometry image phantom xray volume simulation devices",
@@ -34,6 +35,8 @@ MODULES = {
                   " verification volume simulation",
     "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
               " verification volume simulation pipeline",
+    "case_registration": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
+                         " volume registration pipeline report",
     "phantom_calibration": "core geometry image phantom xray detection rectification fiducials calibration localization"
                            " pipeline report",
     "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"

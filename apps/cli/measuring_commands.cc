@@ -8,6 +8,7 @@
 #include "locate_command.h"
 #include "predict_command.h"
 #include "rectify_command.h"
+#include "register_command.h"
 #include "run_cases_command.h"
 #include "solve_command.h"
 
@@ -39,6 +40,34 @@ void add_run(CLI::App& app, Action& action) {
   command->add_option("--machine", a.history,
                       "The C-arm's history (JSON): used as prior; this case's acquisitions are added");
   command->add_flag("--no-report", a.no_report, "Write result.json only");
+}
+
+void add_register(CLI::App& app, Action& action) {
+  auto* command = add_command(app, "register",
+                              "Register CT volumes and surfaces of bones or implants to the views of a case",
+                              "helicarm register my-case --out my-registration\n\n"
+                              "case.json holds \"models\": a CT (\"volume\", with \"mask\" or \"window_hu\") "
+                              "or a closed surface (\"surface\",\n"
+                              "STL or PLY), a \"start\" (a pose, landmarks, or none) and a \"plan\" (3D "
+                              "Slicer's markups). The views are\n"
+                              "calibrated by the program, or bring cameras: \"camera\": \"camera.json\" as "
+                              "helicarm import --json prints it.\n"
+                              "Exit code 3: a registration is refused; registration.json holds the figures. "
+                              "See docs/registration.md.");
+  auto& a = arguments_of(command, action, register_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--out", a.out, "Folder for registration.json, report.html and the overlays")
+      ->capture_default_str();
+  command
+      ->add_option("--max-error", a.options.max_error_mm,
+                   "Refuse when a point of the model may be off by more, mm (95 %)")
+      ->check(within(1e-6, 1000));
+  command->add_option("--search-mm", a.options.shift_mm, "Search about the start, mm per axis")
+      ->check(within(0, 100))
+      ->capture_default_str();
+  command->add_option("--search-deg", a.options.turn_deg, "Search about the start, degrees per axis")
+      ->check(within(0, 180))
+      ->capture_default_str();
 }
 
 void add_export(CLI::App& app, Action& action) {
@@ -151,6 +180,7 @@ void add_import(CLI::App& app, Action& action) {
 
 void add_measuring_commands(CLI::App& app, Action& action) {
   add_run(app, action);
+  add_register(app, action);
   add_export(app, action);
   add_predict(app, action);
   add_solve(app, action);

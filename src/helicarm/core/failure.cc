@@ -147,6 +147,14 @@ std::string_view code(Reason reason) {
       return "residual_distortion";
     case Reason::scale_weak:
       return "scale_weak";
+    case Reason::registration_ambiguous:
+      return "registration_ambiguous";
+    case Reason::registration_disagrees:
+      return "registration_disagrees";
+    case Reason::wrong_model:
+      return "wrong_model";
+    case Reason::out_of_capture:
+      return "out_of_capture";
   }
   return "internal";
 }

@@ -89,6 +89,11 @@ enum class Reason {
   ball_displaced,
   scale_unverified,
   scale_weak,
+  // Refused registrations of a model to the views.
+  registration_ambiguous,
+  registration_disagrees,
+  wrong_model,
+  out_of_capture,
 };
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".

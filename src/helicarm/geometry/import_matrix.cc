@@ -130,12 +130,34 @@ ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin) {
   return *result;
 }
 
+/// "K", "R", "t" as `helicarm import --json` prints them.
+ImportedMatrix camera_from(JsonReader& reader, const std::string& origin) {
+  using Square = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const auto square = [&](const char* key) -> Eigen::Matrix3d {
+    return Eigen::Map<const Square>(reader.matrix(key, 3, 3, {-largest_number, largest_number}).data());
+  };
+  const Eigen::Matrix3d k = square("K");
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+  pose.topLeftCorner<3, 3>() = square("R");
+  pose.topRightCorner<3, 1>() =
+      Eigen::Vector3d(reader.numbers("t", 3, {-largest_number, largest_number}).data());
+  if (k.row(2) != Eigen::RowVector3d(0, 0, 1) || k(1, 0) != 0 || k(0, 0) == 0 || k(1, 1) == 0)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: \"K\" is not an upper triangle that ends in 1", origin));
+  reader.raw("projection");
+  return {{{k(0, 0), k(1, 1), k(0, 2), k(1, 2), k(0, 1)},
+           value_or_throw(rigid_transform_from(pose, origin + ": \"R\""))},
+          std::nullopt};
+}
+
 ImportedMatrix parse_json_matrix(const std::string& text, const std::string& origin) {
   Json json = value_or_throw(parse_json(text, origin));
   if (json.is_array()) json = Json{{"projection", std::move(json)}};
   JsonReader reader(json, origin);
   ImportedMatrix result =
-      imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin);
+      reader.has("K")
+          ? camera_from(reader, origin)
+          : imported(reader.matrix("projection", 3, 4, {-largest_number, largest_number}), origin);
   if (reader.has("image_size"))
     result.image_size = image_size_from(reader.numbers("image_size", 2, {1, largest_side_px}), origin);
   reader.raw("image_size");

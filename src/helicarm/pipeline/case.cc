@@ -10,6 +10,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
+#include "helicarm/pipeline/case_json.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -190,9 +191,6 @@ guidance::TrackerNoise tracker_from(JsonReader reader) {
   return noise;
 }
 
-/// Use of a case.
-enum class Purpose { run, phantom };
-
 std::vector<double> diameters_from(JsonReader& reader) {
   constexpr std::size_t most_kinds = 10;
   const Json& list = reader.raw("diameters_mm");
@@ -205,6 +203,7 @@ std::vector<double> diameters_from(JsonReader& reader) {
 
 void read_calibrator_of(Case& read, JsonReader& reader, Purpose purpose) {
   read.diameters_mm = diameters_from(reader);
+  if (purpose == Purpose::cameras && reader.raw("calibrator").is_null()) return;
   if (purpose == Purpose::phantom && reader.raw("calibrator").is_null()) {
     if (read.diameters_mm.empty())
       reader.refuse(Reason::bad_value, "diameters_mm", "is missing: required where \"calibrator\" is null");
@@ -240,6 +239,8 @@ void warn_of_name(Case& read) {
          {}});
 }
 
+}  // namespace
+
 Case case_of(const Json& json, const std::string& origin, const fs::path& folder, Purpose purpose) {
   JsonReader reader(json, origin);
   reader.choice("format", {"helicarm-case/1"});
@@ -260,6 +261,8 @@ Case case_of(const Json& json, const std::string& origin, const fs::path& folder
   warn_of_name(read);
   return read;
 }
+
+namespace {
 
 Case case_from(const fs::path& path, Purpose purpose) {
   const fs::path file = case_file(path);
@@ -285,9 +288,7 @@ Expected<std::vector<Pick>> picks_from(const Json& picks, const std::string& ori
   });
 }
 
-fs::path case_file(const fs::path& path) {
-  return fs::is_regular_file(path) ? path : path / "case.json";
-}
+fs::path case_file(const fs::path& path) { return fs::is_regular_file(path) ? path : path / "case.json"; }
 
 fs::path folder_of_case(const fs::path& path) {
   return fs::is_regular_file(path) ? fs::absolute(path).parent_path() : path;

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "register_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/pipeline/registration_case.h"
+
+namespace helicarm::cli {
+namespace {
+
+using case_registration::RegisteredModel;
+
+void print(const RegisteredModel& model, std::ostream& out) {
+  const registration::Registration& r = model.registration;
+  const Eigen::Matrix<double, 6, 1> sigma = r.covariance.diagonal().cwiseSqrt();
+  out << fmt::format("  {}: {}{}\n", r.name, registration::word(r.decision),
+                     r.failure ? fmt::format(" ({})", code(r.failure->reason)) : "")
+      << fmt::format(
+             "    centre  {:9.3f} {:9.3f} {:9.3f} mm, sigma {:.3f} {:.3f} {:.3f} mm, {:.2f} {:.2f} {:.2f} "
+             "degrees\n",
+             r.centre.x(), r.centre.y(), r.centre.z(), sigma[3], sigma[4], sigma[5],
+             sigma[0] * 180 / EIGEN_PI, sigma[1] * 180 / EIGEN_PI, sigma[2] * 180 / EIGEN_PI);
+  for (const auto& view : r.views)
+    out << fmt::format("    {:<8} agreement {:.3f}, residual {:.2f} px\n", view.name, view.score,
+                       view.residual_px);
+  if (model.landmarks)
+    out << fmt::format("    landmarks: FRE {:.2f} mm, FLE {:.2f} mm\n", model.landmarks->fre_mm,
+                       model.landmarks->fle_mm);
+  for (const auto& point : model.points)
+    out << fmt::format("    {:<12} {:9.3f} {:9.3f} {:9.3f}   within {:.3f} (95 %)\n", point.name,
+                       point.place.in_calibrator.x(), point.place.in_calibrator.y(),
+                       point.place.in_calibrator.z(),
+                       localization::length_at_95(point.place.covariance_in_calibrator));
+}
+
+/// Files of an earlier run could be taken for an answer.
+void forget(const std::filesystem::path& out) {
+  std::error_code ignored;
+  for (const char* file : {"registration.json", "report.html"}) std::filesystem::remove(out / file, ignored);
+}
+
+}  // namespace
+
+CommandResult register_command(const RegisterArguments& arguments, Console& console) {
+  return guarded([&] {
+    forget(arguments.out);
+    case_registration::RegisterOptions options = arguments.options;
+    options.threads = console.threads;
+    if (!console.quiet)
+      options.on_step = [&](const std::string& model, std::string_view step) {
+        console.progress << fmt::format("helicarm: {}{}{}\n", model, model.empty() ? "" : ": ", step);
+      };
+    const auto given = value_or_throw(pipeline::read_registration_case(arguments.folder));
+    const auto result = value_or_throw(case_registration::register_case(given, options));
+    value_or_throw(case_registration::write_registration(result, arguments.out));
+    if (!console.quiet)
+      for (const RegisteredModel& model : result.models)
+        for (const Warning& warning : model.registration.warnings)
+          console.progress << fmt::format("helicarm: warning: {}: {}\n", code(warning.reason),
+                                          warning.message);
+    if (console.json && !result.refused())
+      console.out << to_text(case_registration::to_json(result)) << '\n';
+    else if (!console.quiet && !console.json) {
+      for (const RegisteredModel& model : result.models) print(model, console.out);
+      console.out << fmt::format("\n  written to {}\n", arguments.out.string());
+    }
+    if (result.failure) throw BadInput(*result.failure);
+    for (const RegisteredModel& model : result.models)
+      if (model.registration.failure) throw BadInput(*model.registration.failure);
+  });
+}
+
+}  // namespace helicarm::cli

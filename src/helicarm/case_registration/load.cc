@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/load.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/import_matrix.h"
+#include "helicarm/image/tiff.h"
+#include "helicarm/rectification/rectify.h"
+#include "helicarm/volume/read_volume.h"
+#include "helicarm/xray/read_xray_image.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+namespace fs = std::filesystem;
+using registration::RegistrationView;
+
+RegistrationView view_of(const xray::XrayImage& image, const std::string& name, const geometry::View& view) {
+  RegistrationView made;
+  made.name = name;
+  made.view = view;
+  made.lowest = image.lowest;
+  made.highest = image.highest;
+  made.logarithmic = image.acquisition.logarithmic.value_or(false);
+  return made;
+}
+
+void mask_disc(image::Image<std::uint8_t>& usable, const Eigen::Vector2d& at, double radius) {
+  const int reach = int(std::ceil(radius));
+  const int u0 = int(std::lround(at.x())), v0 = int(std::lround(at.y()));
+  for (int v = v0 - reach; v <= v0 + reach; ++v)
+    for (int u = u0 - reach; u <= u0 + reach; ++u)
+      if (usable.contains(u, v) && (Eigen::Vector2d(u, v) - at).norm() <= radius) usable(u, v) = 0;
+}
+
+constexpr double mask_margin_px = 3;
+
+/// Discs around dots of the plate (raw), fiducials and every other metal dot.
+image::Image<std::uint8_t> usable_of(const pipeline::LabelledView& view,
+                                     const phantom::Calibrator& calibrator, const geometry::View& camera) {
+  const auto& pixels = view.xray_image->pixels;
+  image::Image<std::uint8_t> usable(pixels.width(), pixels.height(), 1);
+  const rectification::Rectification& rectification = view.rectification;
+  const auto mask_raw = [&](const detection::Dot& dot) {
+    if (const auto at = rectification.map.rectified_from_raw(dot.centre_px))
+      mask_disc(usable, *at, dot.radius_px + mask_margin_px);
+  };
+  for (const detection::Dot& dot : rectification.plate_dots) mask_raw(dot);
+  for (const phantom::CalibratorBall& ball : calibrator.balls) {
+    if (!(camera.depth(ball.centre_in_calibrator) > 1)) continue;
+    const double px_per_mm = std::abs(camera.intrinsics.fy) / camera.depth(ball.centre_in_calibrator);
+    mask_disc(usable, camera.project(ball.centre_in_calibrator),
+              ball.diameter_mm / 2 * px_per_mm + mask_margin_px);
+  }
+  for (const phantom::CalibratorTarget& target : calibrator.targets) {
+    if (!(camera.depth(target.point_in_calibrator) > 1)) continue;
+    const double px_per_mm = std::abs(camera.intrinsics.fy) / camera.depth(target.point_in_calibrator);
+    mask_disc(usable, camera.project(target.point_in_calibrator),
+              3 * target.diameter_mm * px_per_mm + mask_margin_px);
+  }
+  return usable;
+}
+
+volume::Volume tiff_stack(const fs::path& path, const Eigen::Vector3d& voxel_mm, double offset_hu) {
+  const std::string bytes = value_or_throw(read_file(path, volume::max_volume_bytes));
+  const std::string origin = path.filename().string();
+  const int pages = value_or_throw(image::count_tiff_pages(bytes, origin));
+  volume::Volume stack;
+  for (int page = 0; page < pages; ++page) {
+    const image::GreyImage slice = value_or_throw(image::decode_tiff(bytes, page, origin));
+    const Eigen::Vector3i size(slice.pixels.width(), slice.pixels.height(), pages);
+    if (page == 0)
+      stack.voxels.reserve(value_or_throw(volume::voxel_count(size.cast<double>(), origin)));
+    else if (size != stack.size)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: page {} has {} x {} pixels, the first {} x {}", origin, page + 1,
+                                 size.x(), size.y(), stack.size.x(), stack.size.y()));
+    stack.size = size;
+    for (const std::uint16_t value : slice.pixels.pixels())
+      stack.voxels.push_back(static_cast<float>(value + offset_hu));
+  }
+  stack.patient_from_voxel = Eigen::Scaling(voxel_mm);
+  return stack;
+}
+
+volume::Volume volume_at(const fs::path& path, const pipeline::CaseModel& given, double offset_hu) {
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const bool stack = extension == ".tif" || extension == ".tiff";
+  if (stack && !given.voxel_mm)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("models: \"{}\": \"voxel_mm\" is missing: a TIFF stack needs it", given.name));
+  if (!stack && given.voxel_mm)
+    throw BadInput(Reason::bad_value,
+                   fmt::format("models: \"{}\": \"voxel_mm\" is for TIFF stacks only; {} states its own",
+                               given.name, path.filename().string()));
+  return stack ? tiff_stack(path, *given.voxel_mm, offset_hu) : value_or_throw(volume::read_volume(path));
+}
+
+}  // namespace
+
+Expected<LoadedViews> load_views(const pipeline::RegistrationCase& given) {
+  return guarded([&] {
+    LoadedViews loaded;
+    for (std::size_t i = 0; i < given.base.views.size(); ++i) {
+      const pipeline::CaseView& view = given.base.views[i];
+      const xray::XrayImage image = value_or_throw(xray::read_xray_image(view.image, view.name, view.frame));
+      const geometry::ImportedMatrix camera = value_or_throw(geometry::import_matrix(given.cameras[i]));
+      const Eigen::Vector2i size(image.pixels.width(), image.pixels.height());
+      if (camera.image_size && *camera.image_size != size)
+        throw BadInput(Reason::bad_size,
+                       fmt::format("{}: the camera is for {} x {} pixels, the image has {} x {}", view.name,
+                                   camera.image_size->x(), camera.image_size->y(), size.x(), size.y()));
+      loaded.views.push_back(view_of(image, view.name, camera.view));
+      loaded.views.back().grey = image.pixels;
+      loaded.maps.emplace_back();
+      loaded.warnings.insert(loaded.warnings.end(), image.warnings.begin(), image.warnings.end());
+    }
+    return loaded;
+  });
+}
+
+LoadedViews load_views(const pipeline::RegistrationCase& given,
+                       const pipeline::CaseCalibration& calibration) {
+  LoadedViews loaded;
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    const pipeline::LabelledView& image = calibration.images[i];
+    const calibration::CalibratedView& view = calibration.views[i];
+    loaded.views.push_back(view_of(*image.xray_image, view.name, view.view));
+    loaded.views.back().grey = rectification::resample(*image.xray_image, image.rectification.map);
+    loaded.views.back().usable = usable_of(image, given.base.calibrator, view.view);
+    loaded.maps.emplace_back(image.rectification.map);
+  }
+  loaded.camera_covariance = calibration.joint_covariance;
+  loaded.warnings = calibration.warnings;
+  return loaded;
+}
+
+Expected<std::optional<registration::Model>> load_model(const pipeline::CaseModel& given) {
+  return guarded([&]() -> std::optional<registration::Model> {
+    if (given.surface)
+      return value_or_throw(
+          registration::model_from(given.name, value_or_throw(registration::read_surface(*given.surface))));
+    if (!given.volume) return std::nullopt;
+    const volume::Volume volume = volume_at(*given.volume, given, given.tiff_offset_hu);
+    std::optional<volume::Volume> mask;
+    if (given.mask) mask = volume_at(*given.mask, given, 0);
+    std::optional<registration::HuWindow> window;
+    if (given.window_hu) window = {given.window_hu->x(), given.window_hu->y()};
+    return value_or_throw(registration::model_from(given.name, volume, mask, window));
+  });
+}
+
+}  // namespace helicarm::case_registration

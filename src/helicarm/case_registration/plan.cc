@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+constexpr std::size_t most_points = 10000;
+constexpr double farthest_mm = 10000;
+
+/// Slicer's files hold many display settings: only what is used is read, and other keys are allowed.
+class Markup {
+ public:
+  Markup(const Json& json, std::string where) : json_(json), where_(std::move(where)) {}
+
+  std::string text(const char* key, const std::string& fallback) const {
+    if (!json_.is_object() || !json_.contains(key)) return fallback;
+    if (!json_[key].is_string()) refuse(fmt::format("\"{}\" is not a text", key));
+    return without_control_characters(json_[key].get<std::string>()).substr(0, 100);
+  }
+
+  std::vector<PlanPoint> points() const {
+    std::vector<PlanPoint> points;
+    if (!json_.is_object() || !json_.contains("controlPoints")) return points;
+    const std::string system = text("coordinateSystem", "LPS");
+    const bool ras = system == "RAS" || system == "0";
+    if (!ras && system != "LPS" && system != "1") refuse(fmt::format("coordinateSystem \"{}\"", system));
+    if (const std::string unit = text("coordinateUnits", "mm"); unit != "mm")
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: coordinateUnits \"{}\", must be mm", where_, unit));
+    if (!json_["controlPoints"].is_array()) refuse("\"controlPoints\" is not a list");
+    for (const Json& entry : json_["controlPoints"]) {
+      const Markup point(entry, where_ + ": controlPoints");
+      if (point.text("positionStatus", "defined") != "defined") continue;
+      points.push_back({point.text("label", ""), point.position()});
+      if (ras) points.back().in_model.head<2>() *= -1;
+    }
+    return points;
+  }
+
+ private:
+  Eigen::Vector3d position() const {
+    if (!json_.is_object() || !json_.contains("position") || !json_["position"].is_array() ||
+        json_["position"].size() != 3)
+      refuse("\"position\" must be three numbers");
+    Eigen::Vector3d place;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Json& value = json_["position"][axis];
+      if (!value.is_number() || !(std::abs(value.get<double>()) <= farthest_mm))
+        refuse(fmt::format("\"position\" must be numbers within {:g} mm", farthest_mm));
+      place[Eigen::Index(axis)] = value.get<double>();
+    }
+    return place;
+  }
+  [[noreturn]] void refuse(const std::string& problem) const {
+    throw BadInput(Reason::bad_value, fmt::format("{}: {}", where_, problem));
+  }
+
+  const Json& json_;
+  std::string where_;
+};
+
+void add_point(Plan& plan, PlanPoint point, const std::string& where) {
+  if (std::ranges::find(plan.points, point.name, &PlanPoint::name) != plan.points.end())
+    throw BadInput(Reason::name_clash, fmt::format("{}: \"{}\" is given twice", where, point.name));
+  if (plan.points.size() == most_points)
+    throw BadInput(Reason::bad_size, fmt::format("{}: over {} points", where, most_points));
+  plan.points.push_back(std::move(point));
+}
+
+}  // namespace
+
+Expected<Plan> read_plan(const std::filesystem::path& path) {
+  return guarded([&] {
+    const Json json = value_or_throw(read_json(path));
+    const std::string origin = path.filename().string();
+    if (!json.is_object() || !json.contains("markups") || !json["markups"].is_array())
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: no list \"markups\": not a file of Slicer's markups", origin));
+    std::string stem = origin.substr(0, origin.find('.'));
+    Plan plan;
+    for (std::size_t i = 0; i < json["markups"].size(); ++i) {
+      const std::string where = fmt::format("{}: markups[{}]", origin, i);
+      const Markup markup(json["markups"][i], where);
+      std::vector<PlanPoint> points = markup.points();
+      if (markup.text("type", "Fiducial") == "Line") {
+        if (points.size() != 2)
+          throw BadInput(Reason::bad_value,
+                         fmt::format("{}: a line of {} points, must be 2", where, points.size()));
+        const std::string name = markup.text("name", i == 0 ? stem : fmt::format("{}_{}", stem, i + 1));
+        points[0].name = name + "_start", points[1].name = name + "_end";
+        plan.tunnels.push_back({name, plan.points.size(), plan.points.size() + 1});
+      }
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        if (points[k].name.empty()) points[k].name = fmt::format("{}-{}", stem, k + 1);
+        add_point(plan, std::move(points[k]), where);
+      }
+    }
+    return plan;
+  });
+}
+
+}  // namespace helicarm::case_registration

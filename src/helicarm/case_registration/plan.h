@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "helicarm/core/failure.h"
+
+namespace helicarm::case_registration {
+
+struct PlanPoint {
+  std::string name;
+  Eigen::Vector3d in_model;  ///< mm
+};
+
+/// A line of the plan: its first point is the tunnel's start.
+struct PlanTunnel {
+  std::string name;
+  std::size_t start = 0, end = 0;  ///< among the points
+};
+
+struct Plan {
+  std::vector<PlanPoint> points;
+  std::vector<PlanTunnel> tunnels;
+};
+
+/// Reads 3D Slicer's markups (.mrk.json): point lists give points, lines give tunnels with points NAME_start
+/// and NAME_end; a line without a name is called as the file. RAS is converted to LPS, cm and m are refused.
+/// Fails with missing_file, bad_json, not_finite, bad_value, unsupported, name_clash.
+Expected<Plan> read_plan(const std::filesystem::path& path);
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/case_registration/load.h"
+#include "helicarm/case_registration/plan.h"
+#include "helicarm/core/json.h"
+#include "helicarm/guidance/guide.h"
+#include "helicarm/guidance/tunnel.h"
+#include "helicarm/registration/landmarks.h"
+#include "helicarm/registration/register_model.h"
+
+namespace helicarm::case_registration {
+
+struct RegisterOptions {
+  std::optional<double> max_error_mm;  ///< refuse (uncertain) beyond it
+  unsigned threads = 0;
+  double shift_mm = 15;  ///< searched about each start
+  double turn_deg = 15;
+  /// Called with the model's name (empty: the views) and the step.
+  std::function<void(const std::string& model, std::string_view step)> on_step = {};
+};
+
+/// A point of a plan carried to the world, bones and tool.
+struct RegisteredPoint {
+  std::string name;
+  guidance::PointInFrames place;
+};
+
+struct RegisteredModel {
+  registration::Registration registration;
+  std::optional<registration::LandmarkRegistration> landmarks;  ///< of the start, or the result itself
+  std::vector<std::string> landmark_names;
+  bool by_landmarks_only = false;
+  std::optional<guidance::Bone> moves_with;
+  std::vector<RegisteredPoint> points;
+  std::vector<guidance::Tunnel> tunnels;
+  std::vector<geometry::View> views;  ///< as used: of a tracked bone at the first acquisition
+  /// For overlays, per view: outlines of the model at its pose, rectified px.
+  std::vector<std::vector<Eigen::Vector2d>> outlines;
+};
+
+struct CaseRegistration {
+  std::optional<Failure> failure;  ///< of the whole: the views are refused
+  std::vector<Warning> warnings;
+  std::vector<RegisteredModel> models;
+  LoadedViews loaded;
+
+  bool refused() const;
+};
+
+/// Registers every model of a case. Unreadable input is a failure; refusals are in the result.
+Expected<CaseRegistration> register_case(const pipeline::RegistrationCase& given,
+                                         const RegisterOptions& options);
+
+/// registration.json (docs/formats.md).
+Json to_json(const CaseRegistration& result);
+
+/// One HTML file with the overlays inside.
+std::string report_html(const CaseRegistration& result);
+
+/// The view's image with the models' outlines and plan points, PNG.
+std::string overlay_png(const CaseRegistration& result, std::size_t view);
+
+/// Writes registration.json, report.html and NAME_overlay.png for each view; registration.json last.
+Expected<void> write_registration(const CaseRegistration& result, const std::filesystem::path& folder);
+
+}  // namespace helicarm::case_registration

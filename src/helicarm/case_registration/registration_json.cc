@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/case_registration/register_case.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/pipeline/result.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using geometry::json_list;
+using geometry::json_rows;
+
+Json optional_list(const std::optional<Eigen::Vector3d>& point) { return point ? json_list(*point) : Json(); }
+
+Json json_of(const RegisteredPoint& point) {
+  const guidance::PointInFrames& place = point.place;
+  return {{"name", point.name},
+          {"xyz_mm", json_list(place.in_calibrator)},
+          {"covariance_mm2", json_rows(place.covariance_in_calibrator)},
+          {"error_95_mm", localization::length_at_95(place.covariance_in_calibrator)},
+          {"in_femur", optional_list(place.in_femur)},
+          {"in_tibia", optional_list(place.in_tibia)},
+          {"in_tool", optional_list(place.in_tool)}};
+}
+
+Json json_of(const guidance::Tunnel& tunnel) {
+  return {{"name", tunnel.name},
+          {"start_in_tool", optional_list(tunnel.start_in_tool)},
+          {"end_in_tool", optional_list(tunnel.end_in_tool)},
+          {"axis_in_tool", optional_list(tunnel.axis_in_tool)},
+          {"length_mm", tunnel.length_mm ? Json(*tunnel.length_mm) : Json()}};
+}
+
+Json json_of(const registration::RegisteredView& view) {
+  return {{"name", view.name},
+          {"residual_px", view.residual_px},
+          {"held_out_mm", view.held_out_mm ? Json(*view.held_out_mm) : Json()},
+          {"score", view.score},
+          {"comparisons", view.comparisons}};
+}
+
+Json json_of_landmarks(const RegisteredModel& model) {
+  if (!model.landmarks) return nullptr;
+  Json residuals = Json::array();
+  for (std::size_t i = 0; i < model.landmark_names.size(); ++i)
+    residuals.push_back(
+        {{"name", model.landmark_names[i]}, {"residual_mm", model.landmarks->residuals_mm[i]}});
+  return {{"fre_mm", model.landmarks->fre_mm},
+          {"fle_mm", model.landmarks->fle_mm},
+          {"tre_at_centre_mm", registration::predicted_tre_mm(*model.landmarks, model.registration.centre)},
+          {"landmarks", residuals}};
+}
+
+Json json_of(const RegisteredModel& model) {
+  const registration::Registration& r = model.registration;
+  Json json = {{"name", r.name},
+               {"status", r.failure ? "refused" : "ok"},
+               {"failure", r.failure ? pipeline::to_json(*r.failure) : Json()},
+               {"decision", registration::word(r.decision)},
+               {"warnings", pipeline::json_list_of(r.warnings)},
+               {"notes", pipeline::json_list_of(r.notes)},
+               {"world_from_model", json_rows(r.world_from_model.matrix())},
+               {"covariance", json_rows(r.covariance)},
+               {"centre_mm", json_list(r.centre)},
+               {"starts", {{"n", r.starts}, {"agree", r.agree}}},
+               {"runner_up", nullptr},
+               {"score", r.score},
+               {"spacing_mm", r.spacing_mm},
+               {"mirrored_cost_ratio", r.mirrored_ratio ? Json(*r.mirrored_ratio) : Json()},
+               {"strain", {{"value", r.deformation.strain}, {"sigma", r.deformation.sigma}}},
+               {"disagreement", nullptr},
+               {"landmarks", json_of_landmarks(model)}};
+  if (r.runner_up)
+    json["runner_up"] = {{"distance_mm", r.runner_up->distance_mm}, {"cost_ratio", r.runner_up->cost_ratio}};
+  if (r.disagreement)
+    json["disagreement"] = {{"distance_mm", r.disagreement->distance_mm},
+                            {"sigma_mm", r.disagreement->sigma_mm},
+                            {"chi2", r.disagreement->chi2},
+                            {"dof", r.disagreement->dof}};
+  for (const char* list : {"views", "points", "tunnels"}) json[list] = Json::array();
+  for (const auto& view : r.views) json["views"].push_back(json_of(view));
+  for (const RegisteredPoint& point : model.points) json["points"].push_back(json_of(point));
+  for (const guidance::Tunnel& tunnel : model.tunnels) json["tunnels"].push_back(json_of(tunnel));
+  json["seconds"] = r.seconds;
+  return json;
+}
+
+}  // namespace
+
+Json to_json(const CaseRegistration& result) {
+  Json json = {{"format", "helicarm-registration/1"},
+               {"status", result.refused() ? "refused" : "ok"},
+               {"failure", result.failure ? pipeline::to_json(*result.failure) : Json()},
+               {"warnings", pipeline::json_list_of(result.warnings)},
+               {"models", Json::array()}};
+  for (const RegisteredModel& model : result.models) json["models"].push_back(json_of(model));
+  json["version"] = HELICARM_VERSION;
+  return json;
+}
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/files.h"
+#include "helicarm/image/grey_window.h"
+#include "helicarm/image/opencv.h"
+#include "helicarm/image/png.h"
+#include "helicarm/report/markup.h"
+#include "helicarm/report/overlay.h"
+#include "helicarm/report/style.h"
+
+namespace helicarm::case_registration {
+namespace {
+
+using registration::Registration;
+
+// RGB, distinct for readers who do not see red and green apart.
+const cv::Scalar colours[] = {{250, 204, 21}, {96, 165, 250}, {240, 171, 252}, {74, 222, 128}};
+
+cv::Point pixel_of(const Eigen::Vector2d& at) {
+  const Eigen::Vector2d safe = at.cwiseMax(-1e5).cwiseMin(1e5);
+  return {int(std::lround(safe.x())), int(std::lround(safe.y()))};
+}
+
+/// Marks a point unless it lies behind the source.
+void draw_point(cv::Mat& image, const geometry::View& view, const RegisteredPoint& point,
+                const cv::Scalar& colour) {
+  if (!(view.depth(point.place.in_calibrator) > 1)) return;
+  const cv::Point at = pixel_of(view.project(point.place.in_calibrator));
+  cv::drawMarker(image, at, colour, cv::MARKER_TILTED_CROSS, image.cols / 60, 2, cv::LINE_AA);
+  cv::putText(image, point.name, at + cv::Point(12, -8), cv::FONT_HERSHEY_SIMPLEX, image.cols / 2000.0,
+              colour, 1, cv::LINE_AA);
+}
+
+std::string model_section(const RegisteredModel& model) {
+  const Registration& r = model.registration;
+  std::string html =
+      fmt::format("<h2>{}</h2>\n<p><span class=\"state {}\">{}</span></p>\n", report::escaped(r.name),
+                  r.failure ? "refused" : "ok", registration::word(r.decision));
+  if (r.failure)
+    html += fmt::format("<p>{}: {}</p>\n", code(r.failure->reason), report::escaped(r.failure->message));
+  for (const auto* list : {&r.warnings, &r.notes})
+    for (const Warning& each : *list)
+      html += fmt::format("<p class=\"soft\">{}: {}</p>\n", code(each.reason), report::escaped(each.message));
+  report::HtmlTable pose({"", "# x", "# y", "# z"});
+  const Eigen::Matrix<double, 6, 1> sigma = r.covariance.diagonal().cwiseSqrt();
+  const auto row = [&](const char* what, const Eigen::Vector3d& value, int digits) {
+    pose.row({what, report::fixed(value.x(), digits), report::fixed(value.y(), digits),
+              report::fixed(value.z(), digits)});
+  };
+  row("centre, mm", r.centre, 2);
+  row("sigma of the centre, mm", sigma.tail<3>(), 3);
+  row("sigma of the rotation, degrees", sigma.head<3>() * 180 / EIGEN_PI, 3);
+  html += pose.html();
+  report::HtmlTable views({"view", "# agreement", "# residual px", "# other views mm", "# comparisons"});
+  for (const auto& view : r.views)
+    views.row({report::escaped(view.name), report::fixed(view.score, 3), report::fixed(view.residual_px, 2),
+               report::fixed(view.held_out_mm, 2), std::to_string(view.comparisons)});
+  if (!views.empty()) html += views.html();
+  if (!model.by_landmarks_only)
+    html += fmt::format(
+        "<p class=\"soft\">{} of {} starts ended here. Runner-up: {}. Strain that would fit better: {:.2f} "
+        "%, sigma "
+        "{:.2f} %. {:.1f} s.</p>\n",
+        r.agree, r.starts,
+        r.runner_up ? fmt::format("{:.1f} mm away, cost ratio {:.2f}", r.runner_up->distance_mm,
+                                  r.runner_up->cost_ratio)
+                    : "none",
+        100 * r.deformation.strain, 100 * r.deformation.sigma, r.seconds);
+  if (model.landmarks)
+    html += fmt::format("<p>Landmarks: FRE {:.2f} mm, FLE {:.2f} mm (rms).</p>\n", model.landmarks->fre_mm,
+                        model.landmarks->fle_mm);
+  report::HtmlTable points({"point", "# x mm", "# y mm", "# z mm", "# within mm (95 %)"});
+  for (const RegisteredPoint& point : model.points) {
+    const Eigen::Vector3d& at = point.place.in_calibrator;
+    points.row({report::escaped(point.name), report::fixed(at.x(), 2), report::fixed(at.y(), 2),
+                report::fixed(at.z(), 2),
+                report::fixed(localization::length_at_95(point.place.covariance_in_calibrator), 2)});
+  }
+  return points.empty() ? html : html + points.html();
+}
+
+}  // namespace
+
+std::string overlay_png(const CaseRegistration& result, std::size_t index) {
+  const registration::RegistrationView& view = result.loaded.views[index];
+  const auto grey = image::eight_bit(view.grey, image::usual_window(view.grey, view.lowest));
+  cv::Mat image;
+  cv::cvtColor(image::as_mat(grey), image, cv::COLOR_GRAY2RGB);
+  for (std::size_t m = 0; m < result.models.size(); ++m) {
+    const RegisteredModel& model = result.models[m];
+    const cv::Scalar& colour = colours[m % std::size(colours)];
+    if (index < model.outlines.size())
+      for (const Eigen::Vector2d& at : model.outlines[index])
+        cv::circle(image, pixel_of(at), std::max(1, image.cols / 1024), colour, cv::FILLED);
+    for (const RegisteredPoint& point : model.points) draw_point(image, model.views[index], point, colour);
+  }
+  return image::encode_png(image);
+}
+
+std::string report_html(const CaseRegistration& result) {
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\"/>\n<title>helicarm "
+      "registration</title>\n<style>{}</style>\n"
+      "</head>\n<body>\n<header>\n<h1>Registration</h1>\n<p class=\"notice\">Research instrument, not a "
+      "medical "
+      "device.</p>\n</header>\n<main>\n",
+      report::report_style);
+  if (result.failure)
+    html += fmt::format("<p><span class=\"state refused\">refused: {}</span></p>\n<p>{}</p>\n",
+                        code(result.failure->reason), report::escaped(result.failure->message));
+  for (const Warning& warning : result.warnings)
+    html +=
+        fmt::format("<p class=\"soft\">{}: {}</p>\n", code(warning.reason), report::escaped(warning.message));
+  html += "<div class=\"views\">\n";
+  for (std::size_t i = 0; i < result.loaded.views.size(); ++i)
+    html += fmt::format(
+        "<figure><img style=\"width:100%\" alt=\"{0}\" src=\"data:image/png;base64,{1}\"/><figcaption>{0}: "
+        "outlines of "
+        "the registered models</figcaption></figure>\n",
+        report::escaped(result.loaded.views[i].name), report::base64(overlay_png(result, i)));
+  html += "</div>\n";
+  for (const RegisteredModel& model : result.models) html += model_section(model);
+  return html + fmt::format(
+                    "</main>\n<footer><p class=\"soft\">helicarm {}. Millimetres and pixels.</p></footer>\n"
+                    "</body>\n</html>\n",
+                    HELICARM_VERSION);
+}
+
+Expected<void> write_registration(const CaseRegistration& result, const std::filesystem::path& folder) {
+  return guarded([&] {
+    for (std::size_t i = 0; i < result.loaded.views.size(); ++i)
+      value_or_throw(
+          write_file(folder / report::overlay_name(result.loaded.views[i].name, i), overlay_png(result, i)));
+    value_or_throw(write_file(folder / "report.html", report_html(result)));
+    value_or_throw(write_file(folder / "registration.json", to_text(to_json(result)) + "\n"));
+  });
+}
+
+}  // namespace helicarm::case_registration

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "helicarm/pipeline/case.h"
+
+namespace helicarm::pipeline {
+
+/// Use of a case: what may be left out follows from it.
+enum class Purpose { run, phantom, registration, cameras };
+
+/// The case with this content of case.json. Throws BadInput as `read_case` fails; `origin` begins each
+/// message.
+Case case_of(const Json& json, const std::string& origin, const std::filesystem::path& folder,
+             Purpose purpose);
+
+}  // namespace helicarm::pipeline

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/registration_case.h"
+
+#include <set>
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/pipeline/case_json.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t most_models = 20;
+constexpr Range hu_range{-32768, 32767};
+
+std::optional<fs::path> model_file(JsonReader& reader, const char* key, const fs::path& folder) {
+  const auto name = reader.optional_text(key, 1000);
+  if (!name) return std::nullopt;
+  return value_or_throw(path_inside(folder, *name));
+}
+
+void read_start(JsonReader reader, const fs::path& folder, CaseModel& model) {
+  if (reader.has("world_from_model"))
+    model.world_from_model = value_or_throw(
+        geometry::rigid_transform_from(geometry::matrix_from(reader, "world_from_model", {-1e5, 1e5}),
+                                       reader.where() + ": \"world_from_model\""));
+  model.landmarks = model_file(reader, "landmarks", folder);
+  if (model.world_from_model && model.landmarks)
+    reader.refuse(Reason::bad_value, "landmarks", "cannot be combined with \"world_from_model\"");
+  reader.finish();
+}
+
+CaseModel model_from(JsonReader& reader, const fs::path& folder) {
+  CaseModel model;
+  model.name = reader.text("name", 100);
+  if (model.name.empty()) reader.refuse(Reason::bad_value, "name", "is empty");
+  model.volume = model_file(reader, "volume", folder);
+  model.surface = model_file(reader, "surface", folder);
+  if (model.volume && model.surface)
+    reader.refuse(Reason::bad_value, "surface", "cannot be combined with \"volume\"");
+  model.mask = model_file(reader, "mask", folder);
+  if (model.mask && !model.volume) reader.refuse(Reason::bad_value, "mask", "needs a \"volume\"");
+  if (!reader.raw("window_hu").is_null()) {
+    model.window_hu = Eigen::Vector2d(reader.numbers("window_hu", 2, hu_range).data());
+    if (!(model.window_hu->x() < model.window_hu->y()))
+      reader.refuse(Reason::bad_value, "window_hu", "must be two increasing numbers");
+    if (!model.volume) reader.refuse(Reason::bad_value, "window_hu", "needs a \"volume\"");
+  }
+  if (!reader.raw("voxel_mm").is_null())
+    model.voxel_mm = Eigen::Vector3d(reader.numbers("voxel_mm", 3, {1e-3, 100}).data());
+  model.tiff_offset_hu = reader.optional_number("tiff_offset_hu", hu_range).value_or(0);
+  if (!reader.raw("side").is_null())
+    model.side = reader.choice("side", {"left", "right"}) == 0 ? "left" : "right";
+  if (!reader.raw("moves_with").is_null())
+    model.moves_with = static_cast<guidance::Bone>(reader.choice("moves_with", {"femur", "tibia"}));
+  if (!reader.raw("start").is_null()) read_start(reader.object("start"), folder, model);
+  model.plan = model_file(reader, "plan", folder);
+  if (!model.volume && !model.surface && !model.landmarks)
+    reader.refuse(Reason::bad_value, "volume", "is missing: a model needs a volume, a surface or landmarks");
+  reader.finish();
+  return model;
+}
+
+/// Takes "camera" out of every view: the rest is a case like any other.
+std::vector<fs::path> take_cameras(Json& json, const fs::path& file) {
+  std::vector<fs::path> cameras;
+  if (!json.is_object() || !json.contains("views") || !json["views"].is_array()) return cameras;
+  std::size_t index = 0;
+  for (Json& view : json["views"]) {
+    const std::string where = fmt::format("{}: views[{}]", file.filename().string(), index++);
+    if (!view.is_object()) continue;
+    if (const auto found = view.find("camera"); found != view.end() && !found->is_null()) {
+      if (!found->is_string())
+        throw BadInput(Reason::bad_value, fmt::format("{}: \"camera\" is not a file name", where));
+      cameras.push_back(value_or_throw(path_inside(file.parent_path(), found->get<std::string>())));
+    }
+    view.erase("camera");
+    if (!cameras.empty() && cameras.size() != index)
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: \"camera\" must be given for all views or for none: their world is one", where));
+  }
+  return cameras;
+}
+
+}  // namespace
+
+Expected<RegistrationCase> read_registration_case(const fs::path& path) {
+  return guarded([&] {
+    const fs::path file = fs::absolute(case_file(path));
+    Json json = value_or_throw(read_json(file));
+    RegistrationCase read;
+    read.cameras = take_cameras(json, file);
+    Json models = Json::object();
+    if (json.is_object() && json.contains("models")) models["models"] = json["models"];
+    if (json.is_object()) json.erase("models");
+    read.base = case_of(json, file.filename().string(), file.parent_path(),
+                        read.cameras.empty() ? Purpose::registration : Purpose::cameras);
+    JsonReader reader(models, file.filename().string());
+    std::set<std::string> names;
+    for (JsonReader& entry : reader.objects("models", true, most_models)) {
+      read.models.push_back(model_from(entry, read.base.folder));
+      if (!names.insert(read.models.back().name).second)
+        entry.refuse(Reason::name_clash, "name",
+                     fmt::format("\"{}\" is given twice", read.models.back().name));
+    }
+    if (read.models.empty())
+      reader.refuse(Reason::bad_value, "models", "is empty: name a volume or a surface");
+    return read;
+  });
+}
+
+}  // namespace helicarm::pipeline

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/checks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <fmt/format.h>
+
+#include "helicarm/registration/covariance.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+constexpr double strain_prior = 0.05;
+constexpr double least_patch_score = 0.4;
+constexpr double least_contour_score = 0.6;
+constexpr double least_mirrored_ratio = 1.1;
+constexpr double least_runner_up_ratio = 1.1;
+constexpr double most_strain = 0.012;
+constexpr double strain_sigmas = 3;
+constexpr double most_disagreement_mm = 0.5;
+constexpr double disagreement_sigmas = 3;
+constexpr double usual_error_mm = 2;
+
+}  // namespace
+
+Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Vector3d& centre,
+                             const std::vector<OwnSolution>& own) {
+  Disagreement result;
+  result.dof = 6 * (int(own.size()) - 1);
+  RigidCovariance total = RigidCovariance::Zero();
+  RigidStep weighted = RigidStep::Zero();
+  std::vector<RigidCovariance> weights;
+  for (const OwnSolution& each : own) {
+    weights.push_back(each.covariance.inverse());
+    total += weights.back();
+    weighted += weights.back() * each.step;
+  }
+  const RigidStep mean = total.ldlt().solve(weighted);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const RigidStep apart = own[i].step - mean;
+    result.chi2 += apart.dot(weights[i] * apart);
+    const RigidCovariance others = total - weights[i];
+    const RigidStep from_others = own[i].step - others.ldlt().solve(weighted - weights[i] * own[i].step);
+    // The other view whose rays cross this one's most steeply.
+    Vector3d axis = Vector3d::Zero();
+    const auto ray = [&](std::size_t k) { return (centre - views[k].view.source_in_world()).normalized(); };
+    for (std::size_t j = 0; j < own.size(); ++j)
+      if (j != i && ray(i).cross(ray(j)).norm() > axis.norm()) axis = ray(i).cross(ray(j));
+    axis.normalize();
+    const double distance = std::abs(axis.dot(from_others.tail<3>()));
+    result.held_out_mm.push_back(distance);
+    if (distance >= result.distance_mm) {
+      result.distance_mm = distance;
+      const RigidCovariance both = own[i].covariance + RigidCovariance(others.inverse());
+      result.sigma_mm = std::sqrt(axis.dot(both.bottomRightCorner<3, 3>() * axis));
+    }
+  }
+  return result;
+}
+
+Deformation deformation_of(const Observation& observation, const std::vector<double>& correlation_px,
+                           double floor) {
+  MatrixXd map(affine_parameters, 12);
+  map << affine_from_rigid(), affine_from_strain(Eigen::Matrix3d::Identity());
+  const Linearised plain =
+      linearised(observation, {}, affine_from_rigid(), MatrixXd::Zero(6, 6), correlation_px);
+  const double unit = plain.information.ldlt().solve(plain.meat).trace() / 6;
+  MatrixXd prior = MatrixXd::Zero(12, 12);
+  prior.bottomRightCorner<6, 6>().diagonal().setConstant(unit / (strain_prior * strain_prior));
+  const Linearised both = linearised(observation, {}, map, prior, correlation_px);
+  const Eigen::VectorXd step = both.information.ldlt().solve(both.gradient);
+  Eigen::Matrix3d strain;
+  const auto e = step.tail<6>();
+  strain << e[0], e[3] / 2, e[4] / 2, e[3] / 2, e[1], e[5] / 2, e[4] / 2, e[5] / 2, e[2];
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(strain);
+  Eigen::Index largest = 0;
+  axes.eigenvalues().cwiseAbs().maxCoeff(&largest);
+  const Vector3d a = axes.eigenvectors().col(largest);
+  Eigen::Matrix<double, 6, 1> along;
+  along << a[0] * a[0], a[1] * a[1], a[2] * a[2], a[0] * a[1], a[0] * a[2], a[1] * a[2];
+  const MatrixXd covariance = both.covariance();
+  return {
+      axes.eigenvalues()[largest],
+      std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
+}
+
+void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
+            const RegistrationOptions& options, Registration& result) {
+  const auto refuse = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
+    if (!result.failure) result.failure = Failure{reason, message, {}, std::move(figures)};
+  };
+  const auto warn = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
+    result.warnings.push_back({reason, message, {}, std::move(figures)});
+  };
+  const double least = model.surface ? least_contour_score : least_patch_score;
+  for (const RegisteredView& view : result.views)
+    if (view.score < least)
+      refuse(Reason::wrong_model,
+             fmt::format(
+                 "{}: the model explains {:.2f} of its edges in {}, at least {:.2f} are required: another "
+                 "bone, another patient, a start too far away, or the model is hidden",
+                 model.name, view.score, view.name, least),
+             {{"score", view.score}, {"limit", least}});
+  double nearest = 1e9;
+  for (const geometry::RigidTransform& start : starts)
+    nearest = std::min(nearest, separation(model, start, result.world_from_model));
+  const double reach = std::hypot(std::sqrt(3.0) * options.search.shift_mm,
+                                  1.5 * model.radius_mm * options.search.turn_deg * EIGEN_PI / 180);
+  if (nearest > reach)
+    refuse(
+        Reason::out_of_capture,
+        fmt::format(
+            "{}: the solution is {:.1f} mm from the nearest start, beyond the {:.1f} mm that were searched",
+            model.name, nearest, reach),
+        {{"distance_mm", nearest}, {"limit_mm", reach}});
+  if (result.mirrored_ratio && *result.mirrored_ratio < least_mirrored_ratio)
+    refuse(Reason::wrong_model,
+           fmt::format(
+               "{}: the mirror image of the model fits {} (cost ratio {:.2f}, at least {:.2f} is required): "
+               "left and right may be exchanged",
+               model.name, *result.mirrored_ratio < 1 ? "better" : "almost as well", *result.mirrored_ratio,
+               least_mirrored_ratio),
+           {{"mirrored_ratio", *result.mirrored_ratio}, {"limit", least_mirrored_ratio}});
+  if (result.runner_up && result.runner_up->cost_ratio < least_runner_up_ratio)
+    refuse(
+        Reason::registration_ambiguous,
+        fmt::format(
+            "{}: another pose, {:.1f} mm away, explains the images almost as well (cost ratio {:.2f}, at "
+            "least {:.2f} is required); give a start nearer to the truth, or landmarks",
+            model.name, result.runner_up->distance_mm, result.runner_up->cost_ratio, least_runner_up_ratio),
+        {{"distance_mm", result.runner_up->distance_mm}, {"cost_ratio", result.runner_up->cost_ratio}});
+  const Deformation& shape = result.deformation;
+  if (std::abs(shape.strain) > most_strain && std::abs(shape.strain) > strain_sigmas * shape.sigma)
+    refuse(Reason::wrong_model,
+           fmt::format(
+               "{}: the images ask for a model {:.1f} % {} along one direction (sigma {:.1f} %): another "
+               "patient's, or its voxel size or unit is wrong",
+               model.name, 100 * std::abs(shape.strain), shape.strain > 0 ? "larger" : "smaller",
+               100 * shape.sigma),
+           {{"strain", shape.strain}, {"sigma", shape.sigma}});
+  if (result.disagreement && result.disagreement->distance_mm > most_disagreement_mm &&
+      result.disagreement->distance_mm > disagreement_sigmas * result.disagreement->sigma_mm)
+    refuse(Reason::registration_disagrees,
+           fmt::format(
+               "{}: the views contradict each other by {:.2f} mm along the direction that both see (sigma "
+               "{:.2f} mm): the body moved between the acquisitions, or a calibration is wrong",
+               model.name, result.disagreement->distance_mm, result.disagreement->sigma_mm),
+           {{"distance_mm", result.disagreement->distance_mm}, {"sigma_mm", result.disagreement->sigma_mm}});
+  const double worst = worst_error_mm(model, result);
+  if (worst > options.max_error_mm.value_or(usual_error_mm)) {
+    const std::string message =
+        fmt::format("{}: a point of the model may be off by {:.2f} mm (95 %), limit {:g} mm{}", model.name,
+                    worst, options.max_error_mm.value_or(usual_error_mm),
+                    result.views.size() < 2 ? "; one view hardly sees the depth: take a second one" : "");
+    if (options.max_error_mm)
+      refuse(Reason::uncertain, message, {{"error_mm", worst}, {"limit_mm", *options.max_error_mm}});
+    else
+      warn(Reason::uncertain, message, {{"error_mm", worst}, {"limit_mm", usual_error_mm}});
+  }
+  if (!result.failure && result.agree < 2)
+    warn(Reason::out_of_capture,
+         fmt::format(
+             "{}: one of {} starts ended here; give a start nearer to the truth for a second confirmation",
+             model.name, result.starts),
+         {{"agree", double(result.agree)}, {"starts", double(result.starts)}});
+  result.decision = result.failure            ? Decision::refuse
+                    : result.warnings.empty() ? Decision::accept
+                                              : Decision::warn;
+}
+
+}  // namespace helicarm::registration

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "helicarm/registration/register_model.h"
+
+namespace helicarm::registration {
+
+/// A view's own solution: the step from the joint one about the centre, and its covariance.
+struct OwnSolution {
+  RigidStep step;
+  RigidCovariance covariance;
+};
+
+/// Differences between each view's own solution and the others' weighted mean; in mm along the direction
+/// across both viewing directions, which both views see without depth.
+Disagreement disagreement_of(const std::vector<RegistrationView>& views, const Eigen::Vector3d& centre,
+                             const std::vector<OwnSolution>& own);
+
+/// The strain that would lower the residuals most, from one Gauss-Newton step of pose and strain under a
+/// prior of 5 %. `floor`: what the model's edges alone allow.
+Deformation deformation_of(const Observation& observation, const std::vector<double>& correlation_px,
+                           double floor);
+
+/// Sets decision, failure, warnings and notes from the figures.
+void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
+            const RegistrationOptions& options, Registration& result);
+
+}  // namespace helicarm::registration

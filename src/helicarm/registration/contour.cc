@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/contour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include <Eigen/LU>
+
+#include "helicarm/geometry/triangulation.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// The surface's shadow on a grid of cells.
+class Shadow {
+ public:
+  Shadow(const std::vector<Vector2d>& corners, const std::vector<std::array<std::uint32_t, 3>>& triangles,
+         double cell)
+      : cell_(cell) {
+    Vector2d low = corners.front(), high = low;
+    for (const Vector2d& at : corners) low = low.cwiseMin(at), high = high.cwiseMax(at);
+    low_ = low - Vector2d::Constant(2 * cell);
+    const Vector2d size = (high - low_) / cell;
+    cells_ = image::Image<std::uint8_t>(int(size.x()) + 4, int(size.y()) + 4, 0);
+    for (const auto& t : triangles) fill(place(corners[t[0]]), place(corners[t[1]]), place(corners[t[2]]));
+  }
+  bool covers(const Vector2d& pixel) const {
+    const Vector2d at = place(pixel);
+    const int u = int(std::floor(at.x() + 0.5)), v = int(std::floor(at.y() + 0.5));
+    return cells_.contains(u, v) && cells_(u, v);
+  }
+
+ private:
+  Vector2d place(const Vector2d& pixel) const { return (pixel - low_) / cell_; }
+  void fill(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
+    const auto across = [](const Vector2d& p, const Vector2d& q, double u, double v) {
+      return (q.x() - p.x()) * (v - p.y()) - (q.y() - p.y()) * (u - p.x());
+    };
+    const double area = across(a, b, c.x(), c.y());
+    if (area == 0) return;
+    const auto [u0, u1] = std::minmax({a.x(), b.x(), c.x()});
+    const auto [v0, v1] = std::minmax({a.y(), b.y(), c.y()});
+    for (int v = int(std::ceil(v0)); v <= int(v1); ++v)
+      for (int u = int(std::ceil(u0)); u <= int(u1); ++u) {
+        const double x = across(a, b, u, v) / area, y = across(b, c, u, v) / area;
+        if (x >= 0 && y >= 0 && x + y <= 1) cells_(u, v) = 1;
+      }
+  }
+  double cell_;
+  Vector2d low_;
+  image::Image<std::uint8_t> cells_;
+};
+
+constexpr double sample_step = 0.5;  // of the profile, raster pixels
+
+/// Attenuation between pixels; nothing where it is not valid.
+std::optional<double> attenuation_at(const Raster& raster, const Vector2d& at) {
+  const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
+  if (u < 0 || v < 0 || u + 1 >= raster.attenuation.width() || v + 1 >= raster.attenuation.height())
+    return std::nullopt;
+  if (!raster.valid(u, v) || !raster.valid(u + 1, v) || !raster.valid(u, v + 1) ||
+      !raster.valid(u + 1, v + 1))
+    return std::nullopt;
+  const double x = at.x() - u, y = at.y() - v;
+  const auto value = [&](int i, int j) { return double(raster.attenuation(u + i, v + j)); };
+  return (1 - y) * ((1 - x) * value(0, 0) + x * value(1, 0)) + y * ((1 - x) * value(0, 1) + x * value(1, 1));
+}
+
+struct EdgeFound {
+  double offset = 0;  ///< outward, raster pixels
+  double slope = 0;   ///< fall of the attenuation per raster pixel
+};
+
+/// The steepest fall of the attenuation along the normal, near ones preferred; three parallel profiles are
+/// averaged.
+std::optional<EdgeFound> edge_along(const Raster& raster, const Vector2d& at, const Vector2d& normal,
+                                    double reach) {
+  const int half = int(std::ceil(reach / sample_step)) + 3;
+  std::vector<double> profile(std::size_t(2 * half + 1), 0);
+  const Vector2d tangent(-normal.y(), normal.x());
+  for (int i = -half; i <= half; ++i)
+    for (const double aside : {-1.0, 0.0, 1.0}) {
+      const auto value = attenuation_at(raster, at + i * sample_step * normal + aside * tangent);
+      if (!value) return std::nullopt;
+      profile[std::size_t(i + half)] += *value / 3;
+    }
+  // Fall over two pixels about each sample, smoothed over three samples.
+  const auto fall = [&](int i) {
+    const auto p = [&](int k) { return profile[std::size_t(k + half)]; };
+    return (p(i - 2) - p(i + 2) + 0.5 * (p(i - 3) - p(i + 1) + p(i - 1) - p(i + 3))) / 4;
+  };
+  const int last = half - 3;
+  std::optional<EdgeFound> best;
+  double best_rank = 0;
+  for (int i = 1 - last; i < last; ++i) {
+    const double here = fall(i), before = fall(i - 1), after = fall(i + 1);
+    if (!(here > 0 && here >= before && here > after)) continue;
+    const double bend = before - 2 * here + after;
+    const double offset = sample_step * (i + (bend < 0 ? 0.5 * (before - after) / bend : 0));
+    const double rank = here * std::exp(-0.5 * std::pow(offset / (0.5 * reach), 2));
+    if (rank > best_rank) {
+      best_rank = rank;
+      best = EdgeFound{offset, here};
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<ContourPoint> apparent_contour(const Surface& surface, const geometry::View& view,
+                                           const geometry::RigidTransform& world_from_model,
+                                           double spacing_px) {
+  const Vector3d source = world_from_model.inverse() * view.source_in_world();
+  const auto& mesh = surface.mesh;
+  std::vector<Vector2d> pixels;
+  pixels.reserve(mesh.corners.size());
+  for (const Vector3d& corner : mesh.corners) {
+    const Vector3d in_world = world_from_model * corner;
+    if (!(view.depth(in_world) > 1)) return {};
+    pixels.push_back(view.project(in_world));
+  }
+  std::vector<double> facing(mesh.triangles.size());
+  for (std::size_t i = 0; i < facing.size(); ++i)
+    facing[i] = surface.normals[i].dot(source - mesh.corners[mesh.triangles[i][0]]);
+  const Shadow shadow(pixels, mesh.triangles, std::max(1.0, spacing_px / 2));
+  const Eigen::Matrix3d line_from_normal = view.intrinsics.matrix().inverse().transpose() *
+                                           view.camera_from_world.rotation * world_from_model.rotation;
+  std::vector<ContourPoint> contour;
+  std::map<std::pair<int, int>, std::size_t> taken;
+  for (const Surface::Edge& edge : surface.edges) {
+    const double a = facing[edge.faces[0]], b = facing[edge.faces[1]];
+    if (a * b >= 0) continue;
+    const Vector2d pixel = 0.5 * (pixels[edge.corners[0]] + pixels[edge.corners[1]]);
+    const std::pair<int, int> cell(int(std::floor(pixel.x() / spacing_px)),
+                                   int(std::floor(pixel.y() / spacing_px)));
+    if (taken.contains(cell)) continue;
+    // Normal of the plane through the source and the edge.
+    const Vector3d normal =
+        std::abs(b) * surface.normals[edge.faces[0]] + std::abs(a) * surface.normals[edge.faces[1]];
+    Vector2d across = (line_from_normal * normal).head<2>();
+    if (!(across.norm() > 0)) continue;
+    across.normalize();
+    const double aside = std::max(2.0, 1.5 * spacing_px);
+    if (shadow.covers(pixel + aside * across)) continue;
+    taken.emplace(cell, contour.size());
+    contour.push_back(
+        {world_from_model * (0.5 * (mesh.corners[edge.corners[0]] + mesh.corners[edge.corners[1]])), pixel,
+         across});
+  }
+  return contour;
+}
+
+ViewObservation compare_contour(const Raster& raster, const geometry::View& view, const Surface& surface,
+                                const geometry::RigidTransform& world_from_model, const Vector3d& centre,
+                                const ContourOptions& options) {
+  ViewObservation observation;
+  const double spacing = 2 * raster.factor;
+  const auto contour = apparent_contour(surface, view, world_from_model, spacing);
+  double sum2 = 0, weights = 0;
+  for (const ContourPoint& point : contour) {
+    Comparison comparison;
+    comparison.pixel = point.pixel;
+    comparison.weight = 1 / double(contour.size());
+    if (const auto edge = edge_along(raster, raster.raster_at(point.pixel), point.normal, options.reach)) {
+      const double residual = raster.factor * edge->offset;
+      comparison.agreement = 1 / (1 + std::pow(residual / (2 * options.sigma_px), 2));
+      const Vector3d by_point =
+          geometry::projection_jacobian(view, point.in_world).transpose() * point.normal;
+      const Vector3d arm = point.in_world - centre;
+      Gradient jacobian;
+      jacobian.head<3>() = by_point;
+      for (int i = 0; i < 3; ++i) jacobian.segment<3>(3 + 3 * i) = by_point[i] * arm;
+      jacobian[edge_offset] = 1;
+      const double weight = std::pow(comparison.agreement, 2) / (options.sigma_px * options.sigma_px);
+      comparison.information = weight * jacobian * jacobian.transpose();
+      comparison.gradient = weight * residual * jacobian;
+      const double robust = std::pow(comparison.agreement, 2);
+      sum2 += robust * residual * residual;
+      weights += robust;
+    }
+    observation.score += comparison.weight * comparison.agreement;
+    observation.comparisons.push_back(std::move(comparison));
+  }
+  observation.residual_px = weights > 0 ? std::sqrt(sum2 / weights) : 0;
+  return observation;
+}
+
+}  // namespace helicarm::registration

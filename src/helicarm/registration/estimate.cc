@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+#include "helicarm/core/parallel.h"
+#include "helicarm/registration/contour.h"
+#include "helicarm/registration/patches.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector3d;
+
+double pixel_mm_of(const geometry::View& view, const Vector3d& at) {
+  return std::max(1.0, view.depth(at)) / std::abs(view.intrinsics.fy);
+}
+
+/// Score over the views that take part.
+double score_of(const Observation& observation, const std::vector<bool>& views) {
+  if (views.empty()) return observation.score();
+  double sum = 0, count = 0;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (views[i]) sum += observation.views[i].score, ++count;
+  return count > 0 ? sum / count : 0;
+}
+
+RigidEquations equations_of(const Observation& observation, const std::vector<bool>& views) {
+  RigidEquations sum;
+  for (std::size_t i = 0; i < observation.views.size(); ++i) {
+    if (!views.empty() && !views[i]) continue;
+    const RigidEquations of_view = rigid_equations(observation.views[i]);
+    sum.information += of_view.information;
+    sum.gradient += of_view.gradient;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Scene::Scene(const Model& model, const std::vector<RegistrationView>& views, unsigned threads)
+    : model_(&model), views_(&views), threads_(threads), full_(views.size()) {
+  parallel_for(views.size(), threads, [&](std::size_t i) { full_[i] = attenuation_raster(views[i]); });
+}
+
+Scene::Scene(const Scene& other, const Model& model)
+    : model_(&model), views_(other.views_), threads_(other.threads_), full_(other.full_) {}
+
+double Scene::pixel_mm(const Vector3d& at) const {
+  double finest = 1e9;
+  for (const RegistrationView& view : *views_) finest = std::min(finest, pixel_mm_of(view.view, at));
+  return finest;
+}
+
+void Scene::prepare(const Level& level, const Vector3d& near) {
+  if (levels_.contains({level.contour, level.spacing_mm})) return;
+  Prepared made;
+  for (std::size_t i = 0; i < views_->size(); ++i) {
+    const double factor = level.spacing_mm / pixel_mm_of((*views_)[i].view, near);
+    made.rasters.push_back(coarser(full_[i], std::clamp(static_cast<int>(std::lround(factor)), 1, 64)));
+  }
+  if (!level.contour) made.density = coarser(model_->density, level.spacing_mm);
+  levels_.emplace(std::pair(level.contour, level.spacing_mm), std::move(made));
+}
+
+const Scene::Prepared& Scene::prepared(const Level& level) const {
+  return levels_.at({level.contour, level.spacing_mm});
+}
+
+Observation Scene::observe(const Level& level, const geometry::RigidTransform& pose, bool derivatives,
+                           unsigned threads) const {
+  const Prepared& made = prepared(level);
+  const Vector3d centre = pose * model_->centre;
+  Observation observation;
+  for (std::size_t i = 0; i < views_->size(); ++i) {
+    const geometry::View& view = (*views_)[i].view;
+    observation.views.push_back(level.contour
+                                    ? compare_contour(made.rasters[i], view, *model_->surface, pose, centre,
+                                                      {level.reach, level.sigma_px})
+                                    : compare_patches(made.rasters[i], view, made.density, model_->cuts, pose,
+                                                      centre, derivatives, threads));
+  }
+  return observation;
+}
+
+RigidEquations rigid_equations(const ViewObservation& view) {
+  Information information = Information::Zero();
+  Gradient gradient = Gradient::Zero();
+  for (const Comparison& comparison : view.comparisons) {
+    information += comparison.information;
+    gradient += comparison.gradient;
+  }
+  const double offset = information(edge_offset, edge_offset) + 1 / std::pow(edge_offset_sigma_px, 2);
+  const Gradient cross = information.col(edge_offset);
+  information -= cross * cross.transpose() / offset;
+  gradient -= cross * (gradient[edge_offset] / offset);
+  const auto map = affine_from_rigid();
+  return {map.transpose() * information.topLeftCorner<12, 12>() * map, map.transpose() * gradient.head<12>()};
+}
+
+Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTransform& start,
+                const RefineOptions& options) {
+  const Model& model = scene.model();
+  Estimate best{start, scene.observe(level, start, true, options.threads), 0};
+  best.score = score_of(best.observation, options.views);
+  double damping = 1e-3;
+  constexpr double converged_mm = 1e-3;
+  constexpr double tolerance = 1e-6;  // of the score: patches enter and leave
+  for (int i = 0; i < options.iterations; ++i) {
+    RigidEquations equations = equations_of(best.observation, options.views);
+    const Vector3d centre = best.pose * model.centre;
+    equations.information += options.prior;
+    equations.gradient += options.prior * step_about(best.pose, start, centre);
+    RigidCovariance damped = equations.information;
+    damped.diagonal() *= 1 + damping;
+    // Without information along a direction there is no step along it.
+    damped.diagonal().array() += 1e-9 * damped.diagonal().maxCoeff() + 1e-30;
+    RigidStep step = damped.ldlt().solve(equations.gradient);
+    if (!step.allFinite()) break;
+    const double length = std::hypot(step.tail<3>().norm(), model.radius_mm * step.head<3>().norm());
+    const double longest = 4 * (level.contour ? level.reach * level.spacing_mm / 4 : level.spacing_mm);
+    if (length > longest) step *= longest / length;
+    const auto pose = moved_about(best.pose, centre, step);
+    Estimate next{pose, scene.observe(level, pose, true, options.threads), 0};
+    next.score = score_of(next.observation, options.views);
+    if (next.score >= best.score - tolerance) {
+      best = std::move(next);
+      damping = std::max(1e-4, damping / 10);
+      if (length < converged_mm) break;
+    } else {
+      damping *= 10;
+      if (damping > 1e3 || length < converged_mm) break;
+    }
+  }
+  return best;
+}
+
+}  // namespace helicarm::registration

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/landmarks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "helicarm/geometry/rotation.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr std::size_t least_landmarks = 3;
+constexpr double least_spread_mm = 2;  // rms distance from the line that fits the landmarks best
+
+}  // namespace
+
+Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks) {
+  const double n = double(landmarks.size());
+  if (landmarks.size() < least_landmarks)
+    return fail(Reason::bad_value,
+                fmt::format("{} landmarks, at least {} are required", landmarks.size(), least_landmarks));
+  Vector3d model_mean = Vector3d::Zero(), world_mean = Vector3d::Zero();
+  for (const Landmark& landmark : landmarks) {
+    model_mean += landmark.in_model / n;
+    world_mean += landmark.in_world / n;
+  }
+  Matrix3d across = Matrix3d::Zero(), spread = Matrix3d::Zero();
+  for (const Landmark& landmark : landmarks) {
+    across += (landmark.in_world - world_mean) * (landmark.in_model - model_mean).transpose();
+    spread += (landmark.in_model - model_mean) * (landmark.in_model - model_mean).transpose() / n;
+  }
+  const double aside =
+      std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix3d>(spread).eigenvalues()[1]));
+  if (aside < least_spread_mm)
+    return fail(
+        Reason::bad_value,
+        fmt::format("the landmarks lie within {:.2g} mm (rms) of a line, at least {:g} mm are required",
+                    aside, least_spread_mm),
+        {{"spread_mm", aside}, {"limit_mm", least_spread_mm}});
+  LandmarkRegistration result;
+  result.world_from_model.rotation = geometry::nearest_rotation(across);
+  result.world_from_model.translation = world_mean - result.world_from_model.rotation * model_mean;
+  result.centre = world_mean;
+  double stated = 0;
+  RigidCovariance information = RigidCovariance::Zero();
+  for (const Landmark& landmark : landmarks) {
+    const Vector3d at = result.world_from_model * landmark.in_model;
+    result.residuals_mm.push_back((landmark.in_world - at).norm());
+    result.fre_mm += std::pow(result.residuals_mm.back(), 2) / n;
+    stated += landmark.covariance_in_world.trace() / n;
+    Eigen::Matrix<double, 3, 6> by_step;
+    by_step << -geometry::cross_matrix(at - world_mean), Matrix3d::Identity();
+    information += by_step.transpose() * by_step;
+  }
+  result.fre_mm = std::sqrt(result.fre_mm);
+  // <FRE^2> = (1 - 2/n) <FLE^2>.
+  result.fle_mm = std::sqrt(std::max(stated, result.fre_mm * result.fre_mm / (1 - 2 / n)));
+  result.covariance = result.fle_mm * result.fle_mm / 3 * RigidCovariance(information.inverse());
+  return result;
+}
+
+double predicted_tre_mm(const LandmarkRegistration& registration, const Vector3d& point_in_world) {
+  return std::sqrt(point_covariance(registration.covariance, registration.centre, point_in_world).trace());
+}
+
+}  // namespace helicarm::registration

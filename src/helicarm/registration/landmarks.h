@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/registration/motion.h"
+
+namespace helicarm::registration {
+
+/// A landmark in the model and in the world.
+struct Landmark {
+  std::string name;
+  Eigen::Vector3d in_model;
+  Eigen::Vector3d in_world;
+  Eigen::Matrix3d covariance_in_world = Eigen::Matrix3d::Zero();  ///< mm^2; zero: not known
+};
+
+struct LandmarkRegistration {
+  geometry::RigidTransform world_from_model;
+  Eigen::Vector3d centre;            ///< mean of the landmarks, world
+  std::vector<double> residuals_mm;  ///< FRE of each
+  double fre_mm = 0;                 ///< rms
+  double fle_mm = 0;                 ///< rms; from the residuals or from the covariances, the larger
+  RigidCovariance covariance;        ///< about `centre`: gives the TRE of Fitzpatrick, West and Maurer (1998)
+};
+
+/// Least-squares rigid motion from model to world (Arun 1987, proper rotations only). Refuses (bad_value)
+/// fewer than three landmarks, and landmarks near one line.
+Expected<LandmarkRegistration> register_landmarks(const std::vector<Landmark>& landmarks);
+
+/// Predicted TRE (rms, mm) at a point of the world.
+double predicted_tre_mm(const LandmarkRegistration& registration, const Eigen::Vector3d& point_in_world);
+
+}  // namespace helicarm::registration

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector3i;
+
+constexpr double soft_tissue_hu = 50;
+constexpr float air_hu = -800;
+constexpr std::size_t sample_count = 60;
+
+/// Density of a voxel, 1 per 1000 HU.
+float density_of(float hu, bool inside, const std::optional<HuWindow>& window, bool excess) {
+  if (!excess) return hu < air_hu ? 0.0F : std::max(0.0F, 1 + hu / 1000);
+  if (!inside || (window && static_cast<double>(hu) < window->low)) return 0;
+  const double value = window ? std::min(static_cast<double>(hu), window->high) : static_cast<double>(hu);
+  return static_cast<float>((value - soft_tissue_hu) / 1000);
+}
+
+struct Bounds {
+  Vector3i low, high;
+};
+
+std::optional<Bounds> bounds_of(const Density& density) {
+  Bounds bounds{density.size, Vector3i::Constant(-1)};
+  for (int z = 0; z < density.size.z(); ++z)
+    for (int y = 0; y < density.size.y(); ++y)
+      for (int x = 0; x < density.size.x(); ++x)
+        if (density.values[density.index(x, y, z)] != 0) {
+          bounds.low = bounds.low.cwiseMin(Vector3i(x, y, z));
+          bounds.high = bounds.high.cwiseMax(Vector3i(x, y, z));
+        }
+  if (bounds.high.x() < 0) return std::nullopt;
+  return bounds;
+}
+
+/// The part within the bounds with a margin of zeros.
+Density cropped(const Density& density, const Bounds& bounds) {
+  Density part;
+  part.size = bounds.high - bounds.low + Vector3i::Constant(3);
+  part.model_from_voxel =
+      density.model_from_voxel * Eigen::Translation3d((bounds.low - Vector3i::Ones()).cast<double>());
+  part.values.assign(std::size_t(part.size.x()) * std::size_t(part.size.y()) * std::size_t(part.size.z()), 0);
+  for (int z = bounds.low.z(); z <= bounds.high.z(); ++z)
+    for (int y = bounds.low.y(); y <= bounds.high.y(); ++y)
+      for (int x = bounds.low.x(); x <= bounds.high.x(); ++x)
+        part.values[part.index(x - bounds.low.x() + 1, y - bounds.low.y() + 1, z - bounds.low.z() + 1)] =
+            density.values[density.index(x, y, z)];
+  return part;
+}
+
+/// Voxels on the faces of the whole grid that hold matter, about 2 mm apart.
+std::vector<Vector3d> cuts_of(const Density& density) {
+  std::vector<Vector3d> cuts;
+  constexpr float matter = 0.1F;
+  const Vector3d spacing = density.model_from_voxel.linear().colwise().norm();
+  const Vector3i stride = (2 / spacing.array()).floor().cast<int>().max(1);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+    for (const int face : {0, density.size[axis] - 1})
+      for (int i = 0; i < density.size[p]; i += stride[p])
+        for (int j = 0; j < density.size[q]; j += stride[q]) {
+          Vector3i voxel;
+          voxel[axis] = face, voxel[p] = i, voxel[q] = j;
+          if (density.values[density.index(voxel.x(), voxel.y(), voxel.z())] > matter)
+            cuts.push_back(density.model_from_voxel * voxel.cast<double>());
+        }
+  }
+  return cuts;
+}
+
+void add_samples(Model& model, const std::vector<Vector3d>& points) {
+  const double stride = std::max(1.0, double(points.size()) / double(sample_count));
+  for (double at = stride / 2; at < double(points.size()); at += stride)
+    model.samples.push_back(points[std::size_t(at)]);
+  for (const Vector3d& point : model.samples) model.centre += point / double(model.samples.size());
+  for (const Vector3d& point : model.samples)
+    model.radius_mm += (point - model.centre).squaredNorm() / double(model.samples.size());
+  model.radius_mm = std::sqrt(model.radius_mm);
+  model.resolution_mm = std::cbrt(std::abs(model.density.model_from_voxel.linear().determinant()));
+}
+
+/// 1 in voxels whose centre's column, along z, is inside the surface.
+Density filled(const phantom::TriangleMesh& mesh, double voxel_mm) {
+  Vector3d low = mesh.corners.front(), high = low;
+  for (const Vector3d& corner : mesh.corners) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  Density density;
+  density.size = ((high - low) / voxel_mm).array().ceil().cast<int>() + 2;
+  // Off the lattice on which designed surfaces have their corners.
+  const Vector3d first = low - voxel_mm * Vector3d(0.5137, 0.4871, 0.5);
+  density.model_from_voxel = Eigen::Translation3d(first) * Eigen::Scaling(voxel_mm);
+  density.values.assign(
+      std::size_t(density.size.x()) * std::size_t(density.size.y()) * std::size_t(density.size.z()), 0);
+  std::vector<std::vector<double>> crossings(std::size_t(density.size.x()) * std::size_t(density.size.y()));
+  for (const auto& triangle : mesh.triangles) {
+    Vector3d c[3];
+    for (std::size_t k = 0; k < 3; ++k) c[k] = (mesh.corners[triangle[k]] - first) / voxel_mm;
+    const auto across = [](const Vector3d& a, const Vector3d& b, double x, double y) {
+      return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+    };
+    const double area = across(c[0], c[1], c[2].x(), c[2].y());
+    if (area == 0) continue;
+    const auto [x0, x1] = std::minmax({c[0].x(), c[1].x(), c[2].x()});
+    const auto [y0, y1] = std::minmax({c[0].y(), c[1].y(), c[2].y()});
+    for (int y = int(std::ceil(y0)); y <= int(std::floor(y1)); ++y)
+      for (int x = int(std::ceil(x0)); x <= int(std::floor(x1)); ++x) {
+        const double a = across(c[1], c[2], x, y) / area, b = across(c[2], c[0], x, y) / area;
+        if (a < 0 || b < 0 || a + b > 1) continue;
+        crossings[std::size_t(y) * std::size_t(density.size.x()) + std::size_t(x)].push_back(
+            a * c[0].z() + b * c[1].z() + (1 - a - b) * c[2].z());
+      }
+  }
+  for (int y = 1; y + 1 < density.size.y(); ++y)
+    for (int x = 1; x + 1 < density.size.x(); ++x) {
+      auto& zs = crossings[std::size_t(y) * std::size_t(density.size.x()) + std::size_t(x)];
+      std::ranges::sort(zs);
+      for (std::size_t k = 0; k + 1 < zs.size(); k += 2)
+        for (int z = std::max(1, int(std::ceil(zs[k])));
+             z <= std::min(density.size.z() - 2, int(std::floor(zs[k + 1]))); ++z)
+          density.values[density.index(x, y, z)] = 1;
+    }
+  return density;
+}
+
+}  // namespace
+
+Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
+                           const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window) {
+  if (mask &&
+      (mask->size != volume.size || !mask->patient_from_voxel.isApprox(volume.patient_from_voxel, 1e-3)))
+    return fail(Reason::bad_value,
+                fmt::format("{}: the mask has {} x {} x {} voxels, the volume {} x {} x {}, or they lie "
+                            "elsewhere; resample the mask to the volume",
+                            name, mask->size.x(), mask->size.y(), mask->size.z(), volume.size.x(),
+                            volume.size.y(), volume.size.z()));
+  Density whole{volume.size, volume.voxels, volume.patient_from_voxel};
+  for (std::size_t i = 0; i < whole.values.size(); ++i)
+    whole.values[i] = density_of(volume.voxels[i], !mask || mask->voxels[i] != 0, window, mask || window);
+  const auto bounds = bounds_of(whole);
+  if (!bounds)
+    return fail(Reason::bad_value, fmt::format("{}: no voxel is within the mask and window", name));
+  Model model;
+  model.name = name;
+  model.cuts = cuts_of(whole);
+  model.density = cropped(whole, *bounds);
+  std::vector<Vector3d> points;
+  for (int z = 0; z < model.density.size.z(); ++z)
+    for (int y = 0; y < model.density.size.y(); ++y)
+      for (int x = 0; x < model.density.size.x(); ++x)
+        if (model.density.values[model.density.index(x, y, z)] > 0.1F)
+          points.push_back(model.density.model_from_voxel * Vector3d(x, y, z));
+  if (points.empty())
+    return fail(Reason::bad_value,
+                fmt::format("{}: nothing within the mask and window is denser than soft tissue", name));
+  add_samples(model, points);
+  return model;
+}
+
+Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh) {
+  return prepare_surface(std::move(mesh), name).map([&](Surface surface) {
+    Model model;
+    model.name = name;
+    Vector3d low = surface.mesh.corners.front(), high = low;
+    for (const Vector3d& corner : surface.mesh.corners)
+      low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+    model.density = filled(surface.mesh, (high - low).maxCoeff() / 96);
+    add_samples(model, surface.mesh.corners);
+    model.surface = std::move(surface);
+    return model;
+  });
+}
+
+double separation(const Model& model, const geometry::RigidTransform& a, const geometry::RigidTransform& b) {
+  double sum = 0;
+  for (const Vector3d& point : model.samples) sum += (a * point - b * point).squaredNorm();
+  return std::sqrt(sum / double(model.samples.size()));
+}
+
+}  // namespace helicarm::registration

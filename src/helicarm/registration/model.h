@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/registration/density.h"
+#include "helicarm/registration/surface.h"
+#include "helicarm/volume/volume.h"
+
+namespace helicarm::registration {
+
+/// A rigid body to be registered. Model coordinates: the volume's patient frame or the surface file's own,
+/// mm.
+struct Model {
+  std::string name;
+  Density density;                    ///< of a surface: 1 inside
+  std::optional<Surface> surface;     ///< then the contour decides
+  std::vector<Eigen::Vector3d> cuts;  ///< where the body goes on beyond the volume
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> samples;  ///< points spread over the body
+  double radius_mm = 0;                  ///< rms distance of the samples from the centre
+  double resolution_mm = 0;              ///< of the density's voxels
+};
+
+/// Hounsfield units taken as the body; values above the upper limit count as the limit.
+struct HuWindow {
+  double low = 150;
+  double high = 3000;
+};
+
+/// A body from a CT. With a mask (same grid; non-zero: inside) or a window its density is the excess over
+/// soft tissue, which surrounds it in the image; without either the attenuation of everything. Refuses
+/// (bad_value) a mask on another grid and a model without voxels.
+Expected<Model> model_from(const std::string& name, const volume::Volume& volume,
+                           const std::optional<volume::Volume>& mask, const std::optional<HuWindow>& window);
+
+/// A body from a closed surface. Fails as `prepare_surface`.
+Expected<Model> model_from(const std::string& name, phantom::TriangleMesh mesh);
+
+/// Root mean square distance (mm) between the samples at two poses.
+double separation(const Model& model, const geometry::RigidTransform& a, const geometry::RigidTransform& b);
+
+}  // namespace helicarm::registration

@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <Eigen/LU>
+
+#include "helicarm/core/parallel.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+struct Box {
+  int u0, v0, u1, v1;  ///< patches
+};
+
+/// Patches that the density's grid may cover.
+Box patches_of(const Raster& raster, const geometry::View& view, const Density& density,
+               const geometry::RigidTransform& world_from_model, int side) {
+  Vector2d low = Vector2d::Constant(1e9), high = -low;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vector3d voxel((corner & 1) ? density.size.x() - 1 : 0, (corner & 2) ? density.size.y() - 1 : 0,
+                         (corner & 4) ? density.size.z() - 1 : 0);
+    const Vector3d in_world = world_from_model * (density.model_from_voxel * voxel);
+    if (!(view.depth(in_world) > 1)) return {0, 0, 0, 0};
+    const Vector2d at = raster.raster_at(view.project(in_world));
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
+  }
+  // A body that is mostly beyond the image needs no more patches than the image has.
+  const auto first = [&](double at, int size) {
+    return static_cast<int>(std::floor(std::max(-0.5 * size, at) / side));
+  };
+  const auto end = [&](double at, int size) {
+    return static_cast<int>(std::floor(std::min(1.5 * size, at) / side)) + 1;
+  };
+  const int width = raster.attenuation.width(), height = raster.attenuation.height();
+  return {first(low.x(), width), first(low.y(), height), end(high.x(), width), end(high.y(), height)};
+}
+
+/// Differences between neighbours along u, then along v, each without their mean.
+Eigen::VectorXf differences(const Eigen::Ref<const Eigen::VectorXf>& pixels, int side) {
+  const int half = side * (side - 1);
+  Eigen::VectorXf rows(2 * half);
+  int row = 0;
+  for (int v = 0; v < side; ++v)
+    for (int u = 0; u + 1 < side; ++u) rows[row++] = pixels[v * side + u + 1] - pixels[v * side + u];
+  for (int v = 0; v + 1 < side; ++v)
+    for (int u = 0; u < side; ++u) rows[row++] = pixels[(v + 1) * side + u] - pixels[v * side + u];
+  rows.head(half).array() -= rows.head(half).mean();
+  rows.tail(half).array() -= rows.tail(half).mean();
+  return rows;
+}
+
+struct Patch {
+  int u, v;             ///< first pixel
+  Eigen::VectorXf drr;  ///< differences
+  Eigen::VectorXf seen;
+  float contrast = 0;  ///< norm of `drr`
+  bool shown = true;   ///< wholly in the usable part of the image
+};
+
+/// What the image does not show counts as half a disagreement: to hide parts must not raise the score.
+constexpr float hidden_weight = 0.5F;
+
+class Comparer {
+ public:
+  Comparer(const Raster& raster, const geometry::View& view, const Density& density,
+           const geometry::RigidTransform& world_from_model, const Vector3d& centre,
+           const PatchOptions& options)
+      : raster_(raster),
+        posed_(density, world_from_model, view.source_in_world(), centre),
+        world_from_pixel_(view.camera_from_world.rotation.transpose() * view.intrinsics.matrix().inverse()),
+        options_(options) {}
+
+  Patch rendered(int u, int v) const {
+    Patch patch{u, v, {}, {}, 0, true};
+    const int side = options_.side;
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i)
+        patch.shown =
+            patch.shown && raster_.attenuation.contains(u + i, v + j) && raster_.valid(u + i, v + j);
+    Eigen::VectorXf pixels(side * side);
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i) pixels[j * side + i] = posed_.integrate(direction(u + i, v + j));
+    patch.drr = differences(pixels, side);
+    patch.contrast = patch.drr.norm();
+    return patch;
+  }
+
+  Eigen::VectorXf seen(const Patch& patch) const {
+    const int side = options_.side;
+    Eigen::VectorXf pixels(side * side);
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i) pixels[j * side + i] = raster_.attenuation(patch.u + i, patch.v + j);
+    return differences(pixels, side);
+  }
+
+  Comparison compare(const Patch& patch, float noise, bool derivatives, double& residual) const {
+    Comparison comparison;
+    const int side = options_.side;
+    comparison.pixel = raster_.pixel_at(Vector2d(patch.u, patch.v) + Vector2d::Constant(0.5 * (side - 1)));
+    comparison.weight = patch.contrast;
+    const float seen2 = patch.seen.squaredNorm() + noise, drr2 = patch.drr.squaredNorm();
+    const float both = patch.seen.dot(patch.drr);
+    comparison.agreement = both / std::sqrt(seen2 * drr2);
+    residual = 0;
+    if (!derivatives || both <= 0) return comparison;
+    const double misfit = 1 - comparison.agreement * comparison.agreement;
+    const double robust = std::pow(1 + misfit / options_.robust_misfit, -2);
+    const float gain = both / drr2;
+    Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> pixels(side * side, affine_parameters);
+    for (int j = 0; j < side; ++j)
+      for (int i = 0; i < side; ++i)
+        pixels.row(j * side + i) =
+            posed_.differentiate(direction(patch.u + i, patch.v + j)).by_motion.transpose();
+    Eigen::Matrix<float, Eigen::Dynamic, affine_parameters> jacobian(patch.drr.size(), affine_parameters);
+    for (int k = 0; k < affine_parameters; ++k) jacobian.col(k) = differences(pixels.col(k), side);
+    jacobian -= patch.drr * (patch.drr.transpose() * jacobian / drr2).eval();
+    jacobian *= gain;
+    const Eigen::VectorXf difference = patch.seen - gain * patch.drr;
+    const double weight = comparison.weight * robust / seen2;
+    comparison.information.topLeftCorner<affine_parameters, affine_parameters>() =
+        weight * (jacobian.transpose() * jacobian).cast<double>();
+    comparison.gradient.head<affine_parameters>() =
+        weight * (jacobian.transpose() * difference).cast<double>();
+    return comparison;
+  }
+
+ private:
+  Vector3d direction(int u, int v) const {
+    const Vector2d pixel = raster_.pixel_at(Vector2d(u, v));
+    return (world_from_pixel_ * pixel.homogeneous()).normalized();
+  }
+
+  const Raster& raster_;
+  PosedDensity posed_;
+  Eigen::Matrix3d world_from_pixel_;
+  const PatchOptions& options_;
+};
+
+/// The patches that show a cut, and their neighbours.
+std::set<std::pair<int, int>> cut_patches(const Raster& raster, const geometry::View& view,
+                                          const geometry::RigidTransform& world_from_model,
+                                          const std::vector<Vector3d>& cuts, int side) {
+  std::set<std::pair<int, int>> cut;
+  for (const Vector3d& point : cuts) {
+    const Vector3d in_world = world_from_model * point;
+    if (!(view.depth(in_world) > 1)) continue;
+    const Vector2d at = raster.raster_at(view.project(in_world)) / side;
+    for (const double du : {-0.25, 0.25})
+      for (const double dv : {-0.25, 0.25})
+        cut.emplace(static_cast<int>(std::floor(at.x() + du)), static_cast<int>(std::floor(at.y() + dv)));
+  }
+  return cut;
+}
+
+}  // namespace
+
+ViewObservation compare_patches(const Raster& raster, const geometry::View& view, const Density& density,
+                                const std::vector<Vector3d>& cuts,
+                                const geometry::RigidTransform& world_from_model, const Vector3d& centre,
+                                bool derivatives, unsigned threads, const PatchOptions& options) {
+  const int side = options.side;
+  const Box box = patches_of(raster, view, density, world_from_model, side);
+  const auto cut = cut_patches(raster, view, world_from_model, cuts, side);
+  std::vector<Patch> patches;
+  for (int v = box.v0; v < box.v1; ++v)
+    for (int u = box.u0; u < box.u1; ++u)
+      if (!cut.contains({u, v})) patches.push_back({u * side, v * side, {}, {}, 0, true});
+  const Comparer comparer(raster, view, density, world_from_model, centre, options);
+  parallel_for(patches.size(), threads,
+               [&](std::size_t i) { patches[i] = comparer.rendered(patches[i].u, patches[i].v); });
+  std::vector<float> contrasts;
+  for (const Patch& patch : patches)
+    if (patch.contrast > 0) contrasts.push_back(patch.contrast);
+  ViewObservation observation;
+  if (contrasts.empty()) return observation;
+  const auto strong = contrasts.begin() + std::ptrdiff_t(contrasts.size() * 9 / 10);
+  std::ranges::nth_element(contrasts, strong);
+  const auto limit = static_cast<float>(options.least_contrast) * *strong;
+  double total = 0;
+  for (const Patch& patch : patches) total += patch.shown ? patch.contrast : hidden_weight * patch.contrast;
+  std::erase_if(patches, [&](const Patch& patch) {
+    return !patch.shown || patch.contrast < limit || patch.contrast == 0;
+  });
+  float noise = 0;
+  for (Patch& patch : patches) {
+    patch.seen = comparer.seen(patch);
+    noise += 0.01F * patch.seen.squaredNorm() / static_cast<float>(patches.size());
+  }
+  observation.comparisons.resize(patches.size());
+  parallel_for(patches.size(), threads, [&](std::size_t i) {
+    double residual = 0;
+    observation.comparisons[i] = comparer.compare(patches[i], noise + 1e-12F, derivatives, residual);
+  });
+  for (Comparison& comparison : observation.comparisons) {
+    comparison.weight /= total;
+    comparison.information /= total;
+    comparison.gradient /= total;
+    observation.score += comparison.weight * comparison.agreement;
+  }
+  return observation;
+}
+
+}  // namespace helicarm::registration

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/register_model.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "helicarm/localization/error_bound.h"
+#include "helicarm/registration/checks.h"
+#include "helicarm/registration/covariance.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using geometry::RigidTransform;
+
+constexpr double same_mm = 1.5;        // between solutions that count as one, before the last level
+constexpr double correlation_mm = 12;  // of residuals along a bone's edge
+constexpr double edge_sigma = 0.1;     // of the finest spacing: bias of a CT's edges, common to a view
+constexpr double alone_prior_mm = 10;  // keeps a single view from running along its rays
+
+/// Levels from coarse to fine for this model and these views.
+std::vector<SearchStage> stages_for(const Scene& scene, const Vector3d& at) {
+  const Model& model = scene.model();
+  const double pixel = scene.pixel_mm(at);
+  if (model.surface) {
+    const double coarse = std::clamp(model.radius_mm / 7, 1.5, 5.0);
+    return {{{false, coarse}, 16},
+            {{false, coarse / 2}, 16},
+            {{true, std::max(pixel, coarse / 2.5), 5, 2.0 / pixel * 0.4}, 6},
+            {{true, std::max(pixel, 1.0), 5, 0.6 / pixel}, 3},
+            {{true, std::max(pixel, 0.5), 5, std::max(1.0, 0.3 / pixel)}, 2}};
+  }
+  const double fine = std::max(model.resolution_mm, 2 * pixel);
+  std::vector<SearchStage> stages = {{{false, fine}, 2}};
+  const double coarsest = std::max(fine, std::min(5.0, model.radius_mm / 5));
+  for (double spacing = 2 * fine; spacing < 1.5 * coarsest; spacing *= 2)
+    stages.insert(stages.begin(), {{false, spacing}, stages.size() < 2 ? 8 : 16});
+  return stages;
+}
+
+MatrixXd camera_covariance_of(const std::vector<RegistrationView>& views,
+                              const RegistrationOptions& options) {
+  constexpr Eigen::Index each = calibration::view_parameters;
+  if (options.camera_covariance.size() > 0) return options.camera_covariance;
+  MatrixXd joint = MatrixXd::Zero(each * Eigen::Index(views.size()), each * Eigen::Index(views.size()));
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (views[i].covariance)
+      joint.block<each, each>(each * Eigen::Index(i), each * Eigen::Index(i)) = *views[i].covariance;
+  return joint;
+}
+
+std::vector<double> correlations_px(const std::vector<RegistrationView>& views, const Model& model,
+                                    const Vector3d& centre) {
+  std::vector<double> lengths;
+  for (const RegistrationView& view : views)
+    lengths.push_back(std::min(correlation_mm, model.radius_mm / 2) * std::abs(view.view.intrinsics.fy) /
+                      view.view.depth(centre));
+  return lengths;
+}
+
+/// The model as its mirror image, in the plane through its centre across the world-fixed model axis x.
+Model mirrored(const Model& model) {
+  Eigen::Affine3d flip = Eigen::Affine3d::Identity();
+  flip.linear()(0, 0) = -1;
+  flip.translation().x() = 2 * model.centre.x();
+  Model mirror = model;
+  mirror.density.model_from_voxel = flip * model.density.model_from_voxel;
+  for (auto* points : {&mirror.cuts, &mirror.samples})
+    for (Vector3d& point : *points) point = flip * point;
+  if (mirror.surface) {
+    for (Vector3d& corner : mirror.surface->mesh.corners) corner = flip * corner;
+    for (Vector3d& normal : mirror.surface->normals) normal = flip.linear() * normal;
+    for (auto& triangle : mirror.surface->mesh.triangles) std::swap(triangle[1], triangle[2]);
+  }
+  return mirror;
+}
+
+/// The best score of the mirrored model near a pose: its mirror plane may lie across any principal axis.
+double mirrored_score(const Scene& scene, const RigidTransform& pose, const std::vector<SearchStage>& stages,
+                      const SearchOptions& options) {
+  const Model mirror = mirrored(scene.model());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Vector3d& point : scene.model().samples)
+    spread += (point - scene.model().centre) * (point - scene.model().centre).transpose();
+  const Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
+  std::vector<RigidTransform> starts;
+  for (int axis = 0; axis < 3; ++axis) {
+    // A reflection across n is the one across x followed by a rotation.
+    Eigen::Matrix3d across_x = Eigen::Matrix3d::Identity();
+    across_x(0, 0) = -1;
+    const Eigen::Matrix3d across =
+        Eigen::Matrix3d::Identity() - 2 * axes.col(axis) * axes.col(axis).transpose();
+    const Eigen::Matrix3d turn = across * across_x;
+    const RigidTransform turned{turn, mirror.centre - turn * mirror.centre};
+    starts.push_back(pose * turned);
+  }
+  Scene other(scene, mirror);
+  std::vector<SearchStage> fewer = stages;
+  for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 6);
+  fewer.back().keep = 1;
+  SearchOptions less = options;
+  less.candidates = std::min(options.candidates, 300);
+  return search(other, fewer, starts, less, same_mm).solutions.front().score;
+}
+
+/// Errors of a solution from the views that take part: residuals, cameras, edges of the model.
+struct ErrorModel {
+  const Scene& scene;
+  MatrixXd cameras;
+  std::vector<double> correlation_px;
+  double edge_mm;
+
+  RigidCovariance covariance(const Observation& observation, const Vector3d& centre, const Part& part) const {
+    Linearised sum = linearised(observation, part.views, affine_from_rigid(), part.prior, correlation_px);
+    return sum.covariance() + camera_part(observation, scene.views(), centre, cameras, part) +
+           edge_part(observation, scene.views(), centre, edge_mm, part);
+  }
+};
+
+/// Information, in the units of the comparisons' weights, of a prior with this sigma (rms over the model).
+RigidCovariance prior_information(const Observation& observation, const ErrorModel& errors, double sigma_mm) {
+  const Linearised sum =
+      linearised(observation, {}, affine_from_rigid(), RigidCovariance::Zero(), errors.correlation_px);
+  const double unit = sum.information.ldlt().solve(sum.meat).trace() / 6;
+  RigidCovariance information = RigidCovariance::Zero();
+  information.topLeftCorner<3, 3>().diagonal().setConstant(
+      std::pow(errors.scene.model().radius_mm / sigma_mm, 2));
+  information.bottomRightCorner<3, 3>().diagonal().setConstant(1 / (sigma_mm * sigma_mm));
+  return unit * information;
+}
+
+/// Each view alone, from the joint solution, and how they differ.
+void compare_views(const ErrorModel& errors, const Level& level, const Estimate& joint,
+                   Registration& result) {
+  const Scene& scene = errors.scene;
+  const std::size_t n = scene.views().size();
+  if (n < 2) return;
+  std::vector<OwnSolution> own;
+  for (std::size_t i = 0; i < n; ++i) {
+    Part part{std::vector<bool>(n, false), prior_information(joint.observation, errors, alone_prior_mm)};
+    part.views[i] = true;
+    const Estimate alone = refine(scene, level, joint.pose,
+                                  {.views = part.views, .prior = part.prior, .threads = scene.threads()});
+    RigidCovariance prior_covariance = RigidCovariance::Zero();
+    prior_covariance.topLeftCorner<3, 3>().diagonal().setConstant(
+        std::pow(alone_prior_mm / scene.model().radius_mm, 2));
+    prior_covariance.bottomRightCorner<3, 3>().diagonal().setConstant(alone_prior_mm * alone_prior_mm);
+    const Eigen::MatrixXd information =
+        linearised(alone.observation, part.views, affine_from_rigid(), part.prior, errors.correlation_px)
+            .information;
+    const RigidCovariance shrink = information.ldlt().solve(MatrixXd(part.prior));
+    own.push_back({step_about(joint.pose, alone.pose, result.centre),
+                   errors.covariance(alone.observation, result.centre, part) +
+                       shrink * prior_covariance * shrink.transpose()});
+  }
+  result.disagreement = disagreement_of(scene.views(), result.centre, own);
+  for (std::size_t i = 0; i < n; ++i) result.views[i].held_out_mm = result.disagreement->held_out_mm[i];
+}
+
+void describe(const Scene& scene, const Estimate& best, Registration& result) {
+  for (std::size_t i = 0; i < scene.views().size(); ++i) {
+    const ViewObservation& seen = best.observation.views[i];
+    result.views.push_back({scene.views()[i].name, seen.score,
+                            local_shift_px(seen, scene.views()[i].view, result.centre), std::nullopt,
+                            int(seen.comparisons.size())});
+  }
+}
+
+}  // namespace
+
+std::string_view word(Decision decision) {
+  return decision == Decision::accept ? "accept" : decision == Decision::warn ? "warn" : "refuse";
+}
+
+double worst_error_mm(const Model& model, const Registration& registration) {
+  double worst = 0;
+  for (const Vector3d& sample : model.samples)
+    worst = std::max(worst,
+                     localization::length_at_95(point_covariance(registration.covariance, registration.centre,
+                                                                 registration.world_from_model * sample)));
+  return worst;
+}
+
+Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
+                            const std::vector<RigidTransform>& starts, const RegistrationOptions& options) {
+  const auto begun = std::chrono::steady_clock::now();
+  const auto step = [&](std::string_view name) {
+    if (options.on_step) options.on_step(name);
+  };
+  step("prepare");
+  Scene scene(model, views, options.threads);
+  const auto stages = stages_for(scene, starts.front() * model.centre);
+  step("search");
+  const SearchResult found = search(scene, stages, starts, options.search, same_mm);
+  const Estimate& best = found.solutions.front();
+  Registration result;
+  result.name = model.name;
+  result.world_from_model = best.pose;
+  result.centre = best.pose * model.centre;
+  result.score = best.score;
+  result.spacing_mm = stages.back().level.spacing_mm;
+  result.starts = found.starts;
+  result.agree = found.agree;
+  if (found.runner_up)
+    result.runner_up = {separation(model, best.pose, found.runner_up->pose),
+                        (1 - found.runner_up->score) / (1 - found.runner_up_best)};
+  describe(scene, best, result);
+  step("errors");
+  const ErrorModel errors{scene, camera_covariance_of(views, options),
+                          correlations_px(views, model, result.centre),
+                          edge_sigma * std::max(result.spacing_mm, model.resolution_mm)};
+  result.covariance = errors.covariance(best.observation, result.centre, {});
+  result.deformation =
+      deformation_of(best.observation, errors.correlation_px, errors.edge_mm / model.radius_mm);
+  compare_views(errors, stages.back().level, best, result);
+  step("mirror image");
+  result.mirrored_ratio =
+      (1 - mirrored_score(scene, best.pose, stages, options.search)) / std::max(1e-6, 1 - best.score);
+  decide(model, starts, options, result);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return result;
+}
+
+}  // namespace helicarm::registration

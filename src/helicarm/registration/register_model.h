@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/registration/estimate.h"
+#include "helicarm/registration/starts.h"
+
+namespace helicarm::registration {
+
+enum class Decision { accept, warn, refuse };
+std::string_view word(Decision decision);
+
+struct RegistrationOptions {
+  SearchOptions search = {};
+  std::optional<double> max_error_mm;  ///< refuse (uncertain) if a point's 95 % error exceeds it
+  unsigned threads = 0;                ///< 0: all cores
+  /// Of all views' parameters, 11 n x 11 n; empty: the views' own covariances, taken as independent.
+  Eigen::MatrixXd camera_covariance = {};
+  /// Called with the name of each step. An exception ends the registration.
+  std::function<void(std::string_view step)> on_step = {};
+};
+
+struct RegisteredView {
+  std::string name;
+  double score = 0;                   ///< agreement with the image, at most 1
+  double residual_px = 0;             ///< rms of the shifts that parts of the image still ask for
+  std::optional<double> held_out_mm;  ///< between this view and the others, along what both can see
+  int comparisons = 0;                ///< patches or contour points
+};
+
+struct RunnerUp {
+  double distance_mm = 0;  ///< rms over the model
+  double cost_ratio = 0;   ///< (1 - its score) / (1 - the best's): 1 is as good
+};
+
+/// A relative change of the model's size that would fit better.
+struct Deformation {
+  double strain = 0;  ///< largest principal value
+  double sigma = 0;
+};
+
+/// What the views, each alone, say of each other.
+struct Disagreement {
+  double chi2 = 0;  ///< of the differences between the views' own solutions
+  int dof = 0;
+  double distance_mm = 0;           ///< largest of `held_out_mm`
+  double sigma_mm = 0;              ///< of that one
+  std::vector<double> held_out_mm;  ///< per view
+};
+
+/// Pose of a model in the views' world with what is known of its error.
+struct Registration {
+  std::string name;
+  Decision decision = Decision::refuse;
+  std::optional<Failure> failure;
+  std::vector<Warning> warnings;
+  std::vector<Warning> notes;
+  geometry::RigidTransform world_from_model;
+  RigidCovariance covariance = RigidCovariance::Zero();  ///< about `centre`, as RigidStep
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();      ///< world
+  double score = 0;
+  double spacing_mm = 0;  ///< of the finest comparison
+  int starts = 0, agree = 0;
+  std::optional<RunnerUp> runner_up;
+  std::optional<double> mirrored_ratio;  ///< cost ratio of the mirrored model
+  Deformation deformation;
+  std::optional<Disagreement> disagreement;  ///< of two or more views
+  std::vector<RegisteredView> views;
+  double seconds = 0;
+};
+
+/// Registers a model to the views from one or more starting poses (world_from_model). Refusals are in the
+/// result: out_of_capture, wrong_model, registration_ambiguous, registration_disagrees, uncertain.
+Registration register_model(const Model& model, const std::vector<RegistrationView>& views,
+                            const std::vector<geometry::RigidTransform>& starts,
+                            const RegistrationOptions& options);
+
+/// 95 % length of the error of the worst of the model's samples, mm.
+double worst_error_mm(const Model& model, const Registration& registration);
+
+}  // namespace helicarm::registration

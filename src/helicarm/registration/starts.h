@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "helicarm/registration/estimate.h"
+
+namespace helicarm::registration {
+
+/// A level of a search and how many of the best solutions of the level before go on to it.
+struct SearchStage {
+  Level level;
+  int keep = 16;
+};
+
+struct SearchOptions {
+  double shift_mm = 15;  ///< per axis, about each start
+  double turn_deg = 15;
+  int candidates = 600;  ///< scored at the first level
+};
+
+struct SearchResult {
+  std::vector<Estimate> solutions;  ///< of the last level, distinct, best first
+  /// Best distinct one at the last level that two of them reached, and the best's score there.
+  std::optional<Estimate> runner_up;
+  double runner_up_best = 0;
+  int starts = 0;  ///< refined
+  int agree = 0;   ///< of them, that ended within `same_mm` of the best before only the best went on
+};
+
+/// Poses about the starts in a low-discrepancy sequence (each start first), the best of which are refined
+/// stage by stage. Solutions closer than `same_mm` (rms over the model) are one. The result does not depend
+/// on the number of threads.
+SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
+                    const std::vector<geometry::RigidTransform>& starts, const SearchOptions& options,
+                    double same_mm);
+
+}  // namespace helicarm::registration

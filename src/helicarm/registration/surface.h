@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/phantom/mesh.h"
+
+namespace helicarm::registration {
+
+/// Largest number of triangles of a surface file.
+inline constexpr std::size_t max_triangles = 5'000'000;
+
+/// Reads STL (binary or text) or PLY (text or binary), detected by content. Corners at one place are joined.
+/// Fails with missing_file, truncated, bad_size, bad_value, not_finite, unsupported.
+Expected<phantom::TriangleMesh> read_surface(const std::filesystem::path& path);
+Expected<phantom::TriangleMesh> surface_from(std::string_view bytes, const std::string& origin);
+
+/// A triangle mesh prepared for its apparent contour.
+struct Surface {
+  struct Edge {
+    std::uint32_t corners[2];
+    std::uint32_t faces[2];
+  };
+  phantom::TriangleMesh mesh;
+  std::vector<Eigen::Vector3d> normals;  ///< outward, per triangle
+  std::vector<Edge> edges;               ///< between two triangles
+};
+
+/// Normals and edges; the mesh is turned outside out if its volume is negative. Refuses (bad_value) a surface
+/// that is not closed: over 1 % of its edges have no second triangle.
+Expected<Surface> prepare_surface(phantom::TriangleMesh mesh, const std::string& origin);
+
+}  // namespace helicarm::registration
