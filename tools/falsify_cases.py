@@ -160,7 +160,7 @@ class Bench:
 def judged(name, case, answer, untouched, truth, note, reason):
     if answer.failure:
         kind = "refused" if answer.exit == 3 or answer.result else "exit 2"
-        hint = " (names the value that fits)" if " would fit" in answer.message else ""
+        hint = " (names the value that fits)" if " fits, the file has " in answer.message else ""
         return Row(name, case, f"{kind}: {answer.failure}{hint}", math.nan, math.nan, False)
     known = {(code, view, message.split(" ")[0]) for code, view, message in untouched.warnings}
     new = [w for w in answer.warnings if (w[0], w[1], w[2].split(" ")[0]) not in known]
