@@ -29,8 +29,8 @@ bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given);
 
-/// Note `ambiguous_handedness` if every image is mirrored: that the calibrator's file is not rests on a tag or
-/// the case alone.
+/// Note `ambiguous_handedness` if every image is mirrored: that the calibrator's file is not rests on a tag
+/// or the case alone.
 std::vector<Warning> handedness_notes(const CaseCalibration& calibration);
 
 /// Effect of an error of the calibrator's scale, which the images do not constrain: mm per per cent at each
