@@ -95,5 +95,67 @@ class OwnFiles(unittest.TestCase):
         self.assertEqual((case / "case.json").read_bytes(), before)
 
 
+    def test_bundle_is_the_same_each_time_and_holds_no_name(self):
+        case = self.root / "doe"
+        shutil.copytree(self.root / "case", case)
+        (case / "AP.dcm").rename(case / "doe_AP.dcm")
+        description = json.loads((case / "case.json").read_text())
+        description.update(notes="Jane Doe")
+        description["views"][0]["image"] = "doe_AP.dcm"
+        (case / "case.json").write_text(json.dumps(description))
+        self.assertEqual(run("run", case, "--out", case / "out", "--no-report", "--quiet").returncode, 0)
+        files = [self.root / f"{n}.tar.gz" for n in range(2)]
+        for file in files:
+            done = run("bundle", case, "--result", case / "out", "--out", file, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(files[0].read_bytes(), files[1].read_bytes())
+        with tarfile.open(files[0]) as archive:
+            self.assertEqual(archive.getnames(), [file["name"] for file in json.loads(done.stdout)["files"]])
+            for member in archive.getmembers():
+                self.assertEqual((member.mtime, member.uname), (0, ""))
+                content = archive.extractfile(member).read()
+                for word in (b"doe", b"Doe", b"SIM5", str(self.root).encode()):
+                    self.assertNotIn(word, content, member.name)
+            archive.extractall(self.root / "unpacked")
+        self.assertEqual(run("run", self.root / "unpacked", "--out", self.root / "again", "--no-report").returncode, 0)
+
+    def test_locate_takes_a_camera_file_for_each_view(self):
+        run("run", self.root / "case", "--out", self.root / "calibrated", "--no-report", "--quiet")
+        result = self.root / "calibrated/result.json"
+        target = next(p for p in json.loads(result.read_text())["points"] if p["name"] == "T1")
+        exported = self.root / "exported"
+        self.assertEqual(run("export", self.root / "case", "--out", exported, "--as", "mayacam").returncode, 0)
+        camera = self.root / "lat.json"
+        camera.write_text(run("import", exported / "LAT_mayacam.txt", "--json").stdout)
+        picks = self.root / "mixed.csv"
+        picks.write_text("name,view,u_px,v_px\n" + "".join(
+            f"T1,{view},{seen['uv'][0]},{seen['uv'][1]}\n" for view, seen in target["seen"].items()))
+        done = run("locate", "--calibration", f"AP={result}", "--calibration", f"LAT={camera}", "--picks", picks, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        answer = json.loads(done.stdout)
+        point = answer["points"][0]
+        for a, b in zip(point["xyz_mm"], target["xyz_mm"]):
+            self.assertAlmostEqual(a, b, 1)
+        self.assertIsNone(point["covariance_mm2"])
+        self.assertIsNotNone(point["ray_gap_mm"])
+        self.assertEqual([warning["code"] for warning in answer["warnings"]], ["covariance_missing"])
+        both = run("locate", "--calibration", f"AP={result}", "--calibration", f"LAT={result}", "--picks", picks, "--json")
+        whole = run("locate", "--calibration", result, "--picks", picks, "--json")
+        self.assertEqual(json.loads(both.stdout), json.loads(whole.stdout))
+        self.assertEqual(run("locate", "--calibration", f"OBL={result}", "--picks", picks).returncode, 2)
+
+    def test_detect_reads_folders_and_writes_a_table(self):
+        folder = self.root / "series"
+        folder.mkdir(exist_ok=True)
+        for image in self.images:
+            shutil.copy(image, folder)
+        done = run("detect", folder, "--json", "--out", self.root / "dots.csv")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        images = json.loads(done.stdout)["images"]
+        self.assertEqual([pathlib.Path(one["image"]).name for one in images], ["IM0001", "IM0002"])
+        self.assertIn("[2/2]", done.stderr)
+        lines = (self.root / "dots.csv").read_text().splitlines()
+        self.assertEqual(len(lines), 1 + sum(len(one["dots"]) for one in images))
+
 if __name__ == "__main__":
     unittest.main()

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/calibration/saved_calibration.h"
+#include "helicarm/calibration/camera_files.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
@@ -71,11 +71,25 @@ std::vector<PickedPoint> picked_points(const CsvTable& table,
   return points;
 }
 
+struct GivenCalibration {
+  calibration::SavedCalibration calibration;
+  bool of_cameras = false;  ///< one file for each view
+};
+
+GivenCalibration calibration_from(const std::vector<std::string>& words) {
+  if (words.size() == 1 && (words[0].find('=') == std::string::npos || std::filesystem::exists(words[0]))) {
+    const std::filesystem::path path = words[0];
+    return {value_or_throw(
+        calibration::saved_calibration_from_json(value_or_throw(read_json(path)), path.filename().string()))};
+  }
+  std::vector<calibration::CameraFile> files;
+  for (const std::string& word : words) files.push_back(value_or_throw(calibration::camera_file_from(word)));
+  return {value_or_throw(calibration::calibration_of_cameras(files)), true};
+}
+
 /// {"points", "warnings", "notes"}.
 Json located(const LocateArguments& arguments, std::ostream& progress) {
-  const Json result = value_or_throw(read_json(arguments.calibration));
-  const auto calibration = value_or_throw(
-      calibration::saved_calibration_from_json(result, arguments.calibration.filename().string()));
+  const auto [calibration, of_cameras] = calibration_from(arguments.calibrations);
   const auto table =
       value_or_throw(read_csv(arguments.picks, {"name", "view", "u_px", "v_px"}, {"sigma_px"}));
   Json points = Json::array();
@@ -84,12 +98,17 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
     const double motion = arguments.motion_sigma_mm;
     const auto point =
         localization::locate(name, localization::PointSource::pick, images, calibration, motion);
-    auto why = point ? point->missing_rays : unseen ? unseen : std::optional(point.error());
+    const auto unknown = point && of_cameras ? localization::covariance_missing(*point, images, calibration)
+                                             : std::optional<Warning>();
+    auto why = unknown  ? unknown
+               : point  ? point->missing_rays
+               : unseen ? unseen
+                        : std::optional(point.error());
     std::vector<Warning> own_warnings, own_notes;
     if (point && why) own_warnings.push_back(*why);
     if (why) progress << fmt::format("{}: {}\n", name, why->message);
     const auto on_ball =
-        point ? localization::pick_on_fiducial(name, images, calibration, calibration.balls, why.has_value())
+        point ? localization::pick_on_fiducial(name, images, calibration, calibration.balls, why && !unknown)
               : std::nullopt;
     if (on_ball) {
       progress << fmt::format("{}\n", on_ball->message);
@@ -97,9 +116,10 @@ Json located(const LocateArguments& arguments, std::ostream& progress) {
       why = on_ball;
     }
     const bool is_located = point && !on_ball;
-    points.push_back(is_located
-                         ? localization::point_json(*point)
-                         : localization::point_json(name, localization::PointSource::pick, why->reason));
+    points.push_back(!is_located
+                         ? localization::point_json(name, localization::PointSource::pick, why->reason)
+                     : unknown ? localization::point_json_without_covariance(*point)
+                               : localization::point_json(*point));
     if (is_located)
       own_notes.push_back(localization::unobservable_motion(name, point->point_in_anchor,
                                                             calibration.views[images.front().view], motion));
@@ -123,8 +143,10 @@ void print_table(const Json& points, std::ostream& out) {
       continue;
     }
     const auto xyz = point["xyz_mm"].get<std::vector<double>>();
-    out << fmt::format("{:<16} {:10.3f} {:10.3f} {:10.3f} {:9.3f} {:9.3f}\n", name, xyz[0], xyz[1], xyz[2],
-                       point["error_95_mm"].get<double>(), point["ray_gap_mm"].get<double>());
+    const Json& error = point["error_95_mm"];
+    out << fmt::format("{:<16} {:10.3f} {:10.3f} {:10.3f} {:>9} {:9.3f}\n", name, xyz[0], xyz[1], xyz[2],
+                       error.is_null() ? "-" : fmt::format("{:.3f}", error.get<double>()),
+                       point["ray_gap_mm"].get<double>());
   }
 }
 

@@ -121,10 +121,17 @@ void add_solve(CLI::App& app, Action& action) {
 }
 
 void add_locate(CLI::App& app, Action& action) {
-  auto* command = add_command(app, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
-                              "helicarm locate --calibration my-result/result.json --picks picks.csv --json");
+  auto* command = add_command(
+      app, "locate", "Triangulate picked pixels in calibrated views (Eq. 8)",
+      "helicarm locate --calibration my-result/result.json --picks picks.csv --json\n"
+      "  helicarm locate --calibration AP=cam1.json --calibration LAT=cam2.json --picks picks.csv");
   auto& a = arguments_of(command, action, locate_command);
-  command->add_option("--calibration", a.calibration, "result.json of a run")->required();
+  command
+      ->add_option("--calibration", a.calibrations,
+                   "result.json of a run; or for each view VIEW=FILE: result.json, the output of solve or "
+                   "import, or a file that import reads, all in one frame and in mm")
+      ->allow_extra_args(false)
+      ->required();
   command->add_option("--picks", a.picks, "CSV: name,view,u_px,v_px[,sigma_px], rectified pixels")
       ->required();
   command->add_flag("--raw", a.raw, "The picks are raw pixels");

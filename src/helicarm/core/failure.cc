@@ -157,6 +157,8 @@ std::string_view code(Reason reason) {
       return "out_of_capture";
   }
   return "internal";
+    case Reason::covariance_missing:
+      return "covariance_missing";
 }
 
 int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }

@@ -95,6 +95,7 @@ enum class Reason {
   wrong_model,
   out_of_capture,
 };
+  covariance_missing,
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".
 std::string_view code(Reason reason);

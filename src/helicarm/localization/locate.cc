@@ -170,6 +170,22 @@ std::optional<Warning> pick_on_fiducial(const std::string& name,
                  {{"views", double(hits.size())}}};
 }
 
+std::optional<Warning> covariance_missing(const LocatedPoint& point,
+                                          std::span<const PointObservation> observations,
+                                          const calibration::Calibration& calibration) {
+  std::vector<std::string> views;
+  for (const PointObservation& observation : observations)
+    if (const auto& view = calibration.views[observation.view]; view.covariance.isZero(0))
+      views.push_back(view.name);
+  if (views.empty()) return std::nullopt;
+  return Warning{Reason::covariance_missing,
+                 fmt::format("\"{}\": the calibration of {} has no covariance, so the point has none; its "
+                             "error is at least half the ray gap, {:.3g} mm",
+                             point.name, fmt::join(views, ", "), 0.5 * point.ray_gap_mm),
+                 {},
+                 {{"ray_gap_mm", point.ray_gap_mm}}};
+}
+
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,
                             const calibration::CalibratedView& first, double motion_sigma_mm) {
   const Eigen::Vector3d direction = (point_in_calibrator - first.view.source_in_world()).normalized();

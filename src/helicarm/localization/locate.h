@@ -53,6 +53,12 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
                               std::span<const PointObservation> observations,
                               const calibration::Calibration& calibration, double motion_sigma_mm = 0);
 
+/// covariance_missing: the calibration of one of the point's views has no covariance, so that the point has
+/// none; `ray_gap_mm` bounds its error from below.
+std::optional<Warning> covariance_missing(const LocatedPoint& point,
+                                          std::span<const PointObservation> observations,
+                                          const calibration::Calibration& calibration);
+
 /// A note: motion between the acquisitions along the first view's ray displaces the located point by the same
 /// amount without a ray gap. The direction is a unit vector in the calibrator's frame.
 Warning unobservable_motion(const std::string& name, const Eigen::Vector3d& point_in_calibrator,

@@ -31,4 +31,10 @@ Json point_json(const LocatedPoint& point) {
   return json;
 }
 
+Json point_json_without_covariance(const LocatedPoint& point) {
+  Json json = point_json(point);
+  for (const char* key : {"covariance_mm2", "predicted_mm", "error_95_mm"}) json[key] = nullptr;
+  return json;
+}
+
 }  // namespace helicarm::localization

@@ -12,6 +12,9 @@ namespace helicarm::localization {
 /// guidance sets them.
 Json point_json(const LocatedPoint& located_in_calibrator);
 
+/// The same without covariance, predicted error and 95 % length.
+Json point_json_without_covariance(const LocatedPoint& located_in_calibrator);
+
 /// A point that was not located, with the reason.
 Json point_json(const std::string& name, PointSource source, Reason reason);
 
