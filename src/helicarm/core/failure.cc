@@ -113,6 +113,8 @@ std::string_view code(Reason reason) {
       return "distances_disagree";
     case Reason::phantom_changed:
       return "phantom_changed";
+    case Reason::unequal_pixels:
+      return "unequal_pixels";
     case Reason::name_differs:
       return "name_differs";
     case Reason::bone_taken_as_fixed:

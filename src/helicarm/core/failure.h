@@ -71,6 +71,7 @@ enum class Reason {
   too_few_views,
   distances_disagree,
   phantom_changed,
+  unequal_pixels,
   // Warnings only.
   name_differs,
   bone_taken_as_fixed,

@@ -8,6 +8,7 @@
 
 #include "helicarm/core/parallel.h"
 #include "helicarm/pipeline/prior.h"
+#include "helicarm/rectification/round_field.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -114,6 +115,56 @@ void add_distance(Failure& failure, double file_mm, double fitting_mm, std::opti
   failure.message += ": correct it";
 }
 
+/// The image with its columns resampled, as wide as `factor` times.
+image::Image<float> widened(const image::Image<float>& given, double factor) {
+  const int width = std::max(1, int(std::lround(given.width() * factor)));
+  image::Image<float> wide(width, given.height());
+  const double share = double(given.width()) / width;
+  for (int u = 0; u < width; ++u) {
+    const double at = std::clamp((u + 0.5) * share - 0.5, 0.0, double(given.width() - 1));
+    const int left = std::min(int(at), given.width() - 2);
+    const auto weight = float(at - left);
+    for (int v = 0; v < given.height(); ++v)
+      wide(u, v) = (1 - weight) * given(left, v) + weight * given(left + 1, v);
+  }
+  return wide;
+}
+
+/// Factor by which the image is too wide: its fiducials are labelled only after its columns are resampled
+/// back. The round field proposes it, else the formats of screens. The pixel size is then unknown.
+std::optional<double> excess_width(const Trial& trial) {
+  constexpr double least_excess = 0.03;
+  std::vector<double> factors{4.0 / 3, 3.0 / 4, 5.0 / 4, 4.0 / 5};
+  if (const auto field = rectification::round_field(trial.image)) factors = {field->aspect()};
+  for (const double factor : factors) {
+    if (std::abs(factor - 1) < least_excess) continue;
+    xray::XrayImage square = trial.image;
+    square.pixels = widened(trial.image.pixels, 1 / factor);
+    square.acquisition.pixel_mm.reset();
+    const auto labelled =
+        rectify_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(square))}},
+                      trial.given, trial.options)
+            .and_then(
+                [&](auto views) { return detect_in_views(std::move(views), trial.given, trial.options); })
+            .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); });
+    if (labelled) return factor;
+  }
+  return std::nullopt;
+}
+
+Failure unequal_pixels(const Failure& failure, const image::Image<float>& pixels, double factor) {
+  Failure named = failure;
+  named.reason = Reason::unequal_pixels;
+  named.message = fmt::format(
+      "the image was resampled with unequal pixels: its fiducials are labelled only after its {} x {} pixels "
+      "are "
+      "made {:.3g} times {} (as it is: {}: {}). Export it as the C-arm stored it",
+      pixels.width(), pixels.height(), factor > 1 ? factor : 1 / factor, factor > 1 ? "narrower" : "wider",
+      code(failure.reason), failure.message);
+  named.figures["aspect"] = factor;
+  return named;
+}
+
 }  // namespace
 
 Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& options) {
@@ -136,6 +187,9 @@ Failure with_cause(const Refusal& refusal, const Case& given, const RunOptions& 
   const bool of_labels = failure.reason == Reason::calibrator_mismatch ||
                          failure.reason == Reason::ambiguous_labels ||
                          failure.reason == Reason::too_few_fiducials;
+  if (of_plate || of_labels)
+    if (const auto factor = excess_width(trial))
+      return unequal_pixels(failure, at->xray_image->pixels, *factor);
   if (!of_labels || !tags.pixel_mm || !tags.source_detector_mm) return failure;
   const auto focal = fitted_focal(trial, options.threads);
   if (!focal) return failure;
