@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "bundle_command.h"
 #include "command_line.h"
+#include "helicarm/pipeline/run_fields.h"
 #include "new_command.h"
 #include "pick_command.h"
 
@@ -43,11 +45,25 @@ void add_pick(CLI::App& app, Action& action) {
       "name and view is replaced");
 }
 
+void add_bundle(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, "bundle", "Pack a de-identified case with its result and a log into one file for a bug report",
+      "helicarm bundle my-case --result my-result --out report.tar.gz");
+  auto& a = arguments_of(command, action, bundle_command);
+  command->add_option("CASE", a.folder, "Folder that holds case.json")->required();
+  command->add_option("--result", a.result,
+                      "Folder of an earlier run: its result.json is added without its texts");
+  command->add_option("--out", a.out, "The file: a gzip-compressed tar archive")->capture_default_str();
+  command->add_flag("--no-run", a.no_run, "Do not measure the packed case, for a case that ends the program");
+  add_fields(command, a.options, pipeline::run_fields);
+}
+
 }  // namespace
 
 void add_case_commands(CLI::App& app, Action& action) {
   add_new(app, action);
   add_pick(app, action);
+  add_bundle(app, action);
 }
 
 }  // namespace helicarm::cli

@@ -80,6 +80,7 @@ void put_acquisition(DcmDataset& dataset, const Acquisition& a) {
     put(dataset, DCM_ImagerPixelSpacing,
         fmt::format("{}\\{}", decimal(a.pixel_mm->y()), decimal(a.pixel_mm->x())));
   if (a.source_detector_mm) put(dataset, DCM_DistanceSourceToDetector, decimal(*a.source_detector_mm));
+  if (a.source_patient_mm) put(dataset, DCM_DistanceSourceToPatient, decimal(*a.source_patient_mm));
   put(dataset, DCM_PositionerPrimaryAngle, decimal(a.primary_angle_deg));
   put(dataset, DCM_PositionerSecondaryAngle, decimal(a.secondary_angle_deg));
   put(dataset, DCM_PositionerMotion, "STATIC");

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bundle_command.h"
+
+#include <fmt/format.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/pipeline/case_bundle.h"
+
+namespace helicarm::cli {
+namespace {
+
+void print(const pipeline::CaseBundle& bundle, const std::filesystem::path& out, Console& console) {
+  if (console.json) {
+    Json files = Json::array();
+    for (const pipeline::ArchivedFile& file : bundle.files)
+      files.push_back({{"name", file.name}, {"bytes", file.bytes.size()}});
+    console.out << to_text({{"written", out.string()}, {"files", files}, {"left_out", bundle.left_out}})
+                << '\n';
+    return;
+  }
+  for (const pipeline::ArchivedFile& file : bundle.files)
+    console.out << fmt::format("  {:<24}{:>12} bytes\n", file.name, file.bytes.size());
+  for (const std::string& missing : bundle.left_out) console.out << "  left out: " << missing << '\n';
+  console.out << fmt::format(
+      "\n  written to {}\n  Removed: patient data, dates, UIDs, notes, names of files, views, picks, tunnels "
+      "and "
+      "tool lines.\n  Text within the images' pixels stays: look at the images before you send the file.\n",
+      out.string());
+}
+
+}  // namespace
+
+CommandResult bundle_command(const BundleArguments& arguments, Console& console) {
+  return guarded([&] {
+    pipeline::BundleOptions options{arguments.options, !arguments.no_run, {}};
+    options.run.threads = console.threads;
+    if (arguments.result)
+      options.result = value_or_throw(read_json(std::filesystem::is_directory(*arguments.result)
+                                                    ? *arguments.result / "result.json"
+                                                    : *arguments.result));
+    const pipeline::CaseBundle bundle = value_or_throw(pipeline::bundle_case(arguments.folder, options));
+    value_or_throw(write_file(arguments.out, pipeline::tar_gz(bundle.files)));
+    print(bundle, arguments.out, console);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/case_bundle.h"
+
+#include <algorithm>
+#include <map>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/run_case.h"
+#include "helicarm/xray/derived_image.h"
+#include "helicarm/xray/read_xray_image.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t most_bundled_bytes = std::uintmax_t{256} << 20;
+
+using Renamed = std::map<std::string, std::string>;
+
+/// New names of a list's entries, numbered in their order.
+Renamed numbered(const Json& json, const char* list, const char* stem) {
+  Renamed names;
+  for (const Json& entry : json.value(list, Json::array()))
+    if (const auto name = entry["name"].get<std::string>(); !names.count(name))
+      names.emplace(name, fmt::format("{}{}", stem, names.size() + 1));
+  return names;
+}
+
+Json listed(const Json& json, const char* list) {
+  const Json all = json.value(list, Json::array());
+  return all.is_null() ? Json::array() : all;
+}
+
+/// The folder of the bundled case, while it is made.
+class Bundler {
+ public:
+  Bundler(const Case& given, Json json) : given_(given), json_(std::move(json)) {
+    for (const char* list : {"picks", "tunnels", "tool_lines"}) json_[list] = listed(json_, list);
+    views_ = numbered(json_, "views", "V");
+    picks_ = numbered(json_, "picks", "pick");
+    tunnels_ = numbered(json_, "tunnels", "tunnel");
+    lines_ = numbered(json_, "tool_lines", "line");
+  }
+
+  void write() {
+    json_.erase("notes");
+    write_descriptions();
+    for (std::size_t i = 0; i < given_.views.size(); ++i) write_view(i);
+    for (Json& pick : json_["picks"]) {
+      rename(pick, "name", picks_);
+      rename(pick, "view", views_);
+    }
+    for (Json& tunnel : json_["tunnels"]) {
+      rename(tunnel, "name", tunnels_);
+      rename(tunnel, "start", picks_);
+      rename(tunnel, "end", picks_);
+    }
+    for (Json& line : json_["tool_lines"]) {
+      rename(line, "name", lines_);
+      rename(line, "tunnel", tunnels_);
+    }
+    add_json("case.json", json_);
+  }
+
+  const fs::path& folder() const { return folder_.path(); }
+  CaseBundle& bundle() { return bundle_; }
+  const std::string& log() const { return log_; }
+
+  /// Every new name by the old one.
+  Renamed names() const {
+    Renamed all = views_;
+    for (const Renamed* some : {&picks_, &tunnels_, &lines_}) all.insert(some->begin(), some->end());
+    return all;
+  }
+
+ private:
+  static void rename(Json& entry, const char* key, const Renamed& names) {
+    entry[key] = names.at(entry[key].get<std::string>());
+  }
+
+  void add_json(const std::string& name, const Json& json) {
+    value_or_throw(write_file(folder() / name, to_text(json) + "\n"));
+    add(name);
+  }
+
+  void add(const std::string& name) {
+    bundle_.files.push_back({name, value_or_throw(read_file(folder() / name, most_bundled_bytes))});
+  }
+
+  void leave_out(const std::string& name, const Failure& why) {
+    bundle_.left_out.push_back(fmt::format("{}: {}", name, code(why.reason)));
+  }
+
+  void write_descriptions() {
+    if (const Json& name = json_["calibrator"]; name.is_string() && name != phantom::udcsc().name) {
+      phantom::Calibrator calibrator = given_.calibrator;
+      if (calibrator.name != phantom::udcsc().name) calibrator.name = "calibrator";
+      calibrator.measured = nullptr;
+      json_["calibrator"] = "calibrator.json";
+      add_json("calibrator.json", phantom::to_json(calibrator));
+    }
+    if (!given_.plate || json_["plate"] == phantom::plate48().name) return;
+    phantom::Plate plate = *given_.plate;
+    if (plate.name != phantom::plate48().name) plate.name = "plate";
+    json_["plate"] = "plate.json";
+    add_json("plate.json", phantom::to_json(plate));
+  }
+
+  void write_view(std::size_t index) {
+    const CaseView& view = given_.views[index];
+    Json& entry = json_["views"][index];
+    rename(entry, "name", views_);
+    const auto name = entry["name"].get<std::string>();
+    entry["image"] = write_image(view.image, view.frame, name);
+    entry.erase("frame");
+    if (view.plate_image) entry["plate_image"] = write_image(*view.plate_image, {}, name + "_plate");
+    if (!view.map) return;
+    entry["map"] = name + "_map.json";
+    const auto map = read_json(*view.map).and_then(
+        [&](const Json& json) { return rectification::distortion_map_from_json(json, name); });
+    if (map)
+      add_json(name + "_map.json", rectification::to_json(*map));
+    else
+      leave_out(name + "_map.json", map.error());
+  }
+
+  std::string write_image(const fs::path& file, std::optional<int> frame, const std::string& name) {
+    const auto image = xray::read_xray_image(file, name, frame);
+    if (!image) {
+      leave_out(name + ".dcm", image.error());
+      return name + ".dcm";
+    }
+    const xray::Acquisition& a = image->acquisition;
+    std::vector<std::string_view> codes;
+    for (const Warning& warning : image->warnings) codes.push_back(code(warning.reason));
+    log_ += fmt::format(
+        "{}: {} x {} pixels of {} mm, grey {:g} to {:g}, source to detector {} mm; read with: {}\n", name,
+        image->pixels.width(), image->pixels.height(),
+        a.pixel_mm ? fmt::format("{:g} x {:g}", a.pixel_mm->x(), a.pixel_mm->y()) : "unknown", image->lowest,
+        image->highest, a.source_detector_mm ? fmt::format("{:g}", *a.source_detector_mm) : "unknown",
+        codes.empty() ? "no warning" : fmt::format("{}", fmt::join(codes, ", ")));
+    value_or_throw(xray::write_dicom(folder() / (name + ".dcm"), de_identify_(*image)));
+    add(name + ".dcm");
+    return name + ".dcm";
+  }
+
+  const Case& given_;
+  Json json_;
+  Renamed views_, picks_, tunnels_, lines_;
+  xray::DeIdentification de_identify_;
+  TemporaryFolder folder_;
+  CaseBundle bundle_;
+  std::string log_;
+};
+
+/// All texts and keys of a value.
+void collect_texts(const Json& json, Renamed& texts) {
+  if (json.is_string()) texts.emplace(json.get<std::string>(), json.get<std::string>());
+  if (json.is_object())
+    for (const auto& [key, value] : json.items()) {
+      texts.emplace(key, key);
+      collect_texts(value, texts);
+    }
+  if (json.is_array())
+    for (const Json& value : json) collect_texts(value, texts);
+}
+
+std::string line_of(const char* kind, const Failure& failure) {
+  return fmt::format("{}: {}: {}{}{}\n", kind, code(failure.reason), failure.view,
+                     failure.view.empty() ? "" : ": ", failure.message);
+}
+
+/// result.json of the bundled case without times, which differ from run to run.
+Json measured(const Case& bundled, const RunOptions& options, std::string& log) {
+  const Result result = value_or_throw(run_case(bundled, options));
+  if (result.failure) log += line_of("refused", *result.failure);
+  for (const Warning& warning : result.warnings) log += line_of("warning", warning);
+  Json json = to_json(result);
+  json.erase("timing_ms");
+  return json;
+}
+
+}  // namespace
+
+Json without_texts(const Json& result, const std::map<std::string, std::string>& known) {
+  const auto shown = [&](const std::string& text) {
+    const auto found = known.find(text);
+    return found == known.end() ? std::string("(removed)") : found->second;
+  };
+  if (result.is_string()) return shown(result.get<std::string>());
+  if (result.is_array()) {
+    Json list = Json::array();
+    for (const Json& value : result) list.push_back(without_texts(value, known));
+    return list;
+  }
+  if (!result.is_object()) return result;
+  Json object = Json::object();
+  for (const auto& [key, value] : result.items()) object[shown(key)] = without_texts(value, known);
+  return object;
+}
+
+Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& options) {
+  return guarded([&] {
+    const Case given = value_or_throw(read_case(path));
+    Bundler bundler(given, value_or_throw(read_json(case_file(path))));
+    bundler.write();
+    CaseBundle bundle = std::move(bundler.bundle());
+    std::string log =
+        fmt::format("helicarm {}, compiler {}\n", HELICARM_VERSION, __VERSION__) + bundler.log();
+    for (const std::string& missing : bundle.left_out) log += fmt::format("not packed: {}\n", missing);
+    Renamed known = bundler.names();
+    if (options.measure && bundle.left_out.empty()) {
+      const Json result = measured(value_or_throw(read_case(bundler.folder())), options.run, log);
+      bundle.files.push_back({"result.json", to_text(result) + "\n"});
+      if (options.result) collect_texts(result, known);
+    }
+    for (int reason = 0; reason <= int(Reason::covariance_missing); ++reason)
+      known.emplace(code(Reason(reason)), code(Reason(reason)));
+    if (options.result)
+      bundle.files.push_back({"given_result.json", to_text(without_texts(*options.result, known)) + "\n"});
+    bundle.files.push_back({"log.txt", log});
+    return bundle;
+  });
+}
+
+}  // namespace helicarm::pipeline

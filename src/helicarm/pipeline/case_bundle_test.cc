@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/case_bundle.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/temporary_folder.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/simulation/write_case.h"
+
+namespace helicarm::pipeline {
+namespace {
+
+/// A simulated case in which every text names the patient.
+class BundleOfNamedCase : public testing::Test {
+ protected:
+  void SetUp() override {
+    simulation::SimulationOptions options;
+    options.kind = simulation::CaseKind::tunnels;
+    options.size = 512;
+    options.seed = 5;
+    ASSERT_TRUE(simulation::write_case(folder_.path(), *simulation::simulate_case(options)));
+    Json json = *read_json(folder_.path() / "case.json");
+    json["notes"] = "knee of Jane Doe";
+    for (Json& view : json["views"]) {
+      const auto name = view["name"].get<std::string>();
+      std::filesystem::rename(folder_.path() / (name + ".dcm"), folder_.path() / ("doe_" + name + ".dcm"));
+      view["image"] = "doe_" + name + ".dcm";
+      view["name"] = "doe_" + name;
+    }
+    const auto name = [](Json& entry, const char* key) {
+      entry[key] = "doe_" + entry[key].get<std::string>();
+    };
+    for (Json& pick : json["picks"]) name(pick, "name"), name(pick, "view");
+    for (Json& tunnel : json["tunnels"]) name(tunnel, "name"), name(tunnel, "start"), name(tunnel, "end");
+    for (Json& line : json["tool_lines"]) name(line, "name"), name(line, "tunnel");
+    ASSERT_TRUE(write_file(folder_.path() / "case.json", to_text(json)));
+  }
+
+  CaseBundle bundle(BundleOptions options = {}) {
+    auto made = bundle_case(folder_.path(), options);
+    EXPECT_TRUE(made) << made.error().message;
+    return made ? *made : CaseBundle{};
+  }
+
+  static std::vector<std::string> names(const CaseBundle& bundle) {
+    std::vector<std::string> all;
+    for (const ArchivedFile& file : bundle.files) all.push_back(file.name);
+    return all;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(BundleOfNamedCase, HoldsNoNameAndRuns) {
+  const CaseBundle made = bundle();
+  EXPECT_THAT(names(made), testing::ElementsAre("calibrator.json", "plate.json", "V1.dcm", "V2.dcm",
+                                                "case.json", "result.json", "log.txt"));
+  for (const ArchivedFile& file : made.files)
+    for (const char* word : {"doe", "Doe", "Jane", "SIM5", "SIMULATED", "tmp"})
+      EXPECT_EQ(file.bytes.find(word), std::string::npos) << file.name << ": " << word;
+  const auto result = parse_json(made.files[5].bytes, "result.json");
+  EXPECT_EQ((*result)["status"], "ok");
+  EXPECT_EQ((*result)["tunnels"].size(), 2u);
+  EXPECT_FALSE(result->contains("timing_ms"));
+}
+
+TEST_F(BundleOfNamedCase, IsTheSameEachTime) {
+  const BundleOptions only_files{.measure = false};
+  EXPECT_EQ(tar_gz(bundle(only_files).files), tar_gz(bundle(only_files).files));
+}
+
+TEST_F(BundleOfNamedCase, LeavesOutAnImageThatCannotBeRead) {
+  ASSERT_TRUE(write_file(folder_.path() / "doe_AP.dcm", "Jane Doe"));
+  const CaseBundle made = bundle();
+  EXPECT_THAT(made.left_out, testing::ElementsAre("V1.dcm: not_an_image"));
+  EXPECT_THAT(names(made), testing::Not(testing::Contains("result.json")));
+  EXPECT_THAT(made.files.back().bytes, testing::HasSubstr("not packed: V1.dcm"));
+}
+
+TEST_F(BundleOfNamedCase, TakesFiguresAndNotTextsFromAGivenResult) {
+  const Json given = {
+      {"status", "refused"},
+      {"failure", {{"code", "ambiguous_labels"}, {"message", "Jane Doe"}, {"view", "doe_LAT"}}},
+      {"doe_AP", 17}};
+  const CaseBundle made = bundle({.measure = false, .result = given});
+  const auto file = std::ranges::find(made.files, "given_result.json", &ArchivedFile::name);
+  ASSERT_NE(file, made.files.end());
+  const Json written = *parse_json(file->bytes, "given_result.json");
+  EXPECT_EQ(written["V1"], 17);
+  EXPECT_EQ(file->bytes.find("oe"), std::string::npos) << file->bytes;
+  EXPECT_NE(file->bytes.find("ambiguous_labels"), std::string::npos);
+  EXPECT_NE(file->bytes.find("V2"), std::string::npos);
+}
+
+TEST(WithoutTexts, KeepsNumbersAndKnownTexts) {
+  const Json given = {{"a", {1.5, "known", "Doe"}}, {"Doe", nullptr}};
+  EXPECT_EQ(without_texts(given, {{"a", "a"}, {"known", "new"}}),
+            (Json{{"a", {1.5, "new", "(removed)"}}, {"(removed)", nullptr}}));
+}
+
+}  // namespace
+}  // namespace helicarm::pipeline
