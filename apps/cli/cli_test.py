@@ -192,8 +192,8 @@ class CommandLine(unittest.TestCase):
         out = self.root / "exported"
         done = run("export", self.root / "case", "--out", out, "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
-        names = ["AP_matrix.txt", "AP_mayacam.txt", "LAT_matrix.txt", "LAT_mayacam.txt", "dlt.csv", "points.csv",
-                 "points.mrk.json"]
+        names = ["AP_matrix.txt", "AP_mayacam.txt", "AP_rectified.dcm", "LAT_matrix.txt", "LAT_mayacam.txt",
+                 "LAT_rectified.dcm", "dlt.csv", "points.csv", "points.mrk.json"]
         self.assertEqual(sorted(path.name for path in out.iterdir()), names)
         self.assertEqual(json.loads(done.stdout)["written"], [str(out / name) for name in names])
         back = [json.loads(run("import", out / f"AP_{kind}.txt", "--json").stdout) for kind in ("mayacam", "matrix")]

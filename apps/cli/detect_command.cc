@@ -3,32 +3,77 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/core/csv.h"
+#include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
 #include "helicarm/detection/find_marks.h"
 #include "helicarm/xray/read_xray_image.h"
+#include "image_files.h"
 
 namespace helicarm::cli {
+namespace {
+
+struct Detected {
+  std::string image;
+  std::vector<detection::Dot> dots;
+};
+
+Json json_of(const std::vector<detection::Dot>& dots) {
+  Json list = Json::array();
+  for (const detection::Dot& dot : dots)
+    list.push_back({{"u", dot.centre_px.x()},
+                    {"v", dot.centre_px.y()},
+                    {"sigma_px", dot.sigma_px},
+                    {"radius_px", dot.radius_px}});
+  return list;
+}
+
+Json json_of(const std::vector<Detected>& all) {
+  if (all.size() == 1) return {{"dots", json_of(all[0].dots)}};
+  Json list = Json::array();
+  for (const Detected& one : all) list.push_back({{"image", one.image}, {"dots", json_of(one.dots)}});
+  return {{"images", std::move(list)}};
+}
+
+std::string csv_of(const std::vector<Detected>& all) {
+  std::string csv = "image,u_px,v_px,sigma_px,radius_px\n";
+  for (const Detected& one : all)
+    for (const detection::Dot& dot : one.dots)
+      csv += fmt::format("{},{},{},{},{}\n", csv_field(one.image), dot.centre_px.x(), dot.centre_px.y(),
+                         dot.sigma_px, dot.radius_px);
+  return csv;
+}
+
+void print_table(const std::vector<Detected>& all, std::ostream& out) {
+  for (const Detected& one : all) {
+    if (all.size() > 1) out << one.image << '\n';
+    out << fmt::format("{:>10} {:>10} {:>9} {:>9}\n", "u px", "v px", "sigma px", "radius px");
+    for (const detection::Dot& dot : one.dots)
+      out << fmt::format("{:>10.3f} {:>10.3f} {:>9.3f} {:>9.2f}\n", dot.centre_px.x(), dot.centre_px.y(),
+                         dot.sigma_px, dot.radius_px);
+  }
+}
+
+}  // namespace
 
 CommandResult detect_command(const DetectArguments& arguments, Console& console) {
   return guarded([&] {
     const detection::MarkKind kind = value_or_throw(detection::mark_kind(arguments.kind));
-    const xray::XrayImage xray_image = value_or_throw(
-        xray::read_xray_image(arguments.image, arguments.image.filename().string(), arguments.frame));
-    const std::vector<detection::Dot> dots = detection::find_marks(xray_image, kind);
-    if (console.json) {
-      Json list = Json::array();
-      for (const detection::Dot& dot : dots)
-        list.push_back({{"u", dot.centre_px.x()},
-                        {"v", dot.centre_px.y()},
-                        {"sigma_px", dot.sigma_px},
-                        {"radius_px", dot.radius_px}});
-      console.out << to_text(Json{{"dots", std::move(list)}}) << '\n';
-      return;
+    const std::vector<std::filesystem::path> files = image_files(arguments.images);
+    std::vector<Detected> all;
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const xray::XrayImage image =
+          value_or_throw(xray::read_xray_image(files[i], files[i].filename().string(), arguments.frame));
+      all.push_back({files[i].string(), detection::find_marks(image, kind)});
+      if (files.size() > 1 && !console.quiet)
+        console.progress << fmt::format("[{}/{}] {}: {} {}\n", i + 1, files.size(), files[i].string(),
+                                        all.back().dots.size(), arguments.kind);
     }
-    console.out << fmt::format("{:>10} {:>10} {:>9} {:>9}\n", "u px", "v px", "sigma px", "radius px");
-    for (const detection::Dot& dot : dots)
-      console.out << fmt::format("{:>10.3f} {:>10.3f} {:>9.3f} {:>9.2f}\n", dot.centre_px.x(),
-                                 dot.centre_px.y(), dot.sigma_px, dot.radius_px);
+    if (arguments.out) value_or_throw(write_file(*arguments.out, csv_of(all)));
+    if (console.json)
+      console.out << to_text(json_of(all)) << '\n';
+    else if (!arguments.out)
+      print_table(all, console.out);
   });
 }
 

@@ -166,9 +166,10 @@ void add_rectify(CLI::App& app, Action& action) {
 
 void add_detect(CLI::App& app, Action& action) {
   auto* command = add_command(app, "detect", "Detect balls, holes or wire crossings with sub-pixel precision",
-                              "helicarm detect AP.dcm --kind balls --json");
+                              "helicarm detect AP.dcm --kind balls --json\n"
+                              "  helicarm detect series/ --out dots.csv");
   auto& a = arguments_of(command, action, detect_command);
-  command->add_option("IMAGE", a.image, "DICOM, PNG or TIFF")->required();
+  command->add_option("IMAGE", a.images, "DICOM, PNG or TIFF; several, and folders of images")->required();
   command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
       ->check(within(1, 100000));
   command->add_option("--kind", a.kind, "balls, holes or crosses")->capture_default_str();

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rectify_command.h"
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
-
 #include <fmt/format.h>
 
 #include "distinct_names.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/rectification/inpaint.h"
+#include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/test_grid.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/write_dicom.h"
+#include "image_files.h"
+#include "named_files.h"
 #include "run_command.h"
 
 namespace helicarm::cli {
@@ -24,51 +23,9 @@ xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments&
   return value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
 }
 
-/// The files, and in their name's order those of the folders.
-std::vector<std::filesystem::path> files_of(const std::vector<std::filesystem::path>& images) {
-  std::vector<std::filesystem::path> files;
-  for (const std::filesystem::path& image : images) {
-    if (!std::filesystem::is_directory(image)) {
-      files.push_back(image);
-      continue;
-    }
-    std::vector<std::filesystem::path> inside;
-    for (const auto& entry : std::filesystem::directory_iterator(image))
-      if (entry.is_regular_file() && !entry.path().filename().string().starts_with('.'))
-        inside.push_back(entry.path());
-    if (inside.empty())
-      throw BadInput(Reason::missing_file, fmt::format("{}: the folder holds no file", image.string()));
-    std::ranges::sort(inside);
-    files.insert(files.end(), inside.begin(), inside.end());
-  }
-  return files;
-}
-
 rectification::DistortionMap map_of(const RectifyArguments& arguments) {
   return value_or_throw(rectification::distortion_map_from_json(value_or_throw(read_json(*arguments.map)),
                                                                 arguments.map->filename().string()));
-}
-
-phantom::Plate plate_of(const std::string& name) {
-  return name == phantom::plate48().name ? phantom::plate48() : value_or_throw(phantom::read_plate(name));
-}
-
-xray::DerivedImage rectified_image(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
-                                   std::string description) {
-  const image::Image<float> view_image = rectification::resample(xray_image, map);
-  xray::DerivedImage image;
-  const auto range =
-      std::clamp(static_cast<long>(std::lround(xray_image.highest - xray_image.lowest)), 1l, 65535l);
-  image.bits_stored = std::max(8, static_cast<int>(std::bit_width(static_cast<unsigned>(range))));
-  image.pixels = image::Image<std::uint16_t>(view_image.width(), view_image.height());
-  std::ranges::transform(view_image.pixels(), image.pixels.pixels().begin(), [&](float value) {
-    return static_cast<std::uint16_t>(std::clamp(std::lround(value - xray_image.lowest), 0l, range));
-  });
-  image.acquisition = xray_image.acquisition;
-  if (map.rectified_plane == rectification::RectifiedPlane::detector && map.rectified_pixel_mm)
-    image.acquisition.pixel_mm = Eigen::Vector2d::Constant(*map.rectified_pixel_mm);
-  image.series_description = std::move(description);
-  return image;
 }
 
 Json figures_of(const rectification::Rectification& r) {
@@ -85,17 +42,18 @@ Json figures_of(const rectification::Rectification& r) {
 void rectify_image(const RectifyArguments& arguments, Console& console) {
   const xray::XrayImage xray_image = read(arguments.images.front(), arguments);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
-      xray_image, plate_of(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
+      xray_image, plate_from(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
-  value_or_throw(
-      xray::write_dicom(arguments.out / "rectified.dcm", rectified_image(xray_image, r.map, "rectified")));
+  value_or_throw(xray::write_dicom(arguments.out / "rectified.dcm",
+                                   rectification::rectified_dicom(xray_image, r.map, "rectified")));
   xray::XrayImage without_dots = xray_image;
   without_dots.pixels = rectification::inpainted(xray_image.pixels, r.plate_dots);
-  value_or_throw(xray::write_dicom(arguments.out / "inpainted.dcm",
-                                   rectified_image(without_dots, r.map, "rectified, plate hidden")));
+  value_or_throw(
+      xray::write_dicom(arguments.out / "inpainted.dcm",
+                        rectification::rectified_dicom(without_dots, r.map, "rectified, plate hidden")));
   value_or_throw(write_file(arguments.out / "map.json", to_text(rectification::to_json(r.map)) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)
@@ -110,7 +68,7 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
 /// Refuses an image that the map is not for, or whose plate it does not make straight.
 void map_images(const RectifyArguments& arguments, Console& console) {
   const rectification::DistortionMap map = map_of(arguments);
-  const std::vector<std::filesystem::path> files = files_of(arguments.images);
+  const std::vector<std::filesystem::path> files = image_files(arguments.images);
   std::vector<std::string> names;
   for (const std::filesystem::path& file : files) names.push_back(file.stem().string());
   names = distinct(names);
@@ -123,7 +81,7 @@ void map_images(const RectifyArguments& arguments, Console& console) {
     }));
     const std::filesystem::path to =
         arguments.out / (files.size() == 1 ? "rectified.dcm" : names[i] + "_rectified.dcm");
-    value_or_throw(xray::write_dicom(to, rectified_image(xray_image, map, "rectified")));
+    value_or_throw(xray::write_dicom(to, rectification::rectified_dicom(xray_image, map, "rectified")));
     written.push_back(to.string());
     if (!console.quiet && !console.json)
       console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());

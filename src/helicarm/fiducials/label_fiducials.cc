@@ -172,6 +172,33 @@ std::optional<detection::Dot> circle_near(const std::vector<detection::Dot>& cir
   return std::nullopt;
 }
 
+/// What the labelling works on.
+struct LabellingInput {
+  std::vector<detection::Dot> balls;
+  std::vector<BallCandidate> rectified;  ///< of each
+  LabellingPrior prior;
+  LabellingOptions options;
+};
+
+LabellingInput labelling_input(const xray::XrayImage& xray_image, const rectification::DistortionMap& map,
+                               const Candidates& candidates, const phantom::Calibrator& calibrator,
+                               const FiducialOptions& options) {
+  LabellingInput input{plausible_balls(candidates.dots, map, calibrator), {}, {}, {}};
+  for (const detection::Dot& ball : input.balls) {
+    const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
+    input.rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1,
+                               sigma_of(ball, map, uv)});
+  }
+  if (options.method == rectification::Method::paper) input.options.systematic_sigma = paper_systematic;
+  input.prior = labelling_prior(xray_image, rectification::intrinsics_prior(xray_image, map));
+  input.prior.mirrored = options.mirrored;
+  if (options.radius_bias) {
+    input.prior.radius_bias = *options.radius_bias;
+    input.prior.radius_bias_sigma = shared_bias_sigma;
+  }
+  return input;
+}
+
 }  // namespace
 
 Range ball_radii_px(const phantom::Calibrator& calibrator, double pixel_mm) {
@@ -195,21 +222,9 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
                                             const FiducialOptions& options) {
   const rectification::DistortionMap& map = rectification.map;
   const rectification::Method method = options.method;
-  const std::vector<detection::Dot> balls = plausible_balls(candidates.dots, map, calibrator);
-  std::vector<BallCandidate> rectified;
-  for (const detection::Dot& ball : balls) {
-    const Vector2d uv = *map.rectified_from_raw(ball.centre_px);
-    rectified.push_back({uv, std::max(0.05, ball.sigma_px), ball.radius_px, 0.02 * ball.radius_px + 0.1,
-                         sigma_of(ball, map, uv)});
-  }
-  LabellingOptions labelling_options;
-  if (method == rectification::Method::paper) labelling_options.systematic_sigma = paper_systematic;
-  LabellingPrior prior = labelling_prior(xray_image, rectification::intrinsics_prior(xray_image, map));
-  prior.mirrored = options.mirrored;
-  if (options.radius_bias) {
-    prior.radius_bias = *options.radius_bias;
-    prior.radius_bias_sigma = shared_bias_sigma;
-  }
+  const auto [balls, rectified, prior, given_options] =
+      labelling_input(xray_image, map, candidates, calibrator, options);
+  LabellingOptions labelling_options = given_options;
   auto labelling = label_balls(calibrator, rectified, prior, labelling_options);
   if (may_be_displaced(labelling, calibrator)) {
     labelling_options.tolerance_mm = printed_tolerance_mm;

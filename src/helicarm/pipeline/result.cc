@@ -85,6 +85,19 @@ Json intrinsics_of(const ViewResult& view) {
 }
 
 Json json_of(const ViewResult& view) {
+/// Candidates and best labels, of a view whose labelling was refused.
+void add_guess(Json& json, const ViewResult& view) {
+  json["candidates"] = nullptr;
+  json["guessed"] = Json::array();
+  if (view.found || !view.candidates) return;
+  json["candidates"] = Json::array();
+  for (const detection::Dot& dot : view.candidates->dots)
+    json["candidates"].push_back({{"uv_raw", vector(dot.centre_px)}, {"radius_px", dot.radius_px}});
+  for (const fiducials::GuessedLabel& guess : view.guessed)
+    json["guessed"].push_back(
+        {{"label", guess.label}, {"uv_raw", vector(guess.uv_raw)}, {"residual_px", guess.residual_px}});
+}
+
   Json json = {{"name", view.name}};
   json["image_size"] = view.xray_image
                            ? Json({view.xray_image->pixels.width(), view.xray_image->pixels.height()})

@@ -10,6 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/report/overlay.h"
 
 namespace helicarm::report {
@@ -148,24 +149,48 @@ Files files_of(const pipeline::Result& result, std::span<const Export> kinds) {
   return files;
 }
 
+/// NAME_rectified.dcm for each calibrated view: the pixels that its projection refers to.
+std::map<std::string, xray::DerivedImage> images_of(const pipeline::Result& result,
+                                                    std::span<const Export> kinds) {
+  std::map<std::string, xray::DerivedImage> images;
+  if (std::ranges::find(kinds, Export::images) == kinds.end()) return images;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    const pipeline::ViewResult& view = result.views[i];
+    if (!view.calibrated || !view.xray_image || !view.rectification) continue;
+    const std::string name = file_stem(view.name, i) + "_rectified.dcm";
+    if (!images
+             .emplace(name,
+                      rectification::rectified_dicom(*view.xray_image, view.rectification->map, "rectified"))
+             .second)
+      throw BadInput(Reason::name_clash, fmt::format("{}: two views would share this file", name));
+  }
+  return images;
+}
+
 }  // namespace
 
 Expected<std::vector<std::filesystem::path>> write_exports(const pipeline::Result& result,
                                                            const std::filesystem::path& folder,
                                                            std::span<const Export> kinds) {
   if (result.failure) return tl::unexpected<Failure>(*result.failure);
-  const auto files = guarded([&] { return files_of(result, kinds); });
-  if (!files) return tl::unexpected<Failure>(files.error());
   std::vector<std::filesystem::path> paths;
-  for (const auto& [name, text] : *files) {
-    if (const auto written = write_file(folder / name, text); !written) {
-      std::error_code ignored;
-      for (const auto& path : paths) std::filesystem::remove(path, ignored);
-      return tl::unexpected<Failure>(written.error());
+  auto written = guarded([&] {
+    const Files files = files_of(result, kinds);
+    const auto images = images_of(result, kinds);
+    for (const auto& [name, text] : files) {
+      value_or_throw(write_file(folder / name, text));
+      paths.push_back(folder / name);
     }
-    paths.push_back(folder / name);
-  }
-  return paths;
+    for (const auto& [name, image] : images) {
+      value_or_throw(xray::write_dicom(folder / name, image));
+      paths.push_back(folder / name);
+    }
+  });
+  std::ranges::sort(paths);
+  if (written) return paths;
+  std::error_code ignored;
+  for (const auto& path : paths) std::filesystem::remove(path, ignored);
+  return tl::unexpected<Failure>(written.error());
 }
 
 }  // namespace helicarm::report

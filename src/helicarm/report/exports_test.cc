@@ -12,6 +12,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/geometry/import_matrix.h"
 #include "helicarm/geometry/rotation.h"
+#include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::report {
 namespace {
@@ -66,6 +67,19 @@ TEST_F(Exports, AllAreWritten) {
   for (const fs::path& path : *written) names.push_back(path.filename().string());
   EXPECT_THAT(names, testing::ElementsAre("AP_matrix.txt", "AP_mayacam.txt", "LAT_matrix.txt",
                                           "LAT_mayacam.txt", "dlt.csv", "points.csv", "points.mrk.json"));
+}
+
+TEST_F(Exports, RectifiedImagesAreOfTheViews) {
+  for (pipeline::ViewResult& view : result_.views) {
+    view.rectification.emplace();
+    view.rectification->map = rectification::identity_map(64, 48, 0.25);
+  }
+  const std::array only{Export::images};
+  ASSERT_TRUE(write_exports(result_, folder_, only));
+  const auto image = xray::read_xray_image(folder_ / "LAT_rectified.dcm", "LAT", {});
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->pixels.width(), 64);
+  EXPECT_EQ(image->acquisition.pixel_mm, std::optional(Eigen::Vector2d(0.25, 0.25)));
 }
 
 TEST_F(Exports, MayaCamReadsBackToTheLastBit) {
