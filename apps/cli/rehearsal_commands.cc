@@ -20,7 +20,8 @@ void add_demo(CLI::App& app, Action& action) {
 void add_simulate(CLI::App& app, Action& action) {
   auto* command = add_command(
       app, "simulate", "Simulate a case with known ground truth: X-ray images of a knee with the calibrator",
-      "helicarm simulate my-case --kind tunnels --seed 7");
+      "helicarm simulate my-case --kind tunnels --seed 7\n"
+      "  helicarm simulate my-case --calibrator my-phantom.json --plate my-plate.json");
   auto& a = arguments_of(command, action, simulate_command);
   command->add_option("DIR", a.folder, "Folder for the case and truth.json")->required();
   command
@@ -46,9 +47,18 @@ void add_simulate(CLI::App& app, Action& action) {
       "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
   command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
-  command->add_flag("!--no-knee", a.knee, "Without the knee");
-  command->add_option("--response", a.response,
-                      "Response of the grey values: linear or log (default: log with the knee, else linear)");
+  command->add_flag_callback(
+      "--no-knee", [&a] { a.knee = false; }, "Without the knee");
+  command->add_option(
+      "--calibrator", a.calibrator,
+      "calibrator.json instead of udcsc and its check targets; the C-arm turns about its balls' "
+      "centroid, z along the knee");
+  command->add_option("--plate", a.plate,
+                      "plate.json instead of plate48; a lattice without dots fills the field");
+  command
+      ->add_option("--response", a.response,
+                   "Response of the grey values: linear or log (default: log with the knee, else linear)")
+      ->type_name("WORD");
   command
       ->add_option("--view", a.views,
                    "NAME:PRIMARY,SECONDARY, degrees; repeatable, 2 to 20 (grid: one). AP:0,0 has the source "

@@ -8,6 +8,7 @@
 
 #include "helicarm/simulation/write_case.h"
 #include "helicarm/volume/read_volume.h"
+#include "named_files.h"
 
 namespace helicarm::cli {
 namespace {
@@ -77,6 +78,10 @@ simulation::SimulationOptions options_from(const SimulateArguments& arguments, c
       throw BadInput(Reason::usage, "simulate: --distance requires --kind grid");
     options.grid_distances_mm = arguments.distances_mm;
   }
+  if (!arguments.calibrator.empty()) options.calibrator = calibrator_from(arguments.calibrator);
+  if (!arguments.plate.empty()) options.plate = plate_from(arguments.plate);
+  if (options.calibrator && options.kind == simulation::CaseKind::grid)
+    throw BadInput(Reason::usage, "simulate: --calibrator cannot be combined with --kind grid");
   options.ct = ct_from(arguments, console);
   constexpr std::string_view lost = "lost:";
   for (const std::string& fault : arguments.faults)

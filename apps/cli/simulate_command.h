@@ -19,6 +19,8 @@ struct SimulateArguments {
   int size = 1024;                ///< 512 or 1024 pixels per side
   int bits = 12;                  ///< 8, 10, 12, 14 or 16
   bool knee = true;
+  std::string calibrator;                 ///< a built-in or a file; empty: udcsc with check targets
+  std::string plate;                      ///< a built-in or a file; empty: plate48
   std::string response;                   ///< linear or log; empty: log with the knee
   std::vector<std::string> views;         ///< NAME:PRIMARY,SECONDARY (deg); none: AP and LAT
   std::optional<std::uint64_t> arm_seed;  ///< none: the seed

@@ -17,6 +17,9 @@ using Eigen::Vector3d;
 constexpr double wire_length_mm = 16;
 constexpr double half_wall_mm = 1.5;
 constexpr double disc_mm = 3;
+constexpr double off_wall_mm = 2;     // of a ball's centre: farther off, the cone is not its body
+constexpr double holder_wall_mm = 3;  // of plastic around a ball
+constexpr double sheet_mm = 0.5;      // of a perforated plate
 
 Solid cone(const ConeWall& wall, double bottom, double top, double offset) {
   return frustum({0, 0, bottom}, {0, 0, top}, wall.radius_at(bottom) + offset, wall.radius_at(top) + offset);
@@ -50,6 +53,14 @@ Body target_body(const phantom::CalibratorTarget& target, const std::vector<phan
     wires.push_back(cylinder(at - half, at + half, 0.5 * target.diameter_mm));
   }
   return steel(target.name, wires);
+}
+
+bool lies_on(const ConeWall& wall, const phantom::Calibrator& calibrator) {
+  return std::isfinite(wall.slope) && wall.radius_at(wall.top_mm) > 5 && wall.radius_at(wall.bottom_mm) > 5 &&
+         std::ranges::all_of(calibrator.balls, [&](const phantom::CalibratorBall& ball) {
+           const Vector3d& centre = ball.centre_in_calibrator;
+           return std::abs(centre.head<2>().norm() - wall.radius_at(centre.z())) < off_wall_mm;
+         });
 }
 
 }  // namespace
@@ -109,6 +120,13 @@ Scene calibrator_body(const phantom::Calibrator& calibrator) {
     scene.push_back(target_body(target, calibrator.targets));
 
   const ConeWall wall = cone_wall(calibrator);
+  if (!lies_on(wall, calibrator)) {
+    Body holders{"holders", {}, material::plastic};
+    for (const phantom::CalibratorBall& ball : calibrator.balls)
+      holders.solids.push_back(sphere(ball.centre_in_calibrator, 0.5 * ball.diameter_mm + holder_wall_mm));
+    scene.push_back(std::move(holders));
+    return scene;
+  }
   const double foot = wall.radius_at(wall.bottom_mm);
   scene.push_back({"cone",
                    {cone(wall, wall.bottom_mm, wall.top_mm, half_wall_mm),
@@ -129,14 +147,40 @@ Scene calibrator_body(const phantom::Calibrator& calibrator) {
 
 std::string plate_dot_name(std::size_t index) { return fmt::format("plate {}", index); }
 
+Expected<std::vector<Vector2d>> dots_within(const phantom::Plate& plate, double radius_mm) {
+  if (!plate.dots_mm.empty()) return plate.dots_mm;
+  if (!plate.pitch_mm)
+    return fail(Reason::bad_value,
+                fmt::format("{}: neither dots nor a pitch: it cannot be simulated", plate.name));
+  const Eigen::Matrix2d steps = *plate.pitch_mm * phantom::lattice_steps(plate.lattice);
+  const int reach = 2 * static_cast<int>(radius_mm / *plate.pitch_mm) + 1;
+  std::vector<Vector2d> dots;
+  for (int i = -reach; i <= reach; ++i)
+    for (int j = -reach; j <= reach; ++j)
+      if (const Vector2d dot = steps * Vector2d(i, j); dot.norm() <= radius_mm) dots.push_back(dot);
+  return dots;
+}
+
 Scene plate_body(const phantom::Plate& plate, const geometry::RigidTransform& camera_from_plate,
                  const geometry::View& view) {
   const geometry::RigidTransform world_from_plate = view.camera_from_world.inverse() * camera_from_plate;
+  const bool holes = plate.kind == phantom::DotKind::holes;
   Scene scene;
+  double reach = 0;
   for (std::size_t i = 0; i < plate.dots_mm.size(); ++i) {
     const Vector3d centre(plate.dots_mm[i].x(), plate.dots_mm[i].y(), 0);
-    scene.push_back(steel(plate_dot_name(i), {sphere(world_from_plate * centre, 0.5 * plate.diameter_mm)}));
+    reach = std::max(reach, centre.norm() + 2 * plate.diameter_mm);
+    const Vector3d half(0, 0, 0.5 * sheet_mm);
+    const Solid hole = cylinder(world_from_plate * (centre - half), world_from_plate * (centre + half),
+                                0.5 * plate.diameter_mm);
+    scene.push_back(
+        holes ? Body{plate_dot_name(i), {hole}, -material::steel}
+              : steel(plate_dot_name(i), {sphere(world_from_plate * centre, 0.5 * plate.diameter_mm)}));
   }
+  if (holes)
+    scene.push_back(
+        moved({"sheet", {cylinder({0, 0, -0.5 * sheet_mm}, {0, 0, 0.5 * sheet_mm}, reach)}, material::steel},
+              world_from_plate));
   return scene;
 }
 

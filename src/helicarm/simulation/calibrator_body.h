@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "helicarm/core/failure.h"
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
@@ -29,13 +30,19 @@ ConeWall cone_wall(const phantom::Calibrator& calibrator);
 /// one wire on the top.
 std::vector<phantom::CalibratorTarget> check_targets(const phantom::Calibrator& calibrator);
 
-/// The manufactured calibrator: steel balls and targets, plastic cone, flange, top disc and posts.
+/// The manufactured calibrator: steel balls and targets, plastic cone, flange, top disc and posts. Balls that
+/// do not lie on a cone about z are held by plastic spheres instead.
 Scene calibrator_body(const phantom::Calibrator& calibrator);
 
 /// Name of the body of a plate dot.
 std::string plate_dot_name(std::size_t index);
 
-/// The plate's balls on the receiver. `camera_from_plate` has its origin in the plate's plane.
+/// The dots of a plate: the file's, or of an unbounded lattice those within `radius_mm` of its origin.
+/// Refuses (bad_value) a lattice without dots and pitch.
+Expected<std::vector<Eigen::Vector2d>> dots_within(const phantom::Plate& plate, double radius_mm);
+
+/// The plate's balls on the receiver, or a steel sheet with its holes. `camera_from_plate` has its origin in
+/// the plate's plane.
 Scene plate_body(const phantom::Plate& plate, const geometry::RigidTransform& camera_from_plate,
                  const geometry::View& view);
 

@@ -86,6 +86,11 @@ Expected<void> check(const SimulationOptions& options, const phantom::Calibrator
   if (options.kind == CaseKind::flat && model_of(options.c_arm_preset()).intensifier)
     return fail(Reason::bad_value, fmt::format("preset: {} is an intensifier, kind flat is of a flat panel",
                                                word(options.c_arm_preset())));
+  if (options.calibrator && options.c_arm_preset() == Preset::paper_sim)
+    return fail(Reason::bad_value, "calibrator: preset paper-sim is of the built-in calibrator");
+  if (options.plate && !model_of(options.c_arm_preset()).intensifier)
+    return fail(Reason::bad_value, fmt::format("plate: preset {} is not an intensifier and has no plate",
+                                               word(options.c_arm_preset())));
   if (options.ct && !options.knee) return fail(Reason::usage, "CT: --no-knee cannot be combined with --ct");
   for (const std::string& lost : options.lost_balls)
     if (std::none_of(calibrator.balls.begin(), calibrator.balls.end(),
@@ -155,14 +160,29 @@ SimulatedView take_view(const SimulatedCase& simulated_case, const Scene& patien
   return view;
 }
 
+constexpr double usual_height_mm = 15;  // of a plate that does not state it
+constexpr double plate_radius_mm = 130;
+
+double plate_height_mm(const phantom::Plate& plate) {
+  return plate.height_above_receiver_mm.value_or(usual_height_mm);
+}
+
+/// With its dots listed, in whatever way the file gives them.
+Expected<phantom::Plate> plate_of(const SimulationOptions& options) {
+  phantom::Plate plate = options.plate.value_or(phantom::plate48());
+  return dots_within(plate, plate_radius_mm).map([&](std::vector<Eigen::Vector2d> dots) {
+    plate.dots_mm = std::move(dots);
+    return plate;
+  });
+}
+
 SimulatedCase simulate_grid(SimulationOptions options) {
   options.knee = false;
   SimulatedCase simulated_case;
   simulated_case.options = options;
-  simulated_case.plate = phantom::plate48();
+  simulated_case.plate = value_or_throw(plate_of(options));
   const WireGrid grid;
-  for (const TrueView& true_view :
-       take_grid_stand(options, *simulated_case.plate->height_above_receiver_mm)) {
+  for (const TrueView& true_view : take_grid_stand(options, plate_height_mm(*simulated_case.plate))) {
     SimulatedView view;
     view.true_view = true_view;
     Scene scene = plate_body(*simulated_case.plate, true_view.camera_from_plate, true_view.view);
@@ -181,25 +201,35 @@ SimulatedCase simulate_grid(SimulationOptions options) {
 Expected<SimulatedCase> simulate_case(const SimulationOptions& options) {
   SimulatedCase simulated_case;
   simulated_case.options = options;
-  simulated_case.calibrator = phantom::udcsc();
+  simulated_case.calibrator = options.calibrator.value_or(phantom::udcsc());
   if (const auto checked = check(options, simulated_case.calibrator); !checked)
     return tl::unexpected<Failure>(checked.error());
   if (options.kind == CaseKind::grid) {
     if (const auto checked = check_grid(options); !checked) return tl::unexpected<Failure>(checked.error());
-    return simulate_grid(options);
+    return guarded([&] { return simulate_grid(options); });
   }
   const bool tunnels = options.kind == CaseKind::tunnels;
-  if (!tunnels) simulated_case.calibrator.targets = check_targets(simulated_case.calibrator);
-  if (model_of(options.c_arm_preset()).intensifier) simulated_case.plate = phantom::plate48();
+  if (tunnels)
+    simulated_case.calibrator.targets.clear();
+  else if (!options.calibrator)
+    simulated_case.calibrator.targets = check_targets(simulated_case.calibrator);
+  if (model_of(options.c_arm_preset()).intensifier) {
+    auto plate = plate_of(options);
+    if (!plate) return tl::unexpected<Failure>(plate.error());
+    simulated_case.plate = *std::move(plate);
+  }
 
   RandomStream random(options.seed, stream::patient);
-  const geometry::RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
+  geometry::RigidTransform calibrator_from_patient = random_motion(random, 1.2, 1.5);
+  if (options.calibrator)
+    calibrator_from_patient.translation +=
+        phantom::middle_of(simulated_case.calibrator) - phantom::middle_of(phantom::udcsc());
   geometry::RigidTransform patient_from_knee = random_motion(random, 1.5, 1.5);
   patient_from_knee.translation += Eigen::Vector3d(10, 0, 14);
   const geometry::RigidTransform calibrator_from_knee = calibrator_from_patient * patient_from_knee;
   if (options.knee) simulated_case.calibrator_from_knee = calibrator_from_knee;
 
-  const double plate_height = simulated_case.plate ? *simulated_case.plate->height_above_receiver_mm : 0;
+  const double plate_height = simulated_case.plate ? plate_height_mm(*simulated_case.plate) : 0;
   const std::vector<TrueView> true_views = take_stand(options, plate_height, calibrator_from_patient);
   Scene patient = calibrator_body(simulated_case.calibrator);
   std::erase_if(patient, [&](const Body& body) {

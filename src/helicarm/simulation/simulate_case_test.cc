@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -74,6 +75,71 @@ TEST(SimulateCase, ClearBallsAreDarkAtTheirTruePositions) {
       EXPECT_GE(clear, 8);
     }
   }
+}
+
+/// Seven balls of two sizes far from the origin, on no cone.
+phantom::Calibrator own_phantom() {
+  phantom::Calibrator calibrator{"own", {}, {}};
+  for (const Eigen::Vector3d& p : {Eigen::Vector3d(230, 20, 100),
+                                   {170, 55, 112},
+                                   {160, -10, 125},
+                                   {195, -45, 133},
+                                   {185, 15, 151},
+                                   {215, 40, 160},
+                                   {160, 30, 175}})
+    calibrator.balls.push_back(
+        {fmt::format("B{}", calibrator.balls.size()), p, calibrator.balls.size() % 2 ? 5.0 : 4.0});
+  return calibrator;
+}
+
+TEST(SimulateCase, OwnPhantomIsInTheMiddleOfEveryImage) {
+  SimulationOptions options;
+  options.size = 512;
+  options.knee = false;
+  options.calibrator = own_phantom();
+  const auto simulated = simulate_case(options);
+  ASSERT_TRUE(simulated) << simulated.error().message;
+  EXPECT_TRUE(simulated->calibrator.targets.empty());
+  for (const SimulatedView& view : simulated->views)
+    for (const TruePoint& ball : view.balls)
+      EXPECT_NE(ball.visibility, Visibility::outside) << view.true_view.name << " " << ball.name;
+}
+
+TEST(SimulateCase, OwnPlateOfHolesHasBrightDots) {
+  SimulationOptions options;
+  options.size = 512;
+  options.knee = false;
+  options.response = Response::linear;
+  options.plate = phantom::Plate{"own", phantom::DotKind::holes, phantom::Lattice::hexagonal, 20, 5, {}, {}};
+  const auto simulated = simulate_case(options);
+  ASSERT_TRUE(simulated) << simulated.error().message;
+  const SimulatedView& view = simulated->views[0];
+  EXPECT_GT(view.plate_dots.size(), 100u);
+  int brighter = 0, clear = 0;
+  for (const TruePoint& dot : view.plate_dots) {
+    if (dot.visibility != Visibility::clear) continue;
+    ++clear;
+    const auto grey = [&](double du) {
+      return view.pixels(int(std::lround(dot.raw.x() + du)), int(std::lround(dot.raw.y())));
+    };
+    brighter += grey(0) > grey(9);
+  }
+  EXPECT_GT(clear, 50);
+  EXPECT_GT(brighter, 0.9 * clear);
+}
+
+TEST(SimulateCase, PlateWithoutDotsAndPitchIsRefused) {
+  SimulationOptions options;
+  options.plate = phantom::Plate{};
+  options.plate->name = "own";
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
+}
+
+TEST(SimulateCase, FlatPanelHasNoPlate) {
+  SimulationOptions options;
+  options.kind = CaseKind::flat;
+  options.plate = phantom::plate48();
+  EXPECT_EQ(simulate_case(options).error().reason, Reason::bad_value);
 }
 
 TEST(SimulateCase, PaperSimHasThePosesAndPixelsOfThePaper) {

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/phantom/calibrator.h"
+#include "helicarm/phantom/plate.h"
 #include "helicarm/simulation/ct_body.h"
 
 namespace helicarm::simulation {
@@ -75,7 +77,10 @@ struct SimulationOptions {
   std::optional<Response> response = {};       ///< default: logarithmic with the knee, else linear
   std::vector<ViewAngles> views;               ///< 2 to 20; none: AP and LAT with a random positioning error
   std::optional<std::uint64_t> arm_seed = {};  ///< seed of the C-arm itself; default: the case's seed
-  std::shared_ptr<const CtOptions> ct = {};    ///< instead of the modelled knee
+  /// Instead of udcsc with its check targets; the C-arm and the knee then stand about its balls' centroid.
+  std::optional<phantom::Calibrator> calibrator = {};
+  std::optional<phantom::Plate> plate = {};  ///< instead of plate48, of an intensifier
+  std::shared_ptr<const CtOptions> ct = {};  ///< instead of the modelled knee
   std::vector<Fault> faults;
   std::vector<double> grid_distances_mm = {
       45};                              ///< kind grid: from the receiver to the wires' axes; up to 20
