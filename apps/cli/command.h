@@ -16,6 +16,7 @@ struct Console {
   bool quiet = false;
   unsigned threads = 0;
   std::uint64_t seed = 1;
+  bool answered = false;  ///< the command printed its own answer to a refusal, with --json
 };
 
 /// A command is `Expected<void> name_command(const NameArguments&, Console&)` in name_command.h/.cc; main.cc

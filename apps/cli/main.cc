@@ -22,7 +22,7 @@ int report(const Failure& failure, const Console& console) {
   const std::string view = failure.view.empty() ? std::string{} : failure.view + ": ";
   console.progress << fmt::format("helicarm: {}: {}{}\n", code(failure.reason), view,
                                   without_control_characters(failure.message));
-  if (console.json)
+  if (console.json && !console.answered)
     console.out << to_text({{"status", exit == 3 ? "refused" : "failed"},
                             {"failure", pipeline::to_json(failure)}})
                 << '\n';
@@ -77,7 +77,7 @@ int run(int argc, char** argv) {
                 console.threads,
                 console.seed};
   const auto done = action(heard);
-  return done ? 0 : report(done.error(), console);
+  return done ? 0 : report(done.error(), heard);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "phantom_command.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -11,11 +12,11 @@
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/drawing.h"
 #include "helicarm/phantom/plate.h"
-#include "helicarm/phantom/rules.h"
-#include "helicarm/phantom/uniformity.h"
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
+#include "named_files.h"
+#include "phantom_check_command.h"
 
 namespace helicarm::cli {
 namespace {
@@ -23,15 +24,11 @@ namespace {
 using Files = std::vector<std::pair<std::filesystem::path, std::string>>;
 
 phantom::Calibrator calibrator_of(const PhantomArguments& arguments) {
-  if (arguments.name_or_file.empty() || arguments.name_or_file == phantom::udcsc().name)
-    return phantom::udcsc();
-  return value_or_throw(phantom::read_calibrator(arguments.name_or_file));
+  return arguments.name_or_file.empty() ? phantom::udcsc() : calibrator_from(arguments.name_or_file);
 }
 
 phantom::Plate plate_of(const PhantomArguments& arguments) {
-  if (arguments.name_or_file.empty() || arguments.name_or_file == phantom::plate48().name)
-    return phantom::plate48();
-  return value_or_throw(phantom::read_plate(arguments.name_or_file));
+  return arguments.name_or_file.empty() ? phantom::plate48() : plate_from(arguments.name_or_file);
 }
 
 void show(const phantom::Calibrator& calibrator, Console& console) {
@@ -68,39 +65,30 @@ void show(const phantom::Plate& plate, Console& console) {
   for (const auto& dot : plate.dots_mm) console.out << fmt::format("{:>10.3f}{:>10.3f}\n", dot.x(), dot.y());
 }
 
-void check(const phantom::Calibrator& calibrator, Console& console) {
-  const auto findings = phantom::check_rules(calibrator);
-  const bool passed = std::all_of(findings.begin(), findings.end(), [](const auto& f) { return f.passed(); });
-  std::vector<Eigen::Vector3d> centres;
-  for (const auto& ball : calibrator.balls) centres.push_back(ball.centre_in_calibrator);
-  const double spread = phantom::uniformity(centres);
-  if (console.json) {
-    Json json{
-        {"name", calibrator.name}, {"passed", passed}, {"uniformity", spread}, {"rules", Json::array()}};
-    for (const auto& f : findings)
-      json["rules"].push_back({{"rule", f.rule},
-                               {"sentence", f.sentence},
-                               {"figure", f.figure},
-                               {"bound", f.bound == phantom::Bound::at_most ? "at_most" : "at_least"},
-                               {"limit", f.limit},
-                               {"unit", f.unit},
-                               {"passed", f.passed()}});
-    console.out << to_text(json) << "\n";
-  } else {
-    for (const auto& f : findings)
-      console.out << fmt::format("{:<7}{:>9.3f} {} {:>6.2f} {:<6} {}\n", f.passed() ? "kept" : "BROKEN",
-                                 f.figure, f.bound == phantom::Bound::at_most ? "<=" : ">=", f.limit, f.unit,
-                                 f.sentence);
-    console.out << fmt::format("\n{}: {}; uniformity (Eq. 13) {:.3f}\n", calibrator.name,
-                               passed ? "keeps all rules" : "breaks a rule", spread);
+phantom::BodyOptions body_options(const phantom::Calibrator& calibrator, const PhantomArguments& arguments,
+                                  Console& console) {
+  phantom::BodyOptions options{.clearance_mm = arguments.clearance_mm, .step_mm = arguments.step_mm};
+  constexpr std::array<std::string_view, 3> shapes{"cone", "rings", "plate"};
+  if (!arguments.body) {
+    options.shape = phantom::suitable_shape(calibrator);
+    if (!console.quiet)
+      console.progress << fmt::format("body: {} (--body chooses another)\n",
+                                      shapes[std::size_t(options.shape)]);
+    return options;
   }
-  if (!passed) throw BadInput(Reason::rules_broken, fmt::format("{} breaks a design rule", calibrator.name));
+  const auto found = std::ranges::find(shapes, *arguments.body);
+  if (found == shapes.end())
+    throw BadInput(Reason::usage,
+                   fmt::format("--body: \"{}\" is none of: {}", *arguments.body, fmt::join(shapes, ", ")));
+  options.shape = phantom::BodyShape(found - shapes.begin());
+  return options;
 }
 
-Files exported(const phantom::Calibrator& calibrator, const PhantomArguments& arguments) {
+Files exported(const phantom::Calibrator& calibrator, const PhantomArguments& arguments, Console& console) {
   Files files;
   if (arguments.stl)
-    files.emplace_back(*arguments.stl, phantom::to_stl(value_or_throw(phantom::printable_body(calibrator))));
+    files.emplace_back(*arguments.stl, phantom::to_stl(value_or_throw(phantom::printable_body(
+                                           calibrator, body_options(calibrator, arguments, console)))));
   if (arguments.svg) files.emplace_back(*arguments.svg, phantom::drawing_of(calibrator));
   if (arguments.file) files.emplace_back(*arguments.file, to_text(phantom::to_json(calibrator)) + "\n");
   return files;
@@ -243,10 +231,10 @@ CommandResult phantom_command(const PhantomArguments& arguments, Console& consol
         if (arguments.plate)
           throw BadInput(Reason::usage,
                          "phantom check: the rules apply to the calibrator only; omit --plate");
-        return check(calibrator_of(arguments), console);
+        return check_calibrator(calibrator_of(arguments), console);
       case PhantomAction::export_files:
         return write(arguments.plate ? exported(plate_of(arguments), arguments)
-                                     : exported(calibrator_of(arguments), arguments),
+                                     : exported(calibrator_of(arguments), arguments, console),
                      console);
       case PhantomAction::measure:
         return measure(arguments, console);

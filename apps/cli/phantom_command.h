@@ -20,6 +20,9 @@ struct PhantomArguments {
   std::string name_or_file;                      ///< name of a built-in or a file; empty: udcsc or plate48
   bool plate = false;                            ///< the rectification plate instead of the calibrator
   std::optional<std::filesystem::path> stl;      ///< export: the printable body
+  std::optional<std::string> body;               ///< export: cone, rings or plate; nothing: the suitable one
+  double clearance_mm = 0;                       ///< export: pocket's diameter less the ball's
+  double step_mm = 1;                            ///< export: of the body's surface
   std::optional<std::filesystem::path> svg;      ///< export: the drawing
   std::optional<std::filesystem::path> file;     ///< export: calibrator.json or plate.json
   std::optional<std::filesystem::path> out;      ///< measure, verify: folder of the result

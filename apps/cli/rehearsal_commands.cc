@@ -188,6 +188,7 @@ void add_phantom(CLI::App& app, Action& action) {
           "ACTION", a.action,
           "show, check, export: a calibrator or plate\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
+      "  helicarm phantom export my-balls.json --body rings --clearance -0.1 --step 0.5 --stl body.stl\n"
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
       ->transform(CLI::CheckedTransformer(
@@ -204,7 +205,23 @@ void add_phantom(CLI::App& app, Action& action) {
       "Name of a built-in or a file (default: udcsc or plate48). measure, verify: the case's folder");
   command->add_flag("--plate", a.plate, "The rectification plate instead of the calibrator");
   command->add_option("--stl", a.stl, "export: the body for 3D printing, as STL");
-  command->add_option("--svg", a.svg, "export: the drawing, as SVG");
+  command
+      ->add_option("--body", a.body,
+                   "export: shape of the body\n"
+                   "cone: balls on the wall of the built-in calibrator's cone\n"
+                   "rings: any layout, a ring through each ball and four ribs\n"
+                   "plate: any layout, a plate with a post under each ball\n"
+                   "(default: cone if the balls lie on its wall, else rings)")
+      ->type_name("WORD");
+  command
+      ->add_option("--clearance", a.clearance_mm,
+                   "export: diameter of a ball's pocket less that of the ball, mm; negative: press fit")
+      ->check(within(-0.5, 2))
+      ->capture_default_str();
+  command->add_option("--step", a.step_mm, "export: step of the body's surface, mm; fine for a press fit")
+      ->check(within(0.2, 3))
+      ->capture_default_str();
+  command->add_option("--svg", a.svg, "export: the drawing with all coordinates, as SVG");
   command->add_option("--file", a.file, "export: calibrator.json or plate.json");
   command->add_option("--out", a.out,
                       "measure: folder for calibrator.json, result.json and report.html; verify: for "

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/phantom/open_body.h"
+
 namespace helicarm::phantom {
 namespace {
 
@@ -126,16 +128,35 @@ std::vector<Groove> grooves_of(const Calibrator& calibrator) {
   return grooves;
 }
 
-double pocket_distance(const CalibratorBall& ball, const Eigen::Vector3d& outward, const Eigen::Vector3d& p) {
-  const Eigen::Vector3d from = p - ball.centre_in_calibrator;
-  return (from - outward * std::clamp(from.dot(outward), 0.0, 20.0)).norm() - ball.diameter_mm / 2;
+double azimuth_of(const Eigen::Vector3d& p) { return std::atan2(p.y(), p.x()); }
+
+Expected<void> check_wall(const Calibrator& calibrator, const BodyOptions& options) {
+  const Cone cone(options);
+  for (const auto& ball : calibrator.balls) {
+    const double depth = cone.depth(ball.centre_in_calibrator);
+    const double z = ball.centre_in_calibrator.z();
+    if (depth < -ball.diameter_mm / 4 || depth > options.wall_mm + ball.diameter_mm / 2 || z < 0 ||
+        z > options.height_mm)
+      return fail(
+          Reason::bad_value,
+          fmt::format(
+              "{}: ball {} lies {:.2f} mm below the cone's surface at z = {:.2f} mm: outside the wall; "
+              "choose --body rings or plate",
+              calibrator.name, ball.label, depth, z),
+          {{"depth_mm", depth}, {"z_mm", z}});
+  }
+  return {};
 }
 
-double azimuth_of(const Eigen::Vector3d& p) { return std::atan2(p.y(), p.x()); }
+Expected<void> check_range(const char* name, double value, double low, double high) {
+  if (value >= low && value <= high) return {};
+  return fail(Reason::bad_value, fmt::format("{}: {} is outside {} to {}", name, value, low, high));
+}
 
 }  // namespace
 
 SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& options) {
+  if (options.shape != BodyShape::cone) return open_body_distance(calibrator, options);
   const Cone cone(options);
   std::vector<Facet> facets;
   for (int k = 0; k < 4; ++k)  // halfway between the columns of balls
@@ -152,28 +173,29 @@ SignedDistance body_distance(const Calibrator& calibrator, const BodyOptions& op
     for (const auto& facet : facets) distance = std::min(distance, facet.distance(p));
     for (const auto& groove : grooves) distance = std::max(distance, -groove.distance(p, cone, options));
     for (const auto& ball : balls)
-      distance =
-          std::max(distance, -pocket_distance(ball, cone.normal(azimuth_of(ball.centre_in_calibrator)), p));
+      distance = std::max(distance, -pocket_distance(ball, cone.normal(azimuth_of(ball.centre_in_calibrator)),
+                                                     options.clearance_mm, p));
     return distance;
   };
 }
 
+BodyShape suitable_shape(const Calibrator& calibrator, const BodyOptions& options) {
+  return check_wall(calibrator, options) ? BodyShape::cone : BodyShape::rings;
+}
+
 Expected<TriangleMesh> printable_body(const Calibrator& calibrator, const BodyOptions& options) {
-  if (!(options.step_mm >= 0.2 && options.step_mm <= 3))
-    return fail(Reason::bad_value, fmt::format("step_mm: {} is outside 0.2 to 3", options.step_mm));
+  const auto checked =
+      check_range("step_mm", options.step_mm, 0.2, 3)
+          .and_then([&] { return check_range("clearance_mm", options.clearance_mm, -0.5, 2); })
+          .and_then([&]() -> Expected<void> {
+            if (options.shape == BodyShape::cone) return check_wall(calibrator, options);
+            return options.shape == BodyShape::plate ? check_posts(calibrator, options) : Expected<void>();
+          });
+  if (!checked) return tl::unexpected<Failure>(checked.error());
+  if (options.shape != BodyShape::cone)
+    return surface_of(body_distance(calibrator, options), open_body_box(calibrator, options),
+                      options.step_mm);
   const Cone cone(options);
-  for (const auto& ball : calibrator.balls) {
-    const double depth = cone.depth(ball.centre_in_calibrator);
-    const double z = ball.centre_in_calibrator.z();
-    if (depth < -ball.diameter_mm / 4 || depth > options.wall_mm + ball.diameter_mm / 2 || z < 0 ||
-        z > options.height_mm)
-      return fail(
-          Reason::bad_value,
-          fmt::format(
-              "{}: ball {} lies {:.2f} mm below the cone's surface at z = {:.2f} mm: outside the wall",
-              calibrator.name, ball.label, depth, z),
-          {{"depth_mm", depth}, {"z_mm", z}});
-  }
   const double reach = cone.radius(-options.flange_depth_mm) + options.flange_width_mm + 2 * options.step_mm;
   const Eigen::AlignedBox3d box(
       Eigen::Vector3d(-reach, -reach, -options.flange_depth_mm - 2 * options.step_mm),

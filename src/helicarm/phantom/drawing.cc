@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/phantom/drawing.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -113,6 +115,30 @@ void draw_view(Sheet& sheet, const Calibrator& calibrator, const Eigen::Matrix<d
   sheet.dimension(corner + Eigen::Vector2d(0, size.y()), corner, {-10, 0});
 }
 
+constexpr double table_row = 4.5, table_width = 82;
+
+/// A row for each ball and target: name, coordinates and diameter in mm.
+void draw_table(Sheet& sheet, const Calibrator& calibrator, Eigen::Vector2d at) {
+  const auto row = [&](const std::string& name, const std::array<std::string, 4>& cells, const char* colour) {
+    sheet.text(at, name, colour, "start", 3);
+    for (std::size_t i = 0; i < cells.size(); ++i)
+      sheet.text(at + Eigen::Vector2d(34 + 16 * double(i), 0), cells[i], colour, "end", 3);
+    at.y() += table_row;
+  };
+  const auto entry = [&](const std::string& name, const Eigen::Vector3d& p, double diameter,
+                         const char* colour) {
+    row(name,
+        {fmt::format("{:.3f}", p.x()), fmt::format("{:.3f}", p.y()), fmt::format("{:.3f}", p.z()),
+         fmt::format("{:.3f}", diameter)},
+        colour);
+  };
+  row("", {"x", "y", "z", "diameter"}, measure);
+  for (const auto& ball : calibrator.balls)
+    entry(ball.label, ball.centre_in_calibrator, ball.diameter_mm, ink);
+  for (const auto& target : calibrator.targets)
+    entry(target.name, target.point_in_calibrator, target.diameter_mm, target_ink);
+}
+
 }  // namespace
 
 Expected<std::string> drawing_of(const Plate& plate) {
@@ -166,14 +192,16 @@ std::string drawing_of(const Calibrator& calibrator) {
   for (const auto& ball : calibrator.balls) extend(ball.centre_in_calibrator);
   for (const auto& target : calibrator.targets) extend(target.point_in_calibrator);
   const double left = 30, top = 46, between = 45;
-  const double width = above.sizes().x() + side.sizes().x() + 2 * left + between;
-  Sheet sheet(width, std::max(above.sizes().y(), side.sizes().y()) + top + 25);
+  const double views = above.sizes().x() + side.sizes().x() + 2 * left + between;
+  const double rows = table_row * double(2 + calibrator.balls.size() + calibrator.targets.size());
+  Sheet sheet(views + table_width, std::max({above.sizes().y() + 25, side.sizes().y() + 25, rows}) + top);
   sheet.text({left - 10, 12}, calibrator.name, ink, "start", 6);
   sheet.text({left - 10, 19}, "1 : 1, mm; the extents are those of the centres and the origin", ink, "start",
              3.2);
   draw_view(sheet, calibrator, from_above, above.min(), above.max(), {left, top}, "from above", "x", "y");
   draw_view(sheet, calibrator, from_side, side.min(), side.max(), {left + above.sizes().x() + between, top},
             "from the side", "x", "z");
+  draw_table(sheet, calibrator, {views, top});
   return sheet.finish();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/phantom/drawing.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,10 +28,13 @@ TEST(DrawingOfPlate, UnboundedLatticeIsRefused) {
   EXPECT_EQ(drawing_of(Plate{}).error().reason, Reason::bad_value);
 }
 
-TEST(DrawingOfCalibrator, ShowsEveryBallTwiceWithItsLabel) {
+TEST(DrawingOfCalibrator, ShowsEveryBallTwiceAndItsCoordinatesInATable) {
   const std::string svg = drawing_of(udcsc());
   EXPECT_EQ(count(svg, "<circle"), 24u);
-  EXPECT_EQ(count(svg, ">P12</text>"), 2u);
+  EXPECT_EQ(count(svg, ">P12</text>"), 3u);
+  for (const CalibratorBall& ball : udcsc().balls)
+    for (const double number : ball.centre_in_calibrator)
+      EXPECT_THAT(svg, HasSubstr(fmt::format(">{:.3f}</text>", number)));
 }
 
 TEST(DrawingOfCalibrator, NamesAreEscaped) {

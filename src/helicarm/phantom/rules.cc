@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <tuple>
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
@@ -103,10 +104,12 @@ void check_space(const Calibrator& calibrator, const DesignViews& views, const R
   for (const double range_deg : {0.0, options.range_deg}) {
     const std::string turned = range_deg > 0 ? fmt::format(", rotated by up to {} degrees", range_deg) : "";
     const std::string suffix = range_deg > 0 ? "_turned" : "";
-    add("gap_ap" + suffix, "no balls overlap in the AP image" + turned,
-        smallest_gap_mm(calibrator, views.ap, range_deg), Bound::at_least, 0.0, "mm");
-    add("gap_lateral" + suffix, "no balls overlap in the lateral image" + turned,
-        smallest_gap_mm(calibrator, views.lateral, range_deg), Bound::at_least, 0.0, "mm");
+    for (const auto& [rule, image, view] :
+         {std::tuple{"gap_ap", "AP", &views.ap}, {"gap_lateral", "lateral", &views.lateral}}) {
+      const BallGap gap = smallest_gap(calibrator, *view, range_deg);
+      add(rule + suffix, fmt::format("no balls overlap in the {} image{}", image, turned), gap.gap_mm,
+          Bound::at_least, 0.0, "mm", gap.gap_mm < 0 ? gap.a + " and " + gap.b : "");
+    }
   }
 }
 
@@ -152,10 +155,10 @@ DesignViews design_views(const Calibrator& calibrator, const RuleOptions& option
           view((Eigen::Matrix3d() << 1, 0, 0, 0, 0, 1, 0, -1, 0).finished())};
 }
 
-double smallest_gap_mm(const Calibrator& calibrator, const geometry::View& view, double range_deg) {
+BallGap smallest_gap(const Calibrator& calibrator, const geometry::View& view, double range_deg) {
   const Eigen::Vector3d middle = view.camera_from_world * middle_of(calibrator);
   const int steps = range_deg > 0 ? 5 : 0;
-  double smallest = infinity;
+  BallGap smallest{{}, {}, infinity};
   for (int i = -steps; i <= steps; ++i)
     for (int j = -steps; j <= steps; ++j) {
       const Eigen::Matrix3d turn = (Eigen::AngleAxisd(i * range_deg / 5 * degree, Eigen::Vector3d::UnitX()) *
@@ -170,7 +173,8 @@ double smallest_gap_mm(const Calibrator& calibrator, const geometry::View& view,
       for (std::size_t a = 0; a < rays.size(); ++a)
         for (std::size_t b = 0; b < a; ++b) {
           const double angle = std::atan2(rays[a].cross(rays[b]).norm(), rays[a].dot(rays[b]));
-          smallest = std::min(smallest, (angle - half_angles[a] - half_angles[b]) * middle.z());
+          const double gap = (angle - half_angles[a] - half_angles[b]) * middle.z();
+          if (gap < smallest.gap_mm) smallest = {calibrator.balls[b].label, calibrator.balls[a].label, gap};
         }
     }
   return smallest;

@@ -30,6 +30,7 @@ struct RuleFinding {
   Bound bound;
   double limit;
   std::string unit;
+  std::string names = {};  ///< of the balls concerned, if they overlap
   bool passed() const { return bound == Bound::at_most ? figure <= limit : figure >= limit; }
 };
 
@@ -44,9 +45,15 @@ struct DesignViews {
 };
 DesignViews design_views(const Calibrator& calibrator, const RuleOptions& options = {});
 
-/// Smallest gap between the outlines of two balls, mm at the calibrator's distance; negative if they overlap.
-/// The source rotates about both image axes within `range_deg`.
-double smallest_gap_mm(const Calibrator& calibrator, const geometry::View& view, double range_deg);
+/// Two balls and the gap between their outlines.
+struct BallGap {
+  std::string a, b;
+  double gap_mm;
+};
+
+/// The two balls with the smallest gap between their outlines, mm at the calibrator's distance; negative if
+/// they overlap. The source rotates about both image axes within `range_deg`.
+BallGap smallest_gap(const Calibrator& calibrator, const geometry::View& view, double range_deg);
 
 /// Depth of a point below the nearest face of the balls' convex hull, mm; negative outside.
 double depth_in_hull_mm(const Calibrator& calibrator, const Eigen::Vector3d& point_in_calibrator);

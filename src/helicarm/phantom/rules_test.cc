@@ -84,8 +84,8 @@ TEST(CheckRules, BallsOutsideTheFieldAreNotCounted) {
 
 TEST(SmallestGap, TwoBallsSideBySide) {
   Calibrator calibrator{"two", {{"A", {-5, 0, 0}, 4}, {"B", {5, 0, 0}, 4}}, {}};
-  EXPECT_NEAR(smallest_gap_mm(calibrator, design_views(calibrator).ap, 0), 6, 1e-3);
-  EXPECT_NEAR(smallest_gap_mm(calibrator, design_views(calibrator).lateral, 0), 6, 1e-3);
+  EXPECT_NEAR(smallest_gap(calibrator, design_views(calibrator).ap, 0).gap_mm, 6, 1e-3);
+  EXPECT_NEAR(smallest_gap(calibrator, design_views(calibrator).lateral, 0).gap_mm, 6, 1e-3);
 }
 
 TEST(DepthInHull, OfACube) {
