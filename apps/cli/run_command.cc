@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/pipeline/advice.h"
 #include "helicarm/pipeline/case.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/report/overlay.h"
@@ -41,6 +42,18 @@ void print_notes(const std::vector<Warning>& notes, std::ostream& out) {
     if (const auto of_kind = more.extract(note.reason))
       out << fmt::format("helicarm: note: {}: {}{}\n", code(note.reason), note.message,
                          of_kind.mapped() > 1 ? fmt::format(" (and {} more)", of_kind.mapped() - 1) : "");
+}
+
+/// Likely causes of a refusal, and where to look.
+void print_advice(const pipeline::Result& result, const RunArguments& arguments, std::ostream& out) {
+  const pipeline::Advice advice = pipeline::advice_for(result);
+  if (advice.causes.empty()) return;
+  out << "helicarm: likely causes, in order:\n";
+  for (std::size_t i = 0; i < advice.causes.size(); ++i)
+    out << fmt::format("  {}. {}\n", i + 1, advice.causes[i]);
+  out << fmt::format("  Next: {}\n", advice.next);
+  if (!arguments.no_report)
+    out << fmt::format("  All that was found: {}\n", (arguments.out / "report.html").string());
 }
 
 /// The views of an earlier result in the folder, if any.
@@ -175,6 +188,7 @@ Expected<pipeline::Result> run_and_write(const RunArguments& arguments, Console&
 CommandResult run_command(const RunArguments& arguments, Console& console) {
   const auto result = run_and_write(arguments, console);
   if (!result) return tl::unexpected<Failure>(result.error());
+  if (result->failure && !console.quiet) print_advice(*result, arguments, console.progress);
   if (result->failure) return tl::unexpected<Failure>(*result->failure);
   if (console.json)
     console.out << to_text(pipeline::to_json(*result)) << '\n';

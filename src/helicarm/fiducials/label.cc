@@ -253,13 +253,38 @@ Expected<Hypothesis> unambiguous(LabelSearch& search, const LabellingOptions& op
   return best;
 }
 
+Labelling labelling_of(const LabelSearch& search, const Hypothesis& best,
+                       const phantom::Calibrator& calibrator, const LabellingPrior& prior) {
+  Labelling labelling;
+  labelling.candidate_of_ball = best.candidate_of_ball;
+  labelling.view = best.fit.view;
+  labelling.view.camera_from_world.translation -=
+      best.fit.view.camera_from_world.rotation * centroid(calibrator);
+  labelling.mirrored = best.mirrored();
+  labelling.matched = count_labelled(best);
+  labelling.false_blobs = static_cast<int>(search.scene().candidates.size()) - best.matched;
+  labelling.rms_px = std::sqrt(best.residual2_px2 / best.matched);
+  labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best.radius_excess) - 1;
+  labelling.log_odds = best.log_odds;
+  labelling.margin = best.log_odds;
+  for (const auto& rival : search.ranking()) {
+    if (!contradicts(rival, best)) continue;
+    labelling.margin = best.log_odds - std::max(0.0, rival.log_odds);
+    labelling.runner_up_matched = rival.matched;
+    labelling.runner_up_rms_px = std::sqrt(rival.residual2_px2 / rival.matched);
+    break;
+  }
+  return labelling;
+}
+
 }  // namespace
 
-Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
+LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
                                 const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
                                 const LabellingOptions& options) {
+  constexpr int least_shown = 4;
   const int n = static_cast<int>(candidates.size());
-  if (n < least_balls) return too_few(n, n);
+  if (n < least_balls) return {{}, too_few(n, n).value()};
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   // By then, a labelling with one fiducial less would have been found, too.
@@ -269,31 +294,26 @@ Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
                tried >= triples_required(std::max(least_balls, h.matched - 1), candidates.size());
       });
   if (!search.ranking().empty()) search_rivals(search);
-  auto failure = refusal_of(search, options);
-  if (failure) return tl::unexpected(*std::move(failure));
-  const auto best = unambiguous(search, options);
-  if (!best) return tl::unexpected(best.error());
-
-  Labelling labelling;
-  labelling.candidate_of_ball = best->candidate_of_ball;
-  labelling.view = best->fit.view;
-  labelling.view.camera_from_world.translation -=
-      best->fit.view.camera_from_world.rotation * centroid(calibrator);
-  labelling.mirrored = best->mirrored();
-  labelling.matched = count_labelled(*best);
-  labelling.false_blobs = n - best->matched;
-  labelling.rms_px = std::sqrt(best->residual2_px2 / best->matched);
-  labelling.radius_bias = (1 + prior.radius_bias) * std::exp(best->radius_excess) - 1;
-  labelling.log_odds = best->log_odds;
-  labelling.margin = best->log_odds;
-  for (const auto& rival : search.ranking()) {
-    if (!contradicts(rival, *best)) continue;
-    labelling.margin = best->log_odds - std::max(0.0, rival.log_odds);
-    labelling.runner_up_matched = rival.matched;
-    labelling.runner_up_rms_px = std::sqrt(rival.residual2_px2 / rival.matched);
-    break;
+  LabellingAttempt attempt;
+  attempt.failure = refusal_of(search, options);
+  auto best =
+      attempt.failure ? Expected<Hypothesis>(tl::unexpect, *attempt.failure) : unambiguous(search, options);
+  if (!best) {
+    attempt.failure = best.error();
+    if (!search.ranking().empty() && search.ranking().front().matched >= least_shown)
+      attempt.best = labelling_of(search, search.ranking().front(), calibrator, prior);
+    return attempt;
   }
-  return labelling;
+  attempt.best = labelling_of(search, *best, calibrator, prior);
+  return attempt;
+}
+
+Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
+                                const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
+                                const LabellingOptions& options) {
+  LabellingAttempt attempt = attempt_labels(calibrator, candidates, prior, options);
+  if (attempt.failure) return tl::unexpected<Failure>(*std::move(attempt.failure));
+  return *std::move(attempt.best);
 }
 
 }  // namespace helicarm::fiducials

@@ -47,6 +47,17 @@ struct Labelling {
   double runner_up_rms_px = 0;
 };
 
+/// The best labelling, also where it is refused, and why it is.
+struct LabellingAttempt {
+  std::optional<Labelling> best;  ///< nothing if no pose explains four candidates
+  std::optional<Failure> failure;
+};
+
+/// As `label_balls`, with the best guess after a refusal: to be shown, never to be used.
+LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
+                                const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
+                                const LabellingOptions& options = {});
+
 /// Labels the fiducials among the candidates, in any orientation, without a starting pose, mirrored or not.
 /// Refuses too_few_fiducials (fewer than six are labelled), ambiguous_labels (another labelling, or the
 /// mirror image, explains the image almost as well) or calibrator_mismatch (no pose explains the candidates).

@@ -201,6 +201,27 @@ LabellingInput labelling_input(const xray::XrayImage& xray_image, const rectific
 
 }  // namespace
 
+std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image,
+                                       const rectification::Rectification& rectification,
+                                       const Candidates& candidates, const phantom::Calibrator& calibrator,
+                                       const FiducialOptions& options) {
+  auto [balls, rectified, prior, labelling_options] =
+      labelling_input(xray_image, rectification.map, candidates, calibrator, options);
+  labelling_options.tolerance_mm = printed_tolerance_mm;
+  const LabellingAttempt attempt = attempt_labels(calibrator, rectified, prior, labelling_options);
+  std::vector<GuessedLabel> guessed;
+  if (!attempt.best) return guessed;
+  for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
+    const int candidate = attempt.best->candidate_of_ball[k];
+    if (candidate < 0) continue;
+    const phantom::CalibratorBall& ball = calibrator.balls[k];
+    const Vector2d& uv = rectified[std::size_t(candidate)].uv;
+    guessed.push_back({ball.label, balls[std::size_t(candidate)].centre_px, uv,
+                       (attempt.best->view.project(ball.centre_in_calibrator) - uv).norm()});
+  }
+  return guessed;
+}
+
 Range ball_radii_px(const phantom::Calibrator& calibrator, double pixel_mm) {
   const auto [least, most] =
       std::ranges::minmax(calibrator.balls | std::views::transform(&phantom::CalibratorBall::diameter_mm));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "helicarm/core/json.h"
@@ -55,5 +56,19 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
                                             const Candidates& candidates,
                                             const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options);
+
+/// A fiducial of a labelling that was refused.
+struct GuessedLabel {
+  std::string label;
+  Eigen::Vector2d uv_raw, uv;  ///< raw and rectified pixels of the candidate
+  double residual_px;          ///< from the fiducial's projection, rectified
+};
+
+/// The labels that explain the image best although they are refused: to be shown, never to be used. Empty if
+/// no pose explains four candidates. Costs as much as `label_fiducials`.
+std::vector<GuessedLabel> guess_labels(const xray::XrayImage& xray_image,
+                                       const rectification::Rectification& rectification,
+                                       const Candidates& candidates, const phantom::Calibrator& calibrator,
+                                       const FiducialOptions& options);
 
 }  // namespace helicarm::fiducials

@@ -123,6 +123,16 @@ OrRefusal<CaseCalibration> calibrate_views(LabelledViews views, const Case& give
   return *std::move(calibration);
 }
 
+/// The best labels of the views that were not labelled, to be shown.
+void add_guesses(Refusal& refusal, const Case& given, const RunOptions& options) {
+  for (std::size_t i = 0; i < refusal.views.size(); ++i) {
+    ViewResult& view = refusal.views[i];
+    if (!view.found && view.candidates && view.rectification)
+      view.guessed = fiducials::guess_labels(*view.xray_image, *view.rectification, *view.candidates,
+                                             given.calibrator, {options.method, {}, given.views[i].mirrored});
+  }
+}
+
 }  // namespace
 
 OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& options) {
@@ -149,6 +159,7 @@ OrRefusal<CaseCalibration> calibrate_case(const Case& given, const RunOptions& o
       })
       .map_error([&](Refusal refusal) {
         refusal.failure = with_cause(refusal, given, options);
+        add_guesses(refusal, given, options);
         refusal.timing_ms = time;
         return refusal;
       });

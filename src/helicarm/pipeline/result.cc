@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "helicarm/fiducials/status_words.h"
+#include "helicarm/pipeline/advice.h"
 
 namespace helicarm::pipeline {
 namespace {
@@ -84,7 +85,6 @@ Json intrinsics_of(const ViewResult& view) {
           {"pixel_mm", optional_number(pixel_mm)}};
 }
 
-Json json_of(const ViewResult& view) {
 /// Candidates and best labels, of a view whose labelling was refused.
 void add_guess(Json& json, const ViewResult& view) {
   json["candidates"] = nullptr;
@@ -98,6 +98,7 @@ void add_guess(Json& json, const ViewResult& view) {
         {{"label", guess.label}, {"uv_raw", vector(guess.uv_raw)}, {"residual_px", guess.residual_px}});
 }
 
+Json json_of(const ViewResult& view) {
   Json json = {{"name", view.name}};
   json["image_size"] = view.xray_image
                            ? Json({view.xray_image->pixels.width(), view.xray_image->pixels.height()})
@@ -107,6 +108,7 @@ void add_guess(Json& json, const ViewResult& view) {
   if (view.found)
     for (const fiducials::Fiducial& fiducial : view.found->fiducials)
       json["fiducials"].push_back(json_of(fiducial));
+  add_guess(json, view);
   json["false_blobs"] = view.found ? Json(view.found->false_blobs.size()) : Json(nullptr);
   json["mirrored"] = view.found ? Json(view.found->mirrored) : Json(nullptr);
   json["labelling"] = view.found ? Json{{"margin", view.found->margin},
@@ -270,6 +272,9 @@ Json json_list_of(std::span<const Failure> failures) {
 Json to_json(const Result& result) {
   Json json = {{"format", "helicarm-result/1"}, {"status", result.failure ? "refused" : "ok"}};
   json["failure"] = result.failure ? to_json(*result.failure) : Json(nullptr);
+  const Advice advice = advice_for(result);
+  json["causes"] = advice.causes;
+  json["next"] = advice.next.empty() ? Json(nullptr) : Json(advice.next);
   json["warnings"] = json_list_of(result.warnings);
   json["notes"] = json_list_of(result.notes);
   json["calibrator"] = {

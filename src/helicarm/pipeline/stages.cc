@@ -107,16 +107,34 @@ std::optional<double> common_radius_bias(const std::vector<Expected<fiducials::L
 
 }  // namespace
 
-ViewResult reported(const NamedView& view) { return {view.name, {}, {}, {}, {}}; }
+ViewResult reported(const NamedView& view) {
+  ViewResult result;
+  result.name = view.name;
+  return result;
+}
 
-ViewResult reported(const ReadView& view) { return {view.name, view.xray_image, {}, {}, {}}; }
+ViewResult reported(const ReadView& view) {
+  ViewResult result = reported(static_cast<const NamedView&>(view));
+  result.xray_image = view.xray_image;
+  return result;
+}
 
 ViewResult reported(const RectifiedView& view) {
-  return {view.name, view.xray_image, view.rectification, {}, {}};
+  ViewResult result = reported(static_cast<const ReadView&>(view));
+  result.rectification = view.rectification;
+  return result;
+}
+
+ViewResult reported(const DetectedView& view) {
+  ViewResult result = reported(static_cast<const RectifiedView&>(view));
+  result.candidates = view.candidates;
+  return result;
 }
 
 ViewResult reported(const LabelledView& view) {
-  return {view.name, view.xray_image, view.rectification, view.fiducials, {}};
+  ViewResult result = reported(static_cast<const DetectedView&>(view));
+  result.found = view.fiducials;
+  return result;
 }
 
 Expected<void> check_images_belong_together(const std::vector<ReadView>& views) {

@@ -34,6 +34,7 @@ struct LabelledView : DetectedView {
 ViewResult reported(const NamedView& view);
 ViewResult reported(const ReadView& view);
 ViewResult reported(const RectifiedView& view);
+ViewResult reported(const DetectedView& view);
 ViewResult reported(const LabelledView& view);
 
 /// Reason of a refusal, and the results of all stages before it.

@@ -78,6 +78,9 @@ void draw_dots(Drawing& drawing, const ViewMarks& marks) {
   for (const DotMark& dot : marks.plate_dots)
     drawing.circle("plate", dot.place, dot.radius_px / drawing.unit());
   for (const DotMark& blob : marks.false_blobs) drawing.cross("false", blob.place, 8);
+  for (const DotMark& candidate : marks.candidates) drawing.circle("candidate", candidate.place, 15);
+  for (const BallMark& guess : marks.guessed)
+    drawing.text("label guess", guess.place + drawing.unit() * Pixel(18, -10), guess.label);
 }
 
 void draw_balls(Drawing& drawing, const ViewMarks& marks, int height) {

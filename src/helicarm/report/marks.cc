@@ -19,7 +19,7 @@ std::vector<DotMark> rectified_dots(const rectification::DistortionMap& map,
   return marks;
 }
 
-std::vector<BallMark> balls_of(const pipeline::ViewResult& view) {
+std::vector<BallMark> balls_of(const pipeline::ViewResult& view, bool refused) {
   std::vector<BallMark> marks;
   for (const fiducials::Fiducial& fiducial : view.found->fiducials) {
     const bool used = fiducial.status == fiducials::FiducialStatus::used;
@@ -27,6 +27,8 @@ std::vector<BallMark> balls_of(const pipeline::ViewResult& view) {
     BallMark ball{fiducial.label, fiducial.uv, used, fiducial.sigma_px};
     if (view.calibrated)
       ball.residual = fiducial.uv - view.calibrated->view.project(fiducial.centre_in_calibrator);
+    else if (refused)
+      ball.residual = fiducial.uv - view.found->view.project(fiducial.centre_in_calibrator);
     marks.push_back(std::move(ball));
   }
   return marks;
@@ -78,7 +80,12 @@ ViewMarks marks_of(const pipeline::Result& result, std::size_t index) {
     marks.plate_dots = rectified_dots(view.rectification->map, view.rectification->plate_dots);
   if (view.rectification && view.found)
     marks.false_blobs = rectified_dots(view.rectification->map, view.found->false_blobs);
-  if (view.found) marks.balls = balls_of(view);
+  if (view.found) marks.balls = balls_of(view, result.failure.has_value());
+  if (view.rectification && view.candidates && !view.found) {
+    marks.candidates = rectified_dots(view.rectification->map, view.candidates->dots);
+    for (const fiducials::GuessedLabel& guess : view.guessed)
+      marks.guessed.push_back({guess.label + "?", guess.uv, false});
+  }
   marks.points = points_of(result, index);
   if (view.calibrated) add_lines(marks, result, index);
   return marks;
@@ -93,6 +100,8 @@ ViewMarks raw_marks(const ViewMarks& rectified, const rectification::DistortionM
   carry(raw.balls, map);
   carry(raw.plate_dots, map);
   carry(raw.false_blobs, map);
+  carry(raw.candidates, map);
+  carry(raw.guessed, map);
   carry(raw.points, map);
   raw.tunnels = carried(rectified.tunnels, map);
   raw.tool_lines = carried(rectified.tool_lines, map);

@@ -16,7 +16,8 @@ struct BallMark {
   Eigen::Vector2d place;
   bool used = true;  ///< else rejected
   double sigma_px = 0;
-  std::optional<Eigen::Vector2d> residual = {};  ///< observed minus projected; empty before the calibration
+  /// Observed minus projected; before the calibration by the labelling's pose, after a refusal only.
+  std::optional<Eigen::Vector2d> residual = {};
 };
 
 struct DotMark {
@@ -38,6 +39,8 @@ struct ViewMarks {
   std::vector<BallMark> balls;
   std::vector<DotMark> plate_dots;
   std::vector<DotMark> false_blobs;
+  std::vector<DotMark> candidates;  ///< of a view whose labelling was refused
+  std::vector<BallMark> guessed;    ///< its best labels
   std::vector<PointMark> points;
   std::vector<rectification::PixelPath> tunnels;     ///< from start to end
   std::vector<rectification::PixelPath> tool_lines;  ///< extended beyond the tool's two points

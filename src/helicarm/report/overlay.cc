@@ -55,6 +55,17 @@ class Canvas {
   double scale_;
 };
 
+/// Magnified, with the factor in the lower left corner.
+void draw_residuals(Canvas& canvas, const ViewMarks& marks, const pipeline::ViewResult& view) {
+  const double largest = largest_residual(marks), unit = view.xray_image->pixels.width() / 1024.0;
+  if (!(largest > 0)) return;
+  const double factor = round_below(60 * unit / largest);
+  for (const BallMark& ball : marks.balls)
+    if (ball.used && ball.residual) canvas.line(ball.place, ball.place + factor * *ball.residual, orange);
+  canvas.text(Eigen::Vector2d(0, view.xray_image->pixels.height() - 20 * unit),
+              fmt::format("residuals, magnified {:g} times, up to {:.2f} px", factor, largest), orange);
+}
+
 }  // namespace
 
 std::string overlay_png(const pipeline::Result& result, std::size_t index,
@@ -63,10 +74,13 @@ std::string overlay_png(const pipeline::Result& result, std::size_t index,
   const ViewMarks marks = marks_of(result, index);
   for (const DotMark& dot : marks.plate_dots) canvas.circle(dot.place, 9, blue);
   for (const DotMark& blob : marks.false_blobs) canvas.cross(blob.place, 8, red);
+  for (const DotMark& candidate : marks.candidates) canvas.circle(candidate.place, 15, orange);
+  for (const BallMark& guess : marks.guessed) canvas.text(guess.place, guess.label, orange);
   for (const BallMark& ball : marks.balls) {
     canvas.circle(ball.place, 15, ball.used ? green : red);
     canvas.text(ball.place, ball.label, ball.used ? green : red);
   }
+  if (result.failure) draw_residuals(canvas, marks, result.views[index]);
   for (const PointMark& point : marks.points) {
     canvas.cross(point.place, 7, violet);
     canvas.text(point.place, point.name, violet);

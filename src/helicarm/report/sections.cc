@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/pipeline/advice.h"
 #include "helicarm/report/figures.h"
 #include "helicarm/report/markup.h"
 
@@ -60,13 +61,23 @@ void statistics_row(HtmlTable& table, std::string_view what, const localization:
                std::to_string(s.n)});
 }
 
+/// Likely causes in order, and the next step.
+std::string advice_of(const pipeline::Result& result) {
+  const pipeline::Advice advice = pipeline::advice_for(result);
+  if (advice.causes.empty()) return {};
+  std::string html = "<p>Likely causes, in order:</p>\n<ol class=\"causes\">\n";
+  for (const std::string& cause : advice.causes) html += "<li>" + escaped(cause) + "</li>\n";
+  return html + "</ol>\n<p><b>Next:</b> " + escaped(advice.next) + ".</p>\n";
+}
+
 }  // namespace
 
 std::string summary_section(const pipeline::Result& result) {
   std::string html;
   if (result.failure)
     html +=
-        fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure));
+        fmt::format("<p><span class=\"state refused\">refused</span> {}</p>\n", message_of(*result.failure)) +
+        advice_of(result);
   else
     html += "<p><span class=\"state ok\">measured</span></p>\n";
   const localization::Accuracy& accuracy = result.accuracy;
@@ -101,7 +112,9 @@ std::string views_section(const pipeline::Result& result) {
   return headed("Rectified X-ray images",
                 "<div class=\"views\">\n" + html +
                     "</div>\n<p class=\"soft\">Green: used fiducials, with their residuals as orange arrows. "
-                    "Red crosses: outliers. Blue: plate. Violet: points. Yellow: planned tunnels. Red lines: "
+                    "Red crosses: outliers. Orange circles and labels with a question mark: "
+                    "candidates and best guess of a refused view. Blue: plate. Violet: points. Yellow: "
+                    "planned tunnels. Red lines: "
                     "tool.</p>\n");
 }
 

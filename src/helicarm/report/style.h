@@ -38,7 +38,7 @@ td { border-bottom: 1px solid var(--rule); }
 .error { display: inline-block; height: 0.7rem; background: var(--bar); border-left: 2px solid var(--accent); }
 svg { fill: none; font-family: system-ui, sans-serif; }
 svg text { fill: #fff; paint-order: stroke; stroke: #000c; stroke-width: 3px; stroke-linejoin: round; }
-svg .ball { stroke: #4ade80; } svg .lost { stroke: #f87171; stroke-dasharray: 4 3; } svg .plate { stroke: #93c5fd99; }
+svg .ball { stroke: #4ade80; } svg .candidate { stroke: #fb923c; } svg .guess { fill: #fb923c; } svg .lost { stroke: #f87171; stroke-dasharray: 4 3; } svg .plate { stroke: #93c5fd99; }
 svg .residual { stroke: #fb923c; stroke-width: 2; } svg .false { stroke: #f87171; } svg .point { stroke: #f0abfc; }
 svg .planned { stroke: #facc15; stroke-width: 2; } svg .tool { stroke: #ef4444; } svg .bar { stroke: #fff; stroke-width: 3; }
 .plain svg text { fill: var(--ink); stroke: none; } .plain svg .bar { stroke: var(--ink); }
