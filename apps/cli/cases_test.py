@@ -95,7 +95,6 @@ class OwnFiles(unittest.TestCase):
         self.assertIn("OBL", done.stderr)
         self.assertEqual((case / "case.json").read_bytes(), before)
 
-
     def test_bundle_is_the_same_each_time_and_holds_no_name(self):
         case = self.root / "doe"
         shutil.copytree(self.root / "case", case)
@@ -157,6 +156,7 @@ class OwnFiles(unittest.TestCase):
         self.assertIn("[2/2]", done.stderr)
         lines = (self.root / "dots.csv").read_text().splitlines()
         self.assertEqual(len(lines), 1 + sum(len(one["dots"]) for one in images))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -67,7 +67,10 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     console.json =
         std::any_of(argv, argv + argc, [](const char* word) { return std::string_view(word) == "--json"; });
-    return report({Reason::usage, error.what(), {}, {}}, console);
+    std::string message = error.what();
+    const auto commands = app.get_subcommands();
+    if (!commands.empty()) message += fmt::format(" (see helicarm {} --help)", commands.front()->get_name());
+    return report({Reason::usage, std::move(message), {}, {}}, console);
   }
   std::ostream nowhere(nullptr);
   Console heard{console.quiet && !console.json ? nowhere : console.out,

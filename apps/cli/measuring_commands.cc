@@ -81,6 +81,7 @@ void add_export(CLI::App& app, Action& action) {
       ->add_option("--as", a.as,
                    fmt::format("One or more of {}, separated by commas (default: all)",
                                fmt::join(report::export_words, ", ")))
+      ->type_name("WORD")
       ->delimiter(',');
   add_fields(command, a.run.options, pipeline::run_fields);
   command->add_option("--machine", a.run.history, "The C-arm's history (JSON), read only");
@@ -117,7 +118,9 @@ void add_solve(CLI::App& app, Action& action) {
                   "helicarm solve --points points.csv --method ml --json");
   auto& a = arguments_of(command, action, solve_command);
   command->add_option("--points", a.points, "CSV: label,x_mm,y_mm,z_mm,u_px,v_px[,sigma_px]")->required();
-  command->add_option("--method", a.method, "dlt, homogeneous or ml")->capture_default_str();
+  command->add_option("--method", a.method, "dlt, homogeneous or ml")
+      ->type_name("WORD")
+      ->capture_default_str();
 }
 
 void add_locate(CLI::App& app, Action& action) {
@@ -161,6 +164,7 @@ void add_rectify(CLI::App& app, Action& action) {
                    "map.json and residuals.csv")
       ->capture_default_str();
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
+      ->type_name("WORD")
       ->capture_default_str();
 }
 
@@ -172,7 +176,8 @@ void add_detect(CLI::App& app, Action& action) {
   command->add_option("IMAGE", a.images, "DICOM, PNG or TIFF; several, and folders of images")->required();
   command->add_option("--frame", a.frame, "Number of the image in a multi-frame file, from 1")
       ->check(within(1, 100000));
-  command->add_option("--kind", a.kind, "balls, holes or crosses")->capture_default_str();
+  command->add_option("--kind", a.kind, "balls, holes or crosses")->type_name("WORD")->capture_default_str();
+  command->add_option("--out", a.out, "CSV: image,u_px,v_px,sigma_px,radius_px of all images");
 }
 
 void add_import(CLI::App& app, Action& action) {
@@ -181,7 +186,9 @@ void add_import(CLI::App& app, Action& action) {
                   "helicarm import camera.txt --unit cm --json");
   auto& a = arguments_of(command, action, import_command);
   command->add_option("FILE", a.file, "MayaCam 2, NRRD header, or a 3x4 matrix as text or JSON")->required();
-  command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")->capture_default_str();
+  command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")
+      ->type_name("WORD")
+      ->capture_default_str();
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ void add_simulate(CLI::App& app, Action& action) {
                    "tunnels: balls at the tunnels' ends, tracker and tool\n"
                    "flat: as accuracy, on a flat panel\n"
                    "grid: the test grid of wires (3.1), for rectify --test-grid")
+      ->type_name("WORD")
       ->capture_default_str();
   command
       ->add_option("--distance", a.distances_mm,
@@ -38,13 +39,15 @@ void add_simulate(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(20, 500));
-  command->add_option(
-      "--preset", a.preset,
-      "The C-arm; pixel sizes are those of images with 1024 px per side\n"
-      "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
-      "no distortion, no plate\n"
-      "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
-      "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)");
+  command
+      ->add_option(
+          "--preset", a.preset,
+          "The C-arm; pixel sizes are those of images with 1024 px per side\n"
+          "paper-sim: the paper's simulation (2.3.3): f 900 mm, 0.15 mm pixels, AP and lateral at 800 mm, "
+          "no distortion, no plate\n"
+          "ii-9in: 9 inch intensifier, 997 mm, 0.2295 mm: plate, distortion, sag (default)\n"
+          "flat-panel: 1020 mm, 0.29 mm: sag, no distortion (default of kind flat)")
+      ->type_name("WORD");
   command->add_option("--size", a.size, "Pixels per side: 512 or 1024")->capture_default_str();
   command->add_option("--bits", a.bits, "Stored bits: 8, 10, 12, 14 or 16")->capture_default_str();
   command->add_flag_callback(
@@ -80,9 +83,11 @@ void add_simulate(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(-360, 360));
-  command->add_option(
-      "--fault", a.faults,
-      "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable");
+  command
+      ->add_option(
+          "--fault", a.faults,
+          "decoys, wires, screws, low_dose, shutters, mirrored, saturated, or lost:LABEL; repeatable")
+      ->type_name("WORD");
 }
 
 void add_drr(CLI::App& app, Action& action) {
@@ -119,6 +124,7 @@ void add_drr(CLI::App& app, Action& action) {
       ->add_option("--values", a.values,
                    "hu: attenuation by Hounsfield units, water 0.02059 / mm, 0 below -800\n"
                    "raw: integrate the voxels' values unchanged")
+      ->type_name("WORD")
       ->capture_default_str();
 }
 
@@ -140,6 +146,7 @@ void add_study(CLI::App& app, Action& action) {
                    "design: ball positions of least TRE under the rules\n"
                    "limit: error over the Cramer-Rao bound, and coverage of the confidence regions\n"
                    "centres: errors of ball centres under wrong assumptions about the image")
+      ->type_name("WORD")
       ->required();
   command
       ->add_option("--groups", a.groups,
@@ -165,10 +172,13 @@ void add_study(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--fle", a.fle, "Value instead of 2.34")->check(within(0, 1000));
-  command->add_option("--origin", a.origin,
-                      "Origin of the world frame on the cone's axis: base (as published) or centre");
+  command
+      ->add_option("--origin", a.origin,
+                   "Origin of the world frame on the cone's axis: base (as published) or centre")
+      ->type_name("WORD");
   command->add_option("--draws", a.draws, "uniformity: noise draws to average over")->check(within(1, 1e5));
-  command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome");
+  command->add_option("--surface", a.surface, "design: balls on the helix, the cone or a dome")
+      ->type_name("WORD");
   command->add_option("--calibrator", a.calibrator,
                       "location: name of a built-in or a file (default: random balls)");
 }
@@ -178,6 +188,7 @@ void add_phantom(CLI::App& app, Action& action) {
       app, "phantom", "Show, check, export, measure or verify the calibrator",
       "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
       "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg\n"
+      "  helicarm phantom export my-balls.json --body rings --clearance -0.1 --step 0.5 --stl body.stl\n"
       "  helicarm phantom measure eight-views --distance P1,P7=118.42 --distance-is outer --out my-phantom\n"
       "  helicarm phantom measure eight-views --from-scratch --distance \"212,480;803,466=83.4\" --out "
       "my-phantom\n"
@@ -188,7 +199,6 @@ void add_phantom(CLI::App& app, Action& action) {
           "ACTION", a.action,
           "show, check, export: a calibrator or plate\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
-      "  helicarm phantom export my-balls.json --body rings --clearance -0.1 --step 0.5 --stl body.stl\n"
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
       ->transform(CLI::CheckedTransformer(
@@ -244,6 +254,7 @@ void add_phantom(CLI::App& app, Action& action) {
   command
       ->add_option("--distance-is", a.distance_is,
                    "measure: centres (centre to centre) or outer (outside dimension across both balls)")
+      ->type_name("WORD")
       ->capture_default_str();
   command->add_option("--history", a.history, "verify: JSON file to which this verification is added");
 }

@@ -157,10 +157,10 @@ std::string_view code(Reason reason) {
       return "wrong_model";
     case Reason::out_of_capture:
       return "out_of_capture";
-  }
-  return "internal";
     case Reason::covariance_missing:
       return "covariance_missing";
+  }
+  return "internal";
 }
 
 int exit_code(Reason reason) { return reason <= Reason::port_taken ? 2 : 3; }

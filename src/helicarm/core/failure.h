@@ -90,13 +90,13 @@ enum class Reason {
   ball_displaced,
   scale_unverified,
   scale_weak,
+  covariance_missing,
   // Refused registrations of a model to the views.
   registration_ambiguous,
   registration_disagrees,
   wrong_model,
   out_of_capture,
 };
-  covariance_missing,
 
 /// Machine-readable code of a reason, e.g. "too_few_fiducials".
 std::string_view code(Reason reason);

@@ -156,7 +156,12 @@ double JsonReader::checked(const Json& value, const char* key, Range range) cons
   return number;
 }
 
-double JsonReader::number(const char* key, Range range) { return checked(required(key), key, range); }
+double JsonReader::number(const char* key, Range range) {
+  if (!has(key))
+    refuse(Reason::bad_value, key,
+           fmt::format("is missing: write a number from {} to {}", range.low, range.high));
+  return checked(required(key), key, range);
+}
 
 std::optional<double> JsonReader::optional_number(const char* key, Range range) {
   const Json& value = raw(key);
@@ -165,6 +170,8 @@ std::optional<double> JsonReader::optional_number(const char* key, Range range) 
 }
 
 int JsonReader::integer(const char* key, int low, int high) {
+  if (!has(key))
+    refuse(Reason::bad_value, key, fmt::format("is missing: write a whole number from {} to {}", low, high));
   const double value = checked(required(key), key, {double(low), double(high)});
   if (value != std::floor(value))
     refuse(Reason::bad_value, key, fmt::format("{} is not a whole number", value));
@@ -172,6 +179,7 @@ int JsonReader::integer(const char* key, int low, int high) {
 }
 
 std::string JsonReader::text(const char* key, std::size_t max_length) {
+  if (!has(key)) refuse(Reason::bad_value, key, fmt::format("is missing: write \"{}\": \"...\"", key));
   const Json& value = required(key);
   if (!value.is_string()) refuse(Reason::bad_value, key, fmt::format("{} is not a text", shorten(value)));
   auto text = value.get<std::string>();
@@ -199,6 +207,7 @@ bool JsonReader::boolean(const char* key, bool fallback) {
 }
 
 std::vector<double> JsonReader::numbers(const char* key, std::size_t count, Range range) {
+  if (!has(key)) refuse(Reason::bad_value, key, fmt::format("is missing: write a list of {} numbers", count));
   const Json& value = required(key);
   if (!value.is_array() || value.size() != count)
     refuse(Reason::bad_value, key, fmt::format("must be {} numbers, is {}", count, shorten(value)));
@@ -208,6 +217,8 @@ std::vector<double> JsonReader::numbers(const char* key, std::size_t count, Rang
 }
 
 std::vector<double> JsonReader::matrix(const char* key, std::size_t rows, std::size_t columns, Range range) {
+  if (!has(key))
+    refuse(Reason::bad_value, key, fmt::format("is missing: write {} rows of {} numbers", rows, columns));
   const Json& value = required(key);
   std::vector<double> numbers;
   if (value.is_array() && value.size() == rows)
@@ -219,10 +230,15 @@ std::vector<double> JsonReader::matrix(const char* key, std::size_t rows, std::s
   return numbers;
 }
 
-JsonReader JsonReader::object(const char* key) { return {required(key), fmt::format("{}: {}", where_, key)}; }
+JsonReader JsonReader::object(const char* key) {
+  if (!has(key)) refuse(Reason::bad_value, key, fmt::format("is missing: write \"{}\": {{...}}", key));
+  return {required(key), fmt::format("{}: {}", where_, key)};
+}
 
 std::vector<JsonReader> JsonReader::objects(const char* key, bool required_here, std::size_t max_count) {
-  const Json& value = required_here ? required(key) : raw(key);
+  if (required_here && !has(key))
+    refuse(Reason::bad_value, key, fmt::format("is missing: write \"{}\": [{{...}}, ...]", key));
+  const Json& value = raw(key);
   std::vector<JsonReader> readers;
   if (value.is_null()) return readers;
   if (!value.is_array()) refuse(Reason::bad_value, key, "must be a list");
@@ -234,6 +250,9 @@ std::vector<JsonReader> JsonReader::objects(const char* key, bool required_here,
 }
 
 std::size_t JsonReader::choice(const char* key, std::initializer_list<std::string_view> names) {
+  if (!has(key))
+    refuse(Reason::bad_value, key,
+           fmt::format("is missing: write \"{}\": \"{}\"", key, fmt::join(names, "\" or \"")));
   const std::string value = text(key);
   const auto found = std::find(names.begin(), names.end(), value);
   if (found == names.end())

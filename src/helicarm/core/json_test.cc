@@ -73,6 +73,34 @@ TEST(JsonReader, ValueOutsideItsRangeNamesFieldValueAndLimit) {
   EXPECT_EQ(failure.message, "x.json: \"size\": 400 is outside 0.5 to 30");
 }
 
+TEST(JsonReader, MissingKeySaysWhatToWrite) {
+  const Json empty = Json::object();
+  const auto message = [&](auto read) {
+    return guarded([&] {
+             JsonReader reader(empty, "a.json");
+             read(reader);
+           })
+        .error()
+        .message;
+  };
+  EXPECT_EQ(message([](JsonReader& r) { r.text("plate"); }),
+            "a.json: \"plate\": is missing: write \"plate\": \"...\"");
+  EXPECT_EQ(message([](JsonReader& r) {
+              r.number("pitch_mm", {1, 100});
+            }),
+            "a.json: \"pitch_mm\": is missing: write a number from 1 to 100");
+  EXPECT_EQ(message([](JsonReader& r) {
+              r.numbers("xyz_mm", 3, {0, 1});
+            }),
+            "a.json: \"xyz_mm\": is missing: write a list of 3 numbers");
+  EXPECT_EQ(message([](JsonReader& r) {
+              r.choice("kind", {"balls", "holes"});
+            }),
+            "a.json: \"kind\": is missing: write \"kind\": \"balls\" or \"holes\"");
+  EXPECT_EQ(message([](JsonReader& r) { r.objects("views", true); }),
+            "a.json: \"views\": is missing: write \"views\": [{...}, ...]");
+}
+
 TEST(JsonReader, UnreadKeyIsUnknown) {
   const Failure failure = failure_of(R"({"size": 4, "sise": 5})", [](JsonReader& r) {
     r.number("size", {0, 9});

@@ -60,8 +60,7 @@ BadInput not_an_image(std::string_view bytes, const std::string& origin) {
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
   const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
   const std::string origin = path.filename().string();
-  if (is_dicom(bytes))
-    return value_or_throw(read_dicom(bytes, origin, frame));
+  if (is_dicom(bytes)) return value_or_throw(read_dicom(bytes, origin, frame));
   if (image::is_png(bytes)) {
     value_or_throw(choose_frame(origin, 1, frame));
     return xray_image_of_png(value_or_throw(image::decode_png(bytes, origin)), path);
