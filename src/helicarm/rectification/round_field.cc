@@ -16,7 +16,7 @@ constexpr double corner_share = 0.04;  // of a side: the square that must be dar
 constexpr double dark_share = 0.1;     // of the grey value in the middle
 constexpr double largest_miss =
     0.05;  // of a boundary point, relative to the radius; real fields deviate by 0.04
-constexpr double largest_rms = 0.025;   // a square differs from its ellipse by 0.08
+constexpr double largest_rms = 0.025;  // a square differs from its ellipse by 0.08
 constexpr double least_kept = 0.5;     // of the boundary: collimator leaves and annotations take the rest
 constexpr std::size_t least_points = 40;
 
