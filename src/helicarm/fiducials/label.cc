@@ -284,7 +284,7 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
                                 const LabellingOptions& options) {
   constexpr int least_shown = 4;
   const int n = static_cast<int>(candidates.size());
-  if (n < least_balls) return {{}, too_few(n, n).value()};
+  if (n < least_shown) return {{}, too_few(n, n).value()};
   const Scene scene = scene_of(calibrator, candidates, prior, options);
   LabelSearch search(scene, focals_to_try(prior));
   // By then, a labelling with one fiducial less would have been found, too.
@@ -295,7 +295,7 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
       });
   if (!search.ranking().empty()) search_rivals(search);
   LabellingAttempt attempt;
-  attempt.failure = refusal_of(search, options);
+  attempt.failure = n < least_balls ? too_few(n, n).value() : refusal_of(search, options);
   auto best =
       attempt.failure ? Expected<Hypothesis>(tl::unexpect, *attempt.failure) : unambiguous(search, options);
   if (!best) {
@@ -311,6 +311,7 @@ LabellingAttempt attempt_labels(const phantom::Calibrator& calibrator,
 Expected<Labelling> label_balls(const phantom::Calibrator& calibrator,
                                 const std::vector<BallCandidate>& candidates, const LabellingPrior& prior,
                                 const LabellingOptions& options) {
+  if (const int n = static_cast<int>(candidates.size()); n < least_balls) return too_few(n, n);
   LabellingAttempt attempt = attempt_labels(calibrator, candidates, prior, options);
   if (attempt.failure) return tl::unexpected<Failure>(*std::move(attempt.failure));
   return *std::move(attempt.best);

@@ -26,6 +26,10 @@ std::string guessed_share(const Result& result) {
 }
 
 Advice of_plate(const Result& result) {
+  if (has_figure(*result.failure, "residual_rms_px"))  // of a plate in the image, after rectification
+    return {{"the case names no plate although the image shows one",
+             "the map or the image of the plate is of another C-arm position"},
+            "name the plate as \"plate\" in case.json, or make the map again in this position"};
   const bool mismatch = result.failure->reason == Reason::plate_mismatch;
   Advice advice{
       {"the case names another plate than the one in the image (pitch, lattice, balls or holes)",

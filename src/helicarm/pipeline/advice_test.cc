@@ -46,6 +46,11 @@ TEST(Advice, WrongTagsComeFirstWhereOthersFit) {
                 HasSubstr("pixel size"));
 }
 
+TEST(Advice, PlateThatTheMapDoesNotStraightenIsMissingInTheCase) {
+  EXPECT_THAT(advice_for(refused(Reason::plate_mismatch, {{"residual_rms_px", 2}})).causes.front(),
+              HasSubstr("names no plate"));
+}
+
 TEST(Advice, MismatchStatesHowManyBallsTheGuessExplains) {
   Result result = refused(Reason::calibrator_mismatch);
   result.calibrator.balls.resize(12);

@@ -45,10 +45,10 @@ struct ViewResult {
   std::string name;
   std::shared_ptr<const xray::XrayImage> xray_image;
   std::optional<rectification::Rectification> rectification;
+  std::optional<fiducials::LabelledFiducials> found;  ///< with residuals and rejections after calibration
+  std::optional<calibration::CalibratedView> calibrated;
   std::optional<fiducials::Candidates> candidates = {};  ///< raw px
   std::vector<fiducials::GuessedLabel> guessed = {};     ///< the best labelling where it was refused
-  std::optional<fiducials::LabelledFiducials> found;     ///< with residuals and rejections after calibration
-  std::optional<calibration::CalibratedView> calibrated;
 };
 
 /// One pick or check target: observations and position, or the reason why it was not located.

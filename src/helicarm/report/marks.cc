@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include <fmt/format.h>
+
 #include "helicarm/verification/image_line.h"
 
 namespace helicarm::report {
@@ -84,7 +86,8 @@ ViewMarks marks_of(const pipeline::Result& result, std::size_t index) {
   if (view.rectification && view.candidates && !view.found) {
     marks.candidates = rectified_dots(view.rectification->map, view.candidates->dots);
     for (const fiducials::GuessedLabel& guess : view.guessed)
-      marks.guessed.push_back({guess.label + "?", guess.uv, false});
+      marks.guessed.push_back(
+          {fmt::format("{}? {:.1f} px", guess.label, guess.residual_px), guess.uv, false});
   }
   marks.points = points_of(result, index);
   if (view.calibrated) add_lines(marks, result, index);
