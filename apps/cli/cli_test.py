@@ -43,6 +43,44 @@ class CommandLine(unittest.TestCase):
         self.assertIn("<svg", (self.root / "tre/tre.svg").read_text())
         self.assertEqual(run("predict", self.root / "case", "--at", "1,2").returncode, 2)
 
+    def test_landmarks_alone_register_a_model(self):
+        folder = self.root / "landmarks"
+        shutil.copytree(self.root / "case", folder)
+        truth = json.loads((folder / "truth.json").read_text())
+        case = json.loads((folder / "case.json").read_text())
+        rows = ["name,x_mm,y_mm,z_mm"]
+        case["picks"] = []
+        for name, (x, y, z) in truth["targets_in_calibrator"].items():
+            rows.append(f"p{name},{x - 100},{y},{z}")
+            for view in truth["views"]:
+                raw = next(target["raw"] for target in view["targets"] if target["name"] == name)
+                case["picks"].append({"name": f"p{name}", "view": view["name"], "uv": raw})
+        (folder / "points.csv").write_text("\n".join(rows) + "\n")
+        case["models"] = [{"name": "body", "start": {"landmarks": "points.csv"}}]
+        (folder / "case.json").write_text(json.dumps(case))
+        done = run("register", folder, "--out", self.root / "registered", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        model = json.loads(done.stdout)["models"][0]
+        self.assertEqual(model["decision"], "accept")
+        for row, expected in zip(model["world_from_model"], ((1, 0, 0, 100), (0, 1, 0, 0), (0, 0, 1, 0))):
+            for value, wanted in zip(row, expected):
+                self.assertAlmostEqual(value, wanted, delta=0.7 if abs(wanted) > 1 or wanted == 0 else 0.02)
+        self.assertLess(model["landmarks"]["fre_mm"], 1)
+        self.assertTrue((self.root / "registered/report.html").exists())
+
+    def test_register_names_what_is_wrong_with_a_model(self):
+        folder = self.root / "no-model"
+        shutil.copytree(self.root / "case", folder)
+        case = json.loads((folder / "case.json").read_text())
+        for models, code in (([], "bad_value"), ([{"name": "femur"}], "bad_value"),
+                             ([{"name": "femur", "surface": "none.stl"}], "bad_value"),
+                             ([{"name": "femur", "surface": "../femur.stl"}], "path_outside"),
+                             ([{"name": "femur", "surfaces": "x.stl"}], "bad_value")):
+            (folder / "case.json").write_text(json.dumps(dict(case, models=models)))
+            done = run("register", folder, "--out", self.root / "none")
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertFalse((self.root / "none/registration.json").exists())
+
     def test_simulated_test_grid_is_rectified_and_measured(self):
         folder = self.root / "grid"
         done = run("simulate", folder, "--kind", "grid", "--size", 512, "--seed", 2)

@@ -132,9 +132,9 @@ ImportedMatrix parse_nrrd(const std::string& text, const std::string& origin) {
 
 /// "K", "R", "t" as `helicarm import --json` prints them.
 ImportedMatrix camera_from(JsonReader& reader, const std::string& origin) {
-  using Square = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const auto square = [&](const char* key) -> Eigen::Matrix3d {
-    return Eigen::Map<const Square>(reader.matrix(key, 3, 3, {-largest_number, largest_number}).data());
+    return Eigen::Map<const RowMajor3>(reader.matrix(key, 3, 3, {-largest_number, largest_number}).data());
   };
   const Eigen::Matrix3d k = square("K");
   Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();

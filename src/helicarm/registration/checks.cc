@@ -19,12 +19,14 @@ using Eigen::Vector3d;
 constexpr double strain_prior = 0.05;
 constexpr double least_patch_score = 0.4;
 constexpr double least_contour_score = 0.6;
-constexpr double least_mirrored_ratio = 1.1;
+constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
 constexpr double most_strain = 0.012;
-constexpr double strain_sigmas = 3;
+constexpr double strain_sigmas = 2.5;
 constexpr double most_disagreement_mm = 0.5;
 constexpr double disagreement_sigmas = 3;
+constexpr double most_disagreement_ratio =
+    4;  // chi-square per degree of freedom; by chance once in 2000 registrations
 constexpr double usual_error_mm = 2;
 
 }  // namespace
@@ -152,6 +154,15 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                "{:.2f} mm): the body moved between the acquisitions, or a calibration is wrong",
                model.name, result.disagreement->distance_mm, result.disagreement->sigma_mm),
            {{"distance_mm", result.disagreement->distance_mm}, {"sigma_mm", result.disagreement->sigma_mm}});
+  if (result.disagreement && result.disagreement->ratio() > most_disagreement_ratio)
+    warn(
+        Reason::registration_disagrees,
+        fmt::format(
+            "{}: the views' own solutions differ by more than their errors (chi-square {:.0f} for {} degrees "
+            "of freedom): the body may have moved between the acquisitions, also along a view's rays, or the "
+            "cameras are less exact than stated; the covariance is inflated by {:.1f}",
+            model.name, result.disagreement->chi2, result.disagreement->dof, result.disagreement->ratio()),
+        {{"chi2", result.disagreement->chi2}, {"dof", double(result.disagreement->dof)}});
   const double worst = worst_error_mm(model, result);
   if (worst > options.max_error_mm.value_or(usual_error_mm)) {
     const std::string message =

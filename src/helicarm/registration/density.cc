@@ -120,6 +120,62 @@ float PosedDensity::integrate(const Vector3d& direction) const {
   return sum * static_cast<float>(path.mm_per_plane);
 }
 
+void PosedDensity::integrate_eight(const std::array<Vector3d, 8>& directions,
+                                   std::array<float, 8>& values) const {
+  constexpr std::size_t lanes = 8;
+  std::array<Path, lanes> paths;
+  alignas(32) float p0[lanes], q0[lanes], per_p[lanes], per_q[lanes], low[lanes], high[lanes],
+      sum[lanes] = {};
+  int k = -1, first = 1 << 30, last = -1;
+  bool together = true;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const bool crosses = clip(directions[i], paths[i]);
+    low[i] = crosses ? float(paths[i].first) : 1e9F;
+    high[i] = crosses ? float(paths[i].last) : -1e9F;
+    if (!crosses) continue;
+    together = together && (k < 0 || k == paths[i].k);
+    k = paths[i].k;
+    first = std::min(first, paths[i].first);
+    last = std::max(last, paths[i].last);
+  }
+  if (!together) {
+    for (std::size_t i = 0; i < lanes; ++i) values[i] = integrate(directions[i]);
+    return;
+  }
+  values.fill(0);
+  if (k < 0) return;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const bool crosses = low[i] <= high[i];
+    per_p[i] = crosses ? float(paths[i].per_p) : 0;
+    per_q[i] = crosses ? float(paths[i].per_q) : 0;
+    p0[i] = crosses ? float(paths[i].at_p + paths[i].per_p * first) : 0;
+    q0[i] = crosses ? float(paths[i].at_q + paths[i].per_q * first) : 0;
+  }
+  const int strides[3] = {1, density_->size.x(), density_->size.x() * density_->size.y()};
+  const int p_axis = k == 0 ? 1 : 0, q_axis = 3 - k - p_axis;
+  const int step_p = strides[p_axis], step_q = strides[q_axis];
+  const int last_p = density_->size[p_axis] - 2, last_q = density_->size[q_axis] - 2;
+  for (int plane = first; plane <= last; ++plane) {
+    const float* slab = density_->values.data() + std::ptrdiff_t{plane} * strides[k];
+    const auto along = float(plane - first), at = float(plane);
+#pragma GCC ivdep
+    for (std::size_t i = 0; i < lanes; ++i) {
+      const float p = p0[i] + per_p[i] * along, q = q0[i] + per_q[i] * along;
+      const int whole_p = std::min(std::max(int(p), 0), last_p),
+                whole_q = std::min(std::max(int(q), 0), last_q);
+      const int index = whole_p * step_p + whole_q * step_q;
+      const float u = p - float(whole_p), v = q - float(whole_q);
+      const float v00 = slab[index], v10 = slab[index + step_p];
+      const float v01 = slab[index + step_q], v11 = slab[index + step_p + step_q];
+      const float near = v00 + u * (v10 - v00);
+      const float value = near + v * (v01 + u * (v11 - v01) - near);
+      sum[i] += at >= low[i] && at <= high[i] ? value : 0.0F;
+    }
+  }
+  for (std::size_t i = 0; i < lanes; ++i)
+    if (low[i] <= high[i]) values[i] = sum[i] * float(paths[i].mm_per_plane);
+}
+
 RayIntegral PosedDensity::differentiate(const Vector3d& direction) const {
   RayIntegral integral;
   Path path;

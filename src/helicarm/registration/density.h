@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <Eigen/Core>
@@ -42,6 +43,8 @@ class PosedDensity {
   /// Sum over the grid planes across the ray's main axis, bilinear within a plane (Joseph 1982). `direction`
   /// is a unit vector (world). The source must lie outside the grid.
   float integrate(const Eigen::Vector3d& direction) const;
+  /// The same for eight neighbouring rays, together.
+  void integrate_eight(const std::array<Eigen::Vector3d, 8>& directions, std::array<float, 8>& values) const;
   RayIntegral differentiate(const Eigen::Vector3d& direction) const;
 
  private:

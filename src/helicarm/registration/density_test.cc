@@ -67,6 +67,20 @@ TEST_P(RayDerivatives, AgreeWithFiniteDifferences) {
   }
 }
 
+TEST(EightRays, EqualSingleOnes) {
+  const Density density = smooth_body();
+  const geometry::RigidTransform pose{geometry::rotation_from_vector(Vector3d(0.3, 0.1, -0.2)), {2, -1, 3}};
+  for (const Vector3d& source : {Vector3d(300, 20, 10), Vector3d(250, 250, 1), Vector3d(5, -280, 30)}) {
+    const PosedDensity posed(density, pose, source, Vector3d::Zero());
+    std::array<Vector3d, 8> directions;
+    for (int i = 0; i < 8; ++i)
+      directions[std::size_t(i)] = (Vector3d(i - 3, 4 * i - 14, 2.5 * i - 9) - source).normalized();
+    std::array<float, 8> values;
+    posed.integrate_eight(directions, values);
+    for (std::size_t i = 0; i < 8; ++i) EXPECT_NEAR(values[i], posed.integrate(directions[i]), 2e-4) << i;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(AlongEachAxis, RayDerivatives,
                          testing::Values(Vector3d(1, 0.2, 0.1), Vector3d(0.1, -1, 0.2), Vector3d(0.2, 0.1, 1),
                                          Vector3d(-1, 0.9, 0.1)));

@@ -107,7 +107,7 @@ Estimate refine(const Scene& scene, const Level& level, const geometry::RigidTra
   Estimate best{start, scene.observe(level, start, true, options.threads), 0};
   best.score = score_of(best.observation, options.views);
   double damping = 1e-3;
-  constexpr double converged_mm = 1e-3;
+  const double converged_mm = options.converged * level.spacing_mm;
   constexpr double tolerance = 1e-6;  // of the score: patches enter and leave
   for (int i = 0; i < options.iterations; ++i) {
     RigidEquations equations = equations_of(best.observation, options.views);

@@ -70,6 +70,7 @@ struct Estimate {
 
 struct RefineOptions {
   int iterations = 12;
+  double converged = 0.002;                         ///< step, as a share of the level's spacing
   std::vector<bool> views = {};                     ///< that take part; empty: all
   RigidCovariance prior = RigidCovariance::Zero();  ///< information about the start
   unsigned threads = 1;

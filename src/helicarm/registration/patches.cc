@@ -2,6 +2,7 @@
 #include "helicarm/registration/patches.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -85,9 +86,17 @@ class Comparer {
       for (int i = 0; i < side; ++i)
         patch.shown =
             patch.shown && raster_.attenuation.contains(u + i, v + j) && raster_.valid(u + i, v + j);
+    if (is_empty(u, v)) return patch;
     Eigen::VectorXf pixels(side * side);
+    std::array<Vector3d, 8> directions;
+    std::array<float, 8> values;
     for (int j = 0; j < side; ++j)
-      for (int i = 0; i < side; ++i) pixels[j * side + i] = posed_.integrate(direction(u + i, v + j));
+      for (int i = 0; i < side; i += 8) {
+        for (int k = 0; k < 8; ++k)
+          directions[std::size_t(k)] = direction(u + std::min(i + k, side - 1), v + j);
+        posed_.integrate_eight(directions, values);
+        for (int k = 0; k < std::min(8, side - i); ++k) pixels[j * side + i + k] = values[std::size_t(k)];
+      }
     patch.drr = differences(pixels, side);
     patch.contrast = patch.drr.norm();
     return patch;
@@ -133,6 +142,15 @@ class Comparer {
   }
 
  private:
+  /// Whether nine rays spread over the patch miss the model.
+  bool is_empty(int u, int v) const {
+    const int last = options_.side - 1;
+    for (const int j : {0, last / 2, last})
+      for (const int i : {0, last / 2, last})
+        if (posed_.integrate(direction(u + i, v + j)) != 0) return false;
+    return true;
+  }
+
   Vector3d direction(int u, int v) const {
     const Vector2d pixel = raster_.pixel_at(Vector2d(u, v));
     return (world_from_pixel_ * pixel.homogeneous()).normalized();

@@ -81,9 +81,10 @@ Model mirrored(const Model& model) {
   return mirror;
 }
 
-/// The best score of the mirrored model near a pose: its mirror plane may lie across any principal axis.
-double mirrored_score(const Scene& scene, const RigidTransform& pose, const std::vector<SearchStage>& stages,
-                      const SearchOptions& options) {
+/// Cost of the mirrored model near a pose over the model's own: its mirror plane may lie across any principal
+/// axis.
+double mirrored_cost_ratio(const Scene& scene, const RigidTransform& pose, double own_score,
+                           const std::vector<SearchStage>& stages, const SearchOptions& options) {
   const Model mirror = mirrored(scene.model());
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Vector3d& point : scene.model().samples)
@@ -104,9 +105,9 @@ double mirrored_score(const Scene& scene, const RigidTransform& pose, const std:
   std::vector<SearchStage> fewer = stages;
   for (SearchStage& stage : fewer) stage.keep = std::min(stage.keep, 6);
   fewer.back().keep = 1;
-  SearchOptions less = options;
-  less.candidates = std::min(options.candidates, 300);
-  return search(other, fewer, starts, less, same_mm).solutions.front().score;
+  const SearchOptions less{options.shift_mm / 3, options.turn_deg / 2, 150};
+  const double score = search(other, fewer, starts, less, same_mm).solutions.front().score;
+  return (1 - score) / std::max(1e-6, 1 - own_score);
 }
 
 /// Errors of a solution from the views that take part: residuals, cameras, edges of the model.
@@ -145,8 +146,9 @@ void compare_views(const ErrorModel& errors, const Level& level, const Estimate&
   for (std::size_t i = 0; i < n; ++i) {
     Part part{std::vector<bool>(n, false), prior_information(joint.observation, errors, alone_prior_mm)};
     part.views[i] = true;
-    const Estimate alone = refine(scene, level, joint.pose,
-                                  {.views = part.views, .prior = part.prior, .threads = scene.threads()});
+    const Estimate alone =
+        refine(scene, level, joint.pose,
+               {.converged = 0.02, .views = part.views, .prior = part.prior, .threads = scene.threads()});
     RigidCovariance prior_covariance = RigidCovariance::Zero();
     prior_covariance.topLeftCorner<3, 3>().diagonal().setConstant(
         std::pow(alone_prior_mm / scene.model().radius_mm, 2));
@@ -219,9 +221,9 @@ Registration register_model(const Model& model, const std::vector<RegistrationVi
   result.deformation =
       deformation_of(best.observation, errors.correlation_px, errors.edge_mm / model.radius_mm);
   compare_views(errors, stages.back().level, best, result);
+  if (result.disagreement) result.covariance *= result.disagreement->ratio();
   step("mirror image");
-  result.mirrored_ratio =
-      (1 - mirrored_score(scene, best.pose, stages, options.search)) / std::max(1e-6, 1 - best.score);
+  result.mirrored_ratio = mirrored_cost_ratio(scene, best.pose, best.score, stages, options.search);
   decide(model, starts, options, result);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return result;

@@ -52,6 +52,9 @@ struct Disagreement {
   double distance_mm = 0;           ///< largest of `held_out_mm`
   double sigma_mm = 0;              ///< of that one
   std::vector<double> held_out_mm;  ///< per view
+
+  /// By which the covariance is inflated (Birge 1932), at least 1.
+  double ratio() const { return dof > 0 && chi2 > dof ? chi2 / dof : 1; }
 };
 
 /// Pose of a model in the views' world with what is known of its error.

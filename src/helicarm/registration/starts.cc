@@ -81,8 +81,10 @@ SearchResult search(Scene& scene, const std::vector<SearchStage>& stages,
     std::vector<Estimate> estimates(poses.size());
     const bool few = poses.size() < 2 * std::size_t{std::max(1U, scene.threads())};
     parallel_for(poses.size(), few ? 1 : scene.threads(), [&](std::size_t i) {
-      estimates[i] =
-          refine(scene, stage.level, poses[i], {.iterations = 15, .threads = few ? scene.threads() : 1});
+      estimates[i] = refine(scene, stage.level, poses[i],
+                            {.iterations = 15,
+                             .converged = &stage == &stages.back() ? 0.002 : 0.02,
+                             .threads = few ? scene.threads() : 1});
     });
     if (poses.size() + 3 >= std::size_t(result.starts)) {
       ends.clear();

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/model.h"
+
+#include <gmock/gmock.h>
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A block of bone off the middle of a grid of soft tissue; `signs`: directions of the voxel axes in the
+/// patient frame, as files in RAS or with a left-handed grid have them.
+volume::Volume block(const Vector3d& signs) {
+  volume::Volume volume;
+  volume.size = {20, 16, 12};
+  volume.voxels.assign(20 * 16 * 12, 40);
+  const Vector3d spacing(1, 1.5, 2);
+  volume.patient_from_voxel.linear() = signs.cwiseProduct(spacing).asDiagonal();
+  volume.patient_from_voxel.translation() = Vector3d(100, -50, 20);
+  for (int z = 0; z < 12; ++z)
+    for (int y = 0; y < 16; ++y)
+      for (int x = 0; x < 20; ++x) {
+        const Vector3d at = volume.patient_from_voxel * Vector3d(x, y, z);
+        const Vector3d off = at - volume.patient_from_voxel * Vector3d(5, 10, 3);
+        if (off.cwiseAbs().maxCoeff() <= 4) volume.voxels[std::size_t(x + 20 * (y + 16 * z))] = 900;
+      }
+  return volume;
+}
+
+class GridDirections : public testing::TestWithParam<Vector3d> {};
+
+TEST_P(GridDirections, KeepTheBodyAtItsPlaceInThePatient) {
+  const volume::Volume volume = block(GetParam());
+  const auto model = model_from("block", volume, std::nullopt, HuWindow{150, 3000});
+  ASSERT_TRUE(model);
+  EXPECT_LT((model->centre - volume.patient_from_voxel * Vector3d(5, 10, 3)).norm(), 0.6);
+}
+
+INSTANTIATE_TEST_SUITE_P(LpsRasLeftHanded, GridDirections,
+                         testing::Values(Vector3d(1, 1, 1), Vector3d(-1, -1, 1), Vector3d(-1, 1, 1),
+                                         Vector3d(1, 1, -1)));
+
+TEST(ModelFrom, MaskOfAnotherGridIsRefused) {
+  const volume::Volume volume = block({1, 1, 1});
+  volume::Volume mask = volume;
+  mask.patient_from_voxel.translation().x() += 5;
+  const auto model = model_from("block", volume, mask, std::nullopt);
+  ASSERT_FALSE(model);
+  EXPECT_EQ(model.error().reason, Reason::bad_value);
+}
+
+TEST(ModelFrom, AnEmptyWindowIsRefused) {
+  EXPECT_FALSE(model_from("block", block({1, 1, 1}), std::nullopt, HuWindow{2000, 3000}));
+}
+
+TEST(ModelFrom, ABodyThatReachesTheEdgeHasCuts) {
+  volume::Volume volume = block({1, 1, 1});
+  EXPECT_TRUE(model_from("block", volume, std::nullopt, HuWindow{150, 3000})->cuts.empty());
+  for (int x = 0; x < 20; ++x)
+    for (int y = 4; y < 12; ++y) volume.voxels[std::size_t(x + 20 * y)] = 900;
+  EXPECT_FALSE(model_from("block", volume, std::nullopt, HuWindow{150, 3000})->cuts.empty());
+}
+
+}  // namespace
+}  // namespace helicarm::registration

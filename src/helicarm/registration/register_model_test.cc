@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/registration/register_model.h"
+
+#include <gmock/gmock.h>
+
+#include "helicarm/phantom/mesh.h"
+#include "helicarm/registration/covariance.h"
+#include "helicarm/registration/scene_test.h"
+
+namespace helicarm::registration {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::RigidTransform;
+
+Model model_of(const volume::Volume& volume) {
+  return *model_from("bone", volume, std::nullopt, HuWindow{150, 3000});
+}
+
+RigidTransform start_near(const Model& model, const RigidTransform& pose) {
+  RigidStep step;
+  step << 0.08, -0.06, 0.07, 4, -3, 5;
+  return moved_about(pose, pose * model.centre, step);
+}
+
+RegistrationOptions quick() {
+  RegistrationOptions options;
+  options.threads = 1;
+  options.search = {8, 8, 200};
+  return options;
+}
+
+TEST(RegisterModel, FindsAVolumeInImagesOfAnotherRenderer) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  const auto result = register_model(model, two_views(volume), {start_near(model, true_pose())}, quick());
+  EXPECT_NE(result.decision, Decision::refuse) << (result.failure ? result.failure->message : "");
+  EXPECT_LT(separation(model, result.world_from_model, true_pose()), 0.3);
+  EXPECT_LT(worst_error_mm(model, result), 1.5);
+}
+
+TEST(RegisterModel, ResultDoesNotDependOnThreads) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  const auto views = two_views(volume);
+  RegistrationOptions options = quick();
+  const auto one = register_model(model, views, {start_near(model, true_pose())}, options);
+  options.threads = 3;
+  const auto three = register_model(model, views, {start_near(model, true_pose())}, options);
+  EXPECT_EQ(one.world_from_model.matrix(), three.world_from_model.matrix());
+  EXPECT_EQ(one.covariance, three.covariance);
+}
+
+TEST(RegisterModel, RefusesABodyThatMovedBetweenTheAcquisitions) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  auto views = two_views(volume);
+  RigidTransform moved = true_pose();
+  moved.translation.z() += 3;  // across both viewing directions
+  views[1] = image_of(volume, moved, view_from(80), "LAT", 2);
+  const auto result = register_model(model, views, {start_near(model, true_pose())}, quick());
+  ASSERT_TRUE(result.failure);
+}
+
+TEST(RegisterModel, RefusesAnotherSize) {
+  const Model model = model_of(lopsided_bone(1.04));
+  const auto result =
+      register_model(model, two_views(lopsided_bone()), {start_near(model, true_pose())}, quick());
+  ASSERT_TRUE(result.failure);
+  EXPECT_EQ(result.failure->reason, Reason::wrong_model);
+}
+
+TEST(RegisterModel, OneViewStatesItsDepthAsUncertain) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  auto views = two_views(volume);
+  const auto both = register_model(model, views, {start_near(model, true_pose())}, quick());
+  views.pop_back();
+  const auto one = register_model(model, views, {start_near(model, true_pose())}, quick());
+  const auto depth_sigma = [&](const Registration& result) {
+    const Vector3d ray = (result.centre - view_from(0).source_in_world()).normalized();
+    return std::sqrt(ray.dot(result.covariance.bottomRightCorner<3, 3>() * ray));
+  };
+  EXPECT_GT(depth_sigma(one), 3 * depth_sigma(both));
+}
+
+TEST(Covariance, MatchesTheScatterOfNoise) {
+  const auto volume = lopsided_bone();
+  const Model model = model_of(volume);
+  const Level level{false, 1};
+  double mean = 0;
+  constexpr int trials = 12;
+  for (std::uint32_t trial = 0; trial < trials; ++trial) {
+    const std::vector<RegistrationView> views = {
+        image_of(volume, true_pose(), view_from(0), "AP", 2 * trial, 0.01),
+        image_of(volume, true_pose(), view_from(80), "LAT", 2 * trial + 1, 0.01)};
+    Scene scene(model, views, 1);
+    scene.prepare(level, true_pose() * model.centre);
+    const Estimate estimate = refine(scene, level, true_pose(), {});
+    const Vector3d centre = estimate.pose * model.centre;
+    const auto sum =
+        linearised(estimate.observation, {}, affine_from_rigid(), RigidCovariance::Zero(), {20, 20});
+    const RigidStep error = step_about(estimate.pose, true_pose(), centre);
+    const RigidCovariance covariance =
+        RigidCovariance(sum.covariance()) + edge_part(estimate.observation, views, centre, 0.1);
+    mean += error.dot(covariance.inverse() * error) / trials;
+  }
+  EXPECT_GT(mean, 1);
+  EXPECT_LT(mean, 14);
+}
+
+TEST(Motion, CameraChangesAreMotionsOfTheModel) {
+  geometry::View view = view_from(30);
+  view.intrinsics = {1300, 1250, 80, 70, 3};
+  const Vector3d centre(2, -3, 4);
+  const auto map = affine_from_camera(view, centre);
+  const Vector3d point(12, 9, -20);
+  constexpr double step = 1e-4;
+  for (int k = 0; k < 11; ++k) {
+    geometry::View changed = view;
+    double* const intrinsics[] = {&changed.intrinsics.fx, &changed.intrinsics.fy, &changed.intrinsics.u0,
+                                  &changed.intrinsics.v0};
+    if (k < 4) *intrinsics[k] += step;
+    if (k >= 4 && k < 7)
+      changed.camera_from_world.rotation =
+          geometry::rotation_from_vector(step * Vector3d::Unit(k - 4)) * view.camera_from_world.rotation;
+    if (k >= 7 && k < 10) changed.camera_from_world.translation[k - 7] += step;
+    if (k == 10) changed.intrinsics.skew += step;
+    Eigen::Matrix3d linear;
+    for (int i = 0; i < 3; ++i) linear.row(i) = map.col(k).segment<3>(3 + 3 * i).transpose();
+    const Vector3d moved = point + step * (map.col(k).head<3>() + linear * (point - centre));
+    EXPECT_LT((changed.project(point) - view.project(moved)).norm(), 1e-3 * step + 1e-8) << k;
+  }
+}
+
+/// A lopsided closed surface.
+phantom::TriangleMesh lopsided_surface() {
+  const auto ball = [](const Vector3d& p, const Vector3d& c, double r) { return (p - c).norm() - r; };
+  return phantom::surface_of(
+      [&](const Vector3d& p) {
+        return std::min({ball(p, {0, 0, 0}, 14), ball(p, {12, 5, 10}, 9), ball(p, {-6, 12, -9}, 8)});
+      },
+      {Vector3d(-18, -18, -22), Vector3d(26, 24, 24)}, 1.0);
+}
+
+/// Metal: its density at the surface, filled and drawn by the exact renderer.
+volume::Volume filled_volume(const Model& model) {
+  volume::Volume volume{model.density.size, model.density.values, model.density.model_from_voxel, {}};
+  for (float& voxel : volume.voxels) voxel = voxel > 0 ? 3000.0F : -1024.0F;
+  return volume;
+}
+
+TEST(RegisterModel, FindsASurfaceByItsContour) {
+  const Model model = *model_from("implant", lopsided_surface());
+  RigidTransform pose;
+  pose.rotation = geometry::rotation_from_vector({0.3, 0.5, -0.2});
+  const auto result =
+      register_model(model, two_views(filled_volume(model), pose), {start_near(model, pose)}, quick());
+  EXPECT_LT(separation(model, result.world_from_model, pose), 0.4);
+}
+
+}  // namespace
+}  // namespace helicarm::registration
