@@ -22,11 +22,13 @@ constexpr double least_contour_score = 0.6;
 constexpr double least_mirrored_ratio = 1.02;  // of a nearly symmetric bone 1.05 to 1.1
 constexpr double least_runner_up_ratio = 1.1;
 constexpr double most_strain = 0.012;
-constexpr double strain_sigmas = 2.5;
+constexpr double strain_sigmas = 2;
 constexpr double most_disagreement_mm = 0.5;
 constexpr double disagreement_sigmas = 3;
 constexpr double most_disagreement_ratio =
-    4;  // chi-square per degree of freedom; by chance once in 2000 registrations
+    4;                               // chi-square per degree of freedom; by chance once in 2000 registrations
+constexpr double refused_ratio = 9;  // three standard deviations
+constexpr double refused_ratio_exact = 50;  // cameras of unknown error
 constexpr double usual_error_mm = 2;
 
 }  // namespace
@@ -92,6 +94,26 @@ Deformation deformation_of(const Observation& observation, const std::vector<dou
       std::hypot(std::sqrt(std::max(0.0, along.dot(covariance.bottomRightCorner<6, 6>() * along))), floor)};
 }
 
+/// The views' own solutions against their errors. Cameras without covariance explain more.
+template <class Refuse, class Warn>
+void check_chi_square(const Model& model, const RegistrationOptions& options, const Registration& result,
+                      const Refuse& refuse, const Warn& warn) {
+  if (!result.disagreement || result.disagreement->ratio() <= most_disagreement_ratio) return;
+  const Disagreement& apart = *result.disagreement;
+  const std::string message = fmt::format(
+      "{}: the views' own solutions differ by more than their errors (chi-square {:.0f} for {} degrees of "
+      "freedom): the body moved between the acquisitions, also along a view's rays, or has another size, or "
+      "the cameras are less exact than stated",
+      model.name, apart.chi2, apart.dof);
+  const std::map<std::string, double> figures = {{"chi2", apart.chi2}, {"dof", double(apart.dof)}};
+  const bool exact = options.camera_covariance.size() == 0;
+  if (apart.ratio() > (exact ? refused_ratio_exact : refused_ratio))
+    refuse(Reason::registration_disagrees, message, figures);
+  else
+    warn(Reason::registration_disagrees,
+         message + fmt::format("; the covariance is inflated by {:.1f}", apart.ratio()), figures);
+}
+
 void decide(const Model& model, const std::vector<geometry::RigidTransform>& starts,
             const RegistrationOptions& options, Registration& result) {
   const auto refuse = [&](Reason reason, const std::string& message, std::map<std::string, double> figures) {
@@ -154,15 +176,7 @@ void decide(const Model& model, const std::vector<geometry::RigidTransform>& sta
                "{:.2f} mm): the body moved between the acquisitions, or a calibration is wrong",
                model.name, result.disagreement->distance_mm, result.disagreement->sigma_mm),
            {{"distance_mm", result.disagreement->distance_mm}, {"sigma_mm", result.disagreement->sigma_mm}});
-  if (result.disagreement && result.disagreement->ratio() > most_disagreement_ratio)
-    warn(
-        Reason::registration_disagrees,
-        fmt::format(
-            "{}: the views' own solutions differ by more than their errors (chi-square {:.0f} for {} degrees "
-            "of freedom): the body may have moved between the acquisitions, also along a view's rays, or the "
-            "cameras are less exact than stated; the covariance is inflated by {:.1f}",
-            model.name, result.disagreement->chi2, result.disagreement->dof, result.disagreement->ratio()),
-        {{"chi2", result.disagreement->chi2}, {"dof", double(result.disagreement->dof)}});
+  check_chi_square(model, options, result, refuse, warn);
   const double worst = worst_error_mm(model, result);
   if (worst > options.max_error_mm.value_or(usual_error_mm)) {
     const std::string message =
