@@ -45,7 +45,7 @@ Answer locate_in(const Json& calibration, const std::string& picks, bool raw = f
   std::ostringstream out, progress;
   Console console{out, progress};
   console.json = true;
-  auto result = locate_command({folder / "result.json", folder / "picks.csv", raw}, console);
+  auto result = locate_command({{(folder / "result.json").string()}, folder / "picks.csv", raw}, console);
   fs::remove_all(folder);
   Json json = result ? *parse_json(out.str(), "out") : Json();
   return {std::move(result), std::move(json)};

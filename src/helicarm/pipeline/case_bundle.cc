@@ -2,6 +2,7 @@
 #include "helicarm/pipeline/case_bundle.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include <fmt/format.h>
@@ -205,6 +206,16 @@ Json without_texts(const Json& result, const std::map<std::string, std::string>&
   return object;
 }
 
+namespace {
+
+/// Keys and words of result.json that say why a case was refused; a measured result adds all of its own.
+constexpr std::array always_kept{"format",  "helicarm-result/1", "status", "ok",       "refused", "failure",
+                                 "code",    "message",           "view",   "figures",  "causes",  "next",
+                                 "points",  "warnings",          "notes",  "views",    "name",    "reason",
+                                 "version", "options",           "method", "accuracy", "best",    "paper"};
+
+}  // namespace
+
 Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& options) {
   return guarded([&] {
     const Case given = value_or_throw(read_case(path));
@@ -220,8 +231,9 @@ Expected<CaseBundle> bundle_case(const fs::path& path, const BundleOptions& opti
       bundle.files.push_back({"result.json", to_text(result) + "\n"});
       if (options.result) collect_texts(result, known);
     }
-    for (int reason = 0; reason <= int(Reason::covariance_missing); ++reason)
+    for (int reason = 0; reason <= int(Reason::out_of_capture); ++reason)
       known.emplace(code(Reason(reason)), code(Reason(reason)));
+    for (const char* text : always_kept) known.emplace(text, text);
     if (options.result)
       bundle.files.push_back({"given_result.json", to_text(without_texts(*options.result, known)) + "\n"});
     bundle.files.push_back({"log.txt", log});
