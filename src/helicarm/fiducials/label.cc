@@ -191,11 +191,12 @@ Hypothesis best_by_own_errors(const LabelSearch& search, const LabellingOptions&
 }
 
 /// Whether `rival` labels more fiducials and is almost as good if the source distance is wrong, for which the
-/// prior odds are 1 to 1000: then labels of a helix shifted by one may fit better than the true ones.
+/// prior odds are 1 to 1000: then labels of a helix shifted by one, which keep the handedness, may fit better
+/// than the true ones.
 bool explains_more(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
   constexpr double wrong_focal_sigma = 0.1;  // relative
   constexpr double wrong_log_odds = -6.9;
-  if (rival.matched <= h.matched) return false;
+  if (rival.matched <= h.matched || rival.mirrored() != h.mirrored()) return false;
   Scene wrong = scene;
   wrong.camera.focal_sigma = std::max(wrong_focal_sigma, scene.camera.focal_sigma);
   return refitted(wrong, rival).log_odds + wrong_log_odds > h.log_odds - required;
