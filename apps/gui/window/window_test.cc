@@ -19,7 +19,7 @@ class WholeOperation : public Window {
     for (int row = 0; row < 4; ++row)
       for (const Json& point : measured["points"])
         if (point["name"] == ends->item(row, 0)->text().toStdString()) {
-          EXPECT_EQ(ends->item(row, 4)->text().toStdString(),
+          EXPECT_EQ(ends->item(row, 5)->text().toStdString(),
                     fmt::format("{:.2f}", point["ray_gap_mm"].get<double>()));
         }
     EXPECT_GE(state().measurements, 2)
