@@ -130,25 +130,29 @@ image::Image<float> widened(const image::Image<float>& given, double factor) {
   return wide;
 }
 
+/// Whether the view's fiducials are labelled with its columns resampled by a factor and the pixel size
+/// unknown.
+bool is_labelled(const Trial& trial, double factor) {
+  xray::XrayImage resampled = trial.image;
+  if (factor != 1) resampled.pixels = widened(trial.image.pixels, factor);
+  resampled.acquisition.pixel_mm.reset();
+  return rectify_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(resampled))}},
+                       trial.given, trial.options)
+      .and_then([&](auto views) { return detect_in_views(std::move(views), trial.given, trial.options); })
+      .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); })
+      .has_value();
+}
+
 /// Factor by which the image is too wide: its fiducials are labelled only after its columns are resampled
-/// back. The round field proposes it, else the formats of screens. The pixel size is then unknown.
+/// back, not with an unknown pixel size alone. The round field proposes it, else the formats of screens.
 std::optional<double> excess_width(const Trial& trial) {
   constexpr double least_excess = 0.03;
   std::vector<double> factors{4.0 / 3, 3.0 / 4, 5.0 / 4, 4.0 / 5};
   if (const auto field = rectification::round_field(trial.image)) factors = {field->aspect()};
-  for (const double factor : factors) {
-    if (std::abs(factor - 1) < least_excess) continue;
-    xray::XrayImage square = trial.image;
-    square.pixels = widened(trial.image.pixels, 1 / factor);
-    square.acquisition.pixel_mm.reset();
-    const auto labelled =
-        rectify_views({{{trial.name}, std::make_shared<const xray::XrayImage>(std::move(square))}},
-                      trial.given, trial.options)
-            .and_then(
-                [&](auto views) { return detect_in_views(std::move(views), trial.given, trial.options); })
-            .and_then([&](auto views) { return label_views(std::move(views), trial.given, trial.options); });
-    if (labelled) return factor;
-  }
+  std::erase_if(factors, [&](double factor) { return std::abs(factor - 1) < least_excess; });
+  if (factors.empty() || is_labelled(trial, 1)) return std::nullopt;
+  for (const double factor : factors)
+    if (is_labelled(trial, 1 / factor)) return factor;
   return std::nullopt;
 }
 
@@ -157,8 +161,7 @@ Failure unequal_pixels(const Failure& failure, const image::Image<float>& pixels
   named.reason = Reason::unequal_pixels;
   named.message = fmt::format(
       "the image was resampled with unequal pixels: its fiducials are labelled only after its {} x {} pixels "
-      "are "
-      "made {:.3g} times {} (as it is: {}: {}). Export it as the C-arm stored it",
+      "are made {:.3g} times {} (as it is: {}: {}). Export it as the C-arm stored it",
       pixels.width(), pixels.height(), factor > 1 ? factor : 1 / factor, factor > 1 ? "narrower" : "wider",
       code(failure.reason), failure.message);
   named.figures["aspect"] = factor;
