@@ -20,5 +20,5 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/helicarmConfig.cmake.i
                               ${PROJECT_BINARY_DIR}/helicarmConfig.cmake INSTALL_DESTINATION ${helicarm_cmake_dir})
 install(FILES ${PROJECT_BINARY_DIR}/helicarmConfig.cmake ${PROJECT_BINARY_DIR}/helicarmConfigVersion.cmake
               ${PROJECT_SOURCE_DIR}/cmake/FindAsio.cmake ${PROJECT_SOURCE_DIR}/cmake/FindOpenCVParts.cmake
-              ${PROJECT_SOURCE_DIR}/cmake/FindRandom123.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindOpenJP2.cmake ${PROJECT_SOURCE_DIR}/cmake/FindRandom123.cmake
         DESTINATION ${helicarm_cmake_dir} COMPONENT dev)

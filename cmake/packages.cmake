@@ -69,8 +69,8 @@ set(CPACK_DEBIAN_GUI_PACKAGE_DEPENDS "helicarm (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libhelicarm-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_DESCRIPTION "C-arm X-ray images to points in space with confidence regions: headers and libraries")
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libasio-dev, libdcmtk-dev, libeigen3-dev, libexpected-dev, libfmt-dev, libopencv-core-dev, \
-libopencv-imgproc-dev, libopencv-photo-dev, libpng-dev, librandom123-dev, libssl-dev, libtiff-dev, nlohmann-json3-dev, zlib1g-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "libasio-dev, libcharls-dev, libdcmtk-dev, libeigen3-dev, libexpected-dev, libfmt-dev, libopencv-core-dev, \
+libopencv-imgproc-dev, libopencv-photo-dev, libopenjp2-7-dev, libpng-dev, librandom123-dev, libssl-dev, libtiff-dev, nlohmann-json3-dev, zlib1g-dev")
 if(MPI_CXX_FOUND)
   string(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", libopenmpi-dev")
 endif()

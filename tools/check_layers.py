@@ -23,6 +23,7 @@ MODULES = {
     "fiducials": "core geometry image phantom xray detection rectification",
     "calibration": "core geometry phantom rectification fiducials",
     "localization": "core geometry image phantom xray detection rectification fiducials calibration",
+    "measures": "core geometry phantom calibration",
     "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
     "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
     "volume": "core geometry image xray",

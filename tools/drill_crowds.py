@@ -113,7 +113,7 @@ def receiving(program, folder, *options, **more):
 
 
 def virtual_or(program, **more):
-    ports = [word for name in ("tracker", "rtde", "dashboard", "script") for word in (f"--{name}-port", "0")]
+    ports = [word for name in ("tracker", "rtde", "dashboard", "script", "primary") for word in (f"--{name}-port", "0")]
     return running([program, "virtual-or", "--size", "512", *ports], "commands:", **more)
 
 

@@ -254,7 +254,7 @@ def drill_system(program, folder):
         ports = json.loads(devices.plan.read_text())
         taken = {"--tracker-port": ports["tracker"]["port"], "--rtde-port": ports["robot"]["rtde_port"]}
         for option, port in taken.items():
-            others = [word for name in ("--tracker-port", "--rtde-port", "--dashboard-port", "--script-port")
+            others = [word for name in ("--tracker-port", "--rtde-port", "--dashboard-port", "--script-port", "--primary-port")
                       if name != option for word in (name, "0")]
             done = subprocess.run([program, "virtual-or", option, str(port), *others], capture_output=True, text=True,
                                   stdin=subprocess.DEVNULL)
@@ -286,7 +286,7 @@ def drill_soak(program, folder, minutes):
     receive = Program(program, "receive", "--out", inbox, "--port", port)
     receive.wait_for("listens")
     virtual_or = Program(program, "virtual-or", "--size", 512, "--receiver-port", port, "--tracker-port", 0, "--rtde-port", 0,
-                   "--dashboard-port", 0, "--script-port", 0)
+                   "--dashboard-port", 0, "--script-port", 0, "--primary-port", 0)
     tracker = virtual_or.wait_for("^tracker").split()[-1]
     virtual_or.wait_for("^commands: ")
     watch = Program(program, "tracker", "watch", f"127.0.0.1:{tracker}", "--ask")

@@ -82,7 +82,7 @@ class VirtualDevices:
         self.port, self.plan, self.session = free_port(), folder / "plan.json", folder / "session"
         self.virtual_or = Program(program, "virtual-or", "--size", 512, "--rate", 60, "--plan", self.plan,
                                   "--receiver-port", self.port, "--tracker-port", 0, "--rtde-port", 0,
-                                  "--dashboard-port", 0, "--script-port", 0, *virtual_or)
+                                  "--dashboard-port", 0, "--script-port", 0, "--primary-port", 0, *virtual_or)
         self.virtual_or.wait_for("^commands: ")
         self.terminal = pty.openpty() if terminal else None
         self.navigation = self.navigate(*options)

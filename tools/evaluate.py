@@ -5,6 +5,7 @@ with it.
 
   tools/evaluate.py FOLDER [--method best|paper ...] [--helicarm build/bin/helicarm]
   tools/evaluate.py --simulate 4 --readme README.md     simulates cases first, and renews the README's tables
+  tools/evaluate.py FOLDER --rendered docs/accuracy.md  renews the table of cases rendered by another program
 
 Cases are sub-folders. Groups go by the first letter of a case's name. TRE is the mean distance of the located check
 points (T1, T2, ...) from their true positions; of the tunnels' balls FS, FE, TS, TE if there are no such points or the
@@ -168,6 +169,7 @@ def main():
     parser.add_argument("folder", type=Path, nargs="?")
     parser.add_argument("--simulate", type=int, metavar="N", help="simulate N cases of each kind instead of a folder")
     parser.add_argument("--readme", type=Path, help="file whose tables between the accuracy and speed markers are renewed")
+    parser.add_argument("--rendered", type=Path, help="file whose table between the rendered markers is renewed")
     parser.add_argument("--method", action="append", choices=["best", "paper"])
     parser.add_argument("--helicarm", default=str(Path(__file__).resolve().parent.parent / "build/bin/helicarm"))
     options = parser.parse_args()
@@ -180,8 +182,9 @@ def main():
         cases = sorted(p.parent for p in folder.glob("*/case.json") if (p.parent / "truth.json").exists())
         grids = sorted(p.parent for p in folder.glob("*/GRID*.dcm") if (p.parent / "truth.json").exists())
         grids = list(dict.fromkeys(grids))
+        grid_lines = list(evaluate_grids(options.helicarm, grids)) if grids else []
         if grids:
-            print("", *evaluate_grids(options.helicarm, grids), sep="\n")
+            print("", *grid_lines, sep="\n")
         if not cases and grids:
             return
         if not cases:
@@ -194,6 +197,8 @@ def main():
             times = sorted(row["ms"] for rows in groups.values() for row in rows)
             speed.append(f"| {method} | {len(times)} | {times[len(times) // 2]:.0f} | {times[-1]:.0f} |")
     print("", *summary, "", *speed, sep="\n")
+    if options.rendered:
+        renew(options.rendered, "rendered", summary + [""] * bool(grid_lines) + grid_lines)
     if options.readme:
         renew(options.readme, "accuracy", summary)
         renew(options.readme, "speed", speed)

@@ -83,7 +83,10 @@ class OwnFiles(unittest.TestCase):
         desktop = alone / "helicarm-gui"
         desktop.write_text("#!/bin/sh\necho opened $1\n")
         desktop.chmod(0o755)
-        self.assertEqual(run("pick", case, program=program).stdout.strip(), f"opened {case}")
+        screenless = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")}
+        self.assertIn("there is no display", run("pick", case, program=program, env=screenless).stderr)
+        opened = run("pick", case, program=program, env={**screenless, "DISPLAY": ":0"})
+        self.assertEqual(opened.stdout.strip(), f"opened {case}")
 
     def test_pick_of_an_unknown_view_leaves_the_case_alone(self):
         case = self.made("alone-view")

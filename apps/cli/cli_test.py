@@ -68,6 +68,18 @@ class CommandLine(unittest.TestCase):
         self.assertLess(model["landmarks"]["fre_mm"], 1)
         self.assertTrue((self.root / "registered/report.html").exists())
 
+        points = [{"label": name, "position": place} for name, place in (("s", [-100, 0, 40]), ("e", [-100, 20, 60]))]
+        (folder / "plan.mrk.json").write_text(json.dumps({"markups": [
+            {"type": "Line", "name": "planned", "coordinateSystem": "LPS", "coordinateUnits": "mm", "controlPoints": points}]}))
+        case["models"][0]["plan"] = "plan.mrk.json"
+        (folder / "case.json").write_text(json.dumps(case))
+        done = run("run", folder, "--out", self.root / "run-models", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        result = json.loads(done.stdout)
+        self.assertEqual([tunnel["name"] for tunnel in result["tunnels"]], ["planned"])
+        self.assertEqual(json.loads((self.root / "run-models/result.json").read_text()), result)
+        self.assertEqual(json.loads((self.root / "run-models/registration.json").read_text())["status"], "ok")
+
     def test_register_names_what_is_wrong_with_a_model(self):
         folder = self.root / "no-model"
         shutil.copytree(self.root / "case", folder)
@@ -95,7 +107,11 @@ class CommandLine(unittest.TestCase):
             done = run("rectify", folder / "GRID.dcm", "--map", out / "map.json", "--test-grid", 20, "--json")
             self.assertEqual(done.returncode, 0, done.stderr)
             errors[method] = json.loads(done.stdout)
+        done = run("rectify", folder / "GRID.dcm", "--map", self.root / "grid-best/map.json", "--test-grid", 7)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("pitch 7 mm", done.stderr)
         self.assertGreater(errors["best"]["n"], 70)
+        self.assertEqual(errors["best"]["n"], len(errors["best"]["crossings"]))
         self.assertEqual(errors["best"]["raw"], errors["paper"]["raw"])
         self.assertLess(errors["best"]["rectified"]["max_px"], 0.1 * errors["best"]["raw"]["max_px"])
         self.assertGreater(errors["paper"]["rectified"]["max_px"], 0.5 * errors["paper"]["raw"]["max_px"])
@@ -105,6 +121,39 @@ class CommandLine(unittest.TestCase):
         for wrong in (("--kind", "grid", "--distance", 10), ("--distance", 45), ("--kind", "grid", "--preset", "paper-sim"),
                       ("--preset", "c-arm"), ("--kind", "grid", "--fault", "screws")):
             self.assertEqual(run("simulate", folder, *wrong).returncode, 2, wrong)
+
+    def test_paper_stages_are_written_by_the_paper_method_only(self):
+        out = self.root / "stages"
+        image = self.root / "case/AP.dcm"
+        done = run("rectify", image, "--plate", "plate48", "--method", "paper", "--stages", "--out", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for name in ("raw", "median", "edges", "circles", "inpainted"):
+            self.assertTrue((out / f"stage-{name}.png").read_bytes().startswith(b"\x89PNG"), name)
+        self.assertEqual(run("rectify", image, "--plate", "plate48", "--stages", "--out", out).returncode, 2)
+
+    def test_phantom_is_designed_for_a_knee(self):
+        done = run("phantom", "design", "--knee", "66.7,57.2", "--file", self.root / "knee.json", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        proposed = json.loads(done.stdout)
+        self.assertEqual(proposed["cone"], {"base_diameter_mm": 133.4, "top_diameter_mm": 66.7, "height_mm": 85.80000000000001})
+        self.assertEqual(proposed["broken_rules"], [])
+        self.assertEqual(json.loads((self.root / "knee.json").read_text()), proposed["calibrator"])
+        for wrong in ((), ("--knee", "66.7"), ("--knee", "66.7,5")):
+            self.assertEqual(run("phantom", "design", *wrong).returncode, 2, wrong)
+
+    def test_study_biplane_takes_its_lengths_balls_and_noise(self):
+        means = {}
+        for degrees in (0.05, 0.5):
+            done = run("study", "biplane", "--groups", 64, "--balls", 12, "--tracker-deg", degrees, "--far-plate", 880, "--json",
+                       "--out", self.root / "biplane")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            study = json.loads(done.stdout)
+            self.assertEqual((study["balls_of_biplane"], study["plates_mm"]), (12, [830, 880]))
+            means[degrees] = next(row["mm"]["mean"] for row in study["rows"]
+                                  if (row["calibrator"], row["points"]) == ("biplane", "centre"))
+        self.assertGreater(means[0.5], 1.2 * means[0.05])
+        for wrong in (("--balls", 14), ("--tracker-deg", 11), ("--far-plate", 700), ("--tolerance", 0.1)):
+            self.assertEqual(run("study", "biplane", *wrong, "--out", self.root / "biplane").returncode, 2, wrong)
 
     def test_history_contains_each_image_once(self):
         machine = self.root / "machine.json"
@@ -511,14 +560,60 @@ class Tracker(unittest.TestCase):
         self.assertEqual(done.returncode, 3)
         self.assertIn("poses_too_alike", done.stderr)
 
+    def recorded_touch(self, name, point_in_tracker):
+        """A pointer at rest whose tip, 100 mm below its marker, touches a point of a calibrator at rest."""
+        x, y, z = point_in_tracker
+        lines = [f"Seq_Frame{i:04}_FacetTransform = 1 0 0 0 0 1 0 0 0 0 1 900 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_PointerTransform = 1 0 0 {x} 0 1 0 {y + 100} 0 0 1 {z} 0 0 0 1\n"
+                 f"Seq_Frame{i:04}_Timestamp = {i / 50}\n" for i in range(12)]
+        file = self.file.with_name(f"{name}.mha")
+        file.write_text("".join(lines) + "ElementDataFile = LOCAL\n")
+        return f"{name}={file}"
+
+    def test_mount_is_found_from_recorded_touches(self):
+        mount, divots = (10, 20, 30), {"D1": (60, 0, 0), "D2": (0, 45, 0), "D3": (-40, -20, 50), "D4": (0, 5, 80)}
+        in_tracker = {name: [c - m + o for c, m, o in zip(at, mount, (0, 0, 900))] for name, at in divots.items()}
+        tip, out = self.file.with_name("tip.json"), self.file.with_name("mount.json")
+        tip.write_text(json.dumps({"tip_in_tool": [0, -100, 0]}))
+        common = ["tracker", "calibrate-mount", "--facet", "Facet", "--pointer", "Pointer", "--tip", tip, "--out", out]
+        for name, at in divots.items():
+            common += ["--divot", f"{name}={','.join(map(str, at))}"]
+        touches = [word for name, at in in_tracker.items() for word in ("--recorded", self.recorded_touch(name, at))]
+        done = run(*common, *touches, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        found = json.loads(out.read_text())
+        self.assertEqual(found, json.loads(done.stdout))
+        for axis in range(3):
+            self.assertAlmostEqual(found["facet"]["calibrator_from_facet"][axis][3], mount[axis], delta=0.01)
+        self.assertLess(found["fre_mm"], 0.01)
+        self.assertLess(found["tre_mm"]["D1"], 1)
+        exchanged = run(*common, *touches[:-4], "--recorded", self.recorded_touch("D4", in_tracker["D3"]),
+                        "--recorded", self.recorded_touch("D3", in_tracker["D4"]))
+        self.assertEqual(exchanged.returncode, 3)
+        self.assertIn("residual_too_large", exchanged.stderr)
+        self.assertIn("exchanged", exchanged.stderr)
+        few = run(*common, *touches[:4])
+        self.assertEqual(few.returncode, 3)
+        self.assertIn("poses_too_alike", few.stderr)
+
     def test_missing_or_invalid_arguments_are_named(self):
         for words, said in ((("tracker", "pivot", self.file, "--tool", "Pointer"), "which holds ToolToTracker"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--recorded", "P1=x"), "need --tip"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--divot", "D=1,2"), "xyz_mm"),
+                            (("tracker", "calibrate-mount", "--facet", "F", "--touch", "P1"), "belong together"),
                             (("tracker", "watch", "127.0.0.1:70000"), "1 to 65535"),
                             (("tracker", "replay", self.file, "--port", "70000"), "0 to 65535"),
                             (("receive", "--watch", self.file.parent, "--port", "11112"), "excludes")):
             done = run(*words)
             self.assertEqual(done.returncode, 2, words)
             self.assertIn(said, done.stderr)
+
+
+class Robot(unittest.TestCase):
+    def test_robot_that_does_not_answer_is_refused(self):
+        done = run("robot", "watch", "127.0.0.1", "--port", 9, "--seconds", 0.5)
+        self.assertEqual(done.returncode, 3)
+        self.assertIn("not_connected", done.stderr)
 
 
 class Operate(unittest.TestCase):

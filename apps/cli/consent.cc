@@ -24,13 +24,14 @@ void discard_input() { ::tcflush(STDIN_FILENO, TCIFLUSH); }
 
 }  // namespace
 
-Ending::Ending(StopSignal& signal, robot::RobotLink& robot, operation::Operation& operation)
-    : thread_([this, &signal, &robot, &operation](const std::stop_token& over) {
+Ending::Ending(StopSignal& signal, robot::RobotLink* robot, operation::Operation& operation)
+    : thread_([this, &signal, robot, &operation](const std::stop_token& over) {
         while (!over.stop_requested())
           if (signal.wait(glance_s)) {
             reported_ = true;
             operation.interrupt();
-            return robot.stop();
+            if (robot) robot->stop();
+            return;
           }
       }) {}
 

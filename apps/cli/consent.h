@@ -13,10 +13,11 @@
 
 namespace helicarm::cli {
 
-/// Stops the robot and every wait for the tracker on a stop signal, at any time.
+/// Stops the robot, if any, and every wait for the tracker on a stop signal, at any time.
 class Ending {
  public:
-  Ending(StopSignal& signal, robot::RobotLink& robot, operation::Operation& operation);
+  /// `robot` is null if there is none.
+  Ending(StopSignal& signal, robot::RobotLink* robot, operation::Operation& operation);
 
   /// Throws BadInput (interrupted) after a stop signal.
   void check() const;

@@ -3,10 +3,12 @@
 #include "helicarm/devices/receiver/receiver_fields.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
+#include "mount_command.h"
 #include "navigate_command.h"
 #include "operate_command.h"
 #include "receive_command.h"
 #include "replay_command.h"
+#include "robot_command.h"
 #include "tracker_command.h"
 #include "virtual_or_command.h"
 
@@ -57,18 +59,66 @@ void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
   command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
   command->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
+  command
+      ->add_option_function<double>(
+          "--rate", [&a](double rate_hz) { a.options.interval_ms = static_cast<int>(1000 / rate_hz); },
+          "Rate to request, Hz; default: 60")
+      ->check(within(1, 1000));
   a.options.ask_for_tracking = true;
   command->add_flag("--ask,!--no-ask", a.options.ask_for_tracking,
                     "Request tracking (STT_TDATA), which some servers require (default)");
 }
 
+void add_calibrate_mount(CLI::App* tracker, Action& action) {
+  auto* command = tracker->add_subcommand(
+      "calibrate-mount", "Find the pose of your marker in the calibrator by touching its balls or divots");
+  auto& a = arguments_of(command, action, calibrate_mount_command);
+  command->add_option("PEER", a.link.peer, "address:port of an OpenIGTLink server, for --touch");
+  a.link.options.ask_for_tracking = true;
+  command->add_option("--facet", a.facet, "Name of the calibrator's marker")->required();
+  command->add_option("--pointer", a.pointer, "Name of the pointer's marker")->capture_default_str();
+  command->add_option("--tip", a.tip, "The pointer's tip, as `tracker pivot --json` prints it");
+  command->add_option("--tip-radius", a.tip_radius_mm, "Radius of the pointer's tip, mm; counts on balls")
+      ->check(within(0, 20))
+      ->capture_default_str();
+  command->add_option("--calibrator", a.calibrator, "A built-in or a file")->capture_default_str();
+  command->add_option("--divot", a.divots,
+                      "NAME=X,Y,Z: a point of the calibrator that holds the tip, mm; repeatable");
+  command
+      ->add_option("--touch", a.touch,
+                   "Balls and divots to touch in this order, each as often as it is named")
+      ->delimiter(',');
+  command->add_option("--recorded", a.recorded,
+                      "LABEL=FILE: a recording of the pointer at rest on it; repeatable");
+  command->add_option(
+      "--pivoted", a.pivoted,
+      "LABEL=FILE: a recording of the calibrator turned about this point; repeatable. It gives "
+      "one point: three are needed");
+  command->add_option("--sigma-mm", a.options.sigma_mm, "Error of a reading per axis, mm")
+      ->check(within(0, 10))
+      ->capture_default_str();
+  command->add_option("--sigma-deg", a.options.sigma_deg, "Error of a reading per axis, degrees")
+      ->check(within(0, 10))
+      ->capture_default_str();
+  command->add_option("--seat", a.options.seat_mm, "Error of the tip in a divot or on a ball per axis, mm")
+      ->check(within(0.001, 10))
+      ->capture_default_str();
+  command->add_option("--max-error", a.options.max_tre_mm, "Largest predicted error at a ball, mm")
+      ->check(within(0.01, 100))
+      ->capture_default_str();
+  command->add_option("--out", a.out, "The file to write")->capture_default_str();
+  command->add_option("--plan", a.plan, "A plan.json whose facet of this name is replaced or added");
+}
+
 void add_tracker(CLI::App& app, Action& action) {
-  auto* tracker =
-      add_command(app, "tracker", "Watch, record or play a tracker (OpenIGTLink); calibrate a pointer",
-                  "helicarm tracker watch 127.0.0.1:18944\n"
-                  "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
-                  "  helicarm tracker replay poses.mha --port 18944\n"
-                  "  helicarm tracker pivot poses.mha --tool PointerToTracker");
+  auto* tracker = add_command(
+      app, "tracker", "Watch, record or play a tracker (OpenIGTLink); calibrate pointer and mount",
+      "helicarm tracker watch 127.0.0.1:18944\n"
+      "  helicarm tracker record 127.0.0.1:18944 poses.mha --seconds 20\n"
+      "  helicarm tracker replay poses.mha --port 18944\n"
+      "  helicarm tracker pivot poses.mha --tool PointerToTracker\n"
+      "  helicarm tracker calibrate-mount 127.0.0.1:18944 --facet calibrator --tip tip.json --touch "
+      "P1,P1,P1,P4,P4,P4,P8,P8,P8,P11,P11,P11");
   tracker->require_subcommand(1);
   auto* watch = tracker->add_subcommand("watch", "Print the received poses of each tool");
   add_tracker_link(watch, arguments_of(watch, action, tracker_watch_command));
@@ -95,6 +145,23 @@ void add_tracker(CLI::App& app, Action& action) {
   auto& turned = arguments_of(pivot, action, tracker_pivot_command);
   pivot->add_option("FILE", turned.file, "A MetaImage sequence file")->required();
   pivot->add_option("--tool", turned.tool, "The pointer's name in the file")->required();
+  add_calibrate_mount(tracker, action);
+}
+
+void add_robot(CLI::App& app, Action& action) {
+  auto* robot = add_command(app, "robot", "Watch a robot's state (RTDE); nothing is written to it",
+                            "helicarm robot watch 192.168.7.5\n"
+                            "  helicarm robot watch --seconds 2 --json");
+  robot->require_subcommand(1);
+  auto* watch = robot->add_subcommand("watch", "Print the robot's modes, pose and whether it may move");
+  auto& a = arguments_of(watch, action, robot_watch_command);
+  watch->add_option("ADDRESS", a.options.address, "Numeric address of the robot")->capture_default_str();
+  add_port(watch, "--port", a.options.port, "Port of RTDE");
+  watch->add_option("--rate", a.options.rate_hz, "Requested states per second")
+      ->check(within(1, 500))
+      ->capture_default_str();
+  watch->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
+      ->check(within(0, 1e6));
 }
 
 void add_virtual_or(CLI::App& app, Action& action) {
@@ -105,12 +172,17 @@ void add_virtual_or(CLI::App& app, Action& action) {
   auto& a = arguments_of(command, action, virtual_or_command);
   command->add_option("--plan", a.plan, "Write a plan for navigate, with simulated picks");
   command->add_flag("--check-points", a.check_points, "The plan requires a check point on each bone");
+  command->add_flag(
+      "--freehand", a.virtual_or.freehand,
+      "A person holds the drill; there is no robot, and the plan is one for freehand navigation");
   add_fields(command, a.virtual_or, virtual_devices::virtual_devices_fields);
   add_port(command, "--tracker-port", a.virtual_or.tracker_port,
            "Port of the tracker (OpenIGTLink); 0: a free port, as for the ports below");
   add_port(command, "--rtde-port", a.virtual_or.rtde_port, "of the robot");
   add_port(command, "--dashboard-port", a.virtual_or.dashboard_port, "of the robot");
   add_port(command, "--script-port", a.virtual_or.script_port, "of the robot");
+  a.virtual_or.primary_port = 30001;
+  add_port(command, "--primary-port", a.virtual_or.primary_port, "of the robot");
   add_port(command, "--receiver-port", a.receiver.port, "Port to which the C-arm sends its images");
   command->add_option("--receiver-title", a.receiver.title, "Application entity title of the receiver")
       ->capture_default_str();
@@ -119,9 +191,12 @@ void add_virtual_or(CLI::App& app, Action& action) {
 
 void add_navigate(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "navigate", "Carry out an operation by a plan: X-ray images, measurement, robot, verification",
-      "helicarm virtual-or --plan plan.json        (in one terminal)\n"
-      "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)");
+      app, "navigate",
+      "Carry out an operation by a plan: X-ray images, measurement, robot or drill held by hand, "
+      "verification",
+      "helicarm virtual-or --plan plan.json        (in one terminal; --freehand: without a robot)\n"
+      "  helicarm navigate plan.json --out session   (in another; then: shoot AP, shoot LAT)\n"
+      "  helicarm navigate plan.json --json          (freehand: a line of JSON ten times a second)");
   auto& a = arguments_of(command, action, navigate_command);
   command->add_option("PLAN", a.plan, "plan.json (docs/formats.md)")->required();
   command->add_option("--out", a.out, "Folder of the session: images, cases, record")->capture_default_str();
@@ -169,6 +244,7 @@ void add_replay(CLI::App& app, Action& action) {
 void add_device_commands(CLI::App& app, Action& action) {
   add_receive(app, action);
   add_tracker(app, action);
+  add_robot(app, action);
   add_virtual_or(app, action);
   add_navigate(app, action);
   add_operate(app, action);

@@ -38,8 +38,19 @@ void print_table(const geometry::ImportedMatrix& imported, std::ostream& out) {
 CommandResult import_command(const ImportArguments& arguments, Console& console) {
   if (arguments.unit != "mm" && arguments.unit != "cm")
     return fail(Reason::usage, fmt::format("--unit: \"{}\" is neither mm nor cm", arguments.unit));
-  const auto imported = geometry::import_matrix(arguments.file, arguments.unit == "cm" ? 10 : 1);
+  geometry::ImportOptions options{.mm_per_unit = arguments.unit == "cm" ? 10.0 : 1.0,
+                                  .column = arguments.column,
+                                  .undistorted = arguments.undistorted};
+  if (!arguments.image_size.empty()) options.image_size = {arguments.image_size[0], arguments.image_size[1]};
+  const auto imported = geometry::import_matrix(arguments.file, options);
   if (!imported) return tl::unexpected<Failure>(imported.error());
+  const auto& size = imported->image_size;
+  const geometry::Intrinsics& k = imported->view.intrinsics;
+  if (size && !(k.u0 > 0 && k.v0 > 0 && k.u0 < size->x() && k.v0 < size->y()))
+    console.progress << fmt::format(
+        "helicarm: warning: the central ray ({:.0f}, {:.0f}) lies outside the image of {} x {}: check the "
+        "image size\n",
+        k.u0, k.v0, size->x(), size->y());
   if (console.json)
     console.out << to_text(json_of(*imported)) << '\n';
   else

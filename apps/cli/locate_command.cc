@@ -13,6 +13,7 @@
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/localization/located_point_json.h"
 #include "helicarm/pipeline/result.h"
+#include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::cli {
 namespace {
@@ -43,6 +44,9 @@ Expected<localization::PointObservation> image_from(const CsvTable& table, std::
   if (raw && map && !map->shows(uv))
     throw BadInput(Reason::bad_value, fmt::format("{}: {:g}, {:g} lies outside the image of {} x {} pixels",
                                                   where, uv.x(), uv.y(), map->width, map->height));
+  if (!raw && map && !rectification::raw_in_image(*map, uv))
+    return fail(Reason::not_seen,
+                fmt::format("{}: {:g}, {:g} lies outside the rectified image", where, uv.x(), uv.y()));
   return (raw && map ? fiducials::point_of_click(*map, uv, given_sigma)
                      : fiducials::ImagePoint{uv, uv, given_sigma.value_or(fiducials::click_sigma_px)})
       .map([&](const fiducials::ImagePoint& seen) {

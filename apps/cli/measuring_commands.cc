@@ -6,6 +6,7 @@
 #include "helicarm/report/exports.h"
 #include "import_command.h"
 #include "locate_command.h"
+#include "measure_command.h"
 #include "predict_command.h"
 #include "rectify_command.h"
 #include "register_command.h"
@@ -141,6 +142,41 @@ void add_locate(CLI::App& app, Action& action) {
   add_motion(command, a.motion_sigma_mm);
 }
 
+void add_measure(CLI::App& app, Action& action) {
+  auto* command = add_command(
+      app, "measure", "Measure in single images: distance, angle, circle, positions in femur and tibia",
+      "helicarm measure --clicks clicks.csv --calibration my-result/result.json\n"
+      "  helicarm measure --clicks clicks.csv      without a calibration: lengths in pixels\n\n"
+      "kind and the names of its clicks:\n"
+      "  distance           from, to\n"
+      "  angle              first, vertex, second\n"
+      "  line_angle         line1_from, line1_to, line2_from, line2_to\n"
+      "  circle             rim1, rim2, rim3 and any further ones\n"
+      "  femoral_quadrants  blumensaat_posterior, blumensaat_anterior, inferior[, posterior, anterior]\n"
+      "  tibia_ap           anterior, posterior[, plateau1, plateau2]\n"
+      "  tibia_ml           medial, lateral\n"
+      "In the last three, clicks of other names are points whose positions are given in per cent; a point\n"
+      "without pixels is the located one of this name in result.json.");
+  auto& a = arguments_of(command, action, measure_command);
+  command
+      ->add_option("--clicks", a.clicks,
+                   "CSV: measure,kind,view,name,u_px,v_px[,sigma_px], rectified pixels; a row per click")
+      ->required();
+  command->add_option("--calibration", a.calibration, "result.json of a run: gives lengths in mm");
+  command->add_option("--registration", a.registration,
+                      "registration.json of the same views: its planned points may be named too");
+  command->add_flag("--raw", a.raw, "The clicks are raw pixels");
+  command
+      ->add_option("--depth", a.depth_mm,
+                   "Distance of the plane of lengths from the source, mm (default: through the fiducials' "
+                   "centre)")
+      ->check(within(1, 10000));
+  command->add_option("--depth-sigma", a.depth_sigma_mm, "Its standard deviation, mm")
+      ->check(within(0, 1000))
+      ->capture_default_str();
+  command->add_option("--at", a.at, "A located point of result.json in that plane");
+}
+
 void add_rectify(CLI::App& app, Action& action) {
   auto* command = add_command(app, "rectify",
                               "Correct an intensifier's distortion by its plate, or apply a known map (2.1)",
@@ -163,9 +199,14 @@ void add_rectify(CLI::App& app, Action& action) {
                    "Folder for rectified.dcm (of several images NAME_rectified.dcm), inpainted.dcm, "
                    "map.json and residuals.csv")
       ->capture_default_str();
+  command->add_flag("--keep-patient", a.keep_patient,
+                    "Written images keep the patient and the study of theirs, to be stored with it (default: "
+                    "neither name nor dates nor UIDs)");
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
       ->type_name("WORD")
       ->capture_default_str();
+  command->add_flag("--stages", a.stages,
+                    "With --method paper: also the paper's Fig. 2, stage-raw.png to stage-inpainted.png");
 }
 
 void add_detect(CLI::App& app, Action& action) {
@@ -182,13 +223,27 @@ void add_detect(CLI::App& app, Action& action) {
 
 void add_import(CLI::App& app, Action& action) {
   auto* command =
-      add_command(app, "import", "Read a projection of another program: MayaCam 2, NRRD, a matrix",
-                  "helicarm import camera.txt --unit cm --json");
+      add_command(app, "import", "Read a projection of another program: MayaCam 2, DLT, NRRD, a matrix",
+                  "helicarm import camera.txt --unit cm --json\n"
+                  "  helicarm import MergedDlts.csv --column 2 --image-size 1760,1700 --json");
   auto& a = arguments_of(command, action, import_command);
-  command->add_option("FILE", a.file, "MayaCam 2, NRRD header, or a 3x4 matrix as text or JSON")->required();
+  command
+      ->add_option("FILE", a.file,
+                   "MayaCam 2, NRRD header, a 3x4 matrix as text or JSON, or XMALab's DLT coefficients")
+      ->required();
   command->add_option("--unit", a.unit, "Unit of length in the file: mm or cm")
       ->type_name("WORD")
       ->capture_default_str();
+  command->add_option("--column", a.column, "Camera in a table of DLT coefficients, from 1")
+      ->check(within(1, 100));
+  command
+      ->add_option("--image-size", a.image_size,
+                   "Width,height in px; DLT coefficients count rows upwards from 1")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(1, 16384));
+  command->add_flag("--undistorted", a.undistorted,
+                    "The images are undistorted already: a lens distortion in the file is left out");
 }
 
 }  // namespace
@@ -200,6 +255,7 @@ void add_measuring_commands(CLI::App& app, Action& action) {
   add_predict(app, action);
   add_solve(app, action);
   add_locate(app, action);
+  add_measure(app, action);
   add_rectify(app, action);
   add_detect(app, action);
   add_import(app, action);

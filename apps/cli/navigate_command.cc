@@ -11,12 +11,14 @@
 #include <unistd.h>
 
 #include "consent.h"
+#include "guide_by_hand.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/text.h"
 #include "helicarm/operation/connections.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/plate.h"
 #include "line_input.h"
+#include "touch_points.h"
 
 namespace helicarm::cli {
 namespace {
@@ -30,7 +32,7 @@ void check_plan(const operation::OperationPlan& plan, const NavigateArguments& a
   const auto refuse = [&](Reason reason, const std::string& problem) {
     throw BadInput(reason, fmt::format("{}: {}", arguments.plan.string(), problem));
   };
-  if (!arguments.yes && !::isatty(STDIN_FILENO))
+  if (!plan.drill && !arguments.yes && !::isatty(STDIN_FILENO))
     throw BadInput(Reason::order_not_confirmed,
                    "there is no terminal to confirm orders at; --yes confirms all orders: use it only where "
                    "no person can be injured");
@@ -62,7 +64,7 @@ std::string not_seen(const operation::OperationPlan& plan, const tracker::PoseBo
   return missing;
 }
 
-/// Waits for tracker and robot, and prints what is missing.
+/// Waits for tracker and robot, if any, and prints what is missing.
 void wait_for_devices(const operation::OperationPlan& plan, operation::Connections& devices,
                       const Ending& ending, Console& console) {
   std::string last_printed;
@@ -71,6 +73,8 @@ void wait_for_devices(const operation::OperationPlan& plan, operation::Connectio
     if (const std::string missing = not_seen(plan, devices.board()); !missing.empty())
       wants =
           fmt::format("tracker {} port {}: not visible:{}", plan.tracker.address, plan.tracker.port, missing);
+    else if (plan.drill)
+      wants.clear();
     else if (const auto state = devices.robot().wait_connected({}); !state)
       wants = fmt::format("robot {}: {}", plan.robot.address, state.error().message);
     else if (const auto why = robot::why_stopped(*state))
@@ -92,6 +96,10 @@ Json picks_of(const fs::path& file) {
 }
 
 void print_points(const pipeline::Result& result, Console& console) {
+  if (console.json) {
+    console.out << Json{{"points", pipeline::to_json(result).at("points")}}.dump() << std::endl;
+    return;
+  }
   for (const pipeline::PointResult& point : result.points)
     if (point.place) {
       const Eigen::Vector3d& at = point.place->in_calibrator;
@@ -117,34 +125,6 @@ void print_tour(const std::vector<robot::RobotOrder>& orders, Console& console) 
         i + 1, shift.x(), shift.y(), shift.z(), turn_rad * 180 / std::numbers::pi);
   }
   console.progress << std::flush;
-}
-
-/// Repeating the reading may help.
-bool is_of_poses(const Failure& failure) {
-  return failure.reason == Reason::no_pose || failure.reason == Reason::stale_pose ||
-         failure.reason == Reason::pose_spread;
-}
-
-/// Waits until the pointer is held still in view of the tracker.
-void touch(operation::Operation& operation, const std::string& name, LineInput& input, const Ending& ending,
-           Console& console) {
-  console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
-                                  without_control_characters(name))
-                   << std::flush;
-  for (;;) {
-    ending.wait_until([&] { return input.next(0).has_value(); });
-    const auto off = operation.touch(name);
-    if (off) {
-      console.progress << fmt::format("{}: recorded, deviation {:.2f} mm\n", without_control_characters(name),
-                                      *off)
-                       << std::flush;
-      return;
-    }
-    if (!is_of_poses(off.error())) throw BadInput(off.error());
-    console.progress << fmt::format("{}: {}; again\n", code(off.error().reason),
-                                    without_control_characters(off.error().message))
-                     << std::flush;
-  }
 }
 
 void print_outcome(const operation::TunnelOutcome& outcome, Console& console) {
@@ -175,7 +155,7 @@ void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operati
   };
   const auto approach = [&] {
     for (const std::string& name : operation.checks_to_come(tunnel.bone))
-      touch(operation, name, input, ending, console);
+      touch_point(operation, name, input, ending, console);
     const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
     console.progress << fmt::format("preview: {}\n", (out / ("preview-" + tunnel.name + "-*.png")).string())
                      << std::flush;
@@ -195,6 +175,51 @@ void go_to(const operation::PlannedTunnel& tunnel, operation::Operation& operati
   }
 }
 
+std::unique_ptr<operation::Operation> begin(const operation::OperationPlan& plan, const fs::path& folder,
+                                            operation::Connections& devices, Console& console) {
+  const auto notify = [&console](operation::Step step, const std::string& what) {
+    if (!console.quiet)
+      console.progress << fmt::format("{}: {}\n", operation::name_of(step), without_control_characters(what))
+                       << std::flush;
+  };
+  return value_or_throw(
+      plan.drill ? operation::Operation::begin_freehand(plan, folder, devices.board(), notify)
+                 : operation::Operation::begin(plan, folder, devices.board(), devices.robot(), notify));
+}
+
+/// Each view of the plan; an image that is refused must be acquired again.
+void take_images(operation::Operation& operation, operation::Connections& devices, const Ending& ending,
+                 Console& console) {
+  while (!operation.views_to_come().empty()) {
+    const std::string view = operation.views_to_come().front();
+    if (!console.quiet)
+      console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
+                       << std::flush;
+    std::optional<operation::DatedArrival> image;
+    ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
+    const auto taken = operation.take(view, image->arrival, image->time_s);
+    if (!taken)
+      console.progress << fmt::format("{}: {}: {}; acquire this view again\n", view,
+                                      code(taken.error().reason),
+                                      without_control_characters(taken.error().message))
+                       << std::flush;
+  }
+}
+
+/// Registers the robot and moves its tool to each tunnel.
+void drive_robot(const operation::OperationPlan& plan, const NavigateArguments& arguments,
+                 operation::Operation& operation, robot::RobotLink& robot, LineInput& input,
+                 const Ending& ending, Console& console) {
+  Consent consent(robot, ending, arguments.yes, console);
+  const auto until = std::chrono::steady_clock::now() + robot_patience;
+  ending.wait_until([&] { return robot.wait_connected({}) || std::chrono::steady_clock::now() > until; });
+  value_or_throw(robot.unlock("the operator at the terminal"));
+  print_tour(value_or_throw(operation.preview_tour()), console);
+  value_or_throw(operation.register_robot([&](const robot::RobotOrder& order) { return consent(order); }));
+  for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+    go_to(tunnel, operation, robot, arguments.out, consent, input, ending, console);
+}
+
 }  // namespace
 
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console) {
@@ -206,50 +231,25 @@ CommandResult navigate_command(const NavigateArguments& arguments, Console& cons
     StopSignal stop;
     operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(arguments.out / "inbox")));
     value_or_throw(devices.listen(arguments.receiver));
-    const auto operation = value_or_throw(
-        operation::Operation::begin(plan, arguments.out, devices.board(), devices.robot(),
-                                    [&](operation::Step step, const std::string& what) {
-                                      if (!console.quiet)
-                                        console.progress << fmt::format("{}: {}\n", operation::name_of(step),
-                                                                        without_control_characters(what))
-                                                         << std::flush;
-                                    }));
-    const Ending ending(stop, devices.robot(), *operation);
+    const auto operation = begin(plan, arguments.out, devices, console);
+    const Ending ending(stop, plan.drill ? nullptr : &devices.robot(), *operation);
     operation->confirmed_by(arguments.yes ? "--yes" : "the person at the terminal");
     wait_for_devices(plan, devices, ending, console);
     LineInput input(STDIN_FILENO);
     for (const operation::PlannedCheck& each : plan.check_points)
-      touch(*operation, each.name, input, ending, console);
-    while (!operation->views_to_come().empty()) {
-      const std::string view = operation->views_to_come().front();
-      if (!console.quiet)
-        console.progress << fmt::format("waiting for {} at port {}\n", view, devices.receiver_port())
-                         << std::flush;
-      std::optional<operation::DatedArrival> image;
-      ending.wait_until([&] { return (image = devices.next_image(0)).has_value(); });
-      const auto taken = operation->take(view, image->arrival, image->time_s);
-      if (!taken)
-        console.progress << fmt::format("{}: {}: {}; acquire this view again\n", view,
-                                        code(taken.error().reason),
-                                        without_control_characters(taken.error().message))
-                         << std::flush;
-    }
+      touch_point(*operation, each.name, input, ending, console);
+    take_images(*operation, devices, ending, console);
     if (!arguments.picks.empty()) {
       ending.wait_until([&] { return fs::exists(arguments.picks); });
       operation->pick(picks_of(arguments.picks));
     }
     value_or_throw(operation->measure());
     print_points(operation->result(), console);
-
-    Consent consent(devices.robot(), ending, arguments.yes, console);
-    const auto until = std::chrono::steady_clock::now() + robot_patience;
-    ending.wait_until(
-        [&] { return devices.robot().wait_connected({}) || std::chrono::steady_clock::now() > until; });
-    value_or_throw(devices.robot().unlock("the operator at the terminal"));
-    print_tour(value_or_throw(operation->preview_tour()), console);
-    value_or_throw(operation->register_robot([&](const robot::RobotOrder& order) { return consent(order); }));
-    for (const operation::PlannedTunnel& tunnel : plan.tunnels)
-      go_to(tunnel, *operation, devices.robot(), arguments.out, consent, input, ending, console);
+    if (plan.drill)
+      for (const operation::PlannedTunnel& tunnel : plan.tunnels)
+        guide_by_hand(tunnel, *operation, input, ending, console);
+    else
+      drive_robot(plan, arguments, *operation, devices.robot(), input, ending, console);
     value_or_throw(operation->finish());
   });
 }

@@ -18,7 +18,7 @@ struct NavigateArguments {
   bool yes = false;  ///< confirm every order automatically: for rehearsals
 };
 
-/// A whole operation from a plan: images, measurement, robot, verification.
+/// A whole operation from a plan: images, measurement, robot or hand-held drill, verification.
 CommandResult navigate_command(const NavigateArguments& arguments, Console& console);
 
 }  // namespace helicarm::cli

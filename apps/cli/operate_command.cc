@@ -69,7 +69,10 @@ CommandResult operate_command(const OperateArguments& arguments, Console& consol
         const std::string folder =
             attempt == 1 ? fmt::format("case-{}", i + 1) : fmt::format("case-{}-{}", i + 1, attempt);
         done[i] = guarded([&] {
-          return value_or_throw(rehearsal::rehearse(console.seed + i, arguments.out / folder, options));
+          rehearsal::Rehearsal whole =
+              value_or_throw(rehearsal::rehearse(console.seed + i, arguments.out / folder, options));
+          whole.attempts = attempt;
+          return whole;
         });
         if (done[i] || told || !is_timing_failure(done[i].error())) break;
         say(fmt::format("aborted ({}: {})", code(done[i].error().reason), done[i].error().message));

@@ -6,12 +6,15 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "helicarm/core/files.h"
 #include "helicarm/phantom/body.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/phantom/drawing.h"
+#include "helicarm/phantom/knee_cone.h"
 #include "helicarm/phantom/plate.h"
+#include "helicarm/phantom/rules.h"
 #include "helicarm/phantom_calibration/measure_phantom.h"
 #include "helicarm/phantom_calibration/phantom_report.h"
 #include "helicarm/phantom_calibration/verify_phantom.h"
@@ -113,6 +116,44 @@ void write(const Files& files, Console& console) {
   Json written = Json::array();
   for (const auto& file : files) written.push_back(file.first.string());
   console.out << to_text(Json{{"written", written}}) << "\n";
+}
+
+/// A calibrator for a knee (2.3.1), checked by the rules of 2.3.4.
+void design(const PhantomArguments& arguments, Console& console) {
+  if (arguments.knee_mm.size() != 2)
+    throw BadInput(Reason::usage,
+                   "phantom design: --knee D1,D2 is required, mm (paper: 64.6 to 68.9, 55.3 to 59.0)");
+  const phantom::KneeCone cone =
+      value_or_throw(phantom::cone_for_knee(arguments.knee_mm[0], arguments.knee_mm[1]));
+  const phantom::ConicalHelix helix = phantom::helix_on(cone);
+  const phantom::Calibrator calibrator = phantom::calibrator_on(helix, "knee");
+  phantom::RuleOptions options;
+  options.helix = helix;
+  std::vector<std::string> broken;
+  for (const phantom::RuleFinding& rule : phantom::check_rules(calibrator, options))
+    if (!rule.passed())
+      broken.push_back(fmt::format("{} ({:.3g}, limit {:g})", rule.rule, rule.figure, rule.limit));
+  if (console.json) {
+    console.out << to_text(Json{{"cone",
+                                 {{"base_diameter_mm", cone.base_diameter_mm},
+                                  {"top_diameter_mm", cone.top_diameter_mm},
+                                  {"height_mm", cone.height_mm}}},
+                                {"helix", {{"rr", helix.rr}, {"pp", helix.pp}, {"h", helix.h}}},
+                                {"calibrator", phantom::to_json(calibrator)},
+                                {"broken_rules", broken}})
+                << "\n";
+  } else {
+    console.out << fmt::format(
+        "cone: base {:.1f} mm, top {:.1f} mm, height {:.1f} mm\nhelix (Eq. 9): rr {:.3f}, pp {:.3f}, h "
+        "{:.3f}, 3.5 "
+        "turns\nrules broken: {}\n\n",
+        cone.base_diameter_mm, cone.top_diameter_mm, cone.height_mm, helix.rr, helix.pp, helix.h,
+        broken.empty() ? "none" : fmt::format("{}", fmt::join(broken, "; ")));
+    show(calibrator, console);
+  }
+  if (arguments.svg) value_or_throw(write_file(*arguments.svg, phantom::drawing_of(calibrator)));
+  if (arguments.file)
+    value_or_throw(write_file(*arguments.file, to_text(phantom::to_json(calibrator)) + "\n"));
 }
 
 void notify(const std::vector<Warning>& warnings, Console& console) {
@@ -236,6 +277,8 @@ CommandResult phantom_command(const PhantomArguments& arguments, Console& consol
         return write(arguments.plate ? exported(plate_of(arguments), arguments)
                                      : exported(calibrator_of(arguments), arguments, console),
                      console);
+      case PhantomAction::design:
+        return design(arguments, console);
       case PhantomAction::measure:
         return measure(arguments, console);
       case PhantomAction::verify:

@@ -10,9 +10,10 @@
 
 namespace helicarm::cli {
 
-enum class PhantomAction { show, check, export_files, measure, verify };
+enum class PhantomAction { show, check, export_files, design, measure, verify };
 
 /// `helicarm phantom show|check|export [NAME_OR_FILE] [--plate] [--stl FILE] [--svg FILE]`. With --json,
+/// `design --knee D1,D2` proposes a calibrator for a knee; with --svg and --file as `export`. With --json,
 /// `show` prints a valid calibrator.json or plate.json. `helicarm phantom measure CASE --out DIR` and
 /// `helicarm phantom verify CASE` read a case instead.
 struct PhantomArguments {
@@ -25,6 +26,7 @@ struct PhantomArguments {
   double step_mm = 1;                            ///< export: of the body's surface
   std::optional<std::filesystem::path> svg;      ///< export: the drawing
   std::optional<std::filesystem::path> file;     ///< export: calibrator.json or plate.json
+  std::vector<double> knee_mm;                   ///< design: d1, d2 of Fig. 4
   std::optional<std::filesystem::path> out;      ///< measure, verify: folder of the result
   bool from_scratch = false;                     ///< measure: without a nominal file
   std::vector<std::string> distances;            ///< measure: A,B=MM or u1,v1;u2,v2=MM

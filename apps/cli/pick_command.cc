@@ -2,6 +2,10 @@
 #include "pick_command.h"
 
 #include <array>
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+#include <vector>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -15,16 +19,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Beside this program, else on the PATH. Returns only if there is none.
-void open_desktop(const fs::path& folder) {
+/// The desktop application beside this program, else on the PATH.
+std::optional<fs::path> desktop_program() {
   std::error_code ignored;
-  const fs::path beside = fs::read_symlink("/proc/self/exe", ignored).parent_path() / "helicarm-gui";
-  std::string program = beside.string(), argument = fs::absolute(folder).string();
+  const fs::path name = "helicarm-gui";
+  std::vector<fs::path> folders = {fs::read_symlink("/proc/self/exe", ignored).parent_path()};
+  const char* path = std::getenv("PATH");
+  std::istringstream rest(path ? path : "");
+  for (std::string folder; std::getline(rest, folder, ':');) folders.emplace_back(folder);
+  for (const fs::path& folder : folders)
+    if (::access((folder / name).c_str(), X_OK) == 0) return folder / name;
+  return std::nullopt;
+}
+
+/// Returns only if the program cannot be started.
+void open_desktop(const fs::path& with, const fs::path& folder) {
+  std::string program = with.string(), argument = fs::absolute(folder).string();
   std::array<char*, 3> words{program.data(), argument.data(), nullptr};
   ::execv(program.c_str(), words.data());
-  program = "helicarm-gui";
-  words[0] = program.data();
-  ::execvp(program.c_str(), words.data());
 }
 
 void add_from(const fs::path& csv, const PickArguments& arguments, Console& console) {
@@ -48,11 +60,19 @@ CommandResult pick_command(const PickArguments& arguments, Console& console) {
   return guarded([&] {
     if (arguments.csv) return add_from(*arguments.csv, arguments, console);
     value_or_throw(pipeline::read_case(arguments.folder));
-    open_desktop(pipeline::folder_of_case(arguments.folder));
-    throw BadInput(
-        Reason::missing_file,
-        "helicarm-gui is not installed: apt install helicarm-gui, or ./run --gui in the source; or "
-        "give the picks as a table with --csv FILE (name,view,u_px,v_px[,sigma_px])");
+    const auto program = desktop_program();
+    if (!program)
+      throw BadInput(
+          Reason::missing_file,
+          "helicarm-gui is not installed: apt install helicarm-gui, or ./run --gui in the source; or "
+          "give the picks as a table with --csv FILE (name,view,u_px,v_px[,sigma_px])");
+    if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY") && !std::getenv("QT_QPA_PLATFORM"))
+      throw BadInput(
+          Reason::usage,
+          "pick: there is no display to open the desktop application on; give the picks as a table with "
+          "--csv FILE (name,view,u_px,v_px[,sigma_px])");
+    open_desktop(*program, pipeline::folder_of_case(arguments.folder));
+    throw BadInput(Reason::missing_file, program->string() + " cannot be started");
   });
 }
 

@@ -6,11 +6,14 @@
 #include "distinct_names.h"
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
+#include "helicarm/image/png.h"
 #include "helicarm/rectification/inpaint.h"
+#include "helicarm/rectification/paper_dots.h"
 #include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/rectification/test_grid.h"
 #include "helicarm/xray/read_xray_image.h"
+#include "helicarm/xray/uid.h"
 #include "helicarm/xray/write_dicom.h"
 #include "image_files.h"
 #include "named_files.h"
@@ -18,6 +21,17 @@
 
 namespace helicarm::cli {
 namespace {
+
+void write(const std::filesystem::path& to, xray::DerivedImage image, const std::filesystem::path& source,
+           const RectifyArguments& arguments) {
+  if (arguments.keep_patient) {
+    image.patient_study = value_or_throw(xray::read_patient_study(source));
+    // Not those of the image without its patient, which would link the two.
+    for (std::string* uid : {&image.instance_uid, &image.series_uid})
+      *uid = xray::uid_of(xray::text_key(*uid + image.patient_study->sop_instance_uid));
+  }
+  value_or_throw(xray::write_dicom(to, image));
+}
 
 xray::XrayImage read(const std::filesystem::path& image, const RectifyArguments& arguments) {
   return value_or_throw(xray::read_xray_image(image, image.filename().string(), arguments.frame));
@@ -39,6 +53,18 @@ Json figures_of(const rectification::Rectification& r) {
           {"raw_max_px", r.raw_max_px}};
 }
 
+/// Fig. 2 a to e.
+void write_stages(const xray::XrayImage& xray_image, const rectification::Rectification& r,
+                  const image::Image<float>& inpainted, const std::filesystem::path& out) {
+  const auto stages =
+      rectification::paper_stages(xray_image.pixels, xray_image.lowest, xray_image.highest, r.plate_dots);
+  const auto last = rectification::displayed(inpainted, xray_image.lowest, xray_image.highest);
+  for (const auto& [name, stage] :
+       {std::pair{"raw", &stages.raw}, std::pair{"median", &stages.median}, std::pair{"edges", &stages.edges},
+        std::pair{"circles", &stages.circles}, std::pair{"inpainted", &last}})
+    value_or_throw(write_file(out / fmt::format("stage-{}.png", name), image::encode_png(*stage)));
+}
+
 void rectify_image(const RectifyArguments& arguments, Console& console) {
   const xray::XrayImage xray_image = read(arguments.images.front(), arguments);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
@@ -47,13 +73,14 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
                              r.residual_px[i]);
-  value_or_throw(xray::write_dicom(arguments.out / "rectified.dcm",
-                                   rectification::rectified_dicom(xray_image, r.map, "rectified")));
+  const std::filesystem::path& source = arguments.images.front();
+  write(arguments.out / "rectified.dcm", rectification::rectified_dicom(xray_image, r.map, "rectified"),
+        source, arguments);
   xray::XrayImage without_dots = xray_image;
   without_dots.pixels = rectification::inpainted(xray_image.pixels, r.plate_dots);
-  value_or_throw(
-      xray::write_dicom(arguments.out / "inpainted.dcm",
-                        rectification::rectified_dicom(without_dots, r.map, "rectified, plate hidden")));
+  write(arguments.out / "inpainted.dcm",
+        rectification::rectified_dicom(without_dots, r.map, "rectified, plate hidden"), source, arguments);
+  if (arguments.stages) write_stages(xray_image, r, without_dots.pixels, arguments.out);
   value_or_throw(write_file(arguments.out / "map.json", to_text(rectification::to_json(r.map)) + "\n"));
   value_or_throw(write_file(arguments.out / "residuals.csv", residuals));
   if (console.json)
@@ -75,13 +102,18 @@ void map_images(const RectifyArguments& arguments, Console& console) {
   Json written = Json::array();
   for (std::size_t i = 0; i < files.size(); ++i) {
     const xray::XrayImage xray_image = read(files[i], arguments);
-    value_or_throw(rectification::with_map(xray_image, map, {}).map_error([&](Failure failure) {
-      failure.message = fmt::format("{}: {}", files[i].filename().string(), failure.message);
-      return failure;
-    }));
+    const auto mapped =
+        value_or_throw(rectification::with_map(xray_image, map, {}).map_error([&](Failure failure) {
+          failure.message = fmt::format("{}: {}", files[i].filename().string(), failure.message);
+          return failure;
+        }));
+    if (!mapped.map_confirmed && !console.quiet)
+      console.progress << fmt::format(
+          "helicarm: note: {}: no plate in the image confirms the map; it must be of this C-arm position\n",
+          files[i].filename().string());
     const std::filesystem::path to =
         arguments.out / (files.size() == 1 ? "rectified.dcm" : names[i] + "_rectified.dcm");
-    value_or_throw(xray::write_dicom(to, rectification::rectified_dicom(xray_image, map, "rectified")));
+    write(to, rectification::rectified_dicom(xray_image, map, "rectified"), files[i], arguments);
     written.push_back(to.string());
     if (!console.quiet && !console.json)
       console.out << fmt::format("[{}/{}] {}\n", i + 1, files.size(), to.string());
@@ -108,17 +140,32 @@ void map_points(const RectifyArguments& arguments, Console& console) {
   for (const Json& point : points) console.out << point["u"].dump() << ',' << point["v"].dump() << '\n';
 }
 
+Json crossings_of(const rectification::TestGrid& grid) {
+  Json crossings = Json::array();
+  for (std::size_t k = 0; k < grid.raw_px.size(); ++k)
+    crossings.push_back({{"uv_raw", {grid.raw_px[k].x(), grid.raw_px[k].y()}},
+                         {"uv", {grid.rectified_px[k].x(), grid.rectified_px[k].y()}},
+                         {"ideal_uv_raw", {grid.raw_ideal_px[k].x(), grid.raw_ideal_px[k].y()}},
+                         {"raw_error_px", grid.raw_error_px[k]},
+                         {"rectified_error_px", grid.rectified_error_px[k]}});
+  return crossings;
+}
+
 void measure_grid(const RectifyArguments& arguments, Console& console) {
   const rectification::DistortionMap map = map_of(arguments);
-  const rectification::TestGrid grid = value_or_throw(rectification::measure_test_grid(
-      rectification::find_grid(read(arguments.images.front(), arguments)), map));
+  const xray::XrayImage image = read(arguments.images.front(), arguments);
+  const rectification::TestGrid grid =
+      value_or_throw(rectification::measure_test_grid(rectification::find_grid(image), map));
+  value_or_throw(
+      rectification::check_pitch(grid, *arguments.test_grid_mm, map, image.acquisition.source_detector_mm));
   const auto json_of = [](const rectification::GridError& error) {
     return Json{{"mean_px", error.mean_px}, {"max_px", error.max_px}};
   };
   if (console.json)
     console.out << to_text(Json{{"raw", json_of(grid.raw)},
                                 {"rectified", json_of(grid.rectified)},
-                                {"n", grid.crosses}})
+                                {"n", grid.crosses},
+                                {"crossings", crossings_of(grid)}})
                 << '\n';
   else
     console.out << fmt::format(
@@ -131,10 +178,13 @@ void measure_grid(const RectifyArguments& arguments, Console& console) {
 CommandResult rectify_command(const RectifyArguments& arguments, Console& console) {
   return guarded([&] {
     const RectifyArguments& a = arguments;
+    if (a.stages && (!a.plate || a.method != "paper"))
+      throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
     if (a.points && a.map && a.images.empty()) return map_points(a, console);
     if (a.images.size() == 1 && a.test_grid_mm && a.map) return measure_grid(a, console);
     if (!a.images.empty() && a.map && !a.plate && !a.points && !a.test_grid_mm) return map_images(a, console);
-    if (a.images.size() == 1 && a.plate && !a.map && !a.points) return rectify_image(a, console);
+    if (a.images.size() == 1 && a.plate && !a.map && !a.points && !a.test_grid_mm)
+      return rectify_image(a, console);
     throw BadInput(Reason::usage,
                    "rectify: give IMAGE --plate, or IMAGE... --map, or --map --points, or IMAGE --map "
                    "--test-grid (see --help)");

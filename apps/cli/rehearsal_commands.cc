@@ -2,6 +2,7 @@
 #include "command_line.h"
 #include "demo_command.h"
 #include "drr_command.h"
+#include "helicarm/phantom/knee_cone.h"
 #include "phantom_command.h"
 #include "simulate_command.h"
 #include "study_command.h"
@@ -141,6 +142,7 @@ void add_study(CLI::App& app, Action& action) {
                    "uniformity: E(A) against TRE (Fig. 6)\n"
                    "location: TRE by position of the target (Fig. 7)\n"
                    "biplane: the cone against plates on the receiver (Table 1)\n"
+                   "biplane-images: the plates from images; leaves biplane-case, a case for run (Table 1)\n"
                    "calibration: ten simulated tests, measured (Table 1, Fig. 14)\n"
                    "rectification: the test grid at ten distances, by ten intensifiers (Figs. 9 to 11)\n"
                    "design: ball positions of least TRE under the rules\n"
@@ -156,7 +158,8 @@ void add_study(CLI::App& app, Action& action) {
   command->add_flag("--resume", a.resume, "Continue an interrupted run that wrote to the same folder");
   command
       ->add_option("--balls", a.balls,
-                   "Number of balls; study number takes several, as 6,7,8, uniformity and design take one")
+                   "Number of balls; study number takes several, as 6,7,8; uniformity, design and biplane "
+                   "(default 8) take one")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(within(6, 64));
@@ -181,12 +184,15 @@ void add_study(CLI::App& app, Action& action) {
       ->type_name("WORD");
   command->add_option("--calibrator", a.calibrator,
                       "location: name of a built-in or a file (default: random balls)");
+  add_fields(command, a.biplane, study::biplane_fields);
+  add_fields(command, a.calibration, study::calibration_fields);
 }
 
 void add_phantom(CLI::App& app, Action& action) {
   auto* command = add_command(
-      app, "phantom", "Show, check, export, measure or verify the calibrator",
+      app, "phantom", "Show, check, design, export, measure or verify the calibrator",
       "helicarm phantom show\n  helicarm phantom check calibrator.json\n"
+      "  helicarm phantom design --knee 66.7,57.2 --file knee.json\n"
       "  helicarm phantom export --stl calibrator.stl --svg calibrator.svg\n"
       "  helicarm phantom export my-balls.json --body rings --clearance -0.1 --step 0.5 --stl body.stl\n"
       "  helicarm phantom measure eight-views --distance P1,P7=118.42 --distance-is outer --out my-phantom\n"
@@ -198,6 +204,7 @@ void add_phantom(CLI::App& app, Action& action) {
       ->add_option(
           "ACTION", a.action,
           "show, check, export: a calibrator or plate\n"
+          "design: a calibrator for a knee's dimensions\n"
           "measure: ball coordinates as built, from a case of three views or more (6 to 10 advised, 10 to "
           "30 degrees apart)\n"
           "verify: whether the balls are still at the file's positions, from a case of two views or more")
@@ -205,9 +212,10 @@ void add_phantom(CLI::App& app, Action& action) {
                       std::map<std::string, PhantomAction>{{"show", PhantomAction::show},
                                                            {"check", PhantomAction::check},
                                                            {"export", PhantomAction::export_files},
+                                                           {"design", PhantomAction::design},
                                                            {"measure", PhantomAction::measure},
                                                            {"verify", PhantomAction::verify}})
-                      .description("{show, check, export, measure, verify}"))
+                      .description("{show, check, export, design, measure, verify}"))
       ->type_name("WORD")
       ->required();
   command->add_option(
@@ -231,8 +239,16 @@ void add_phantom(CLI::App& app, Action& action) {
   command->add_option("--step", a.step_mm, "export: step of the body's surface, mm; fine for a press fit")
       ->check(within(0.2, 3))
       ->capture_default_str();
-  command->add_option("--svg", a.svg, "export: the drawing with all coordinates, as SVG");
-  command->add_option("--file", a.file, "export: calibrator.json or plate.json");
+  command
+      ->add_option(
+          "--knee", a.knee_mm,
+          "design: D1,D2: width between lateral femoral wall and medial condyle, and height from the "
+          "top of the knee to the resident's ridge, mm (Fig. 4)")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(within(phantom::knee_range_mm.low, phantom::knee_range_mm.high));
+  command->add_option("--svg", a.svg, "export, design: the drawing with all coordinates, as SVG");
+  command->add_option("--file", a.file, "export, design: calibrator.json or plate.json");
   command->add_option("--out", a.out,
                       "measure: folder for calibrator.json, result.json and report.html; verify: for "
                       "result.json");

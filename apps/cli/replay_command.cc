@@ -19,14 +19,16 @@ CommandResult replay_command(const ReplayArguments& arguments, Console& console)
                               {"pictures", report.images},
                               {"results", report.results},
                               {"hand_eyes", report.hand_eyes},
+                              {"decisions", report.decisions},
                               {"differences", report.differences}})
                   << '\n';
     } else {
       console.out << fmt::format(
-          "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations\n",
+          "{} records{}{}: {} acquisitions, {} images of cases, {} results, {} hand-eye calibrations, {} "
+          "decisions on a hand-held drill\n",
           report.records, report.torn ? " and an incomplete one" : "",
           report.finished ? "" : ", operation not ended", report.exposures, report.images, report.results,
-          report.hand_eyes);
+          report.hand_eyes, report.decisions);
       for (const std::string& difference : report.differences) console.out << "  " << difference << '\n';
     }
     if (!report.differences.empty())

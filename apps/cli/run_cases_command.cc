@@ -11,6 +11,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/localization/error_bound.h"
 #include "helicarm/pipeline/result.h"
+#include "run_models.h"
 
 namespace helicarm::cli {
 namespace {
@@ -97,9 +98,10 @@ CommandResult run_several(const RunCasesArguments& arguments, Console& console) 
     if (console.quiet) continue;
     console.progress << fmt::format(
         "[{}/{}] {}: {}\n", i + 1, names.size(), c.name,
-        c.failure ? fmt::format("{}: {}", code(c.failure->reason), c.failure->message)
-                  : fmt::format("{} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.located,
-                                c.points, c.worst_error_mm.value_or(0), c.warnings));
+        c.failure       ? fmt::format("{}: {}", code(c.failure->reason), c.failure->message)
+        : c.points == 0 ? fmt::format("calibrated, no points, {} warnings", c.warnings)
+                        : fmt::format("{} of {} points, 95 % error up to {:.3f} mm, {} warnings", c.located,
+                                      c.points, c.worst_error_mm.value_or(0), c.warnings));
   }
   if (std::ranges::any_of(done, [](const CaseSummary& c) { return c.failure.has_value(); }))
     return tl::unexpected<Failure>(gravest(done, csv));
@@ -127,7 +129,7 @@ CommandResult run_cases_command(const RunCasesArguments& arguments, Console& con
   if (arguments.cases.size() > 1) return run_several(arguments, console);
   RunArguments run = arguments.run;
   run.folder = arguments.cases.front();
-  return run_command(run, console);
+  return has_models(run.folder) ? run_with_models(run, console) : run_command(run, console);
 }
 
 }  // namespace helicarm::cli

@@ -10,6 +10,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/pipeline/advice.h"
 #include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/outcome.h"
 #include "helicarm/pipeline/run_case.h"
 #include "helicarm/report/overlay.h"
 #include "helicarm/report/report.h"
@@ -129,6 +130,12 @@ Expected<rectification::Method> method_named(const std::string& name) {
   return fail(Reason::usage, fmt::format("--method: \"{}\" is none of: best, paper", name));
 }
 
+/// "   within 0.812 (95 %)" of a tunnel's end.
+std::string within_in_tool(const pipeline::Result& result, const std::string& tunnel, bool start) {
+  const auto error = pipeline::tunnel_end_error_in_tool(result, tunnel, start);
+  return error ? fmt::format("   within {:.3f} (95 %)", *error) : "";
+}
+
 std::string summary_of(const pipeline::Result& result) {
   std::string text = statistics_line("FLE px", result.accuracy.fle_px) +
                      statistics_line("FRE mm", result.accuracy.fre_mm) +
@@ -146,9 +153,10 @@ std::string summary_of(const pipeline::Result& result) {
     if (tunnel.start_in_tool && tunnel.end_in_tool)
       text += fmt::format(
           "\n  tunnel {:<8} in the tool's frame, length {:.2f} mm, axis sigma {:.2f} degrees\n"
-          "    start {}\n    end   {}\n",
+          "    start {}{}\n    end   {}{}\n",
           tunnel.name, tunnel.length_mm.value_or(0), tunnel.axis_sigma_deg().value_or(0),
-          coordinates(*tunnel.start_in_tool), coordinates(*tunnel.end_in_tool));
+          coordinates(*tunnel.start_in_tool), within_in_tool(result, tunnel.name, true),
+          coordinates(*tunnel.end_in_tool), within_in_tool(result, tunnel.name, false));
   for (const verification::Verification& v : result.verifications)
     for (const auto& [end, error] : {std::pair{"start", &v.start}, {"end", &v.end}})
       if (*error)

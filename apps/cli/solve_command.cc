@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "solve_command.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -98,6 +99,14 @@ void print_table(const Solution& solution, double rms_px, const std::vector<fidu
                        (solution.view.project(point.centre_in_calibrator) - point.uv).norm());
 }
 
+/// Label of the point with the largest residual.
+std::string farthest(const Solution& solution, const std::vector<fiducials::Fiducial>& points) {
+  const auto residual = [&](const fiducials::Fiducial& point) {
+    return (solution.view.project(point.centre_in_calibrator) - point.uv).norm();
+  };
+  return std::ranges::max_element(points, {}, residual)->label;
+}
+
 }  // namespace
 
 CommandResult solve_command(const SolveArguments& arguments, Console& console) {
@@ -111,6 +120,12 @@ CommandResult solve_command(const SolveArguments& arguments, Console& console) {
   const auto solution = solve(arguments.method, *points, pairs, table->has("sigma_px"));
   if (!solution) return tl::unexpected<Failure>(solution.error());
   const double rms_px = geometry::reprojection_rms(solution->view, pairs);
+  if (rms_px > calibration::CalibrationOptions{}.largest_rms_px)
+    console.progress << fmt::format(
+        "helicarm: warning: residual_too_large: {:.3g} px rms, over {:g} px: check the point with the "
+        "largest residual "
+        "({}); solve rejects no outlier\n",
+        rms_px, calibration::CalibrationOptions{}.largest_rms_px, farthest(*solution, *points));
   if (console.json)
     console.out << to_text(json_of(*solution, rms_px)) << '\n';
   else

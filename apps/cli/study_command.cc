@@ -11,6 +11,7 @@
 #include "helicarm/core/json.h"
 #include "helicarm/phantom/calibrator.h"
 #include "helicarm/study/biplane.h"
+#include "helicarm/study/biplane_images.h"
 #include "helicarm/study/calibration_study.h"
 #include "helicarm/study/centres.h"
 #include "helicarm/study/design.h"
@@ -56,16 +57,30 @@ void choose(std::vector<Value>& chosen, const char* option, const std::vector<st
   }
 }
 
+using GivenOptions = std::vector<std::pair<std::string_view, bool>>;
+
+/// Fields that differ from their default.
+template <class Options, std::size_t count>
+void add_given(GivenOptions& given, const Options& options, const std::array<Field<Options>, count>& fields) {
+  for (const Field<Options>& field : fields)
+    given.emplace_back(field.flag, field.get(options) != field.get(Options{}));
+}
+
+template <std::size_t count, class Options>
+std::vector<std::string_view> flags_of(std::vector<std::string_view> flags,
+                                       const std::array<Field<Options>, count>& fields) {
+  for (const Field<Options>& field : fields) flags.push_back(field.flag);
+  return flags;
+}
+
 /// An option that this study does not have is an error.
 void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
-  const std::array<std::pair<const char*, bool>, 8> given{{{"--balls", !a.balls.empty()},
-                                                           {"--sigma", !a.sigmas.empty()},
-                                                           {"--reading", !a.readings.empty()},
-                                                           {"--fle", a.fle.has_value()},
-                                                           {"--origin", !a.origin.empty()},
-                                                           {"--draws", a.draws.has_value()},
-                                                           {"--calibrator", !a.calibrator.empty()},
-                                                           {"--surface", !a.surface.empty()}}};
+  GivenOptions given{{"--balls", !a.balls.empty()},           {"--sigma", !a.sigmas.empty()},
+                     {"--reading", !a.readings.empty()},      {"--fle", a.fle.has_value()},
+                     {"--origin", !a.origin.empty()},         {"--draws", a.draws.has_value()},
+                     {"--calibrator", !a.calibrator.empty()}, {"--surface", !a.surface.empty()}};
+  add_given(given, a.biplane, study::biplane_fields);
+  add_given(given, a.calibration, study::calibration_fields);
   for (const auto& [option, is_given] : given)
     if (is_given && std::ranges::count(known, option) == 0)
       refuse(fmt::format("{} has no {}; its options are: {}", a.name, option,
@@ -74,8 +89,7 @@ void only(const StudyArguments& a, const std::vector<std::string_view>& known) {
 
 /// A study's defaults, overridden by the given options.
 template <class Options>
-Options options_of(const StudyRun& run) {
-  Options options;
+Options options_of(const StudyRun& run, Options options = {}) {
   const StudyArguments& a = run.arguments;
   if (a.groups) options.groups = *a.groups;
   options.seed = run.console.seed;
@@ -131,8 +145,22 @@ study::StudyFiles run_location(const StudyRun& run) {
   return files_by<study::study_location>(run, options);
 }
 
+study::StudyFiles run_biplane(const StudyRun& run) {
+  return files_by<study::study_biplane>(run, options_of(run, run.arguments.biplane));
+}
+
+study::StudyFiles run_biplane_images(const StudyRun& run) {
+  const StudyArguments& a = run.arguments;
+  auto options = options_of<study::BiplaneImagesOptions>(run);
+  options.folder = a.out;
+  options.tracker_sigma_mm = a.biplane.tracker_sigma_mm;
+  options.tracker_sigma_deg = a.biplane.tracker_sigma_deg;
+  if (a.calibration.click_sigma_px > 0) options.click_sigma_px = a.calibration.click_sigma_px;
+  return files_by<study::study_biplane_images>(run, options);
+}
+
 study::StudyFiles run_calibration(const StudyRun& run) {
-  auto options = options_of<study::CalibrationStudyOptions>(run);
+  auto options = options_of(run, run.arguments.calibration);
   options.folder = run.arguments.out;
   return files_by<study::study_calibration>(run, options);
 }
@@ -149,12 +177,13 @@ struct KnownStudy {
   study::StudyFiles (*run)(const StudyRun&);
   std::vector<std::string_view> options = {};  ///< besides the common ones
 };
-const std::array<KnownStudy, 9> studies{
+const std::array<KnownStudy, 10> studies{
     {{"number", run_number, {"--balls", "--sigma", "--reading", "--fle", "--origin"}},
      {"uniformity", run_uniformity, {"--balls", "--sigma", "--fle", "--origin", "--draws"}},
      {"location", run_location, {"--calibrator", "--sigma", "--fle", "--origin"}},
-     {"biplane", run_plain<study::BiplaneOptions, study::study_biplane>, {"--sigma", "--fle"}},
-     {"calibration", run_calibration},
+     {"biplane", run_biplane, flags_of({"--balls", "--sigma", "--fle"}, study::biplane_fields)},
+     {"biplane-images", run_biplane_images, {"--tracker-mm", "--tracker-deg", "--click"}},
+     {"calibration", run_calibration, flags_of({}, study::calibration_fields)},
      {"rectification", run_plain<study::RectificationStudyOptions, study::study_rectification>},
      {"design", run_design, {"--balls", "--surface", "--sigma", "--fle"}},
      {"limit", run_plain<study::LimitOptions, study::study_limit>},

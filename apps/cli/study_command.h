@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "command.h"
+#include "helicarm/study/biplane.h"
+#include "helicarm/study/calibration_study.h"
 
 namespace helicarm::cli {
 
 /// Omitted options take the study's defaults.
 struct StudyArguments {
-  /// number, uniformity, location, biplane, calibration, rectification, design, limit or centres
+  /// number, uniformity, location, biplane, biplane-images, calibration, rectification, design, limit or
+  /// centres
   std::string name;
   std::optional<std::size_t> groups;
   std::filesystem::path out = "helicarm-study";
@@ -25,6 +28,8 @@ struct StudyArguments {
   std::optional<int> draws;
   std::string calibrator;
   std::string surface;
+  study::BiplaneOptions biplane;               ///< of biplane_fields
+  study::CalibrationStudyOptions calibration;  ///< of calibration_fields
 };
 
 /// Runs a simulated experiment and writes NAME.csv, NAME.json and NAME.svg. The same seed gives the same

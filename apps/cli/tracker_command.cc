@@ -32,23 +32,6 @@ void wait_telling(StopSignal& interrupt, std::optional<double> seconds, Notify n
   }
 }
 
-/// Options with the address and port of "address:port".
-Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
-  tracker::IgtlClientOptions options = arguments.options;
-  const std::string& peer = arguments.peer;
-  const auto colon = peer.rfind(':');
-  if (colon != peer.npos) {
-    int port = 0;
-    const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
-    if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
-      return fail(Reason::usage, fmt::format("PEER: \"{}\" is not address:port with a port from 1 to 65535",
-                                             without_control_characters(peer)));
-    options.port = static_cast<std::uint16_t>(port);
-  }
-  options.address = peer.substr(0, colon);
-  return options;
-}
-
 Json json_of(const tracker::TrackerLinkStatus& link, const std::vector<tracker::ToolState>& tools) {
   Json json;
   json["state"] = code(link.state);
@@ -92,6 +75,22 @@ Expected<void> check_tool(const std::vector<tracker::SequenceFrame>& frames,
 }
 
 }  // namespace
+
+Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
+  tracker::IgtlClientOptions options = arguments.options;
+  const std::string& peer = arguments.peer;
+  const auto colon = peer.rfind(':');
+  if (colon != peer.npos) {
+    int port = 0;
+    const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
+    if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
+      return fail(Reason::usage, fmt::format("PEER: \"{}\" is not address:port with a port from 1 to 65535",
+                                             without_control_characters(peer)));
+    options.port = static_cast<std::uint16_t>(port);
+  }
+  options.address = peer.substr(0, colon);
+  return options;
+}
 
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console) {
   const auto options = client_options(arguments);

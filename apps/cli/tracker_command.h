@@ -32,6 +32,9 @@ struct TrackerPivotArguments {
   tracker::PivotOptions options;
 };
 
+/// Options with the address and port of "address:port". Refuses usage.
+Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments);
+
 /// Prints a tracker's poses, tool by tool.
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console);
 /// Records them into a MetaImage sequence file.

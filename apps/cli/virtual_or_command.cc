@@ -28,7 +28,9 @@ std::string words() {
   return fmt::format(
       "shoot VIEW | shoot VIEW {} | fault NAME on|off ({}) | move femur|tibia|base X Y Z (mm) | turn "
       "femur|tibia DEG (about its tunnel's outer end) | bump femur|tibia X Y Z (mm: its marker) | touch "
-      "femur|tibia|nothing | power on | where | quit",
+      "femur|tibia|nothing|BALL (P1 ..) | drill femur|tibia DEPTH [OFF_MM [TILT_DEG]] (of a hand-held drill) "
+      "| power on | "
+      "where | quit",
       virtual_devices::c_arm_fault_names(), virtual_devices::virtual_fault_names());
 }
 
@@ -37,6 +39,21 @@ virtual_devices::CArmFault fault_of_shot(const std::string& name) {
   if (const auto fault = virtual_devices::c_arm_fault(name)) return *fault;
   throw BadInput(Reason::bad_value,
                  fmt::format("a fault of the C-arm is one of {}", virtual_devices::c_arm_fault_names()));
+}
+
+std::string motion_of_tool(VirtualDevices& virtual_or) {
+  if (!virtual_or.robot_if_any()) return "held by hand";
+  const robot::VirtualTruth robot = virtual_or.robot().truth();
+  if (robot.moving) return "moving";
+  return robot.rest_since_s ? fmt::format("at rest for {:.3f} s", robot.state.time_s - *robot.rest_since_s)
+                            : "never moved";
+}
+
+std::string ports_of(VirtualDevices& virtual_or) {
+  if (!virtual_or.robot_if_any()) return "drill: held by hand, no robot";
+  const robot::VirtualUr& robot = virtual_or.robot();
+  return fmt::format("robot (UR5): RTDE {}, dashboard {}, script {}, primary {}", robot.rtde_port(),
+                     robot.dashboard_port(), robot.script_port(), robot.primary_port());
 }
 
 /// Executes one command line and returns the answer; throws BadInput.
@@ -79,12 +96,20 @@ std::string execute(const std::string& line, VirtualDevices& virtual_or,
     return "turned " + what;
   }
   if (verb == "touch") {
-    if (!bone && what != "nothing") throw BadInput(Reason::usage, "touch femur|tibia|nothing");
-    if (bone)
-      virtual_or.touch(what);
-    else
+    if (what == "nothing")
       virtual_or.lift_pointer();
+    else if (!virtual_or.touch(what))
+      throw BadInput(Reason::usage, "touch femur|tibia|nothing, or the label of a ball");
     return "touching " + what;
+  }
+  if (verb == "drill") {
+    double depth = 0, off = 0, tilt = 0;
+    if (!(said >> depth) || !bone || virtual_or.robot_if_any())
+      throw BadInput(Reason::usage, "drill femur|tibia DEPTH [OFF_MM [TILT_DEG]], with --freehand");
+    said >> off >> tilt;
+    constexpr double drill_s = 3;
+    virtual_or.drill().move(what, virtual_or.drill().on_tunnel(what, depth, off, tilt), drill_s);
+    return "drilling " + what;
   }
   if (verb == "power") {
     if (what != "on") throw BadInput(Reason::usage, "power on");
@@ -92,12 +117,7 @@ std::string execute(const std::string& line, VirtualDevices& virtual_or,
   }
   if (verb == "where") {
     const Eigen::Vector3d tip = virtual_or.tracker_from_tip().translation;
-    const robot::VirtualTruth robot = virtual_or.robot().truth();
-    const std::string motion =
-        robot.moving         ? "moving"
-        : robot.rest_since_s ? fmt::format("at rest for {:.3f} s", robot.state.time_s - *robot.rest_since_s)
-                             : "never moved";
-    return fmt::format("tip {:.3f} {:.3f} {:.3f}, {}", tip.x(), tip.y(), tip.z(), motion);
+    return fmt::format("tip {:.3f} {:.3f} {:.3f}, {}", tip.x(), tip.y(), tip.z(), motion_of_tool(virtual_or));
   }
   throw BadInput(Reason::usage, "commands: " + words());
 }
@@ -148,12 +168,10 @@ CommandResult virtual_or_command(const VirtualOrArguments& arguments, Console& c
     }
     if (!console.quiet)
       console.progress << fmt::format(
-                              "tracker (OpenIGTLink) port {}\nrobot (UR5): RTDE {}, dashboard {}, script {}\n"
+                              "tracker (OpenIGTLink) port {}\n{}\n"
                               "C-arm sends to {} {} port {}\ncommands: {}\n",
-                              virtual_or->tracker().port(), virtual_or->robot().rtde_port(),
-                              virtual_or->robot().dashboard_port(), virtual_or->robot().script_port(),
-                              arguments.receiver.title, arguments.receiver.address, arguments.receiver.port,
-                              words())
+                              virtual_or->tracker().port(), ports_of(*virtual_or), arguments.receiver.title,
+                              arguments.receiver.address, arguments.receiver.port, words())
                        << std::flush;
     const std::jthread listener(
         [&](const std::stop_token& stop) { listen(stop, *virtual_or, arguments, console, end); });

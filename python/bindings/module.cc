@@ -11,6 +11,7 @@ PYBIND11_MODULE(_helicarm, module) {
   add_phantom(module);
   add_rectification(module);
   add_calibration(module);
+  add_measures(module);
   add_cases(module);
   add_phantom_calibration(module);
 }

@@ -17,6 +17,8 @@ void add_view_points(py::module_& module);
 void add_points(py::module_& module);
 /// calibrate, Calibration.
 void add_calibration(py::module_& module);
+/// measure.
+void add_measures(py::module_& module);
 /// run_case, Result, simulate_case.
 void add_cases(py::module_& module);
 /// measure_phantom, MeasuredPhantom, verify_phantom.

@@ -290,6 +290,10 @@ def calibrate(views: Sequence[ViewPoints], *, c_arm: CArmPrior = ...,
               ball_covariance_mm2: Optional[ArrayLike] = None, ball_labels: Optional[Sequence[str]] = None,
               scale_sigma: float = ..., rejection_probability: float = ..., largest_rms_px: float = ...,
               least_angle_deg: float = ...) -> Calibration: ...
+def measure(kind: str, clicks: Mapping[str, ArrayLike], *, calibration: Optional[Calibration] = None,
+            view: Optional[_View] = None, sigma_px: Optional[float] = None, raw: bool = False,
+            depth_mm: Optional[float] = None, depth_sigma_mm: float = 0.0, at: Optional[ArrayLike] = None,
+            points: Mapping[str, Tuple[ArrayLike, ArrayLike]] = ...) -> _Dict: ...
 def run_case(folder: _Path, *, method: str = "best", max_error_mm: Optional[float] = None,
              motion_sigma_mm: float = 0, threads: int = 0, history: Optional[_Path] = None,
              progress: Optional[Callable[[str], Any]] = None) -> Result: ...

@@ -5,6 +5,12 @@
 
 namespace helicarm::gui {
 
+std::string missing_view(const ApplicationState& state) {
+  for (const pipeline::ViewResult& view : state.result->views)
+    if (!view.xray_image) return view.name;
+  return state.views.empty() ? "" : state.views.front();
+}
+
 const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,
                               const std::string& view) {
   const auto pick = std::ranges::find_if(
@@ -12,19 +18,44 @@ const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& 
   return pick == state.picks.end() ? nullptr : &*pick;
 }
 
+bool is_picked(const std::vector<pipeline::Pick>& picks, const std::vector<std::string>& views,
+               const std::string& point) {
+  const auto picked = std::ranges::count_if(picks, [&](const pipeline::Pick& pick) {
+    return pick.name == point && std::ranges::find(views, pick.view) != views.end();
+  });
+  return picked >= std::min<std::ptrdiff_t>(2, std::ssize(views));
+}
+
+namespace {
+
+std::optional<WantedPick> missing_pick(const ApplicationState& state, const std::string& point,
+                                       std::optional<guidance::Bone> bone) {
+  if (is_picked(state.picks, state.views, point)) return std::nullopt;
+  for (const std::string& view : state.views)
+    if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, bone};
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::optional<WantedPick> next_pick(const ApplicationState& state) {
   for (const operation::PlannedTunnel& tunnel : state.tunnels)
     for (const std::string& point : {tunnel.start, tunnel.end})
-      for (const std::string& view : state.views)
-        if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, tunnel.bone};
+      if (const auto missing = missing_pick(state, point, tunnel.bone)) return missing;
   return std::nullopt;
 }
 
 std::optional<WantedPick> next_landmark(const ApplicationState& state) {
   for (const std::string& point : state.landmarks)
-    for (const std::string& view : state.views)
-      if (pick_of(state, point, view) == nullptr) return WantedPick{point, view, {}};
+    if (const auto missing = missing_pick(state, point, {})) return missing;
   return std::nullopt;
+}
+
+std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const std::string& point) {
+  for (const pipeline::Pick& pick : state.picks)
+    if (pick.name == point && pick.bone) return pick.bone;
+  const auto stated = state.bones_of.find(point);
+  return stated == state.bones_of.end() ? std::nullopt : std::optional(stated->second);
 }
 
 void complete_landmarks(ApplicationState& state) {

@@ -15,8 +15,15 @@
 
 namespace helicarm::gui {
 
-/// Where images come from.
-enum class Source { none, virtual_or, devices, files };
+/// Where images come from: `files` is a case, `images` are image files without one, for looking.
+enum class Source { none, virtual_or, devices, files, images };
+
+/// The file of a view's image.
+struct ViewFile {
+  std::filesystem::path file;
+  int frames = 1;
+  int frame = 1;  ///< 1-based, of the view
+};
 
 /// The steps in their order.
 enum class Phase { acquire, rectify, calibrate, plan, navigate, verify };
@@ -28,6 +35,7 @@ struct ApplicationState {
   Source source = Source::none;
   std::filesystem::path folder;    ///< of the session or the case
   std::vector<std::string> views;  ///< required views, in order
+  std::vector<ViewFile> files;     ///< of the views; empty in an operation
   std::string next_view;           ///< view of the next image
   phantom::Calibrator calibrator;
   std::shared_ptr<const simulation::BoneMeshes> bones;  ///< at the acquisition; simulation only
@@ -41,18 +49,19 @@ struct ApplicationState {
   std::map<std::string, double> touched_mm;  ///< deviation at the last touch
 
   std::vector<operation::PlannedTunnel> tunnels;
-  std::vector<std::string> landmarks;  ///< other points to pick; of files only
+  std::vector<std::string> landmarks;                   ///< other points to pick; of files only
+  std::map<std::string, pipeline::BoneLabel> bones_of;  ///< of landmarks that are not picked yet
   std::vector<pipeline::Pick> picks;
-  std::optional<std::filesystem::path> case_folder =
-      {};                                      ///< where picks are kept; none for replays and images
-  bool has_unsaved_picks = false;              ///< not in the case.json of `case_folder`
-  std::optional<Failure> picks_not_kept = {};  ///< why changed picks are not kept or saved
-  std::vector<pipeline::Pick> offered_picks;   ///< picks of the plan
+  std::optional<std::filesystem::path> case_folder = {};  ///< where picks are kept; not of replays
+  bool has_unsaved_picks = false;                         ///< not in the case.json of `case_folder`
+  std::optional<Failure> picks_not_kept = {};             ///< why changed picks are not kept or saved
+  std::vector<pipeline::Pick> offered_picks;              ///< picks of the plan
 
   QString tour;  ///< description of the registration moves
   std::optional<double> hand_eye_rms_mm;
   std::optional<robot::RobotOrder> order;  ///< previewed, not yet carried out
   operation::PathPreview path;
+  bool is_replayed = false;  ///< a moment of a recorded operation
   bool tool_is_out = false;  ///< moving to a tunnel or in it; can be withdrawn
   std::map<std::string, operation::TunnelOutcome> outcomes;
 
@@ -61,9 +70,16 @@ struct ApplicationState {
   std::map<Phase, Failure> refusals;
 };
 
+/// The first view without an image, else the first one.
+std::string missing_view(const ApplicationState& state);
+
 /// Picks of this point in this view, or null.
 const pipeline::Pick* pick_of(const ApplicationState& state, const std::string& point,
                               const std::string& view);
+
+/// Two views locate a point; it may be picked in more.
+bool is_picked(const std::vector<pipeline::Pick>& picks, const std::vector<std::string>& views,
+               const std::string& point);
 
 /// The next end and view to pick, in order; empty if all are picked.
 struct WantedPick {
@@ -74,6 +90,8 @@ struct WantedPick {
 std::optional<WantedPick> next_pick(const ApplicationState& state);
 /// The next landmark and view to pick.
 std::optional<WantedPick> next_landmark(const ApplicationState& state);
+/// What a point lies on; nothing if it is not stated.
+std::optional<pipeline::BoneLabel> bone_of(const ApplicationState& state, const std::string& point);
 /// Adds the points that are picked and are no tunnel's end to the landmarks.
 void complete_landmarks(ApplicationState& state);
 

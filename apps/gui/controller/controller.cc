@@ -7,12 +7,9 @@
 
 #include "gui/controller/equipment.h"
 #include "gui/controller/steps.h"
-#include "gui/controller/unsaved_picks.h"
 #include "gui/replay/pdf_report.h"
 #include "helicarm/core/files.h"
-#include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_case.h"
-#include "helicarm/rehearsal/rehearse.h"
 #include "helicarm/report/exports.h"
 #include "helicarm/report/report.h"
 
@@ -22,19 +19,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int look_for_images_ms = 100;
-constexpr double bone_step_mm = 5;
-
-std::shared_ptr<const pipeline::Result> only(Images images) {
-  auto result = std::make_shared<pipeline::Result>();
-  result->views = std::move(images);
-  return result;
-}
-
-std::string first_missing(const ApplicationState& state) {
-  for (const pipeline::ViewResult& view : state.result->views)
-    if (!view.xray_image) return view.name;
-  return state.views.empty() ? "" : state.views.front();
-}
 
 void forget_measurement(ApplicationState& state) {
   state.measured = false;
@@ -42,20 +26,6 @@ void forget_measurement(ApplicationState& state) {
   state.path = {};
   state.outcomes.clear();
   state.refusals.clear();
-}
-
-/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none.
-std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
-  std::vector<operation::PlannedTunnel> tunnels;
-  for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
-    const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
-    const guidance::Bone bone =
-        pick == given.picks.end() ? guidance::Bone::femur : pick->moves_with.value_or(guidance::Bone::femur);
-    tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
-  }
-  if (given.picks.empty() && tunnels.empty())
-    tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}, {"tibia", guidance::Bone::tibia, "TS", "TE"}};
-  return tunnels;
 }
 
 }  // namespace
@@ -88,20 +58,24 @@ void Controller::begin(Phase phase, std::string doing, std::function<Change()> w
       }
     });
     QMetaObject::invokeMethod(
-        this,
-        [this, phase, done] {
-          state_.busy.reset();
-          state_.doing.clear();
-          if (done)
-            (*done)(state_);
-          else
-            state_.refusals.insert_or_assign(phase, done.error());
-          emit changed();
-          if (!done) emit refused(phase, sentence_of(done.error()));
-          if (std::exchange(picks_came_, false)) measure();
-        },
-        Qt::QueuedConnection);
+        this, [this, phase, done] { finish(phase, done); }, Qt::QueuedConnection);
   });
+}
+
+void Controller::finish(Phase phase, const Expected<Change>& done) {
+  state_.busy.reset();
+  state_.doing.clear();
+  if (const auto open_next = std::exchange(next_source_, nullptr)) {
+    picks_came_ = false;
+    return open_next();
+  }
+  if (done)
+    (*done)(state_);
+  else
+    state_.refusals.insert_or_assign(phase, done.error());
+  emit changed();
+  if (!done) emit refused(phase, sentence_of(done.error()));
+  if (std::exchange(picks_came_, false)) measure();
 }
 
 void Controller::meanwhile(Change change) {
@@ -112,139 +86,6 @@ void Controller::meanwhile(Change change) {
         emit changed();
       },
       Qt::QueuedConnection);
-}
-
-void Controller::open(Source source, const fs::path& folder, std::string doing,
-                      std::function<Change(Equipment&)> work) {
-  if (state_.busy) return;
-  auto old = std::exchange(equipment_, nullptr);
-  live_tool_.reset();
-  earlier_picks_.clear();
-  later_picks_.clear();
-  state_ = ApplicationState{};
-  begin(Phase::acquire, std::move(doing),
-        [this, source, folder, work = std::move(work), old = std::move(old),
-         options = options_]() mutable -> Change {
-          old.reset();
-          auto equipment = std::make_shared<Equipment>();
-          equipment->options = options;
-          Change change = work(*equipment);
-          return [this, source, folder, equipment, change](ApplicationState& state) {
-            equipment_ = equipment;
-            state.source = source;
-            state.folder = folder;
-            change(state);
-          };
-        });
-}
-
-void Controller::start_operation(Equipment& equipment, operation::OperationPlan plan,
-                                 const fs::path& folder) {
-  equipment.tracker = plan.tracker;
-  equipment.operation = value_or_throw(operation::Operation::begin(
-      std::move(plan), folder, equipment.devices->board(), equipment.devices->robot(),
-      [this](operation::Step, const std::string& what) {
-        meanwhile([what](ApplicationState& state) { state.doing = what; });
-      }));
-  equipment.operation->confirmed_by("the person at the screen");
-}
-
-void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
-                                 const operation::OperationPlan& wished, const fs::path& folder) {
-  const auto work = [=, this, freshness = freshness_](Equipment& equipment) -> Change {
-    equipment.virtual_or = value_or_throw(virtual_devices::VirtualDevices::open(options));
-    operation::OperationPlan plan =
-        rehearsal::plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
-    for (const auto& field : operation::plan_fields)
-      if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
-    const Json offered = std::exchange(plan.picks, Json::array());
-    equipment.devices = std::make_unique<operation::Connections>(
-        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")), freshness);
-    receiver::ReceiverOptions receiver;
-    receiver.port = 0;
-    value_or_throw(equipment.devices->listen(receiver));
-    start_operation(equipment, plan, folder);
-    const auto bones = std::make_shared<const simulation::BoneMeshes>(simulation::moved(
-        simulation::bone_meshes(bone_step_mm),
-        equipment.virtual_or->simulated_scene().simulated_case().calibrator_from_knee.value()));
-    return [change = with_plan(plan, offered), bones](ApplicationState& state) {
-      change(state);
-      state.bones = bones;
-    };
-  };
-  open(Source::virtual_or, folder, "starting the virtual devices", work);
-}
-
-void Controller::open_devices(const fs::path& file, const receiver::ReceiverOptions& receiver,
-                              const fs::path& folder) {
-  open(Source::devices, folder, "connecting", [=, this](Equipment& equipment) -> Change {
-    operation::OperationPlan plan =
-        value_or_throw(operation::plan_from(value_or_throw(read_json(file)), file.string()));
-    const Json offered = std::exchange(plan.picks, Json::array());
-    equipment.devices = std::make_unique<operation::Connections>(
-        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
-    value_or_throw(equipment.devices->listen(receiver));
-    start_operation(equipment, plan, folder);
-    return with_plan(plan, offered);
-  });
-}
-
-Controller::Change Controller::with_plan(const operation::OperationPlan& plan, const Json& offered) {
-  std::vector<pipeline::CaseView> views(plan.views.size());
-  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
-  const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
-  const std::vector<pipeline::Pick> picks = value_or_throw(pipeline::picks_from(offered, "plan", views));
-  return [=](ApplicationState& state) {
-    state.views = plan.views;
-    state.calibrator = calibrator;
-    state.tunnels = plan.tunnels;
-    for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
-    state.offered_picks = picks;
-    Images none(plan.views.size());
-    for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
-    state.result = only(std::move(none));
-    state.next_view = first_missing(state);
-  };
-}
-
-void Controller::open_case(const fs::path& folder, bool keeps_picks) {
-  open(Source::files, folder, "reading " + folder.filename().string(),
-       [=, this](Equipment& equipment) -> Change {
-         pipeline::Case given = value_or_throw(pipeline::read_case(folder));
-         if (!keeps_picks) return with_case(std::move(given), equipment);
-         const auto unsaved = unsaved_picks(folder, given.views);
-         return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
-                 unsaved](ApplicationState& state) {
-           change(state);
-           if (unsaved)
-             state.case_folder = folder;
-           else
-             state.picks_not_kept = unsaved.error();
-         };
-       });
-}
-
-void Controller::open_images(const std::vector<fs::path>& images) {
-  const fs::path folder = images.empty() ? fs::path() : images.front().parent_path();
-  open(Source::files, folder, "reading the images", [=, this](Equipment& equipment) {
-    return with_case(value_or_throw(case_of_images(images)), equipment);
-  });
-}
-
-Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment,
-                                         std::optional<Picks> unsaved) {
-  equipment.given = given;
-  const Change found = measured(equipment, unsaved.value_or(given.picks));
-  return [this, given = std::move(given), unsaved = std::move(unsaved), found](ApplicationState& state) {
-    for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
-    state.calibrator = given.calibrator;
-    state.tunnels = tunnels_of(given);
-    state.picks = unsaved.value_or(given.picks);
-    state.has_unsaved_picks = unsaved.has_value();
-    if (unsaved) earlier_picks_.push_back(given.picks);
-    complete_landmarks(state);
-    found(state);
-  };
 }
 
 void Controller::set_options(const pipeline::RunOptions& options) { options_ = options; }
@@ -275,8 +116,8 @@ Controller::Change Controller::came(Images images) {
   return [this, images = std::move(images)](ApplicationState& state) {
     forget_measurement(state);
     live_tool_.reset();  // its lines belong to the previous images
-    state.result = only(images);
-    state.next_view = first_missing(state);
+    state.result = result_with(images);
+    state.next_view = missing_view(state);
     if (has_all_images()) QMetaObject::invokeMethod(this, &Controller::measure, Qt::QueuedConnection);
   };
 }
@@ -303,7 +144,7 @@ Controller::Change Controller::measured(Equipment& equipment, const std::vector<
 }
 
 void Controller::measure() {
-  if (!equipment_) return;
+  if (!equipment_ || (!equipment_->given && !equipment_->operation)) return;
   picks_came_ = state_.busy == Phase::calibrate;
   begin(Phase::calibrate, "measuring",
         [this, equipment = equipment_, picks = state_.picks, options = options_] {
@@ -312,103 +153,10 @@ void Controller::measure() {
         });
 }
 
-void Controller::change_picks(Picks picks, bool measurable) {
-  earlier_picks_.push_back(std::exchange(state_.picks, std::move(picks)));
-  later_picks_.clear();
-  keep_unsaved_picks();
-  picks_changed(measurable);
-}
-
-void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
-  if (!takes_picks() || from.empty()) return;
-  to.push_back(std::exchange(state_.picks, std::move(from.back())));
-  from.pop_back();
-  keep_unsaved_picks();
-  picks_changed(has_all_images());
-}
-
-void Controller::keep_unsaved_picks() {
-  complete_landmarks(state_);
-  if (!state_.case_folder) return;
-  state_.has_unsaved_picks = true;
-  const auto kept = keep_unsaved(*state_.case_folder, state_.picks);
-  state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
-}
-
-void Controller::save_picks() {
-  if (!state_.case_folder || !takes_picks()) return;
-  std::vector<pipeline::TunnelPlan> tunnels;
-  for (const operation::PlannedTunnel& tunnel : state_.tunnels)
-    tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
-  const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
-  state_.has_unsaved_picks = !saved;
-  state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
-  emit changed();
-}
-
-void Controller::add_landmark(const std::string& name) {
-  if (state_.source != Source::files) return;
-  const bool is_taken =
-      std::ranges::find(state_.landmarks, name) != state_.landmarks.end() ||
-      std::ranges::any_of(state_.tunnels,
-                          [&](const operation::PlannedTunnel& tunnel) {
-                            return tunnel.start == name || tunnel.end == name;
-                          }) ||
-      std::ranges::find(state_.calibrator.targets, name, &phantom::CalibratorTarget::name) !=
-          state_.calibrator.targets.end();
-  if (name.empty() || is_taken)
-    return emit refused(Phase::plan, name.empty() ? tr("A landmark needs a name.")
-                                                  : tr("There is a point of this name already."));
-  state_.landmarks.push_back(name);
-  emit changed();
-}
-
 bool Controller::has_all_images() const {
   return state_.result && std::ranges::all_of(state_.result->views, [](const pipeline::ViewResult& view) {
            return view.xray_image != nullptr;
          });
-}
-
-void Controller::picks_changed(bool measurable) {
-  state_.order.reset();
-  state_.path = {};
-  emit changed();
-  if (measurable) measure();
-}
-
-bool Controller::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
-
-void Controller::pick(pipeline::Pick pick) {
-  if (!takes_picks()) return;
-  Picks picks = state_.picks;
-  for (const pipeline::Pick& other : picks)
-    if (other.name == pick.name) pick.moves_with = other.moves_with;
-  std::erase_if(picks,
-                [&](const pipeline::Pick& old) { return old.name == pick.name && old.view == pick.view; });
-  const std::string point = pick.name;
-  picks.push_back(std::move(pick));
-  const bool completes = std::ranges::all_of(state_.views, [&](const std::string& view) {
-    return std::ranges::any_of(
-        picks, [&](const pipeline::Pick& other) { return other.name == point && other.view == view; });
-  });
-  change_picks(std::move(picks), completes);  // shows its position and ray gap immediately
-}
-
-void Controller::take_offered_picks() {
-  if (takes_picks()) change_picks(state_.offered_picks, has_all_images());
-}
-
-void Controller::erase_picks(const std::string& point) {
-  Picks picks = state_.picks;
-  const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
-  if (!takes_picks()) return;
-  const auto forgotten = std::erase(state_.landmarks, point);
-  if (forgotten > 0 && erased == 0) emit changed();
-  if (erased > 0) change_picks(std::move(picks), has_all_images());
-}
-
-void Controller::clear_picks() {
-  if (takes_picks() && !state_.picks.empty()) change_picks({}, has_all_images());
 }
 
 void Controller::cancel() {

@@ -46,10 +46,13 @@ class Controller : public QObject {
   /// The devices of a plan.
   void open_devices(const std::filesystem::path& plan, const receiver::ReceiverOptions& receiver,
                     const std::filesystem::path& folder);
-  /// A case folder, or X-ray images without tracker and robot.
+  /// A case folder, without tracker and robot.
   /// `keeps_picks`: changed picks are kept beside case.json, and those kept are taken.
   void open_case(const std::filesystem::path& folder, bool keeps_picks = true);
-  void open_images(const std::vector<std::filesystem::path>& images);
+  /// Image files for looking, without a case.
+  void open_images(const std::vector<std::filesystem::path>& files);
+  /// Why opening another source or closing would lose something; empty if it would not.
+  QString loss() const;
 
   /// For virtual devices opened from now on, never for real ones: tests on a busy machine set longer limits.
   void set_virtual_freshness(const operation::FreshnessLimits& limits) { freshness_ = limits; }
@@ -65,7 +68,7 @@ class Controller : public QObject {
   bool takes_picks() const;
   void take_offered_picks();
   /// Another point to pick, in a case of files. Refused if the name is empty or taken.
-  void add_landmark(const std::string& name);
+  void add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone = {});
   /// Into case.json.
   void save_picks();
   /// Removes a point's picks in all views, and the point if it is a landmark.
@@ -110,6 +113,7 @@ class Controller : public QObject {
   using Picks = std::vector<pipeline::Pick>;
 
   void begin(Phase phase, std::string doing, std::function<Change()> work);
+  void finish(Phase phase, const Expected<Change>& done);
   void open(Source source, const std::filesystem::path& folder, std::string doing,
             std::function<Change(Equipment&)> work);
   void start_operation(Equipment& equipment, operation::OperationPlan plan,
@@ -134,6 +138,7 @@ class Controller : public QObject {
   std::string followed_;
   std::vector<Picks> earlier_picks_, later_picks_;  ///< for undo and redo, the last is the next
   bool picks_came_ = false;                         ///< during the measurement
+  std::function<void()> next_source_;               ///< opened as soon as the work in progress has ended
   pipeline::RunOptions options_;
   operation::FreshnessLimits freshness_;
   QTimer images_;

@@ -108,11 +108,69 @@ TEST(Steps, PointThatCannotBeLocatedRefusesThePlan) {
   EXPECT_THAT(card_of(steps_of(state), Phase::plan).why.toStdString(), HasSubstr("parallel_rays"));
 }
 
+TEST(Steps, WarningsStandUnderTheStepThatTheyConcern) {
+  auto image = std::make_shared<xray::XrayImage>();
+  image->warnings = {{Reason::spacing_missing, "no pixel size"}};
+  pipeline::ViewResult view;
+  view.name = "AP";
+  view.xray_image = image;
+  view.rectification.emplace();
+  view.rectification->warnings = {{Reason::residual_too_large, "few dots"}};
+  view.found.emplace();
+  view.calibrated.emplace();
+  ApplicationState state = state_with({view});
+  auto result = std::make_shared<pipeline::Result>(*state.result);
+  result->warnings = {image->warnings[0],
+                      view.rectification->warnings[0],
+                      {Reason::few_fiducials, "five balls"},
+                      {Reason::residual_too_large, "the rays miss", {}, {{"ray_gap_mm", 3}}}};
+  state.result = result;
+  const auto cards = steps_of(state);
+  const auto why = [&](Phase phase) { return card_of(cards, phase).why.toStdString(); };
+  EXPECT_THAT(why(Phase::calibrate), HasSubstr("five balls"));
+  EXPECT_THAT(why(Phase::calibrate), testing::Not(HasSubstr("more")));
+  EXPECT_THAT(why(Phase::rectify), HasSubstr("few dots"));
+  state.views = {"AP"};
+  EXPECT_THAT(card_of(steps_of(state), Phase::acquire).why.toStdString(), HasSubstr("no pixel size"));
+}
+
+TEST(Steps, VerifyShowsTheImagesFiguresWithoutARobot) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
+  state.measured = true;
+  state.source = Source::files;
+  EXPECT_EQ(card_of(steps_of(state), Phase::navigate).why, "images from files: no robot");
+  auto result = std::make_shared<pipeline::Result>(*state.result);
+  verification::LineError near, far;
+  near.distance_mm = 0.4;
+  far.distance_mm = 0.9;
+  result->verifications = {{"femur", near, far}};
+  state.result = result;
+  EXPECT_EQ(card_of(steps_of(state), Phase::verify).figure, "0.90 mm, 2 ends");
+  EXPECT_EQ(card_of(steps_of(state), Phase::verify).status, StepStatus::good);
+}
+
 TEST(Picks, NextOneGoesThroughViewsThenEnds) {
   ApplicationState state = state_with({exposed("AP"), exposed("LAT")});
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSAP");
   state.picks.push_back(pick("FS", "AP"));
   EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FSLAT");
+}
+
+TEST(Picks, TwoOfThreeViewsAreEnough) {
+  ApplicationState state = state_with({exposed("AP"), exposed("LAT"), exposed("OBL")});
+  state.views.push_back("OBL");
+  state.picks = {pick("FS", "AP"), pick("FS", "OBL")};
+  EXPECT_EQ(next_pick(state)->point + next_pick(state)->view, "FEAP");
+}
+
+TEST(Steps, ImagesWithoutACaseDemandNone) {
+  ApplicationState state = state_with({exposed("AP")});
+  state.source = Source::images;
+  state.views = {"AP"};
+  const auto cards = steps_of(state);
+  EXPECT_EQ(card_of(cards, Phase::acquire).status, StepStatus::good);
+  EXPECT_EQ(card_of(cards, Phase::acquire).figure, "1 X-ray image");
+  EXPECT_EQ(card_of(cards, Phase::calibrate).why, "needs a case");
 }
 
 TEST(StatusIndicators, OldPoseIsNotGreen) {

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "helicarm/phantom/plate.h"
+#include "helicarm/pipeline/new_case.h"
 #include "helicarm/xray/read_xray_image.h"
 
 namespace helicarm::gui {
@@ -18,6 +18,12 @@ constexpr double image_patience_s = 20, image_glance_s = 0.1;
 constexpr std::chrono::milliseconds before_exposure{1800};
 
 }  // namespace
+
+std::shared_ptr<const pipeline::Result> result_with(Images images) {
+  auto result = std::make_shared<pipeline::Result>();
+  result->views = std::move(images);
+  return result;
+}
 
 Expected<Images> take(Equipment& equipment, const std::string& view,
                       const operation::DatedArrival& view_image) {
@@ -101,26 +107,51 @@ Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipel
   return tl::unexpected<Failure>(done.error());
 }
 
-Expected<pipeline::Case> case_of_images(const std::vector<std::filesystem::path>& images) {
-  pipeline::Case given;
-  given.calibrator = phantom::udcsc();
-  given.plate = phantom::plate48();
-  for (const std::filesystem::path& view_image : images) {
-    if (!std::filesystem::exists(view_image))
-      return fail(Reason::missing_file, fmt::format("{}: no such file or folder", view_image.string()));
-    pipeline::CaseView view;
-    view.name = view_image.stem().string();
-    view.image = std::filesystem::absolute(view_image);
-    for (const pipeline::CaseView& other : given.views)
-      if (other.name == view.name)
-        return fail(Reason::name_clash, fmt::format("{}: two images have this name", view.name));
-    given.views.push_back(std::move(view));
+namespace {
+
+Expected<std::pair<ViewFile, pipeline::InspectedImage>> middle_frame(const std::filesystem::path& file) {
+  return xray::count_frames(file).and_then([&](int frames) {
+    const int middle = (frames + 1) / 2;
+    return pipeline::inspect_image({file, frames > 1 ? std::optional(middle) : std::nullopt})
+        .map([&](pipeline::InspectedImage image) {
+          return std::pair(ViewFile{file, frames, middle}, std::move(image));
+        });
+  });
+}
+
+}  // namespace
+
+Expected<LooseImages> read_loose_images(const std::vector<std::filesystem::path>& files) {
+  if (files.size() > most_loose_images)
+    return fail(Reason::usage, fmt::format("{} files given, at most {} are opened together", files.size(),
+                                           most_loose_images));
+  LooseImages loose;
+  std::vector<pipeline::InspectedImage> read;
+  for (const std::filesystem::path& file : files) {
+    auto image = middle_frame(file);
+    if (image) {
+      loose.files.push_back(std::move(image->first));
+      read.push_back(std::move(image->second));
+    } else if (!loose.unreadable) {
+      loose.unreadable = image.error();
+    }
   }
-  if (given.views.size() < 2)
-    return fail(Reason::usage,
-                "at least two views are required to locate a point: drag two or more images together, or a "
-                "case folder, into the window");
-  return given;
+  if (read.empty() && loose.unreadable) return tl::unexpected<Failure>(*loose.unreadable);
+  pipeline::name_views(read);
+  for (pipeline::InspectedImage& image : read) {
+    pipeline::ViewResult view;
+    view.name = image.xray_image.name = image.view;
+    view.xray_image = std::make_shared<const xray::XrayImage>(std::move(image.xray_image));
+    loose.images.push_back(std::move(view));
+  }
+  return loose;
+}
+
+std::vector<ViewFile> files_of(const pipeline::Case& given) {
+  std::vector<ViewFile> files;
+  for (const pipeline::CaseView& view : given.views)
+    files.push_back({view.image, xray::count_frames(view.image).value_or(1), view.frame.value_or(1)});
+  return files;
 }
 
 }  // namespace helicarm::gui

@@ -30,6 +30,9 @@ struct Equipment {
 /// All views of the operation with the images received so far.
 using Images = std::vector<pipeline::ViewResult>;
 
+/// With the images alone.
+std::shared_ptr<const pipeline::Result> result_with(Images images);
+
 /// Acquires an image until the tracker has valid poses at rest. Refuses interrupted once `equipment.stopped`.
 Expected<Images> shoot_and_take(Equipment& equipment, const std::string& view);
 /// Takes a received image; its file may assign it to another view.
@@ -39,7 +42,20 @@ Expected<Images> take(Equipment& equipment, const std::string& view,
 /// A refused measurement contains the results up to the refusal.
 Expected<pipeline::Result> measure(Equipment& equipment, const std::vector<pipeline::Pick>& picks);
 
-/// X-ray images without tracker and robot, with the default calibrator and plate; named after their files.
-Expected<pipeline::Case> case_of_images(const std::vector<std::filesystem::path>& images);
+inline constexpr std::size_t most_loose_images = 20;
+
+/// Images of files, for looking; each with its file.
+struct LooseImages {
+  Images images;
+  std::vector<ViewFile> files;
+  std::optional<Failure> unreadable;  ///< the first file that is not an image
+};
+
+/// Reads the files, of several frames the middle one. Views are named as `name_views` does. Refuses (usage)
+/// more than `most_loose_images`, and fails as `inspect_image` if none is an image.
+Expected<LooseImages> read_loose_images(const std::vector<std::filesystem::path>& files);
+
+/// The files of a case's views; an unreadable one counts as one frame.
+std::vector<ViewFile> files_of(const pipeline::Case& given);
 
 }  // namespace helicarm::gui

@@ -20,16 +20,38 @@ QString doubts(const std::vector<Warning>& warnings) {
   return warnings.size() == 1 ? first : tr("%1 (and %2 more)").arg(first).arg(warnings.size() - 1);
 }
 
-/// Warnings about a point concern the plan, not the calibration.
-bool is_of_a_point(const Warning& warning) {
-  return warning.figures.contains("ray_gap_mm") || warning.reason == Reason::pick_on_fiducial;
+bool contains(const std::vector<Warning>& warnings, const Warning& wanted) {
+  return std::ranges::any_of(warnings, [&](const Warning& one) {
+    return one.reason == wanted.reason && one.message == wanted.message;
+  });
 }
 
-std::vector<Warning> chosen(const std::vector<Warning>& warnings, bool of_points) {
-  std::vector<Warning> of_them;
-  for (const Warning& warning : warnings)
-    if (is_of_a_point(warning) == of_points) of_them.push_back(warning);
-  return of_them;
+/// The step that a warning of the result concerns: the stage that gave it, or the one that its reason names.
+Phase phase_of_warning(const Warning& warning, const pipeline::Result& result) {
+  for (const pipeline::ViewResult& view : result.views) {
+    if (view.xray_image && contains(view.xray_image->warnings, warning)) return Phase::acquire;
+    if (view.rectification && contains(view.rectification->warnings, warning)) return Phase::rectify;
+  }
+  switch (warning.reason) {
+    case Reason::tag_disagrees:
+    case Reason::uid_reused:
+      return Phase::acquire;
+    case Reason::residual_distortion:
+      return Phase::rectify;
+    case Reason::pick_on_fiducial:
+    case Reason::bone_taken_as_fixed:
+    case Reason::uncertain:
+      return Phase::plan;
+    default:
+      return warning.figures.contains("ray_gap_mm") ? Phase::plan : Phase::calibrate;
+  }
+}
+
+std::vector<Warning> warnings_of(const ApplicationState& state, Phase phase) {
+  std::vector<Warning> of_it;
+  for (const Warning& warning : state.result->warnings)
+    if (phase_of_warning(warning, *state.result) == phase) of_it.push_back(warning);
+  return of_it;
 }
 
 void settle(StepCard& card, const QString& warning) {
@@ -41,24 +63,26 @@ void acquire(StepCard& card, const ApplicationState& state) {
   const auto& views = state.result->views;
   const auto come = std::ranges::count_if(
       views, [](const pipeline::ViewResult& view) { return view.xray_image != nullptr; });
+  if (state.source == Source::images) {
+    card.figure = come == 1 ? tr("1 X-ray image") : tr("%1 X-ray images").arg(come);
+    return settle(card, {});
+  }
   card.figure = tr("%1 of %2 X-ray images").arg(come).arg(state.views.size());
-  if (come == std::ssize(state.views)) return settle(card, {});
+  if (come == std::ssize(state.views)) return settle(card, doubts(warnings_of(state, Phase::acquire)));
   card.why = tr("%1 is next").arg(text(state.next_view));
 }
 
 void rectify(StepCard& card, const ApplicationState& state) {
   double worst = 0;
   bool bent = false;
-  std::vector<Warning> warnings;
   for (const pipeline::ViewResult& view : state.result->views) {
     if (!view.rectification) return;
     const rectification::Rectification& done = *view.rectification;
     bent = bent || !done.map.is_identity();
     worst = std::max(worst, done.map.residual_rms_px);
-    warnings.insert(warnings.end(), done.warnings.begin(), done.warnings.end());
   }
   card.figure = bent ? tr("residual %1 px rms").arg(worst, 0, 'f', 3) : tr("flat panel");
-  settle(card, doubts(warnings));
+  settle(card, doubts(warnings_of(state, Phase::rectify)));
 }
 
 void calibrate(StepCard& card, const ApplicationState& state) {
@@ -72,7 +96,7 @@ void calibrate(StepCard& card, const ApplicationState& state) {
   }
   card.figure =
       tr("FRE %1 mm, %2/%3").arg(state.result->accuracy.fre_mm.mean, 0, 'f', 3).arg(used).arg(balls);
-  settle(card, doubts(chosen(state.result->warnings, false)));
+  settle(card, doubts(warnings_of(state, Phase::calibrate)));
 }
 
 void plan(StepCard& card, const ApplicationState& state) {
@@ -97,10 +121,14 @@ void plan(StepCard& card, const ApplicationState& state) {
   }
   if (located == 0) return;
   card.figure = tr("within %1 mm (95 %)").arg(worst, 0, 'f', 2);
-  settle(card, doubts(chosen(state.result->warnings, true)));
+  settle(card, doubts(warnings_of(state, Phase::plan)));
 }
 
 void navigate(StepCard& card, const ApplicationState& state) {
+  if (state.source == Source::files && !state.hand_eye_rms_mm) {  // a replay has a registration
+    card.why = tr("images from files: no robot");
+    return;
+  }
   if (!state.hand_eye_rms_mm) return;
   card.figure = tr("registered, %1 mm rms").arg(*state.hand_eye_rms_mm, 0, 'f', 2);
   if (state.order) card.why = tr("%1: inspect the path, then confirm").arg(text(state.order->name));
@@ -115,8 +143,29 @@ void navigate(StepCard& card, const ApplicationState& state) {
   if (state.outcomes.size() == state.tunnels.size()) settle(card, {});
 }
 
+/// The tool lines of a case, compared with their tunnels in the images alone.
+void verify_images(StepCard& card, const pipeline::Result& result) {
+  double worst = 0;
+  int ends = 0;
+  for (const verification::Verification& line : result.verifications)
+    for (const auto& end : {line.start, line.end})
+      if (end) {
+        worst = std::max(worst, end->distance_mm);
+        ++ends;
+      }
+  if (ends == 0) return;
+  const int all = 2 * int(result.verifications.size());
+  card.figure = ends == all ? tr("%1 mm, %2 ends").arg(worst, 0, 'f', 2).arg(ends)
+                            : tr("%1 mm, %2 of %3 ends").arg(worst, 0, 'f', 2).arg(ends).arg(all);
+  settle(card, {});
+  if (ends < all) {
+    card.status = StepStatus::warning;
+    card.why = tr("an end is not located");
+  }
+}
+
 void verify(StepCard& card, const ApplicationState& state) {
-  if (state.outcomes.empty()) return;
+  if (state.outcomes.empty()) return state.is_replayed ? void() : verify_images(card, *state.result);
   double worst = 0, expected = 0;
   for (const auto& [name, outcome] : state.outcomes)
     for (const operation::EndMiss& end : {outcome.start, outcome.end})
@@ -168,6 +217,7 @@ std::array<StepCard, phases.size()> steps_of(const ApplicationState& state) {
     card.name = names[i];
     const bool possible = i < 3 || state.measured;
     if (state.result && possible) judges[i](card, state);
+    if (state.source == Source::images && i > 0) card.why = tr("needs a case");
     if (const auto refusal = state.refusals.find(card.phase); refusal != state.refusals.end()) {
       card.status = StepStatus::refused;
       card.why = sentence_of(refusal->second);

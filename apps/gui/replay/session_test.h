@@ -30,7 +30,10 @@ inline void write_session(const std::filesystem::path& folder) {
   const auto add = [&](const char* kind, Json content) {
     ASSERT_TRUE(session->append(kind, std::move(content)));
   };
-  const Json end = {{"distance_mm", 0.5}, {"predicted_mm", 0.6}};
+  const Json end = {{"across_mm", {0.3, 0.4}},
+                    {"covariance_mm2", {{0.05, 0}, {0, 0.06}}},
+                    {"distance_mm", 0.5},
+                    {"predicted_mm", 0.6}};
   add("plan", operation::to_json(operation::OperationPlan{}));
   add("refused", {{"view", "AP"}, {"picture", "00"}, {"why", "stale_pose"}});
   add("exposure", {{"view", "AP"}, {"picture", "01"}, {"window", window_with(1)}, {"poses", Json::object()}});

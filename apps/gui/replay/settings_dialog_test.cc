@@ -5,6 +5,7 @@
 #include <QDialogButtonBox>
 #include <QDoubleSpinBox>
 #include <QPushButton>
+#include <QTemporaryDir>
 #include <QTest>
 #include <algorithm>
 
@@ -13,6 +14,7 @@
 
 #include "gui/replay/application_test.h"
 #include "gui/replay/field_box.h"
+#include "gui/replay/kept_settings.h"
 #include "helicarm/operation/plan_fields.h"
 #include "helicarm/pipeline/run_fields.h"
 #include "helicarm/virtual_devices/virtual_devices_fields.h"
@@ -92,6 +94,28 @@ TEST_F(Dialog, RestoresDefaults) {
   dialog.findChild<QDialogButtonBox*>()->button(QDialogButtonBox::RestoreDefaults)->click();
   EXPECT_FALSE(dialog.settings().run.max_error_mm);
   EXPECT_EQ(dialog.settings().virtual_or.seed, 1u);
+}
+
+TEST(KeptSettings, ComeBackWithoutThoseOutsideTheLimits) {
+  const QTemporaryDir folder;
+  QSettings store(folder.filePath("kept.ini"), QSettings::IniFormat);
+  Settings given;
+  given.run.max_error_mm = 1.25;
+  given.run.method = rectification::Method::paper;
+  given.virtual_or.seed = 77;
+  given.plan.max_error_mm = 0.1;
+  keep_settings(store, given);
+  const Settings kept = kept_settings(store);
+  EXPECT_EQ(kept.run.max_error_mm, 1.25);
+  EXPECT_EQ(kept.run.method, rectification::Method::paper);
+  EXPECT_EQ(kept.virtual_or.seed, 77u);
+  EXPECT_EQ(kept.plan.max_error_mm, 0.1);
+  store.setValue("settings/run/max_error_mm", "-5");
+  store.setValue("settings/virtual_devices/seed", "many");
+  EXPECT_FALSE(kept_settings(store).run.max_error_mm);
+  EXPECT_EQ(kept_settings(store).virtual_or.seed, 1u);
+  keep_settings(store, {});
+  EXPECT_TRUE(store.allKeys().isEmpty());
 }
 
 }  // namespace

@@ -97,6 +97,24 @@ void see(SessionState& state, const Json& window, std::size_t number) {
     if (!samples.empty()) state.tracker_from[tool] = samples.back().tracker_from_tool;
 }
 
+std::vector<robot::Miss> loop_from(const Json& json) {
+  std::vector<robot::Miss> loop;
+  for (const Json& miss : json)
+    loop.push_back({miss.at("distance_mm").get<double>(), miss.at("turn_deg").get<double>(),
+                    miss.at("sigma_mm").get<double>()});
+  return loop;
+}
+
+operation::EndMiss end_miss_from(const Json& json) {
+  operation::EndMiss miss;
+  for (int i = 0; i < 2; ++i) {
+    miss.across_mm[i] = json.at("across_mm").at(std::size_t(i)).get<double>();
+    for (int j = 0; j < 2; ++j)
+      miss.covariance(i, j) = json.at("covariance_mm2").at(std::size_t(i)).at(std::size_t(j)).get<double>();
+  }
+  return miss;
+}
+
 void take(SessionState& state, const Timeline& timeline, std::size_t number) {
   const auto& [seconds, kind, summary, content] = timeline.moments[number];
   if (kind == "exposure") {
@@ -105,18 +123,25 @@ void take(SessionState& state, const Timeline& timeline, std::size_t number) {
     state.exposures.push_back(view);
     state.exposed_at[view] = number;
   }
-  if (kind == "hand_eye") state.registered_at = number;
+  if (kind == "hand_eye") {
+    state.registered_at = number;
+    state.hand_eye_rms_mm = content.at("found").at("rms_mm").get<double>();
+  }
   if (kind == "order") state.tunnel = content.at("name").get<std::string>();
   if (kind == "exposure" || kind == "poses") see(state, content.at("window"), number);
   if (kind == "case")
     state.case_folder =
         value_or_throw(path_inside(timeline.session, content.at("folder").get<std::string>()));
   if (kind == "case" || kind == "result") state.measured = kind == "result";
-  if (kind == "navigated") {
-    auto& misses = state.misses[content.at("tunnel").get<std::string>()];
-    misses.clear();
-    for (const Json& miss : content.at("loop"))
-      misses.push_back({miss.at("distance_mm").get<double>(), miss.at("turn_deg").get<double>()});
+  if (kind == "navigated")
+    state.loops[content.at("tunnel").get<std::string>()] = loop_from(content.at("loop"));
+  if (kind == "outcome") {
+    const auto tunnel = content.at("tunnel").get<std::string>();
+    state.outcomes.insert_or_assign(tunnel, operation::TunnelOutcome{tunnel,
+                                                                     state.loops[tunnel],
+                                                                     end_miss_from(content.at("start")),
+                                                                     end_miss_from(content.at("end")),
+                                                                     {}});
   }
 }
 

@@ -11,6 +11,7 @@
 #include "helicarm/core/failure.h"
 #include "helicarm/core/json.h"
 #include "helicarm/operation/live_tool.h"
+#include "helicarm/operation/operation.h"
 
 namespace helicarm::gui {
 
@@ -35,21 +36,17 @@ struct Timeline {
   std::size_t at(double seconds) const;
 };
 
-/// Position error of a tool at one measurement of the tracker.
-struct LoopMiss {
-  double distance_mm;
-  double turn_deg;
-};
-
 /// State of the operation after a moment.
 struct SessionState {
   std::vector<std::string> exposures;                            ///< views in order of acquisition
   std::optional<std::filesystem::path> case_folder;              ///< the newest case: images and case.json
   bool measured = false;                                         ///< the newest case has a result
   std::map<std::string, geometry::RigidTransform> tracker_from;  ///< the newest pose of each tool
-  std::map<std::string, std::vector<LoopMiss>> misses;           ///< of the closed loop, by tunnel
+  std::map<std::string, std::vector<robot::Miss>> loops;         ///< the closed loop, by tunnel
+  std::map<std::string, operation::TunnelOutcome> outcomes;      ///< the check that follows it, by tunnel
   std::map<std::string, std::size_t> exposed_at;                 ///< moment of each view's acquisition
   std::optional<std::size_t> registered_at;                      ///< moment of the latest registration
+  std::optional<double> hand_eye_rms_mm;                         ///< of it
   std::string tunnel;                                            ///< target of the newest order
 };
 

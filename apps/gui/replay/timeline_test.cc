@@ -59,8 +59,12 @@ TEST_F(TimelineTest, StateAccumulatesOverTheMoments) {
   EXPECT_FALSE(begun.measured);
   EXPECT_TRUE(state_at(timeline, 6).value().measured);
   const SessionState end = state_at(timeline, timeline.moments.size() - 1).value();
-  ASSERT_EQ(end.misses.at("femur").size(), 2u);
-  EXPECT_EQ(end.misses.at("femur")[1].distance_mm, 0.25);
+  EXPECT_EQ(end.hand_eye_rms_mm, 0.2);
+  const operation::TunnelOutcome& femur = end.outcomes.at("femur");
+  ASSERT_EQ(femur.loop.size(), 2u);
+  EXPECT_EQ(femur.loop[1].distance_mm, 0.25);
+  EXPECT_DOUBLE_EQ(femur.start.distance_mm(), 0.5);
+  EXPECT_DOUBLE_EQ(femur.end.predicted_mm(), 0.6);
   EXPECT_EQ(end.tracker_from.at("femur").translation.x(), 3);
 }
 

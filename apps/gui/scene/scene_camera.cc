@@ -80,6 +80,22 @@ SceneCamera shifted(const SceneCamera& camera, double right, double up) {
   return there;
 }
 
+bool obstructs(const SceneCamera& camera, const DrawnLink& link) {
+  constexpr int parts = 16;
+  const Vector3d along = (link.axis.to - link.axis.from) / parts;
+  const double half = half_height(camera);
+  for (int i = 0; i <= parts; ++i) {
+    const Vector3d off = link.axis.from + i * along - camera.position;
+    const double radius = i == parts ? std::max(link.radius_mm, link.joint_radius_mm) : link.radius_mm;
+    if (off.norm() < radius + 0.5 * along.norm()) return true;
+    const double depth = off.dot(camera.forward());
+    if (depth <= 0 || depth > camera.distance()) continue;
+    const double window = half * depth, aside = (off - depth * camera.forward()).norm();
+    if (radius > 0.5 * window && aside < window) return true;
+  }
+  return false;
+}
+
 std::optional<Eigen::Vector2d> seen_at(const SceneCamera& camera, double aspect, const Vector3d& place) {
   const Vector3d off = place - camera.position;
   const double depth = off.dot(camera.forward());

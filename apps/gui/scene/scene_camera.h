@@ -34,6 +34,10 @@ SceneCamera zoomed(const SceneCamera& camera, double factor);
 /// Moves the content at the focal point right and up by fractions of the window's height.
 SceneCamera shifted(const SceneCamera& camera, double right, double up);
 
+/// Whether a link of the arm hides the content: the camera is in it, or it covers more than half of the
+/// window's height nearer than the focal point.
+bool obstructs(const SceneCamera& camera, const DrawnLink& link);
+
 /// Projection of a position: x right and y up, both within [-1, 1] in the window; empty behind the camera.
 std::optional<Eigen::Vector2d> seen_at(const SceneCamera& camera, double aspect,
                                        const Eigen::Vector3d& place);

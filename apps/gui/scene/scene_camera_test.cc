@@ -80,5 +80,68 @@ TEST(SceneCamera, ThousandRotationsKeepItUpright) {
   EXPECT_NEAR(camera.up.dot(camera.forward()), 0, 1e-9);
 }
 
+SceneCamera outside_camera() { return {{500, 0, 0}, {0, 0, 0}, {0, 0, 1}, 28}; }
+
+TEST(Obstructs, LinkAroundOrCloseBeforeTheCameraOnly) {
+  const SceneCamera camera = outside_camera();
+  const auto link = [](double x, double y) { return DrawnLink{{{x, y, -200}, {x, y, 200}}, 26, 30}; };
+  EXPECT_TRUE(obstructs(camera, link(510, 0)));    // around it
+  EXPECT_TRUE(obstructs(camera, link(400, 0)));    // fills the window
+  EXPECT_FALSE(obstructs(camera, link(400, 80)));  // beside the window
+  EXPECT_FALSE(obstructs(camera, link(40, 0)));    // narrow at that distance
+  EXPECT_FALSE(obstructs(camera, link(700, 0)));   // behind the camera
+}
+
+/// The arm with its tool on each tunnel's axis, from before its entry to its end, in every posture.
+std::vector<LiveScene> flights() {
+  std::vector<LiveScene> all;
+  const auto& points = simulated().truth.navigation->points;
+  for (std::size_t start = 0; start + 1 < points.size(); start += 2) {
+    const Vector3d from = points[start].in_calibrator, way = points[start + 1].in_calibrator - from;
+    const Eigen::Matrix3d turn =
+        Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way).toRotationMatrix();
+    for (const double base_y : {520.0, -520.0})
+      for (double depth = -250; depth <= way.norm(); depth += 25) {
+        LiveScene live;
+        live.calibrator_from_tip = geometry::RigidTransform{turn, from + depth * way.normalized()};
+        live.calibrator_from_base = geometry::RigidTransform{Eigen::Matrix3d::Identity(), {60, base_y, -160}};
+        const geometry::RigidTransform calibrator_from_flange =
+            *live.calibrator_from_tip * geometry::RigidTransform{Eigen::Matrix3d::Identity(), {0, 0, -150}};
+        for (const robot::Joints& joints :
+             robot::inverse(robot::ur5(), live.calibrator_from_base->inverse() * calibrator_from_flange)) {
+          live.joints = joints;
+          all.push_back(live);
+        }
+      }
+  }
+  return all;
+}
+
+TEST(Obstructs, NoDrawnLinkHoldsTheCameraOnAnyFlight) {
+  const ResultScene shown = scene();
+  std::vector<Vector3d> places;
+  for (const phantom::CalibratorBall& ball : shown.balls) places.push_back(ball.centre_in_calibrator);
+  std::vector<SceneCamera> cameras{overview_of(places, 1), zoomed(overview_of(places, 1), 3)};
+  for (const ViewShape& view : shown.views) cameras.push_back(camera_through(view, {0, 0, 40}, 1));
+  const std::vector<LiveScene> all = flights();
+  ASSERT_GT(all.size(), 50u);
+  constexpr double shortest_link_mm = 1;  // shorter ones are not drawn
+  int hidden = 0;
+  for (const LiveScene& live : all)
+    for (const SceneCamera& camera : cameras)
+      for (const DrawnLink& link : drawn_links(live)) {
+        const Vector3d along = link.axis.to - link.axis.from;
+        if (along.norm() <= shortest_link_mm) continue;
+        const double part =
+            std::clamp((camera.position - link.axis.from).dot(along) / along.squaredNorm(), 0.0, 1.0);
+        const double distance = (camera.position - link.axis.from - part * along).norm();
+        if (obstructs(camera, link))
+          ++hidden;
+        else
+          ASSERT_GT(distance, link.radius_mm);
+      }
+  EXPECT_GT(hidden, 0);
+}
+
 }  // namespace
 }  // namespace helicarm::gui

@@ -110,6 +110,33 @@ ResultScene scene_of(const pipeline::Result& result, const phantom::Calibrator& 
   return scene;
 }
 
+std::vector<DrawnLink> drawn_links(const LiveScene& live) {
+  constexpr std::size_t thick = 3;  // links from the base on
+  constexpr double foot_radius_mm = 60, thick_mm = 38, thin_mm = 26, joint = 1.15;
+  std::vector<DrawnLink> links;
+  for (const Segment& axis : robot_links(live)) {
+    const double radius = links.size() < thick ? thick_mm : thin_mm;
+    links.push_back({axis, radius, joint * radius});
+  }
+  if (links.empty()) return links;
+  const Vector3d up = live.calibrator_from_base->rotation.col(2), base = links.front().axis.from;
+  links.push_back({{base - 30 * up, base + 20 * up}, foot_radius_mm, 1});
+  return links;
+}
+
+std::optional<MovedBone> moved_bone(const ResultScene& scene, guidance::Bone bone,
+                                    const std::optional<geometry::RigidTransform>& motion) {
+  constexpr double least_mm = 0.5;
+  Vector3d sum = Vector3d::Zero();
+  int points = 0;
+  for (const PointShape& point : scene.points)
+    if (point.moves_with == bone) sum += point.error.centre, ++points;
+  if (!motion || points == 0) return std::nullopt;
+  const Vector3d middle = sum / points, now = *motion * middle;
+  const double moved_mm = (now - middle).norm();
+  return moved_mm < least_mm ? std::nullopt : std::optional(MovedBone{now, moved_mm});
+}
+
 std::vector<Segment> robot_links(const LiveScene& live) {
   const auto model = robot::robot_model(live.robot_model);
   if (!live.calibrator_from_base || !live.joints || !model) return {};

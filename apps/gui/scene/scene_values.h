@@ -82,6 +82,24 @@ struct LiveScene {
   std::vector<Eigen::Vector3d> path;  ///< of the tool's tip
 };
 
+/// A link as drawn: a tube, and at its end a ball of `joint_radius_mm`.
+struct DrawnLink {
+  Segment axis;
+  double radius_mm, joint_radius_mm;
+};
+
+/// The links of the arm and its foot; empty as `robot_links`.
+std::vector<DrawnLink> drawn_links(const LiveScene& live);
+
+/// A bone that has moved since the acquisition: the middle of its points now, and how far it has moved, mm.
+struct MovedBone {
+  Eigen::Vector3d place;
+  double moved_mm;
+};
+/// Nothing for a motion below 0.5 mm, the tracker's noise, and without points that move with the bone.
+std::optional<MovedBone> moved_bone(const ResultScene& scene, guidance::Bone bone,
+                                    const std::optional<geometry::RigidTransform>& motion);
+
 /// The links of the arm from the base to the flange; empty if base, joints or model are unknown.
 std::vector<Segment> robot_links(const LiveScene& live);
 

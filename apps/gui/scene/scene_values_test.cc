@@ -92,6 +92,25 @@ TEST(SceneValues, ConeIsDrawnOnlyForBallsOnACone) {
   EXPECT_FALSE(cone_of(calibrator));
 }
 
+TEST(SceneValues, MovedBoneIsStatedAtItsPointsAndNotForNoise) {
+  ResultScene scene;
+  for (const double x : {0, 10})
+    scene.points.push_back({"TS",
+                            localization::PointSource::pick,
+                            guidance::Bone::tibia,
+                            {{x, 0, 0}, Matrix3d::Identity(), Vector3d::Ones()},
+                            {}});
+  const geometry::RigidTransform motion{Matrix3d::Identity(), {0, 0, 3.1}};
+  const auto moved = moved_bone(scene, guidance::Bone::tibia, motion);
+  ASSERT_TRUE(moved);
+  EXPECT_DOUBLE_EQ(moved->moved_mm, 3.1);
+  EXPECT_EQ(moved->place, Vector3d(5, 0, 3.1));
+  EXPECT_FALSE(moved_bone(scene, guidance::Bone::femur, motion));
+  EXPECT_FALSE(moved_bone(scene, guidance::Bone::tibia, std::nullopt));
+  EXPECT_FALSE(moved_bone(scene, guidance::Bone::tibia,
+                          geometry::RigidTransform{Matrix3d::Identity(), {0.2, 0, 0.2}}));
+}
+
 TEST(SceneValues, RobotLinksEndAtTheFlange) {
   LiveScene live;
   EXPECT_TRUE(robot_links(live).empty());

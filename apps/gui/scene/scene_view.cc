@@ -76,6 +76,7 @@ void SceneView::draw() {
       stage.set_slice(tre_ ? std::optional(slice_of(*tre_, slice_axis_, slice_mm_)) : std::nullopt,
                       tre_scale_);
     if (live_changed_) stage.set_live(live_);
+    stage.clear_sight(camera_);
     result_changed_ = bones_changed_ = slice_changed_ = live_changed_ = false;
   });
   drawn_.setDevicePixelRatio(devicePixelRatioF());
@@ -117,6 +118,13 @@ std::vector<SceneLabel> SceneView::labels() const {
   if (live_.calibrator_from_base && live_.joints)
     labels.push_back(
         {live_.calibrator_from_base->translation, QString::fromStdString(live_.robot_model), palette::joint});
+  for (const auto& [bone, motion, name] :
+       {std::tuple(guidance::Bone::femur, &live_.calibrator_from_femur_now, tr("femur")),
+        {guidance::Bone::tibia, &live_.calibrator_from_tibia_now, tr("tibia")}})
+    if (const auto moved = moved_bone(scene_, bone, *motion))
+      labels.push_back({moved->place,
+                        tr("%1 moved %2 mm since the image").arg(name).arg(moved->moved_mm, 0, 'f', 1),
+                        palette::bone});
   if (live_.calibrator_from_femur_marker)
     labels.push_back({live_.calibrator_from_femur_marker->translation, tr("femur marker"), palette::bone});
   if (live_.calibrator_from_tibia_marker)
@@ -126,7 +134,7 @@ std::vector<SceneLabel> SceneView::labels() const {
 
 void SceneView::paint_overlay(QPainter& painter) {
   QFont small = font();
-  small.setPixelSize(11);
+  small.setPixelSize(small.pixelSize() > 0 ? small.pixelSize() - 2 : 12);
   painter.setFont(small);
   std::vector<QRect> taken;
   if (const ViewShape* view = moved_ ? nullptr : view_of(preset_))

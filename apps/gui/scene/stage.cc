@@ -183,28 +183,35 @@ void Stage::set_live(const LiveScene& live) {
   }
   move(tool_, live.calibrator_from_tip);
 
-  std::vector<Segment> links = robot_links(live);
-  if (!links.empty()) {
-    const Vector3d up = live.calibrator_from_base->rotation.col(2);
-    links.push_back({links.front().from - 30 * up, links.front().from + 20 * up});
-  }
+  drawn_links_ = drawn_links(live);
   for (std::size_t i = 0; i < links_.size(); ++i) {
-    const bool shown = i < links.size() && (links[i].to - links[i].from).norm() > 1;
+    const bool shown = is_shown(i);
     if (shown && !filled(links_[i])) {  // the link lengths are constant
-      const double length = (links[i].to - links[i].from).norm();
-      const double radius = i == 6 ? 60 : i < 3 ? 38 : 26;
+      const auto& [axis, radius, joint_radius] = drawn_links_[i];
+      const double length = (axis.to - axis.from).norm();
       ShapeBuilder link;
       link.add_tube({Vector3d::Zero(), length * Vector3d::UnitZ()}, radius, radius, palette::robot);
-      link.add_ball(length * Vector3d::UnitZ(), i == 6 ? 1 : 1.15 * radius, palette::joint);
+      link.add_ball(length * Vector3d::UnitZ(), joint_radius, palette::joint);
       give(links_[i], link);
     }
-    move(links_[i], shown ? std::optional(along(links[i])) : std::nullopt);
+    move(links_[i], shown ? std::optional(along(drawn_links_[i].axis)) : std::nullopt);
   }
   if (live.path == shown_path_) return;
   ShapeBuilder path;
   path.add_line(live.path, palette::path);
   give(path_, path);
   shown_path_ = live.path;
+}
+
+bool Stage::is_shown(std::size_t link) const {
+  constexpr double shortest_mm = 1;
+  return link < drawn_links_.size() &&
+         (drawn_links_[link].axis.to - drawn_links_[link].axis.from).norm() > shortest_mm;
+}
+
+void Stage::clear_sight(const SceneCamera& camera) {
+  for (std::size_t i = 0; i < links_.size(); ++i)
+    links_[i]->SetVisibility(is_shown(i) && !obstructs(camera, drawn_links_[i]));
 }
 
 void Stage::render_upside_down(const SceneCamera& camera, unsigned framebuffer) {

@@ -29,11 +29,15 @@ class Stage {
   /// Moves existing parts; only a new path is built.
   void set_live(const LiveScene& live);
 
+  /// Hides the links of the arm that hide the rest from this camera.
+  void clear_sight(const SceneCamera& camera);
+
   void resize(int width, int height) { window_->SetSize(width, height); }
   /// Renders into the framebuffer of this number, with the image's first row first, as in QImage.
   void render_upside_down(const SceneCamera& camera, unsigned framebuffer);
 
  private:
+  bool is_shown(std::size_t link) const;
   vtkActor* add(bool lit);
   void move(vtkActor* actor, const std::optional<geometry::RigidTransform>& calibrator_from_body);
 
@@ -45,6 +49,7 @@ class Stage {
   std::array<vtkActor*, 7> links_;  ///< the last is the base's foot
   std::array<vtkActor*, 2> bones_;
   vtkActor* cone_;
+  std::vector<DrawnLink> drawn_links_;
   std::vector<Eigen::Vector3d> shown_path_;
 };
 

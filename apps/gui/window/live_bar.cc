@@ -20,13 +20,13 @@ constexpr double near_axis_mm = 5;
 QColor colour_of(Light light) {
   switch (light) {
     case Light::off:
-      return style::line;
+      return style::colours().line;
     case Light::red:
-      return style::red;
+      return style::colours().red;
     case Light::amber:
-      return style::amber;
+      return style::colours().amber;
     case Light::green:
-      return style::green;
+      return style::colours().green;
   }
   return {};
 }
@@ -39,9 +39,9 @@ void paint_indicator(QPainter& painter, const QRectF& box, const StatusIndicator
     painter.drawRect(disc);  // a distinct shape, for colour-blind users
   else
     painter.drawEllipse(disc);
-  painter.setPen(style::quiet);
+  painter.setPen(style::colours().quiet);
   painter.drawText(box.adjusted(30, 6, 0, 0), Qt::AlignLeft | Qt::AlignTop, indicator.name);
-  painter.setPen(style::text);
+  painter.setPen(style::colours().text);
   painter.drawText(box.adjusted(30, 0, 0, -6), Qt::AlignLeft | Qt::AlignBottom, indicator.text);
 }
 
@@ -61,14 +61,14 @@ void paint_depth(QPainter& painter, const QRectF& box, const operation::TunnelAi
   const auto at = [&](double depth) {
     return box.left() + box.width() * std::clamp((depth + before_entry_mm) / span, 0.0, 1.0);
   };
-  painter.fillRect(box, style::panel);
+  painter.fillRect(box, style::colours().panel);
   painter.fillRect(QRectF(QPointF(at(0), box.top()), QPointF(at(aim.length_mm), box.bottom())),
-                   style::raised);
+                   style::colours().raised);
   painter.fillRect(QRectF(QPointF(box.left(), box.top() + 4), QPointF(at(aim.depth_mm), box.bottom() - 4)),
-                   aim.distance_mm > near_axis_mm ? style::line
-                   : aim.depth_mm > aim.length_mm ? style::red
-                                                  : style::blue);
-  painter.setPen(style::text);
+                   aim.distance_mm > near_axis_mm ? style::colours().line
+                   : aim.depth_mm > aim.length_mm ? style::colours().red
+                                                  : style::colours().blue);
+  painter.setPen(style::colours().text);
   painter.drawLine(QPointF(at(0), box.top()), QPointF(at(0), box.bottom()));
 }
 
@@ -80,10 +80,19 @@ LiveBar::LiveBar(QWidget* parent) : QWidget(parent) {
 }
 
 void LiveBar::show_live(const LiveState& live) {
+  const bool resizes = live.indicators.empty() != live_.indicators.empty();
   live_ = live;
+  if (resizes) updateGeometry();
   setAccessibleDescription(words());
   update();
 }
+
+QSize LiveBar::sizeHint() const {
+  constexpr int with_devices = 58, without = 26;
+  return {1200, style::scaled(live_.indicators.empty() ? without : with_devices)};
+}
+
+QSize LiveBar::minimumSizeHint() const { return {600, sizeHint().height()}; }
 
 QString LiveBar::words() const {
   QStringList all;
@@ -96,7 +105,7 @@ QString LiveBar::words() const {
 void LiveBar::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.setRenderHint(QPainter::Antialiasing);
-  painter.fillRect(rect(), style::panel);
+  painter.fillRect(rect(), style::colours().panel);
   double left = 8;
   for (const StatusIndicator& indicator : live_.indicators) {
     const int words = std::max(painter.fontMetrics().horizontalAdvance(indicator.name),
@@ -107,30 +116,40 @@ void LiveBar::paintEvent(QPaintEvent*) {
     left += width;
   }
   if (live_.indicators.empty()) {
-    painter.setPen(style::quiet);
+    painter.setPen(style::colours().quiet);
     painter.drawText(rect().adjusted(12, 0, 0, 0), Qt::AlignVCenter, tr("no tracker, no robot"));
   }
   if (!live_.aim) return;
   const QRectF box(left + 10, 0, width() - left - 22, height());
   QFont font = painter.font();
-  font.setPixelSize(17);
+  font.setPixelSize(style::scaled(17));
   painter.setFont(font);
   if (!*live_.aim) {
-    painter.setPen(style::amber);
+    painter.setPen(style::colours().amber);
     painter.drawText(box, Qt::AlignVCenter | Qt::TextWordWrap, sentence_of(live_.aim->error()));
     return;
   }
-  painter.setPen(style::text);
-  painter.drawText(box.adjusted(0, 4, 0, -26), Qt::AlignLeft | Qt::AlignVCenter,
+  painter.setPen(style::colours().text);
+  painter.drawText(box.adjusted(0, 4, 0, -style::scaled(26)), Qt::AlignLeft | Qt::AlignVCenter,
                    aim_words(live_.tunnel, **live_.aim));
-  paint_depth(painter, box.adjusted(0, 36, 0, -6), **live_.aim);
+  paint_depth(painter, box.adjusted(0, style::scaled(36), 0, -6), **live_.aim);
+}
+
+QString LiveBar::definitions() {
+  return tr(
+      "ms, s: age of the last pose or state of the device.\n"
+      "Off axis: distance of the tool's tip from the tunnel's axis, mm; then the angle between both axes, "
+      "degrees.\n"
+      "Before the entry, deep: position of the tip along the tunnel's axis from its entry, mm.");
 }
 
 bool LiveBar::event(QEvent* event) {
+  if (event->type() == QEvent::StyleChange) updateGeometry();
   if (event->type() == QEvent::ToolTip) {
     QStringList all;
     for (const StatusIndicator& indicator : live_.indicators)
       if (!indicator.why.isEmpty()) all << QString("%1: %2").arg(indicator.name, indicator.why);
+    all << definitions();
     QToolTip::showText(static_cast<QHelpEvent*>(event)->globalPos(), all.join("\n"), this);
     return true;
   }

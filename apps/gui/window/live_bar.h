@@ -16,12 +16,14 @@ class LiveBar : public QWidget {
   void show_live(const LiveState& live);
   /// The displayed content as text.
   QString words() const;
+  /// What the displayed quantities are, with their units.
+  static QString definitions();
 
  protected:
   void paintEvent(QPaintEvent* event) override;
   bool event(QEvent* event) override;
-  QSize sizeHint() const override { return {1200, 58}; }
-  QSize minimumSizeHint() const override { return {600, 58}; }
+  QSize sizeHint() const override;
+  QSize minimumSizeHint() const override;
 
  private:
   LiveState live_;

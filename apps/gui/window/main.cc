@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <QApplication>
 #include <QCommandLineParser>
+#include <QScreen>
+#include <QSettings>
 #include <QStandardPaths>
 #include <QTimer>
 #include <QTranslator>
@@ -21,7 +23,11 @@ int main(int argc, char** argv) {
   QApplication::setOrganizationName("helicarm");
   QApplication::setApplicationName("helicarm-gui");
   QApplication::setApplicationVersion(HELICARM_VERSION);
-  app.setStyleSheet(style::sheet());
+  const QSettings kept;
+  constexpr int large_screen = 1000, large_text_px = 16;
+  const bool is_large = QApplication::primaryScreen()->size().height() >= large_screen;
+  style::apply({kept.value("appearance/light").toBool() ? style::Theme::light : style::Theme::dark,
+                kept.value("appearance/text_px", is_large ? large_text_px : style::usual_text_px).toInt()});
   QTranslator language;
   if (language.load(QLocale(), "helicarm", "_",
                     QApplication::applicationDirPath() + "/../share/helicarm/translations"))
@@ -50,7 +56,8 @@ int main(int argc, char** argv) {
           ? words.value(sessions)
           : QStandardPaths::writableLocation(QStandardPaths::AppLocalDataLocation) + "/sessions";
   MainWindow window(place.toStdString());
-  window.resize(1280, 800);
+  window.resize(is_large ? 0.9 * QApplication::primaryScreen()->availableSize() : QSize(1280, 800));
+  window.restore_layout();
   window.show();
   std::vector<std::filesystem::path> paths;
   for (const QString& path : words.positionalArguments()) paths.push_back(path.toStdString());
@@ -63,9 +70,11 @@ int main(int argc, char** argv) {
   for (const int signal : {SIGTERM, SIGINT}) std::signal(signal, [](int) { told_to_end = 1; });
   QTimer listener;
   QObject::connect(&listener, &QTimer::timeout, [] {
-    if (told_to_end) QApplication::quit();
+    if (told_to_end) QApplication::exit();  // quit() would ask
   });
   constexpr int glance_ms = 50;
   listener.start(glance_ms);
-  return QApplication::exec();
+  const int code = QApplication::exec();
+  window.keep_layout();
+  return code;
 }

@@ -29,9 +29,12 @@ constexpr double epipolar_reach_mm = 150;
 
 QString text(const std::string& words) { return QString::fromStdString(words); }
 
-/// The first step that is not done.
-Phase open_phase(const std::array<StepCard, phases.size()>& cards, bool registered) {
+/// The first step that is not done; the plan is the last one of a case of files.
+Phase open_phase(const std::array<StepCard, phases.size()>& cards, const ApplicationState& state) {
+  if (state.source == Source::images) return Phase::acquire;
+  const bool registered = state.hand_eye_rms_mm.has_value();
   for (const StepCard& card : cards) {
+    if (card.phase == Phase::navigate && state.source == Source::files && !registered) return Phase::plan;
     if (card.status == StepStatus::good || (card.status == StepStatus::warning && card.phase != Phase::plan))
       continue;
     // A plan with warnings is inspected before any motion.
@@ -46,6 +49,9 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
     : QMainWindow(parent), sessions_(std::move(sessions)) {
   setWindowTitle(tr("helicarm"));
   setAcceptDrops(true);
+  settings_ = kept_settings(recent_);
+  controller_.set_options(settings_.run);
+  focus_ = new FocusKeeper(this);
   build();
   build_menus();
   connect(&controller_, &Controller::changed, this, &MainWindow::show_state);
@@ -58,6 +64,7 @@ MainWindow::MainWindow(std::filesystem::path sessions, QWidget* parent)
           [this](const QString& folder) { statusBar()->showMessage(tr("Written to %1").arg(folder)); });
   connect(&timer_, &QTimer::timeout, this, &MainWindow::show_live);
   timer_.start(live_ms);
+  panels_->show_state(controller_.state());
   qApp->installEventFilter(this);
   show_state();
 }
@@ -71,23 +78,26 @@ void MainWindow::build() {
   column->setSpacing(6);
   column->addLayout(build_top());
   auto* sides = new QSplitter(Qt::Horizontal);
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    xrays_[i] = new XrayView;
-    xrays_[i]->setObjectName(QString("xray%1").arg(i));
-    sides->addWidget(xrays_[i]);
-    sides->setStretchFactor(int(i), 3);
-    connect(xrays_[i], &XrayView::picked, this, [this, i](const QPointF& raw) { place_pick(i, raw); });
-    connect(xrays_[i], &XrayView::pick_moved, this,
-            [this, i](const QString& name, const QPointF& raw) { move_pick(i, name, raw); });
-  }
+  sides->setObjectName("sides");
+  panels_ = new XrayPanels;
+  for (std::size_t i = 0; i < xrays_.size(); ++i) xrays_[i] = &panels_->xray(i);
+  sides->addWidget(panels_);
+  sides->setStretchFactor(0, 6);
+  connect(panels_, &XrayPanels::picked, this, &MainWindow::place_pick);
+  connect(panels_, &XrayPanels::pick_moved, this, &MainWindow::move_pick);
+  connect(panels_, &XrayPanels::displayed, this, [this] {
+    show_picks();
+    show_measures();
+  });
   sides->addWidget(build_right());
-  sides->setStretchFactor(2, 3);
+  sides->setStretchFactor(1, 3);
   column->addWidget(sides, 1);
   live_bar_ = new LiveBar;
   column->addWidget(live_bar_);
   setCentralWidget(middle);
   build_status();
   build_replay();
+  build_measures();
 }
 
 QLayout* MainWindow::build_top() {
@@ -110,14 +120,15 @@ QLayout* MainWindow::build_top() {
 
 QWidget* MainWindow::build_right() {
   auto* right = new QSplitter(Qt::Vertical);
+  right->setObjectName("right");
   scene_ = new SceneView;
   scene_->setObjectName("scene");
   right->addWidget(scene_);
   build_pages();
   right->addWidget(pages_);
   right->setSizes({280, 380});
-  constexpr int widest_button = 416;
-  right->setMinimumWidth(widest_button);
+  right_ = right;
+  fit_text();
   return right;
 }
 
@@ -141,9 +152,8 @@ void MainWindow::build_pages() {
   }
   connect(acquire, &AcquirePage::rehearsal_wanted, this, &MainWindow::open_rehearsal);
   connect(acquire, &AcquirePage::folder_wanted, this, &MainWindow::ask_folder);
-  connect(rectify, &RectifyPage::layer_wanted, this, [this](Layer layer) {
-    for (XrayView* xray : xrays_) xray->set_layer(layer);
-  });
+  connect(acquire, &AcquirePage::new_case_wanted, this, &MainWindow::ask_new_case);
+  connect(rectify, &RectifyPage::layer_wanted, panels_, &XrayPanels::set_layer);
   connect(plan_, &PlanPage::target_changed, this, &MainWindow::show_picks);
   connect(plan_, &PlanPage::map_wanted, this, [this](const std::optional<TreCut>& cut) {
     cut_ = cut;
@@ -154,6 +164,7 @@ void MainWindow::build_pages() {
 
 void MainWindow::build_replay() {
   replay_dock_ = new QDockWidget(tr("Replay"), this);
+  replay_dock_->setObjectName("replayDock");
   replay_ = new ReplayPanel;
   replay_dock_->setWidget(replay_);
   addDockWidget(Qt::BottomDockWidgetArea, replay_dock_);
@@ -163,7 +174,7 @@ void MainWindow::build_replay() {
 
 void MainWindow::build_status() {
   recording_ = new QLabel(tr("● recording"));
-  recording_->setStyleSheet("color: #ff6b6b;");
+  recording_->setProperty("class", "recording");
   statusBar()->addPermanentWidget(recording_);
   busy_ = new QWidget;
   auto* row = new QHBoxLayout(busy_);
@@ -180,11 +191,22 @@ void MainWindow::build_status() {
   statusBar()->addPermanentWidget(busy_);
 }
 
+ApplicationState MainWindow::displayed_state() const {
+  ApplicationState state = controller_.state();
+  if (state.source != Source::files || !replay_->timeline() || replay_->moment() < 0) return state;
+  state.is_replayed = true;
+  const auto then = state_at(*replay_->timeline(), std::size_t(replay_->moment()));
+  if (!then || then->case_folder != state.folder || !state.measured) return state;
+  state.hand_eye_rms_mm = then->hand_eye_rms_mm;
+  state.outcomes = then->outcomes;
+  return state;
+}
+
 void MainWindow::show_state() {
-  const ApplicationState& state = controller_.state();
+  const ApplicationState state = displayed_state();
   const auto cards = steps_of(state);
   strip_->show_steps(cards);
-  if (!state.busy && !moved_on_) show_phase(open_phase(cards, state.hand_eye_rms_mm.has_value()));
+  if (!state.busy && !moved_on_) show_phase(open_phase(cards, state));
   if (state.busy) moved_on_ = false;
   for (Page* page : all_pages_) page->show_state(state);
   setWindowTitle(state.folder.empty() ? tr("helicarm") : tr("helicarm: %1").arg(text(state.folder.string())));
@@ -195,14 +217,15 @@ void MainWindow::show_state() {
   recording_->setVisible(replays || state.source == Source::virtual_or || state.source == Source::devices);
   recording_->setToolTip(tr("Every step is recorded in %1").arg(text(state.folder.string())));
   if (state.busy)
-    statusBar()->showMessage(text(state.doing));
-  else if (state.refusals.empty())
+    statusBar()->showMessage(doing_ = text(state.doing));
+  else if (state.refusals.empty() || statusBar()->currentMessage() == doing_)
     statusBar()->clearMessage();
   save_->setEnabled(state.has_unsaved_picks);
   undo_->setEnabled(controller_.can_undo_picks() && controller_.takes_picks());
   redo_->setEnabled(controller_.can_redo_picks() && controller_.takes_picks());
   show_images();
   show_picks();
+  focus_->restore(pages_->currentWidget());
 }
 
 void MainWindow::show_images() {
@@ -211,19 +234,11 @@ void MainWindow::show_images() {
   shown_ = state.result;
   shown_source_ = state.source;
   show_recorded();  // only over the images of its own case
-  for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    const bool has = shown_ && i < shown_->views.size();
-    if (has && shown_->views[i].xray_image)
-      xrays_[i]->show_view(shown_, i);
-    else
-      xrays_[i]->clear(state.source == Source::none
-                           ? tr("Drag two or more X-ray images, or a case folder, into the window")
-                       : has ? tr("%1: no image yet").arg(text(shown_->views[i].name))
-                             : tr("No second view"));
-  }
+  panels_->show_state(state);
   if (std::exchange(shown_bones_, state.bones) != state.bones)
     scene_->show_bones(state.bones ? std::optional(*state.bones) : std::nullopt);
   scene_->show_result(state.measured ? shown_ : nullptr, state.calibrator);
+  show_measures();
   if (state.measured && scene_->preset() == SceneView::Preset::free) scene_->look_near();
   show_tre();
 }
@@ -231,33 +246,53 @@ void MainWindow::show_images() {
 void MainWindow::show_picks() {
   const ApplicationState& state = controller_.state();
   const auto wanted = state.measured && phase_ == Phase::plan ? plan_->target() : std::nullopt;
+  display_wanted(wanted);
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
-    if (!shown_ || i >= shown_->views.size() || !shown_->views[i].xray_image) continue;
-    const pipeline::ViewResult& view = shown_->views[i];
-    std::vector<FreshPick> picks;
-    for (const pipeline::Pick& pick : state.picks)
-      if (pick.view == view.name) picks.push_back({text(pick.name), pick.uv_raw});
-    xrays_[i]->set_movable_picks(
-        phase_ == Phase::plan && controller_.takes_picks() ? picks : std::vector<FreshPick>{});
-    if (!next_pick(state)) picks.clear();  // the result shows them
-    xrays_[i]->set_picks(std::move(picks));
-    xrays_[i]->set_picking(wanted.has_value() && controller_.takes_picks());
-    const auto path = state.path.by_view.find(view.name);
-    xrays_[i]->set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
-
-    std::vector<Eigen::Vector2d> epipolar;
-    if (wanted)
-      for (const pipeline::ViewResult& other : shown_->views) {
-        const pipeline::Pick* pick = pick_of(state, wanted->point, other.name);
-        if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated) continue;
-        const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
-        const double depth = other.calibrated->view.depth(phantom::middle_of(state.calibrator));
-        if (uv)
-          epipolar = geometry::epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
-                                             depth - epipolar_reach_mm, depth + epipolar_reach_mm);
-      }
-    xrays_[i]->set_epipolar(std::move(epipolar));
+    const auto view = panels_->view_in(i);
+    if (view && shown_ && *view < shown_->views.size()) show_picks_in(i, *view, wanted);
   }
+}
+
+void MainWindow::display_wanted(const std::optional<WantedPick>& wanted) {
+  const std::string view = wanted ? wanted->view : "";
+  if (std::exchange(wanted_view_, view) == view) return;  // the user may display others
+  const auto& views = controller_.state().views;
+  panels_->display(std::size_t(std::ranges::find(views, view) - views.begin()));
+}
+
+void MainWindow::show_picks_in(std::size_t panel, std::size_t number,
+                               const std::optional<WantedPick>& wanted) {
+  const ApplicationState& state = controller_.state();
+  const pipeline::ViewResult& view = shown_->views[number];
+  XrayView& xray = *xrays_[panel];
+  const bool takes = controller_.takes_picks() && panels_->panel(panel).shows_own_frame();
+  std::vector<FreshPick> picks;
+  for (const pipeline::Pick& pick : state.picks)
+    if (pick.view == view.name) picks.push_back({text(pick.name), pick.uv_raw});
+  xray.set_movable_picks(phase_ == Phase::plan && takes ? picks : std::vector<FreshPick>{});
+  xray.set_picking(wanted.has_value() && takes);
+  if (!panels_->panel(panel).shows_own_frame()) return;
+  if (!next_pick(state)) picks.clear();  // the result shows them
+  xray.set_picks(std::move(picks));
+  const auto path = state.path.by_view.find(view.name);
+  xray.set_path(path == state.path.by_view.end() ? std::vector<Eigen::Vector2d>{} : path->second);
+  xray.set_epipolar(wanted ? epipolar_lines_of(wanted->point, view) : std::vector<EpipolarLine>{});
+}
+
+std::vector<MainWindow::EpipolarLine> MainWindow::epipolar_lines_of(const std::string& point,
+                                                                    const pipeline::ViewResult& view) const {
+  const ApplicationState& state = controller_.state();
+  std::vector<EpipolarLine> lines;
+  for (const pipeline::ViewResult& other : shown_->views) {
+    const pipeline::Pick* pick = pick_of(state, point, other.name);
+    if (&other == &view || pick == nullptr || !other.calibrated || !view.calibrated) continue;
+    const auto uv = other.rectification->map.rectified_from_raw(pick->uv_raw);
+    const double depth = other.calibrated->view.depth(phantom::middle_of(state.calibrator));
+    if (uv)
+      lines.push_back(geometry::epipolar_line(other.calibrated->view, *uv, view.calibrated->view,
+                                              depth - epipolar_reach_mm, depth + epipolar_reach_mm));
+  }
+  return lines;
 }
 
 void MainWindow::show_phase(Phase phase) {
@@ -298,8 +333,9 @@ void MainWindow::show_live() {
   if (live_.tool) tool = *live_.tool ? &**live_.tool : nullptr;
   for (std::size_t i = 0; i < xrays_.size(); ++i) {
     std::optional<verification::ImageLine> line;
-    if (tool && shown_ && i < shown_->views.size())
-      if (const auto seen = tool->by_view.find(shown_->views[i].name); seen != tool->by_view.end())
+    const auto view = panels_->view_in(i);
+    if (tool && shown_ && view && *view < shown_->views.size() && panels_->panel(i).shows_own_frame())
+      if (const auto seen = tool->by_view.find(shown_->views[*view].name); seen != tool->by_view.end())
         line = seen->second;
     xrays_[i]->set_tool(line, tool && live_.tool ? age_text(tool->age_s) : QString());
   }

@@ -3,19 +3,25 @@
 
 #include <QLabel>
 #include <QMainWindow>
+#include <QPointer>
 #include <QSettings>
+#include <QSplitter>
 #include <QStackedWidget>
 #include <filesystem>
 
 #include "gui/controller/controller.h"
+#include "gui/replay/kept_settings.h"
 #include "gui/replay/recent.h"
 #include "gui/replay/replay_panel.h"
 #include "gui/replay/settings_dialog.h"
 #include "gui/scene/scene_view.h"
+#include "gui/window/focus_keeper.h"
 #include "gui/window/live_bar.h"
+#include "gui/window/new_case_dialog.h"
 #include "gui/window/pages.h"
 #include "gui/window/step_strip.h"
-#include "gui/xray/xray_view.h"
+#include "gui/window/xray_panels.h"
+#include "gui/xray/measures_panel.h"
 
 namespace helicarm::gui {
 
@@ -30,16 +36,22 @@ class MainWindow : public QMainWindow {
 
   Controller& controller() { return controller_; }
   StepStrip& strip() { return *strip_; }
-  XrayView& xray(std::size_t number) { return *xrays_.at(number); }
+  XrayPanels& xrays() { return *panels_; }
+  XrayView& xray(std::size_t panel) { return *xrays_.at(panel); }
+  NewCaseDialog* new_case() { return new_case_; }
   SceneView& scene() { return *scene_; }
   LiveBar& live_bar() { return *live_bar_; }
 
   void open_rehearsal();
   void open_plan(const std::filesystem::path& plan);
-  /// A case folder, a session's folder, or X-ray images.
+  /// A case folder, a session's folder, or X-ray images: these are shown, and two or more are offered as a
+  /// new case.
   void open_paths(const std::vector<std::filesystem::path>& paths);
   /// Displays the devices' present state; called by a timer 50 times a second.
   void show_live();
+  /// Size, place and parts of the window, for the next start.
+  void keep_layout();
+  void restore_layout();
   /// The displayed live data.
   const LiveState& live() const { return live_; }
   /// The tool at the replayed moment; empty if no case with a tool is replayed.
@@ -50,6 +62,7 @@ class MainWindow : public QMainWindow {
   void dropEvent(QDropEvent* event) override;
   bool eventFilter(QObject* watched, QEvent* event) override;
   void closeEvent(QCloseEvent* event) override;
+  void changeEvent(QEvent* event) override;
 
  private:
   void build();
@@ -60,22 +73,44 @@ class MainWindow : public QMainWindow {
   void build_pages();
   void build_status();
   void build_replay();
+  void build_measures();
+  void build_measure_menu();
+  /// Room for the widest button at the present text size.
+  void fit_text();
+  void build_layers_menu(QMenu* view);
+  void build_appearance_menu(QMenu* view);
+  /// The table, X-ray image or scene that has the focus to the clipboard, else the window.
+  void copy();
   void build_recent();
   void open_session(const std::filesystem::path& session);
   std::filesystem::path new_session() const;
   void remember(Folder kind, const std::filesystem::path& folder);
 
+  /// The controller's, with the recorded steps at a replayed moment.
+  ApplicationState displayed_state() const;
   void show_state();
   void show_images();
   void show_picks();
+  void show_measures();
+  void display_wanted(const std::optional<WantedPick>& wanted);
+  void show_picks_in(std::size_t panel, std::size_t view, const std::optional<WantedPick>& wanted);
+  using EpipolarLine = std::vector<Eigen::Vector2d>;  ///< rectified px
+  std::vector<EpipolarLine> epipolar_lines_of(const std::string& point,
+                                              const pipeline::ViewResult& view) const;
   void show_phase(Phase phase);
   void place_pick(std::size_t view, const QPointF& raw);
   void move_pick(std::size_t view, const QString& name, const QPointF& raw);
   void show_tre();
   void show_moment(int index);
   void show_recorded();
+  /// Acts at once, or after a question if something would be lost.
+  void leave_then(std::function<void()> act);
+  void leave_for(const std::vector<std::filesystem::path>& paths);
+  void open_images(const std::vector<std::filesystem::path>& files);
   void ask_rehearsal();
   void ask_folder();
+  void ask_new_case();
+  void offer_case(const std::vector<pipeline::NewImage>& images);
   void ask_and_export();
   void save_screenshot();
   void ask_settings();
@@ -88,9 +123,11 @@ class MainWindow : public QMainWindow {
   QTimer timer_;
 
   StepStrip* strip_ = nullptr;
-  std::array<XrayView*, 2> xrays_{};
+  XrayPanels* panels_ = nullptr;
+  std::array<XrayView*, XrayPanels::most_large> xrays_{};  ///< those of the panels
   SceneView* scene_ = nullptr;
   LiveBar* live_bar_ = nullptr;
+  QSplitter* right_ = nullptr;
   QStackedWidget* pages_ = nullptr;
   std::vector<Page*> all_pages_;
   PlanPage* plan_ = nullptr;
@@ -100,11 +137,23 @@ class MainWindow : public QMainWindow {
   QAction* save_ = nullptr;
   QAction* undo_ = nullptr;
   QAction* redo_ = nullptr;
+  MarkGroups mark_groups_ = all_marks;
+  FocusKeeper* focus_ = nullptr;
+  MeasureTool measure_tool_;
+  MeasuresPanel* measures_ = nullptr;
+  QDockWidget* measures_dock_ = nullptr;
+  QAction* leave_tool_ = nullptr;
+  std::shared_ptr<const pipeline::Result> measures_of_;
+  std::vector<std::shared_ptr<const pipeline::Result>> measures_of_frames_;
   QMenu* recent_menu_ = nullptr;
   QMenu* rehearsal_menu_ = nullptr;
 
+  QPointer<NewCaseDialog> new_case_;
+  bool may_close_ = false;
+  std::string wanted_view_;  ///< of the next pick
   QWidget* busy_ = nullptr;  ///< progress and Cancel
   QLabel* recording_ = nullptr;
+  QString doing_;  ///< the last work in progress that was shown
 
   LiveState live_;
   std::optional<TreCut> cut_;

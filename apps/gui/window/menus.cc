@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <QApplication>
-#include <QCloseEvent>
-#include <QDateTime>
 #include <QDockWidget>
-#include <QDragEnterEvent>
-#include <QFileDialog>
 #include <QMenuBar>
 #include <QMessageBox>
-#include <QMimeData>
 #include <QStatusBar>
 #include <QThreadPool>
 
 #include "gui/controller/steps.h"
+#include "gui/window/ask_files.h"
 #include "gui/window/main_window.h"
 #include "helicarm/pipeline/run_case.h"
 
@@ -23,39 +19,6 @@ namespace {
 constexpr double tre_step_mm = 10;
 
 QString text(const fs::path& path) { return QString::fromStdString(path.string()); }
-fs::path path_of(const QString& words) { return words.toStdString(); }
-
-/// X-ray images in a folder without a case.json, by name.
-std::vector<fs::path> images_in(const fs::path& folder) {
-  std::vector<fs::path> images;
-  std::error_code unreadable;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
-    if (const fs::path kind = entry.path().extension();
-        kind == ".dcm" || kind == ".png" || kind == ".tif" || kind == ".tiff")
-      images.push_back(entry.path());
-  std::ranges::sort(images);
-  return images;
-}
-
-/// A dialog that keeps the window, and STOP in it, accessible.
-void show_beside(QDialog* dialog) {
-  dialog->setAttribute(Qt::WA_DeleteOnClose);
-  dialog->setModal(false);
-  dialog->show();
-}
-
-template <class Then>
-void ask_files(QWidget* parent, const QString& title, QFileDialog::FileMode mode, const QString& filter,
-               Then then) {
-  auto* dialog = new QFileDialog(parent, title, {}, filter);
-  dialog->setFileMode(mode);
-  QObject::connect(dialog, &QFileDialog::filesSelected, parent, [then](const QStringList& chosen) {
-    std::vector<fs::path> paths;
-    for (const QString& name : chosen) paths.push_back(path_of(name));
-    if (!paths.empty()) then(paths);
-  });
-  show_beside(dialog);
-}
 
 }  // namespace
 
@@ -65,12 +28,16 @@ void MainWindow::build_menus() {
                   &MainWindow::ask_rehearsal);
   file->addAction(tr("&Connect the devices of a plan..."), this, [this] {
     ask_files(this, tr("Plan"), QFileDialog::ExistingFile, tr("Plan (*.json)"),
-              [this](const std::vector<fs::path>& chosen) { open_plan(chosen.front()); });
+              [this](const std::vector<fs::path>& chosen) {
+                leave_then([this, plan = chosen.front()] { open_plan(plan); });
+              });
   });
+  file->addAction(tr("New &case of X-ray images..."), QKeySequence(tr("Ctrl+Shift+N")), this,
+                  &MainWindow::ask_new_case);
   file->addAction(tr("&Open a case or session folder..."), QKeySequence::Open, this, &MainWindow::ask_folder);
   file->addAction(tr("Open &X-ray images..."), this, [this] {
     ask_files(this, tr("X-rays"), QFileDialog::ExistingFiles, {},
-              [this](const std::vector<fs::path>& chosen) { open_paths(chosen); });
+              [this](const std::vector<fs::path>& chosen) { leave_for(chosen); });
   });
   recent_menu_ = file->addMenu(tr("&Recent"));
   build_recent();
@@ -87,6 +54,8 @@ void MainWindow::build_menus() {
   QMenu* edit = menuBar()->addMenu(tr("&Edit"));
   undo_ = edit->addAction(tr("&Undo pick"), QKeySequence::Undo, &controller_, &Controller::undo_picks);
   redo_ = edit->addAction(tr("&Redo pick"), QKeySequence::Redo, &controller_, &Controller::redo_picks);
+  edit->addSeparator();
+  edit->addAction(tr("&Copy image or table"), QKeySequence::Copy, this, &MainWindow::copy);
 
   QMenu* view = menuBar()->addMenu(tr("&View"));
   using Preset = SceneView::Preset;
@@ -96,6 +65,19 @@ void MainWindow::build_menus() {
     view->addAction(words, QKeySequence(key), this, [this, wanted = preset] { scene_->set_preset(wanted); });
   view->addAction(tr("Scene &near at the knee"), QKeySequence("Ctrl+4"), scene_, &SceneView::look_near);
   view->addAction(replay_dock_->toggleViewAction());
+  view->addAction(measures_dock_->toggleViewAction());
+  build_layers_menu(view);
+  build_appearance_menu(view);
+  build_measure_menu();
+  QAction* four = view->addAction(tr("&Four large X-ray images"));
+  four->setObjectName("fourImages");
+  four->setShortcut(QKeySequence("Ctrl+5"));
+  four->setCheckable(true);
+  connect(four, &QAction::toggled, this, [this](bool on) {
+    recent_.setValue("view/four_images", on);
+    panels_->set_large(on ? XrayPanels::most_large : 2);
+  });
+  four->setChecked(recent_.value("view/four_images").toBool());
   build_rehearsal_menu();
 
   QMenu* help = menuBar()->addMenu(tr("&Help"));
@@ -107,7 +89,8 @@ void MainWindow::build_menus() {
         tr("Keys"),
         tr("Space: stop the robot\nAlt+1 to Alt+6: steps\nTab: next control\n"
            "Enter: press; hold it on a yellow button\n"
-           "Ctrl+N rehearsal, Ctrl+O open, Ctrl+E export, Ctrl+P screenshot, Ctrl+, settings\n"
+           "Ctrl+N rehearsal, Ctrl+Shift+N case of X-ray images, Ctrl+O open, Ctrl+5 two or four images, "
+           "Ctrl+E export, Ctrl+C copy, Ctrl+P screenshot, Ctrl+, settings\n"
            "Ctrl+S saves the picks, Ctrl+Z undoes a pick, Ctrl+Shift+Z repeats it, Delete removes the end "
            "chosen in the table\n\n"
            "On an X-ray image: + - 0 zoom, arrows pan, Shift+arrows and Enter place a tunnel's end, dragging "
@@ -149,66 +132,8 @@ void MainWindow::build_recent() {
   recent_menu_->clear();
   for (const Folder kind : {Folder::cases, Folder::sessions})
     for (const fs::path& folder : recent_folders(recent_, kind))
-      recent_menu_->addAction(text(folder), this, [this, folder] { open_paths({folder}); });
+      recent_menu_->addAction(text(folder), this, [this, folder] { leave_for({folder}); });
   recent_menu_->setEnabled(!recent_menu_->isEmpty());
-}
-
-void MainWindow::remember(Folder kind, const fs::path& folder) {
-  remember_folder(recent_, kind, folder);
-  build_recent();
-}
-
-fs::path MainWindow::new_session() const {
-  const QString now = QDateTime::currentDateTime().toString("yyyy-MM-dd_HH-mm-ss-zzz");
-  return sessions_ / now.toStdString();
-}
-
-void MainWindow::ask_rehearsal() {
-  const Source source = controller_.state().source;
-  if (source != Source::virtual_or && source != Source::devices) return open_rehearsal();
-  auto* question = new QMessageBox(QMessageBox::Question, tr("New rehearsal"),
-                                   tr("End this operation? Its record is kept."),
-                                   QMessageBox::Yes | QMessageBox::No, this);
-  connect(question, &QDialog::finished, this, [this](int answer) {
-    if (answer == QMessageBox::Yes) open_rehearsal();
-  });
-  show_beside(question);
-}
-
-void MainWindow::ask_folder() {
-  ask_files(this, tr("Case or session"), QFileDialog::Directory, {},
-            [this](const std::vector<fs::path>& chosen) { open_paths(chosen); });
-}
-
-void MainWindow::open_rehearsal() {
-  virtual_devices::VirtualDevicesOptions virtual_or = settings_.virtual_or;
-  virtual_or.tracker_port = virtual_or.rtde_port = virtual_or.dashboard_port = virtual_or.script_port = 0;
-  const fs::path folder = new_session();
-  controller_.open_virtual_or(virtual_or, settings_.plan, folder);
-}
-
-void MainWindow::open_plan(const fs::path& plan) {
-  controller_.open_devices(plan, settings_.receiver, new_session());
-}
-
-void MainWindow::open_paths(const std::vector<fs::path>& paths) {
-  const fs::path& first = paths.front();
-  if (paths.size() == 1 && fs::exists(first / "session.log")) return open_session(first);
-  if (paths.size() == 1 && fs::is_directory(first)) {
-    const std::vector<fs::path> loose =
-        fs::exists(first / "case.json") ? std::vector<fs::path>{} : images_in(first);
-    if (!loose.empty()) return controller_.open_images(loose);
-    remember(Folder::cases, first);
-    return controller_.open_case(first);
-  }
-  controller_.open_images(paths);
-}
-
-void MainWindow::open_session(const fs::path& session) {
-  if (const auto opened = replay_->open(session); !opened) return say(opened.error());
-  remember(Folder::sessions, session);
-  replay_dock_->show();
-  replay_dock_->raise();
 }
 
 void MainWindow::show_moment(int index) {
@@ -218,6 +143,7 @@ void MainWindow::show_moment(int index) {
   if (then->case_folder && then->measured && controller_.state().folder != *then->case_folder)
     controller_.open_case(*then->case_folder, false);
   show_recorded();
+  show_state();
 }
 
 void MainWindow::show_recorded() {
@@ -238,8 +164,16 @@ void MainWindow::show_recorded() {
 }
 
 void MainWindow::ask_and_export() {
-  ask_files(this, tr("Folder for the report and the results"), QFileDialog::Directory, {},
-            [this](const std::vector<fs::path>& chosen) { controller_.export_to(chosen.front()); });
+  auto* dialog = new QFileDialog(this, tr("Folder for the report and the results"));
+  dialog->setObjectName("exportDialog");
+  dialog->setFileMode(QFileDialog::AnyFile);  // a new folder is made
+  dialog->setAcceptMode(QFileDialog::AcceptSave);
+  dialog->setOption(QFileDialog::DontConfirmOverwrite);
+  dialog->setLabelText(QFileDialog::FileName, tr("Folder (a new one is made):"));
+  dialog->selectFile("helicarm-export");
+  connect(dialog, &QFileDialog::fileSelected, this,
+          [this](const QString& name) { controller_.export_to(name.toStdString()); });
+  show_beside(dialog);
 }
 
 void MainWindow::save_screenshot() {
@@ -255,6 +189,7 @@ void MainWindow::ask_settings() {
   auto* dialog = new SettingsDialog(settings_, this);
   connect(dialog, &QDialog::accepted, this, [this, dialog] {
     settings_ = dialog->settings();
+    keep_settings(recent_, settings_);
     controller_.set_options(settings_.run);
     statusBar()->showMessage(
         tr("Measurement settings apply to the next measurement; the others to the next rehearsal or "
@@ -289,21 +224,5 @@ void MainWindow::show_tre() {
 }
 
 void MainWindow::say(const Failure& failure) { statusBar()->showMessage(sentence_of(failure)); }
-
-void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
-  if (event->mimeData()->hasUrls()) event->acceptProposedAction();
-}
-
-void MainWindow::dropEvent(QDropEvent* event) {
-  std::vector<fs::path> paths;
-  for (const QUrl& url : event->mimeData()->urls())
-    if (url.isLocalFile()) paths.push_back(path_of(url.toLocalFile()));
-  if (!paths.empty()) open_paths(paths);
-}
-
-void MainWindow::closeEvent(QCloseEvent* event) {
-  controller_.stop();
-  QMainWindow::closeEvent(event);
-}
 
 }  // namespace helicarm::gui

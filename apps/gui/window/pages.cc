@@ -19,6 +19,7 @@ Page::Page(const QString& lead, Controller& controller, QWidget* parent)
   column->setContentsMargins(8, 4, 8, 4);
   auto* words = new QLabel(lead);
   words->setWordWrap(true);
+  words->setObjectName("lead");
   column->addWidget(words);
 }
 
@@ -38,10 +39,14 @@ HoldButton* Page::add_hold(const QString& words, const char* name, std::function
   return button;
 }
 
-QTableWidget* Page::add_table(const QStringList& columns, const char* name) {
+QTableWidget* Page::add_table(const std::vector<Column>& columns, const char* name) {
   auto* table = new QTableWidget(0, int(columns.size()));
   table->setObjectName(name);
-  table->setHorizontalHeaderLabels(columns);
+  for (int i = 0; i < table->columnCount(); ++i) {
+    auto* header = new QTableWidgetItem(columns[std::size_t(i)].title);
+    header->setToolTip(columns[std::size_t(i)].definition);
+    table->setHorizontalHeaderItem(i, header);
+  }
   table->horizontalHeader()->setSectionResizeMode(QHeaderView::ResizeToContents);
   table->horizontalHeader()->setStretchLastSection(true);
   table->verticalHeader()->hide();
@@ -69,6 +74,7 @@ AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
   row->addWidget(rehearse);
   row->addWidget(open);
   layout()->addWidget(ways_in_);
+  new_case_ = add_button({}, "newCase", [this] { emit new_case_wanted(); });
   connect(rehearse, &QPushButton::clicked, this, &AcquirePage::rehearsal_wanted);
   connect(open, &QPushButton::clicked, this, &AcquirePage::folder_wanted);
   where_ = new QLabel;
@@ -78,8 +84,9 @@ AcquirePage::AcquirePage(Controller& controller, QWidget* parent)
 }
 
 void AcquirePage::show_state(const ApplicationState& state) {
-  if (views_ != state.views || state.source == Source::files) {
-    views_ = state.source == Source::files ? std::vector<std::string>{} : state.views;
+  const bool of_files = state.source == Source::files || state.source == Source::images;
+  if (views_ != state.views || of_files) {
+    views_ = of_files ? std::vector<std::string>{} : state.views;
     qDeleteAll(acquisitions_->findChildren<QPushButton*>());
     for (const std::string& point : state.check_points) {
       auto* button = new QPushButton(tr("The pointer is on check point %1").arg(text(point)));
@@ -98,10 +105,17 @@ void AcquirePage::show_state(const ApplicationState& state) {
   }
   for (QPushButton* button : acquisitions_->findChildren<QPushButton*>()) button->setEnabled(!state.busy);
   ways_in_->setVisible(state.source == Source::none && !state.busy);
-  where_->setText(state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
-                  : state.source == Source::devices
-                      ? tr("Waiting for %1 from the C-arm.").arg(text(state.next_view))
-                      : QString());
+  const bool loose = state.source == Source::images;
+  findChild<QLabel*>("lead")->setVisible(!loose);
+  new_case_->setText(loose ? tr("New &case of these images...") : tr("New &case of X-ray images..."));
+  new_case_->setVisible(loose || ways_in_->isVisibleTo(this));
+  where_->setText(
+      state.source == Source::files ? tr("From %1.").arg(text(state.folder.string()))
+      : loose ? tr("%1: for looking and measuring in the image. Points in space need a case: two or "
+                   "more images with the calibrator.")
+                    .arg(text(state.folder.string()))
+      : state.source == Source::devices ? tr("Waiting for %1 from the C-arm.").arg(text(state.next_view))
+                                        : QString());
 }
 
 RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
@@ -122,8 +136,15 @@ RectifyPage::RectifyPage(Controller& controller, QWidget* parent)
     connect(choice, &QRadioButton::clicked, this, [this, wanted = layer] { emit layer_wanted(wanted); });
   }
   static_cast<QVBoxLayout*>(layout())->addLayout(row);
-  table_ = add_table({tr("View"), tr("Dots"), tr("Distortion px"), tr("Residual px"), tr("Cross-val. px")},
-                     "rectifyTable");
+  table_ = add_table(
+      {{tr("View"), tr("Name of the X-ray view")},
+       {tr("Dots"), tr("Dots of the plate that the correction uses; 0 for a flat panel or a given map")},
+       {tr("Distortion px"), tr("Distance of the dots from an undistorted lattice before the correction, "
+                                "mean and largest, raw px")},
+       {tr("Residual px"), tr("Distance of the dots from the correction, root mean square, px")},
+       {tr("Cross-val. px"),
+        tr("The same for dots that were left out of the fit: the error to expect between the dots, px")}},
+      "rectifyTable");
 }
 
 void RectifyPage::show_state(const ApplicationState& state) {
@@ -140,12 +161,25 @@ void RectifyPage::show_state(const ApplicationState& state) {
 }
 
 CalibratePage::CalibratePage(Controller& controller, QWidget* parent)
-    : Page(tr("Labels the twelve fiducials and calibrates each view from them."), controller, parent) {
-  views_ =
-      add_table({tr("View"), tr("Fiducials"), tr("Residual px"), tr("fx px"), tr("Source mm")}, "viewTable");
+    : Page(tr("Labels the calibrator's fiducials and calibrates each view from them."), controller, parent) {
+  views_ = add_table(
+      {{tr("View"), tr("Name of the X-ray view")},
+       {tr("Fiducials"), tr("Balls of the calibrator that the calibration uses, of all")},
+       {tr("Residual px"),
+        tr("Distance of the fiducials from their projections, root mean square, rectified px")},
+       {tr("fx px"), tr("Distance of the source from the detector, in px along a row; negative in a mirrored "
+                        "image")},
+       {tr("Source mm"), tr("Position of the X-ray source in the calibrator's frame, x, y, z, mm")}},
+      "viewTable");
   views_->setFixedHeight(104);
   balls_ =
-      add_table({tr("Fiducial"), tr("View"), tr("State"), tr("Sigma px"), tr("Residual px")}, "ballTable");
+      add_table({{tr("Fiducial"), tr("Label of the ball in the calibrator's file")},
+                 {tr("View"), tr("Name of the X-ray view")},
+                 {tr("State"),
+                  tr("used; rejected: its residual is too large; hidden, outside the image, or not found")},
+                 {tr("Sigma px"), tr("Standard deviation of the centre's image per axis, rectified px")},
+                 {tr("Residual px"), tr("Distance of the centre's image from its projection, rectified px")}},
+                "ballTable");
 }
 
 void CalibratePage::show_state(const ApplicationState& state) {
@@ -176,7 +210,7 @@ void CalibratePage::show_state(const ApplicationState& state) {
                               ball.status == fiducials::FiducialStatus::rejected;
         balls.push_back({text(ball.label), text(view.name), words.at(ball.status),
                          measured ? number(ball.sigma_px, 3) : QString(),
-                         measured ? number(ball.residual_px, 3) : QString()});
+                         measured && view.calibrated ? number(ball.residual_px, 3) : QString()});
       }
     }
   fill(views_, views);

@@ -14,6 +14,11 @@
 
 namespace helicarm::gui {
 
+/// A column of a table: its title with the unit, and what its values are.
+struct Column {
+  QString title, definition;
+};
+
 /// The actions of each step, one page per step. Pages use the controller and hold no state of their own.
 class Page : public QWidget {
   Q_OBJECT
@@ -25,7 +30,7 @@ class Page : public QWidget {
  protected:
   QPushButton* add_button(const QString& text, const char* name, std::function<void()> act);
   HoldButton* add_hold(const QString& text, const char* name, std::function<void()> act);
-  QTableWidget* add_table(const QStringList& columns, const char* name);
+  QTableWidget* add_table(const std::vector<Column>& columns, const char* name);
 
   Controller& controller_;
 };
@@ -40,9 +45,11 @@ class AcquirePage : public Page {
  signals:
   void rehearsal_wanted();
   void folder_wanted();
+  void new_case_wanted();
 
  private:
   QWidget* ways_in_;
+  QPushButton* new_case_;
   std::vector<std::string> views_;
   QWidget* acquisitions_;
   QLabel* where_;

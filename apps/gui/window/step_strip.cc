@@ -20,20 +20,46 @@ struct Appearance {
 Appearance appearance_of(StepStatus status) {
   switch (status) {
     case StepStatus::waiting:
-      return {style::quiet, QStringLiteral("○"), StepStrip::tr("waiting")};
+      return {style::colours().quiet, QStringLiteral("○"), StepStrip::tr("waiting")};
     case StepStatus::running:
-      return {style::blue, QStringLiteral("◐"), StepStrip::tr("working")};
+      return {style::colours().blue, QStringLiteral("◐"), StepStrip::tr("working")};
     case StepStatus::good:
-      return {style::green, QStringLiteral("✓"), StepStrip::tr("good")};
+      return {style::colours().green, QStringLiteral("✓"), StepStrip::tr("good")};
     case StepStatus::warning:
-      return {style::amber, QStringLiteral("!"), StepStrip::tr("warning")};
+      return {style::colours().amber, QStringLiteral("!"), StepStrip::tr("warning")};
     case StepStatus::refused:
-      return {style::red, QStringLiteral("✕"), StepStrip::tr("refused")};
+      return {style::colours().red, QStringLiteral("✕"), StepStrip::tr("refused")};
   }
   return {};
 }
 
 }  // namespace
+
+QString definition_of(Phase phase) {
+  switch (phase) {
+    case Phase::acquire:
+      return StepStrip::tr("Number of X-ray images received, of those needed.");
+    case Phase::rectify:
+      return StepStrip::tr(
+          "Residual: distance of the plate's dots from the correction of distortion, root mean square in the "
+          "worst view, px.");
+    case Phase::calibrate:
+      return StepStrip::tr(
+          "FRE: mean distance of the fiducials, located by their images, from their places in the "
+          "calibrator's file, mm; and fiducials used in all views, of all.");
+    case Phase::plan:
+      return StepStrip::tr("Length that 95 % of the errors of the worst point do not exceed, mm.");
+    case Phase::navigate:
+      return StepStrip::tr(
+          "Residual of the robot's registration, root mean square, mm; then tunnels reached, and the largest "
+          "distance of the tool's tip from its target, mm.");
+    case Phase::verify:
+      return StepStrip::tr(
+          "Largest distance of a tunnel's end from the tool's axis, mm, and its predicted value; from files, "
+          "of the case's tool lines by the X-ray images.");
+  }
+  return {};
+}
 
 StepButton::StepButton(Phase phase, QWidget* parent) : QToolButton(parent) {
   card_.phase = phase;
@@ -48,10 +74,15 @@ void StepButton::show_card(const StepCard& card) {
   const QString word = appearance_of(card.status).word;
   setAccessibleName(QString("%1: %2").arg(card.name, word));
   setAccessibleDescription(QString("%1 %2").arg(card.figure, card.why));
-  setToolTip(
-      QString("%1: %2\n%3\n%4\nAlt+%5").arg(card.name, word, card.figure, card.why).arg(int(card.phase) + 1));
+  setToolTip(QString("%1: %2\n%3\n%4\n\n%5\nAlt+%6")
+                 .arg(card.name, word, card.figure, card.why, definition_of(card.phase))
+                 .arg(int(card.phase) + 1));
   update();
 }
+
+QSize StepButton::sizeHint() const { return {style::scaled(180), style::scaled(72)}; }
+
+QSize StepButton::minimumSizeHint() const { return {100, style::scaled(72)}; }
 
 void StepButton::paintEvent(QPaintEvent*) {
   const Appearance appearance = appearance_of(card_.status);
@@ -60,33 +91,33 @@ void StepButton::paintEvent(QPaintEvent*) {
   const QRectF frame = QRectF(rect()).adjusted(1.5, 1.5, -1.5, -1.5);
   QPainterPath shape;
   shape.addRoundedRect(frame, 6, 6);
-  painter.fillPath(shape, isChecked() ? style::raised : style::panel);
-  painter.setPen(QPen(isChecked() ? appearance.colour : style::line, isChecked() ? 3 : 1));
+  painter.fillPath(shape, isChecked() ? style::colours().raised : style::colours().panel);
+  painter.setPen(QPen(isChecked() ? appearance.colour : style::colours().line, isChecked() ? 3 : 1));
   painter.drawPath(shape);
   if (hasFocus()) {
-    painter.setPen(QPen(style::text, 1, Qt::DotLine));
+    painter.setPen(QPen(style::colours().text, 1, Qt::DotLine));
     painter.drawRoundedRect(frame.adjusted(4, 4, -4, -4), 4, 4);
   }
   painter.fillRect(QRectF(frame.left(), frame.top() + 6, 4, frame.height() - 12), appearance.colour);
 
   QFont font = this->font();
   const QRectF inner = frame.adjusted(12, 6, -8, -4);
-  font.setPixelSize(16), font.setBold(true);
+  font.setPixelSize(style::scaled(16)), font.setBold(true);
   painter.setFont(font);
   painter.setPen(appearance.colour);
   painter.drawText(inner, Qt::AlignRight | Qt::AlignTop, appearance.sign);
-  painter.setPen(style::text);
+  painter.setPen(style::colours().text);
   painter.drawText(inner, Qt::AlignLeft | Qt::AlignTop, card_.name);
-  font.setPixelSize(13), font.setBold(false);
+  font.setPixelSize(style::scaled(13)), font.setBold(false);
   painter.setFont(font);
-  const auto line = [&](const QString& text, double top, const QColor& colour) {
+  const auto line = [&](const QString& text, int top, const QColor& colour) {
     painter.setPen(colour);
-    painter.drawText(QRectF(inner.left(), inner.top() + top, inner.width(), 18),
+    painter.drawText(QRectF(inner.left(), inner.top() + style::scaled(top), inner.width(), style::scaled(18)),
                      Qt::AlignLeft | Qt::AlignVCenter,
                      painter.fontMetrics().elidedText(text, Qt::ElideRight, int(inner.width())));
   };
-  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 22, style::text);
-  line(card_.why, 40, card_.status == StepStatus::good ? style::quiet : appearance.colour);
+  line(card_.figure.isEmpty() ? appearance.word : card_.figure, 22, style::colours().text);
+  line(card_.why, 40, card_.status == StepStatus::good ? style::colours().quiet : appearance.colour);
 }
 
 StepStrip::StepStrip(QWidget* parent) : QWidget(parent) {

@@ -8,6 +8,9 @@
 
 namespace helicarm::gui {
 
+/// What the figure of a step's card is, with its unit.
+QString definition_of(Phase phase);
+
 /// One card of the strip: name, status (by colour, sign and word), number and reason.
 class StepButton : public QToolButton {
   Q_OBJECT
@@ -19,7 +22,8 @@ class StepButton : public QToolButton {
 
  protected:
   void paintEvent(QPaintEvent* event) override;
-  QSize sizeHint() const override { return {180, 72}; }
+  QSize sizeHint() const override;
+  QSize minimumSizeHint() const override;
 
  private:
   StepCard card_;

@@ -1,41 +1,117 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "gui/window/style.h"
 
-namespace helicarm::gui::style {
+#include <QApplication>
+#include <algorithm>
 
-QString sheet() {
-  return QStringLiteral(R"(
-    * { font-size: 14px; color: #e8ecf1; }
-    QMainWindow, QDialog, QWidget { background: #14181d; }
-    QToolTip { background: #2a323c; border: 1px solid #46505c; padding: 4px; }
-    QGroupBox { border: 1px solid #46505c; border-radius: 6px; margin-top: 10px; padding: 8px 6px 6px 6px; }
-    QGroupBox::title { subcontrol-origin: margin; left: 10px; color: #96a1ad; }
-    QPushButton { background: #2a323c; border: 1px solid #46505c; border-radius: 5px; padding: 7px 12px; }
-    QPushButton:hover { background: #35404c; }
-    QPushButton:focus { border: 2px solid #e8ecf1; }
-    QPushButton:disabled { color: #66707b; background: #1e242b; }
-    QPushButton[class="hold"] { border: 1px solid #ffc400; }
-    QPushButton[class="hold"]:disabled { border: 1px solid #46505c; }
-    QPushButton[class="stop"] { background: #c81e1e; border: 2px solid #ff8080; color: white; font-size: 22px;
+namespace helicarm::gui::style {
+namespace {
+
+const Colours dark{.ground{20, 24, 29},
+                   .panel{30, 36, 43},
+                   .raised{42, 50, 60},
+                   .pressed{53, 64, 76},
+                   .chosen{53, 80, 107},
+                   .line{70, 80, 92},
+                   .disabled{102, 112, 123},
+                   .text{232, 236, 241},
+                   .quiet{150, 161, 173},
+                   .blue{86, 180, 233},
+                   .green{64, 200, 130},
+                   .amber{255, 196, 0},
+                   .red{255, 92, 92}};
+
+const Colours light{.ground{240, 243, 246},
+                    .panel{255, 255, 255},
+                    .raised{225, 231, 238},
+                    .pressed{207, 216, 226},
+                    .chosen{176, 208, 236},
+                    .line{160, 171, 182},
+                    .disabled{128, 138, 148},
+                    .text{20, 28, 36},
+                    .quiet{76, 88, 100},
+                    .blue{0, 96, 160},
+                    .green{0, 110, 60},
+                    .amber{140, 84, 0},
+                    .red{190, 24, 24}};
+
+Appearance& current() {
+  static Appearance appearance;
+  return appearance;
+}
+
+constexpr const char* rules = R"(
+    * { font-size: @textpx; color: @text; }
+    QMainWindow, QDialog, QWidget { background: @ground; }
+    QToolTip { background: @raised; border: 1px solid @line; padding: 4px; }
+    QGroupBox { border: 1px solid @line; border-radius: 6px; margin-top: 10px; padding: 8px 6px 6px 6px; }
+    QGroupBox::title { subcontrol-origin: margin; left: 10px; color: @quiet; }
+    QLabel[class="attention"] { color: @amber; font-weight: bold; }
+    QLabel[class="recording"] { color: @red; }
+    QPushButton { background: @raised; border: 1px solid @line; border-radius: 5px; padding: 7px 12px; }
+    QPushButton:hover { background: @pressed; }
+    QPushButton:checked { background: @chosen; }
+    QPushButton:focus { border: 2px solid @text; }
+    QPushButton:disabled { color: @disabled; background: @panel; }
+    QPushButton[class="hold"] { border: 1px solid @amber; }
+    QPushButton[class="hold"]:disabled { border: 1px solid @line; }
+    QPushButton[class="stop"] { background: #c81e1e; border: 2px solid #ff8080; color: white; font-size: @stoppx;
                                 font-weight: bold; padding: 10px 22px; }
     QPushButton[class="stop"]:pressed { background: #ff4040; }
     QTableWidget, QListWidget, QPlainTextEdit, QLineEdit, QSpinBox, QDoubleSpinBox, QComboBox {
-      background: #1e242b; border: 1px solid #46505c; border-radius: 4px; padding: 3px;
-      selection-background-color: #35506b; }
-    QHeaderView::section { background: #1e242b; color: #96a1ad; border: none; padding: 4px; }
-    QMenuBar, QMenu { background: #1e242b; } QMenu::item:selected, QMenuBar::item:selected { background: #35506b; }
-    QCheckBox::indicator, QRadioButton::indicator { width: 15px; height: 15px; border: 2px solid #96a1ad;
-                                                    background: #14181d; }
+      background: @panel; border: 1px solid @line; border-radius: 4px; padding: 3px;
+      selection-background-color: @chosen; selection-color: @text; }
+    QHeaderView::section { background: @panel; color: @quiet; border: none; padding: 4px; }
+    QMenuBar, QMenu { background: @panel; } QMenu::item:selected, QMenuBar::item:selected { background: @chosen; }
+    QMenu::item:disabled { color: @disabled; }
+    QCheckBox::indicator, QRadioButton::indicator { width: 15px; height: 15px; border: 2px solid @quiet;
+                                                    background: @ground; }
     QRadioButton::indicator { border-radius: 9px; }
     QCheckBox::indicator { border-radius: 3px; }
-    QCheckBox::indicator:checked, QRadioButton::indicator:checked { background: #6cb6ff; border-color: #e8ecf1; }
-    QCheckBox::indicator:disabled, QRadioButton::indicator:disabled { border-color: #46505c; }
-    QProgressBar { background: #1e242b; border: 1px solid #46505c; border-radius: 4px; text-align: center; }
-    QProgressBar::chunk { background: #35506b; }
-    QSplitter::handle { background: #2a323c; }
-    QSlider::groove:horizontal { background: #46505c; height: 4px; }
-    QSlider::handle:horizontal { background: #e8ecf1; width: 14px; margin: -6px 0; border-radius: 7px; }
-  )");
+    QCheckBox::indicator:checked, QRadioButton::indicator:checked { background: @blue; border-color: @text; }
+    QCheckBox::indicator:disabled, QRadioButton::indicator:disabled { border-color: @line; }
+    QProgressBar { background: @panel; border: 1px solid @line; border-radius: 4px; text-align: center; }
+    QProgressBar::chunk { background: @chosen; }
+    QSplitter::handle { background: @raised; }
+    QSlider::groove:horizontal { background: @line; height: 4px; }
+    QSlider::handle:horizontal { background: @text; width: 14px; margin: -6px 0; border-radius: 7px; }
+  )";
+
+}  // namespace
+
+const Colours& colours_of(Theme theme) { return theme == Theme::dark ? dark : light; }
+
+const Colours& colours() { return colours_of(current().theme); }
+
+Appearance applied() { return current(); }
+
+int scaled(int px) { return px * current().text_px / usual_text_px; }
+
+void apply(const Appearance& appearance) {
+  current() = appearance;
+  current().text_px = std::clamp(appearance.text_px, smallest_text_px, largest_text_px);
+  qApp->setStyleSheet(sheet(current()));
+}
+
+QString sheet(const Appearance& appearance) {
+  const Colours& in = colours_of(appearance.theme);
+  QString text = QString::fromLatin1(rules);
+  text.replace("@textpx", QString("%1px").arg(appearance.text_px));
+  text.replace("@stoppx", QString("%1px").arg(appearance.text_px * 22 / usual_text_px));
+  for (const auto& [name, colour] : {std::pair("@ground", in.ground),
+                                     {"@panel", in.panel},
+                                     {"@raised", in.raised},
+                                     {"@pressed", in.pressed},
+                                     {"@chosen", in.chosen},
+                                     {"@line", in.line},
+                                     {"@disabled", in.disabled},
+                                     {"@text", in.text},
+                                     {"@quiet", in.quiet},
+                                     {"@blue", in.blue},
+                                     {"@amber", in.amber},
+                                     {"@red", in.red}})
+    text.replace(name, colour.name());
+  return text;
 }
 
 }  // namespace helicarm::gui::style

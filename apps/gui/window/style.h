@@ -4,13 +4,34 @@
 #include <QColor>
 #include <QString>
 
-/// Dark, legible from 2 m.
+/// Colours and text sizes, legible from 2 m. X-ray images and the scene keep their dark ground in both
+/// themes.
 namespace helicarm::gui::style {
 
-inline const QColor ground{20, 24, 29}, panel{30, 36, 43}, raised{42, 50, 60}, line{70, 80, 92},
-    text{232, 236, 241}, quiet{150, 161, 173}, blue{86, 180, 233}, green{64, 200, 130}, amber{255, 196, 0},
-    red{255, 92, 92};
+enum class Theme { dark, light };
 
-QString sheet();
+inline constexpr int smallest_text_px = 11, usual_text_px = 14, largest_text_px = 24;
+
+struct Appearance {
+  Theme theme = Theme::dark;
+  int text_px = usual_text_px;
+  bool operator==(const Appearance&) const = default;
+};
+
+struct Colours {
+  QColor ground, panel, raised, pressed, chosen, line, disabled, text, quiet, blue, green, amber, red;
+};
+
+const Colours& colours_of(Theme theme);
+
+/// Of the whole application; its widgets are drawn again.
+void apply(const Appearance& appearance);
+Appearance applied();
+/// Colours of the applied theme.
+const Colours& colours();
+/// A length in px at the usual text size, at the applied one.
+int scaled(int px);
+
+QString sheet(const Appearance& appearance);
 
 }  // namespace helicarm::gui::style

@@ -121,11 +121,13 @@ TEST_F(WindowWithTunnels, WrongPickRefusesThePlanUntilItIsPickedAgain) {
 TEST_F(WindowWithTunnels, LandmarkIsLocatedAndSavedInTheCase) {
   open_tunnels();
   window_->findChild<QLineEdit*>("landmarkName")->setText("notch");
+  window_->findChild<QLineEdit*>("landmarkBone")->setText("humerus");
+  window_->findChild<QComboBox*>("landmarkSide")->setCurrentIndex(1);
   click("addLandmark");
   EXPECT_EQ(window_->findChild<QLabel*>("nextPick")->text(),
             "notch is selected: click its new position in each X-ray image.");
   for (const std::string& view : state().views) pick("notch", view, pick_of(state(), "FS", view)->uv_raw);
-  EXPECT_EQ(cell("notch", 1), "landmark");
+  EXPECT_EQ(cell("notch", 1), "landmark, left humerus");
   EXPECT_EQ(cell("notch", 2), "AP, LAT");
   EXPECT_FALSE(cell("notch", 3).isEmpty());
   const fs::path unsaved = folder_ / "tunnels" / "unsaved_picks.json";
@@ -138,6 +140,7 @@ TEST_F(WindowWithTunnels, LandmarkIsLocatedAndSavedInTheCase) {
   ASSERT_TRUE(saved) << saved.error().message;
   EXPECT_EQ(std::ranges::count(saved->picks, std::string("notch"), &pipeline::Pick::name), 2);
   EXPECT_EQ(saved->picks.size(), picks_.size() + 2);
+  EXPECT_EQ(saved->picks.back().bone, (pipeline::BoneLabel{"humerus", pipeline::Side::left}));
 }
 
 TEST_F(WindowWithTunnels, LandmarkOfATakenNameIsRefused) {

@@ -66,6 +66,11 @@ class WholeOperation : public Window {
     replay->set_moment(int(replay->timeline()->moments.size()) - 1);
     ASSERT_TRUE(wait("the replayed tool is shown", [&] { return window_->recorded().has_value(); }));
     EXPECT_EQ(window_->recorded()->by_view.size(), 2u);
+    EXPECT_THAT(card(Phase::navigate).figure.toStdString(), HasSubstr("2 of 2 tunnels"));
+    EXPECT_EQ(card(Phase::verify).status, StepStatus::good);
+    replay->set_moment(0);
+    EXPECT_EQ(card(Phase::verify).status, StepStatus::waiting);
+    replay->set_moment(int(replay->timeline()->moments.size()) - 1);
     screenshot("8-replay");
   }
 };
@@ -157,7 +162,7 @@ int main(int argc, char** argv) {
   helicarm::gui::WatchedApplication app(argc, argv);
   QApplication::setOrganizationName("helicarm");
   QApplication::setApplicationName("helicarm-gui-test");
-  app.setStyleSheet(helicarm::gui::style::sheet());
+  helicarm::gui::style::apply({});
   testing::InitGoogleMock(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -222,10 +222,10 @@ class Window : public testing::Test {
     register_robot();
   }
   /// Saves to the folder HELICARM_SCREENSHOTS.
-  void screenshot(const char* name) {
+  void screenshot(const char* name, QWidget* of = nullptr) {
     QTest::qWait(100);
     if (const QString place = qEnvironmentVariable("HELICARM_SCREENSHOTS"); !place.isEmpty())
-      window_->grab().save(QString("%1/%2.png").arg(place, name));
+      (of ? of : window_.get())->grab().save(QString("%1/%2.png").arg(place, name));
   }
 
   void open_rehearsal() {

@@ -21,6 +21,11 @@ void paint_pick(QPainter& painter, const QPointF& at, const QString& name) {
 
 }  // namespace
 
+void LiveMarks::set_epipolar(std::vector<rectification::PixelPath> rectified) {
+  epipolar_.clear();
+  for (rectification::PixelPath& line : rectified) epipolar_.push_back({std::move(line)});
+}
+
 void LiveMarks::set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note) {
   tool_ = {rectified ? rectification::PixelPath{rectified->back, rectified->tip}
                      : rectification::PixelPath{}};
@@ -38,24 +43,28 @@ void LiveMarks::set_moved(std::optional<FreshPick> raw) {
 }
 
 void LiveMarks::forget_layer() {
-  for (Carried* one : {&epipolar_, &path_, &tool_}) one->is_carried = false;
+  for (Carried& line : epipolar_) line.is_carried = false;
+  for (Carried* one : {&path_, &tool_}) one->is_carried = false;
   for (CarriedPick& pick : picks_) pick.in_layer.reset();
 }
 
 void LiveMarks::carry(const pipeline::ViewResult& view, Layer layer) {
-  for (Carried* one : {&epipolar_, &path_, &tool_}) {
-    if (std::exchange(one->is_carried, true)) continue;
-    one->in_layer = in_layer(view, layer, one->given);
-    one->end = one->given.empty() ? std::nullopt : in_layer(view, layer, one->given.back());
-  }
+  const auto carry_one = [&](Carried& one) {
+    if (std::exchange(one.is_carried, true)) return;
+    one.in_layer = in_layer(view, layer, one.given);
+    one.end = one.given.empty() ? std::nullopt : in_layer(view, layer, one.given.back());
+  };
+  for (Carried& line : epipolar_) carry_one(line);
+  for (Carried* one : {&path_, &tool_}) carry_one(*one);
   for (CarriedPick& pick : picks_)
     if (!pick.in_layer) pick.in_layer = layer_from_raw(view, layer, pick.given.raw);
   if (moved_) moved_->in_layer = layer_from_raw(view, layer, moved_->given.raw);
 }
 
 void LiveMarks::paint(QPainter& painter, const ImageFrame& frame) const {
-  for (const rectification::PixelPath& piece : epipolar_.in_layer)
-    paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
+  for (const Carried& line : epipolar_)
+    for (const rectification::PixelPath& piece : line.in_layer)
+      paint_path(painter, piece, frame, QPen(ink::epipolar, 1.6, Qt::DashLine));
   for (const rectification::PixelPath& piece : path_.in_layer)
     paint_path(painter, piece, frame, QPen(ink::residual, 2.2));
   painter.setBrush(ink::residual);

@@ -18,7 +18,8 @@ struct FreshPick {
 /// Changing marks over the image: as given (picks raw, the rest rectified) and in the layer's pixels.
 class LiveMarks {
  public:
-  void set_epipolar(rectification::PixelPath rectified) { epipolar_ = {std::move(rectified)}; }
+  /// One line for each other view with the pick.
+  void set_epipolar(std::vector<rectification::PixelPath> rectified);
   void set_path(rectification::PixelPath rectified) { path_ = {std::move(rectified)}; }
   bool has_tool() const { return !tool_.given.empty(); }
   void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
@@ -43,7 +44,8 @@ class LiveMarks {
     FreshPick given;
     std::optional<Eigen::Vector2d> in_layer;
   };
-  Carried epipolar_, path_, tool_;
+  std::vector<Carried> epipolar_;
+  Carried path_, tool_;
   QString note_;
   std::vector<CarriedPick> picks_;
   std::optional<CarriedPick> moved_;

@@ -57,6 +57,24 @@ double ball_radius(const ImageFrame& frame, int image_width) {
   return std::max(8.0, 15 / 1024.0 * image_width * frame.scale);
 }
 
+/// Beside the disc, which stays visible: it may be what is to be picked.
+void ticks_around(QPainter& painter, const QPointF& at, double disc) {
+  const double from = std::sqrt(0.5) * (disc + 3), to = from + 5;
+  for (const QPointF& way : {QPointF(1, 1), QPointF(-1, 1), QPointF(-1, -1), QPointF(1, -1)})
+    painter.drawLine(at + from * way, at + to * way);
+}
+
+/// Of a view whose labelling was refused: what may be a fiducial, and which of them the best labelling names.
+void paint_candidates(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame,
+                      double radius) {
+  for (const report::DotMark& candidate : marks.candidates)
+    edged(painter, QPen(ink::residual, 1.6),
+          [&] { painter.drawEllipse(frame.to_widget(candidate.place), radius, radius); });
+  for (const report::BallMark& guess : marks.guessed)
+    edged(painter, QPen(ink::residual, 1.6),
+          [&] { painter.drawEllipse(frame.to_widget(guess.place), 0.6 * radius, 0.6 * radius); });
+}
+
 void paint_balls(QPainter& painter, const report::ViewMarks& marks, const ImageFrame& frame, double radius) {
   for (const report::BallMark& ball : marks.balls) {
     const QPointF at = frame.to_widget(ball.place);
@@ -105,6 +123,14 @@ void paint_point(QPainter& painter, const report::PointMark& point, const QPoint
 
 }  // namespace
 
+void paint_open_cross(QPainter& painter, const QPointF& at, const QColor& colour, double gap, double arm) {
+  for (const QPen& pen : {QPen(QColor(0, 0, 0, 180), 3), QPen(colour, 1.2)}) {
+    painter.setPen(pen);
+    for (const QPointF& way : {QPointF(1, 0), QPointF(0, 1), QPointF(-1, 0), QPointF(0, -1)})
+      painter.drawLine(at + gap * way, at + arm * way);
+  }
+}
+
 void paint_path(QPainter& painter, const rectification::PixelPath& path, const ImageFrame& frame,
                 const QPen& pen) {
   QPolygonF line;
@@ -126,7 +152,9 @@ void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageF
   for (const rectification::PixelPath& tool : marks.tool_lines)
     paint_path(painter, tool, frame, QPen(ink::tool, 1.6, Qt::DashDotLine));
   for (const report::DotMark& blob : marks.false_blobs)
-    edged(painter, QPen(ink::rejected, 1.6), [&] { cross(painter, frame.to_widget(blob.place), 5); });
+    edged(painter, QPen(ink::rejected, 1.6),
+          [&] { ticks_around(painter, frame.to_widget(blob.place), blob.radius_px * frame.scale); });
+  paint_candidates(painter, marks, frame, radius);
   paint_balls(painter, marks, frame, radius);
   for (const report::PointMark& point : marks.points)
     paint_point(painter, point, frame.to_widget(point.place));
@@ -141,6 +169,9 @@ void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageF
   for (const report::BallMark& ball : marks.balls)
     labels.place(painter, frame.to_widget(ball.place), radius, QString::fromStdString(ball.label),
                  ball.used ? ink::ball : ink::rejected);
+  for (const report::BallMark& guess : marks.guessed)
+    labels.place(painter, frame.to_widget(guess.place), radius, QString::fromStdString(guess.label),
+                 ink::residual);
   for (const report::PointMark& point : marks.points)
     labels.place(painter, frame.to_widget(point.place), 8, QString::fromStdString(point.name), ink::point);
 }

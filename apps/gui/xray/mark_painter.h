@@ -13,7 +13,7 @@ namespace helicarm::gui {
 namespace ink {
 inline const QColor ball(74, 222, 128), rejected(255, 122, 107), plate(147, 197, 253, 150),
     point(240, 171, 252), tunnel(250, 204, 21), residual(251, 146, 60), tool(239, 68, 68),
-    epipolar(94, 234, 242), quiet(200, 208, 220);
+    epipolar(94, 234, 242), measure(255, 255, 255), quiet(200, 208, 220);
 }  // namespace ink
 
 /// Draws the detections. Line widths do not depend on zoom; `image_width` sets the radius of the fiducials'
@@ -24,5 +24,9 @@ void paint_marks(QPainter& painter, const report::ViewMarks& marks, const ImageF
 /// A line with a dark edge, visible on a bright background.
 void paint_path(QPainter& painter, const rectification::PixelPath& path, const ImageFrame& frame,
                 const QPen& pen);
+
+/// A cross with a central gap, which keeps its target visible; its arms reach from `gap` to `arm`.
+void paint_open_cross(QPainter& painter, const QPointF& at, const QColor& colour, double gap = 4,
+                      double arm = 10);
 
 }  // namespace helicarm::gui

@@ -37,6 +37,10 @@ QString tip_of(const report::PointMark& point) {
   return tip;
 }
 
+QString tip_of(const report::DotMark& candidate) {
+  return QObject::tr("like a fiducial, without a label\nradius %1 px").arg(fixed(candidate.radius_px, 1));
+}
+
 }  // namespace
 
 report::ViewMarks marks_of(const pipeline::Result& result, std::size_t view, Layer layer) {
@@ -82,9 +86,13 @@ std::optional<MarkUnderCursor> mark_near(const report::ViewMarks& marks, const V
       const double distance = (some[i].place - place).norm();
       if (!(distance <= reach_px)) continue;
       reach_px = distance;
-      nearest = MarkUnderCursor{kind, i, QString::fromStdString(name_of(some[i])), tip_of(some[i])};
+      nearest =
+          MarkUnderCursor{kind, some[i].place, QString::fromStdString(name_of(some[i])), tip_of(some[i])};
     }
   };
+  const auto no_name = [](const report::DotMark&) { return std::string(); };
+  consider(marks.candidates, Kind::candidate, no_name);
+  consider(marks.false_blobs, Kind::candidate, no_name);
   consider(marks.balls, Kind::ball, [](const report::BallMark& ball) { return ball.label; });
   consider(marks.points, Kind::point, [](const report::PointMark& point) { return point.name; });
   return nearest;
@@ -97,6 +105,10 @@ QString described(const report::ViewMarks& marks) {
                       .arg(marks.balls.size() - static_cast<std::size_t>(used))
                       .arg(marks.false_blobs.size())
                       .arg(marks.points.size());
+  if (!marks.candidates.empty())
+    words += QObject::tr(" Refused: %1 candidates, %2 of them with a guessed label.")
+                 .arg(marks.candidates.size())
+                 .arg(marks.guessed.size());
   if (const double largest = report::largest_residual(marks); largest > 0)
     words += QObject::tr(" Largest residual %1 px.").arg(fixed(largest, 3));
   return words;

@@ -25,16 +25,16 @@ std::optional<Eigen::Vector2d> raw_from_layer(const pipeline::ViewResult& view, 
 std::optional<Eigen::Vector2d> layer_from_raw(const pipeline::ViewResult& view, Layer layer,
                                               const Eigen::Vector2d& raw);
 
-/// A fiducial or point under the cursor.
+/// A fiducial, point, or candidate under the cursor.
 struct MarkUnderCursor {
-  enum class Kind { ball, point } kind;
-  std::size_t index;  ///< index in the marks' fiducials or points
+  enum class Kind { ball, point, candidate } kind;
+  Eigen::Vector2d place;
   QString name;
   QString tip;  ///< name, error and residual
   bool operator==(const MarkUnderCursor&) const = default;
 };
 
-/// The nearest fiducial or point within `reach_px`.
+/// The nearest fiducial, point or candidate within `reach_px`.
 std::optional<MarkUnderCursor> mark_near(const report::ViewMarks& marks, const Eigen::Vector2d& place,
                                          double reach_px);
 

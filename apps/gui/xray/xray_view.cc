@@ -2,6 +2,7 @@
 #include "gui/xray/xray_view.h"
 
 #include <QResizeEvent>
+#include <algorithm>
 #include <utility>
 
 namespace helicarm::gui {
@@ -27,13 +28,13 @@ XrayView::XrayView(QWidget* parent) : QWidget(parent) {
 
 XrayView::~XrayView() = default;
 
-void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::size_t index) {
+void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::size_t index, bool keeps_zoom) {
   if (!result || index >= result->views.size()) return clear(tr("No image yet"));
   const pipeline::ViewResult& next = result->views[index];
   const QString name = QString::fromStdString(next.name);
   if (!next.xray_image || next.xray_image->pixels.empty())
     return clear(name.isEmpty() ? tr("No image yet") : tr("No image yet: acquire %1").arg(name));
-  const bool stays = result_ && same_image(view(), next);
+  const bool stays = result_ && (keeps_zoom || same_image(view(), next));
   // The previous layer stays until the new one is ready, to avoid flicker.
   const bool stands = stays && shown_ && layer_at_hand(next, shown_->layer) == shown_->layer;
   auto layer = stands ? shown_ : nullptr;
@@ -50,6 +51,7 @@ void XrayView::show_view(std::shared_ptr<const pipeline::Result> result, std::si
     window_.reset();
     fits_ = true;
   }
+  refusal_ = refusal_of(*result_, view_);
   setAccessibleName(tr("X-ray image %1").arg(name));
   computing_ = true;
   loader_.load(result_, view_, wanted_);
@@ -62,6 +64,10 @@ void XrayView::clear(const QString& why) {
   grey_ = {};
   marks_ = {};
   live_ = {};
+  picks_.clear();
+  superseded_.clear();
+  refusal_.reset();
+  measures_ = {};
   cursor_.reset();
   drag_ = {};
   computing_ = false;
@@ -92,10 +98,10 @@ void XrayView::take(const std::shared_ptr<const LoadedLayer>& layer) {
   shown_ = layer;
   window_image();
   marks_ = marks_of(*result_, view_, shown_->layer);
-  setAccessibleDescription(described(marks_));
+  setAccessibleDescription(refusal_ ? refusal_->reason + " " + described(marks_) : described(marks_));
   if (fits_) fit();
   live_.forget_layer();
-  carry_live();
+  hide_repeated_picks();
   hover_over({});
   Q_EMIT shown();
 }
@@ -120,8 +126,18 @@ void XrayView::set_usual_window() {
 
 void XrayView::set_picking(bool picking) {
   if (std::exchange(picking_, picking) != picking) drag_ = {};
-  setCursor(picking ? Qt::CrossCursor : Qt::ArrowCursor);
+  setCursor(takes_clicks() ? Qt::CrossCursor : Qt::ArrowCursor);
   update();
+}
+
+void XrayView::set_measuring(bool measuring) {
+  if (std::exchange(measuring_, measuring) != measuring) drag_ = {};
+  setCursor(takes_clicks() ? Qt::CrossCursor : Qt::ArrowCursor);
+}
+
+void XrayView::set_measures(std::vector<EvaluatedMeasure> measures) {
+  measures_.set(std::move(measures));
+  carry_live();
 }
 
 void XrayView::set_marks_visible(bool visible) {
@@ -134,7 +150,7 @@ void XrayView::set_magnifier(bool on) {
   update();
 }
 
-void XrayView::set_epipolar(std::vector<Eigen::Vector2d> rectified) {
+void XrayView::set_epipolar(std::vector<rectification::PixelPath> rectified) {
   live_.set_epipolar(std::move(rectified));
   carry_live();
 }
@@ -151,8 +167,45 @@ void XrayView::set_tool(const std::optional<verification::ImageLine>& rectified,
 }
 
 void XrayView::set_picks(std::vector<FreshPick> raw) {
-  live_.set_picks(std::move(raw));
+  picks_ = std::move(raw);
+  hide_repeated_picks();
+}
+
+/// A pick that the result shows is not drawn twice; of one that has moved only the new place is.
+void XrayView::hide_repeated_picks() {
+  constexpr double reach_px = 12;  // raw; a snapped pick is off its click
+  std::set<std::string> moved;
+  std::vector<FreshPick> fresh;
+  for (const FreshPick& pick : picks_) {
+    const std::string name = pick.name.toStdString();
+    const auto mark = std::ranges::find(marks_.points, name, &report::PointMark::name);
+    const bool is_marked = mark != marks_.points.end() && shown_;
+    const auto raw = is_marked ? raw_from_layer(view(), shown_->layer, mark->place) : std::nullopt;
+    if (raw && (*raw - pick.raw).norm() < reach_px) continue;
+    if (is_marked) moved.insert(name);
+    fresh.push_back(pick);
+  }
+  live_.set_picks(std::move(fresh));
+  if (moved != superseded_) {
+    superseded_ = std::move(moved);
+    redraw_still();
+  }
   carry_live();
+}
+
+void XrayView::set_mark_groups(MarkGroups groups) {
+  groups_ = groups;
+  redraw_still();
+}
+
+QString XrayView::refusal() const {
+  if (!refusal_) return {};
+  return details_visible_ ? refusal_->reason + '\n' + refusal_->details : refusal_->reason;
+}
+
+void XrayView::set_details_visible(bool visible) {
+  details_visible_ = visible;
+  update();
 }
 
 void XrayView::window_image() {
@@ -162,7 +215,10 @@ void XrayView::window_image() {
 }
 
 void XrayView::carry_live() {
-  if (shown_) live_.carry(view(), shown_->layer);
+  if (shown_) {
+    live_.carry(view(), shown_->layer);
+    measures_.carry(view(), shown_->layer);
+  }
   update();
 }
 

@@ -5,17 +5,22 @@
 #include <QWidget>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "gui/xray/layer_loader.h"
 #include "gui/xray/live_marks.h"
+#include "gui/xray/mark_groups.h"
+#include "gui/xray/measure_marks.h"
+#include "gui/xray/refusal_text.h"
 
 namespace helicarm::gui {
 
 /// One X-ray image with all detections. Wheel: zoom about the cursor; middle or left drag: pan; right drag:
 /// contrast and brightness; double click: fit. Keys: + - 0 zoom, arrows pan, Shift+arrows (with Ctrl: finer)
-/// move a cursor and Enter picks there, L next layer, H hides the marks, M magnifier, W default window, Esc
-/// hides the cursor.
+/// move a cursor and Enter picks there, L next layer, H hides the marks, M magnifier, W default window, D
+/// details of a refusal, Esc hides the cursor.
 class XrayView : public QWidget {
   Q_OBJECT
  public:
@@ -23,8 +28,8 @@ class XrayView : public QWidget {
   ~XrayView() override;
 
   /// Shows a view of a result, also an incomplete one. Removes picks, epipolar line, path and tool of the
-  /// previous view.
-  void show_view(std::shared_ptr<const pipeline::Result> result, std::size_t view);
+  /// previous view. Zoom and window are kept for the same image, or if wished.
+  void show_view(std::shared_ptr<const pipeline::Result> result, std::size_t view, bool keeps_zoom = false);
   void clear(const QString& why);
 
   void set_layer(Layer layer);
@@ -35,19 +40,31 @@ class XrayView : public QWidget {
   std::optional<image::GreyWindow> window() const;
 
   void set_picking(bool picking);
+  /// Clicks measure, whether or not they would pick.
+  void set_measuring(bool measuring);
   void set_magnifier(bool on);
   /// Whether the detections are drawn; live marks are always drawn.
   void set_marks_visible(bool visible);
+  void set_mark_groups(MarkGroups groups);
+  /// The displayed part of the image with its marks, without cursor and magnifier.
+  QImage image_with_marks();
+  /// The reason of a refused result and, once opened, its details; empty without one.
+  QString refusal() const;
+  void set_details_visible(bool visible);
   void fit();
 
   /// Marks over the view: rectified pixels, except picks.
-  void set_epipolar(std::vector<Eigen::Vector2d> rectified);
+  void set_epipolar(std::vector<rectification::PixelPath> rectified);
   void set_path(std::vector<Eigen::Vector2d> rectified);
   void set_tool(const std::optional<verification::ImageLine>& rectified, const QString& note);
   void set_picks(std::vector<FreshPick> raw);
+  /// Drawn over everything; removed as the picks are.
+  void set_measures(std::vector<EvaluatedMeasure> measures);
   /// Those that the left button can drag, drawn or not.
   void set_movable_picks(std::vector<FreshPick> raw) { movable_ = std::move(raw); }
 
+  /// Digest of the shown image's pixels; empty without one.
+  std::string image() const { return result_ ? view().xray_image->acquisition.instance_key : ""; }
   /// Whether the requested layer is still being computed; until then the previous one is displayed.
   bool is_computing() const { return computing_; }
   /// Raw pixel at a widget position and back; empty outside the image.
@@ -60,6 +77,12 @@ class XrayView : public QWidget {
  Q_SIGNALS:
   /// A click or Enter while picking: always raw pixels (docs/frames.md).
   void picked(QPointF raw_pixel);
+  /// A click or Enter while measuring.
+  void measured(QPointF raw_pixel);
+  /// A click of a measure is dragged, while measuring.
+  void measure_click_moved(int number, int click, QPointF raw_pixel);
+  /// Enter without a cursor while measuring.
+  void measure_finished();
   /// A movable pick was dropped at a raw pixel.
   void pick_moved(const QString& name, QPointF raw_pixel);
   void hovered(std::optional<helicarm::gui::MarkUnderCursor> mark);
@@ -86,7 +109,8 @@ class XrayView : public QWidget {
     QPointF from, last;
     bool moved = false;
     bool may_pick = false;
-    QString pick = {};  ///< name of the movable pick under the press
+    QString pick = {};                    ///< name of the movable pick under the press
+    std::optional<ClickMark> click = {};  ///< of a measure, while measuring
   };
 
   const pipeline::ViewResult& view() const { return result_->views[view_]; }
@@ -99,27 +123,43 @@ class XrayView : public QWidget {
   void pan(const QPointF& by);
   void adjust_window(const QPointF& by);
   void move_cursor(const QPointF& by);
+  bool takes_clicks() const { return picking_ || measuring_; }
   void pick_at(const QPointF& place);
   QString movable_at(const QPointF& place) const;
+  void move_click(const QPointF& place);
   void show_moved(const std::optional<QPointF>& raw);
   void hover_at(const QPointF& place);
   void hover_over(const std::optional<MarkUnderCursor>& mark);
   void paint_still();
   void paint_magnifier(QPainter& painter) const;
   void paint_words(QPainter& painter) const;
+  void paint_refusal(QPainter& painter) const;
+  /// Not over an image in which points are clicked, unless it is asked for.
+  bool shows_refusal() const { return refusal_ && (details_visible_ || !takes_clicks()); }
+  QRectF refusal_box() const;
+  QString refusal_hint() const;
+  void paint_readout(QPainter& painter) const;
+  void hide_repeated_picks();
 
   std::shared_ptr<const pipeline::Result> result_;
   std::size_t view_ = 0;
   QString why_empty_;
   Layer wanted_ = Layer::rectified;
   std::optional<image::GreyWindow> window_;  ///< empty: the default one
-  bool picking_ = false, magnifier_ = false, marks_visible_ = true, computing_ = false, fits_ = true;
+  bool picking_ = false, measuring_ = false, magnifier_ = false, marks_visible_ = true, computing_ = false,
+       fits_ = true;
 
   LayerLoader loader_;
   std::shared_ptr<const LoadedLayer> shown_;
   QImage grey_;
   report::ViewMarks marks_;
+  MarkGroups groups_ = all_marks;
+  std::vector<FreshPick> picks_;      ///< as given
+  std::set<std::string> superseded_;  ///< points whose pick has moved since the result
+  std::optional<RefusalText> refusal_;
+  bool details_visible_ = false;
   LiveMarks live_;
+  MeasureMarks measures_;
   ImageFrame frame_;
   QPixmap still_;  ///< image and marks; null: to be redrawn
 

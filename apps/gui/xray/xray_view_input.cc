@@ -62,10 +62,17 @@ void XrayView::wheelEvent(QWheelEvent* event) {
 }
 
 void XrayView::mousePressEvent(QMouseEvent* event) {
-  cursor_.reset();
   const bool left = event->button() == Qt::LeftButton;
-  drag_ = {event->button(), event->position(), event->position(),
-           false,           picking_ && left,  left ? movable_at(event->position()) : QString()};
+  if (left && shows_refusal() && refusal_box().contains(event->position()))
+    return set_details_visible(!details_visible_);
+  cursor_.reset();
+  drag_ = {event->button(), event->position(), event->position()};
+  drag_.may_pick = takes_clicks() && left;
+  constexpr double reach = 12;  // screen px
+  if (left && measuring_)
+    drag_.click = measures_.click_near(event->position(), reach, frame_);
+  else if (left)
+    drag_.pick = movable_at(event->position());
   update();
 }
 
@@ -78,8 +85,9 @@ void XrayView::mouseMoveEvent(QMouseEvent* event) {
   if (drag_.button != Qt::NoButton && drag_.moved) {
     drag_.last = at;
     if (!drag_.pick.isEmpty()) return show_moved(raw_at(at));
+    if (drag_.click) return move_click(at);
     if (drag_.button == Qt::RightButton) return adjust_window(by);
-    if (drag_.button == Qt::MiddleButton || !picking_) return pan(by);
+    if (drag_.button == Qt::MiddleButton || !takes_clicks()) return pan(by);
   }
   hover_at(at);
   if (magnifier_) update();
@@ -95,6 +103,12 @@ void XrayView::mouseReleaseEvent(QMouseEvent* event) {
   if (ended.may_pick && !ended.moved) pick_at(at);
   if (!ended.pick.isEmpty() && ended.moved)
     if (const auto raw = raw_at(at)) Q_EMIT pick_moved(ended.pick, *raw);
+}
+
+void XrayView::move_click(const QPointF& place) {
+  const double half = 0.5 / devicePixelRatioF();  // centre of the screen pixel
+  if (const auto raw = raw_at(place + QPointF(half, half)))
+    Q_EMIT measure_click_moved(drag_.click->number, drag_.click->click, *raw);
 }
 
 QString XrayView::movable_at(const QPointF& place) const {
@@ -117,7 +131,7 @@ void XrayView::show_moved(const std::optional<QPointF>& raw) {
 
 void XrayView::mouseDoubleClickEvent(QMouseEvent* event) {
   drag_ = {};
-  if (event->button() == Qt::LeftButton && !picking_) fit();
+  if (event->button() == Qt::LeftButton && !takes_clicks()) fit();
 }
 
 void XrayView::enterEvent(QEnterEvent*) { setFocus(Qt::MouseFocusReason); }
@@ -149,11 +163,15 @@ void XrayView::keyPressEvent(QKeyEvent* event) {
       return set_marks_visible(!marks_visible_);
     case Qt::Key_M:
       return set_magnifier(!magnifier_);
+    case Qt::Key_D:
+      if (!refusal_) break;
+      return set_details_visible(!details_visible_);
     case Qt::Key_W:
       return set_usual_window();
     case Qt::Key_Return:
     case Qt::Key_Enter:
-      if (cursor_ && picking_) return pick_at(frame_.to_widget(*cursor_));
+      if (cursor_ && takes_clicks()) return pick_at(frame_.to_widget(*cursor_));
+      if (measuring_) return Q_EMIT measure_finished();
       break;
     case Qt::Key_Escape:
       if (!cursor_) break;
@@ -177,7 +195,12 @@ void XrayView::move_cursor(const QPointF& by) {
 }
 
 void XrayView::pick_at(const QPointF& place) {
-  if (const auto raw = raw_at(place)) Q_EMIT picked(*raw);
+  const auto raw = raw_at(place);
+  if (!raw) return;
+  if (measuring_)
+    Q_EMIT measured(*raw);
+  else
+    Q_EMIT picked(*raw);
 }
 
 void XrayView::hover_at(const QPointF& place) {

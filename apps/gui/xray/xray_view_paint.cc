@@ -4,6 +4,7 @@
 
 #include "gui/xray/label_placer.h"
 #include "gui/xray/mark_painter.h"
+#include "gui/xray/readout.h"
 #include "gui/xray/xray_view.h"
 
 namespace helicarm::gui {
@@ -21,17 +22,8 @@ void draw_image(QPainter& painter, const QImage& image, const ImageFrame& frame)
 }
 
 QFont label_font(QFont font) {
-  font.setPixelSize(label_font_px);
+  font.setPixelSize(font.pixelSize() > 0 ? font.pixelSize() - 1 : label_font_px);
   return font;
-}
-
-/// A cross with a central gap, which keeps its target visible.
-void open_cross(QPainter& painter, const QPointF& at, double gap, double arm, const QColor& colour) {
-  for (const QPen& pen : {QPen(QColor(0, 0, 0, 180), 3), QPen(colour, 1.2)}) {
-    painter.setPen(pen);
-    for (const QPointF& way : {QPointF(1, 0), QPointF(0, 1), QPointF(-1, 0), QPointF(0, -1)})
-      painter.drawLine(at + gap * way, at + arm * way);
-  }
 }
 
 }  // namespace
@@ -44,8 +36,9 @@ void XrayView::paintEvent(QPaintEvent*) {
   painter.setFont(label_font(font()));
   if (shown_) {
     live_.paint(painter, frame_);
+    measures_.paint(painter, frame_);
     if (magnifier_) paint_magnifier(painter);
-    if (cursor_) open_cross(painter, frame_.to_widget(*cursor_), 4, 16, Qt::white);
+    if (cursor_) paint_open_cross(painter, frame_.to_widget(*cursor_), Qt::white, 4, 16);
   }
   paint_words(painter);
   if (hasFocus()) {
@@ -65,7 +58,46 @@ void XrayView::paint_still() {
   if (!marks_visible_) return;
   painter.setRenderHint(QPainter::Antialiasing);
   painter.setFont(label_font(font()));
-  paint_marks(painter, marks_, frame_, grey_.width(), rect());
+  report::ViewMarks marks = only(groups_, marks_);
+  std::erase_if(marks.points, [&](const report::PointMark& mark) { return superseded_.contains(mark.name); });
+  paint_marks(painter, marks, frame_, grey_.width(), rect());
+}
+
+QImage XrayView::image_with_marks() {
+  if (still_.isNull()) paint_still();
+  QImage image = still_.toImage();
+  if (!shown_) return image;
+  QPainter painter(&image);
+  painter.setRenderHint(QPainter::Antialiasing);
+  painter.setFont(label_font(font()));
+  live_.paint(painter, frame_);
+  measures_.paint(painter, frame_);
+  return image;
+}
+
+QRectF XrayView::refusal_box() const {
+  constexpr int rim = 10, above_the_scale = 52;
+  const QRectF widest = QRectF(rect()).adjusted(8 + rim, 34, -8 - rim, -above_the_scale);
+  const QRectF text = QFontMetricsF(label_font(font()))
+                          .boundingRect(widest, Qt::TextWordWrap, refusal() + '\n' + refusal_hint());
+  return {8, widest.bottom() - text.height(), width() - 16.0, text.height() + 2 * rim};
+}
+
+QString XrayView::refusal_hint() const {
+  return details_visible_ ? tr("Click here or press D: less")
+                          : tr("Click here or press D: causes and figures");
+}
+
+void XrayView::paint_refusal(QPainter& painter) const {
+  constexpr int rim = 10;
+  const QRectF box = refusal_box();
+  painter.setPen(QPen(ink::rejected, 2));
+  painter.setBrush(QColor(16, 20, 26, 225));
+  painter.drawRoundedRect(box, 6, 6);
+  painter.setPen(QColor(240, 243, 247));
+  painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::TextWordWrap, refusal());
+  painter.setPen(ink::quiet);
+  painter.drawText(box.adjusted(rim, rim, -rim, -rim), Qt::AlignBottom | Qt::AlignLeft, refusal_hint());
 }
 
 void XrayView::paint_magnifier(QPainter& painter) const {
@@ -79,7 +111,7 @@ void XrayView::paint_magnifier(QPainter& painter) const {
   painter.fillRect(glass.boundingRect(), ground);
   draw_image(painter, grey_, {power * frame_.scale, at + power * (frame_.origin - at)});
   painter.restore();
-  open_cross(painter, at, 8, 30, Qt::white);
+  paint_open_cross(painter, at, Qt::white, 8, 30);
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(QColor(255, 255, 255, 170), 2));
   painter.drawEllipse(at, radius, radius);
@@ -88,7 +120,7 @@ void XrayView::paint_magnifier(QPainter& painter) const {
 void XrayView::paint_words(QPainter& painter) const {
   if (!shown_) {
     QFont larger = painter.font();
-    larger.setPixelSize(label_font_px + 3);
+    larger.setPixelSize(larger.pixelSize() + 3);
     painter.setFont(larger);
     painter.setPen(ink::quiet);
     painter.drawText(QRectF(rect()).adjusted(24, 24, -24, -24), Qt::AlignCenter | Qt::TextWordWrap,
@@ -102,12 +134,20 @@ void XrayView::paint_words(QPainter& painter) const {
   if (!marks_visible_) caption += tr("  ·  marks hidden");
   if (computing_) caption += tr("  ·  computing …");
   outlined_text(painter, {12, 22}, caption, ink::quiet);
-  if (under_) {
-    const Eigen::Vector2d& place = under_->kind == MarkUnderCursor::Kind::ball
-                                       ? marks_.balls[under_->index].place
-                                       : marks_.points[under_->index].place;
-    text_box(painter, frame_.to_widget(place), under_->tip, QRectF(rect()).adjusted(6, 6, -6, -6));
-  }
+  paint_readout(painter);
+  if (shows_refusal()) paint_refusal(painter);
+  if (under_)
+    text_box(painter, frame_.to_widget(under_->place), under_->tip, QRectF(rect()).adjusted(6, 6, -6, -6));
+}
+
+void XrayView::paint_readout(QPainter& painter) const {
+  if (!cursor_ && !mouse_) return;
+  const auto raw = raw_at(cursor_ ? frame_.to_widget(*cursor_) : *mouse_);
+  if (!raw) return;
+  const QString words = readout_of(*result_, view_, {raw->x(), raw->y()});
+  const double wide = painter.fontMetrics().horizontalAdvance(words);
+  constexpr double below_caption = 40;
+  outlined_text(painter, {std::max(12.0, width() - 12 - wide), below_caption}, words, ink::quiet);
 }
 
 }  // namespace helicarm::gui

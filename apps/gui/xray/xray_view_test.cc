@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "gui/xray/readout.h"
 #include "gui/xray/simulated_result_test.h"
 
 namespace helicarm::gui {
@@ -97,6 +98,133 @@ TEST_F(XrayViewTest, DragIsNotAPickAndAClickOnlyWhilePicking) {
   drag({300, 300}, {360, 320}, Qt::LeftButton);
   QTest::mouseClick(&view, Qt::RightButton, {}, {300, 300});
   EXPECT_EQ(spy.count(), 0);
+}
+
+TEST_F(XrayViewTest, ClicksMeasureInsteadOfPickingWhileATool) {
+  QSignalSpy picked(&view, &XrayView::picked), measured(&view, &XrayView::measured),
+      finished(&view, &XrayView::measure_finished);
+  view.set_picking(true);
+  view.set_measuring(true);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  key(Qt::Key_Return);
+  EXPECT_EQ(measured.count(), 1);
+  EXPECT_EQ(finished.count(), 1);
+  EXPECT_EQ(picked.count(), 0);
+  view.set_measuring(false);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {300, 300});
+  EXPECT_EQ(picked.count(), 1);
+}
+
+TEST_F(XrayViewTest, ClickOfAMeasureIsDraggedWhileMeasuring) {
+  EvaluatedMeasure measure;
+  measure.number = 3;
+  measure.points = {{200, 260}, {320, 260}};
+  view.set_measures({measure});
+  const QPoint from = ImageFrame::fitted(QSizeF(512, 512), view.size()).to_widget({320, 260}).toPoint();
+  QSignalSpy moved(&view, &XrayView::measure_click_moved), measured(&view, &XrayView::measured);
+  drag(from, from + QPoint(40, 0), Qt::LeftButton);
+  EXPECT_EQ(moved.count(), 0);
+  view.fit();
+  view.set_measuring(true);
+  drag(from, from + QPoint(40, 0), Qt::LeftButton);
+  ASSERT_GT(moved.count(), 0);
+  EXPECT_EQ(moved.back()[0].toInt(), 3);
+  EXPECT_EQ(moved.back()[1].toInt(), 1);
+  const QPointF off = *view.place_of(moved.back()[2].toPointF()) - QPointF(from + QPoint(40, 0));
+  EXPECT_LT(std::hypot(off.x(), off.y()), 1);
+  EXPECT_EQ(measured.count(), 0);
+}
+
+TEST_F(XrayViewTest, MeasuresAreDrawnInEveryLayer) {
+  EvaluatedMeasure measure;
+  measure.strokes = {{{{200, 260}, {320, 260}}}};
+  for (const Layer layer : {Layer::rectified, Layer::raw}) {
+    view.set_layer(layer);
+    settle();
+    view.set_measures({});
+    const QImage before = view.grab().toImage();
+    view.set_measures({measure});
+    EXPECT_NE(view.grab().toImage(), before);
+  }
+  view.clear("gone");
+  view.show_view(simulated_result(), 0);
+  settle();
+  const QImage fresh = view.grab().toImage();
+  view.set_measures({});
+  EXPECT_EQ(view.grab().toImage(), fresh);
+}
+
+/// The case after a refused labelling of the second view.
+std::shared_ptr<const pipeline::Result> refused_result() {
+  auto refused = std::make_shared<pipeline::Result>(*simulated_result());
+  pipeline::ViewResult& view = refused->views[1];
+  for (const fiducials::Fiducial& ball : view.found->fiducials)
+    view.guessed.push_back({ball.label, ball.uv_raw, ball.uv, 2.5});
+  view.found.reset();
+  view.calibrated.reset();
+  refused->points.clear();
+  refused->tunnel_ends.clear();
+  refused->failure =
+      Failure{Reason::ambiguous_labels, "two labellings fit alike", view.name, {{"margin", 1.25}}};
+  return refused;
+}
+
+TEST_F(XrayViewTest, RefusalShowsReasonCandidatesAndDetails) {
+  view.show_view(refused_result(), 1);
+  settle();
+  EXPECT_EQ(view.refusal(), "Refused: two labellings fit alike (ambiguous_labels)");
+  EXPECT_TRUE(view.accessibleDescription().contains("12 of them with a guessed label"))
+      << view.accessibleDescription().toStdString();
+  const QImage reason = view.grab().toImage();
+  key(Qt::Key_D);
+  EXPECT_TRUE(view.refusal().contains("Likely causes"));
+  EXPECT_TRUE(view.refusal().contains("margin = 1.25"));
+  EXPECT_NE(view.grab().toImage(), reason);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {320, 560});  // in the box
+  EXPECT_FALSE(view.refusal().contains("Likely causes"));
+  const QString place = qEnvironmentVariable("HELICARM_SCREENSHOTS");
+  if (!place.isEmpty()) view.grab().save(place + "/refused.png");
+}
+
+TEST_F(XrayViewTest, RefusalOfAnotherViewAndWhilePickingIsNotInTheWay) {
+  view.show_view(refused_result(), 0);
+  settle();
+  EXPECT_EQ(view.refusal(), "");
+  view.show_view(refused_result(), 1);
+  settle();
+  view.set_picking(true);
+  QSignalSpy picked(&view, &XrayView::picked);
+  QTest::mouseClick(&view, Qt::LeftButton, {}, {320, 560});
+  EXPECT_EQ(picked.count(), 1);
+}
+
+TEST_F(XrayViewTest, PickThatTheResultShowsIsDrawnOnce) {
+  const pipeline::PointResult& point = simulated_result()->points[0];
+  const QString name = QString::fromStdString(point.name);
+  const QImage by_result = view.grab().toImage();
+  view.set_picks({{name, point.seen[0]->uv_raw + Eigen::Vector2d(2, 0)}});
+  EXPECT_EQ(view.grab().toImage(), by_result);
+  view.set_picks({{name, point.seen[0]->uv_raw + Eigen::Vector2d(60, 0)}});
+  const QImage moved = view.grab().toImage();
+  EXPECT_NE(moved, by_result);
+  view.set_mark_groups(all_marks & ~MarkGroups(MarkGroup::points));
+  view.set_picks({});
+  EXPECT_NE(view.grab().toImage(), by_result);
+  view.set_mark_groups(all_marks);
+  EXPECT_EQ(view.grab().toImage(), by_result);
+}
+
+TEST_F(XrayViewTest, ReadoutGivesGreyValueAndPlace) {
+  const fiducials::Fiducial& ball = shown().found->fiducials[3];
+  const QString words = readout_of(*simulated_result(), 0, ball.uv_raw);
+  const int u = int(std::lround(ball.uv_raw.x())), v = int(std::lround(ball.uv_raw.y()));
+  EXPECT_TRUE(words.contains(QString("grey %1").arg(double(shown().xray_image->pixels(u, v)), 0, 'g', 6)))
+      << words.toStdString();
+  EXPECT_TRUE(words.contains("mm at the calibrator")) << words.toStdString();
+  EXPECT_EQ(readout_of(*simulated_result(), 0, {-5, 3}), "");
+  pipeline::Result bare;
+  bare.views.push_back({"AP", shown().xray_image, {}, {}, {}});
+  EXPECT_FALSE(readout_of(bare, 0, ball.uv_raw).contains("mm"));
 }
 
 TEST_F(XrayViewTest, DraggedMovablePickIsDroppedAtItsNewPixel) {

@@ -236,6 +236,7 @@ Expected<CalibrationResult> calibrate_paper(const std::vector<ViewFiducials>& vi
     auto calibrated = described(view.name, dlt->view, result.fiducials.back(), options);
     if (!calibrated) return tl::unexpected<Failure>(calibrated.error());
     calibrated->dlt = dlt->factors;
+    calibrated->by_paper = true;
     calibrated->dof = 2 * int(pairs.size()) - 11;
     result.chi2 += calibrated->chi2;
     result.dof += calibrated->dof;

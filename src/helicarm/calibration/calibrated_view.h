@@ -26,7 +26,8 @@ struct CalibratedView {
   double reprojection_rms_px = 0;
   double chi2 = 0;
   int dof = 0;
-  double condition = 0;  ///< of the normalised DLT's design matrix
+  double condition = 0;   ///< of the normalised DLT's design matrix
+  bool by_paper = false;  ///< by Eq. 7 alone (`--method paper`); points of such views are those of Eq. 8
 };
 
 /// Views calibrated together.

@@ -38,12 +38,13 @@ void report_offsets(CalibrationResult& result, const CleanFit& clean) {
   result.ball_rms_mm = rms_offset_mm(clean.problems, clean.fit);
   constexpr double least_reported_mm = 0.02;
   if (result.ball_rms_mm < least_reported_mm) return;
-  Warning deviation{Reason::calibrator_deviates,
-                    fmt::format("the fiducials deviate by {:.2g} mm rms from the calibrator's file: measure "
-                                "it with `helicarm phantom measure`",
-                                result.ball_rms_mm),
-                    {},
-                    {{"rms_mm", result.ball_rms_mm}}};
+  Warning deviation{
+      Reason::calibrator_deviates,
+      fmt::format("the fiducials deviate by {:.2g} mm rms from the calibrator's file: check that "
+                  "it is this calibrator's, and measure it with `helicarm phantom measure`",
+                  result.ball_rms_mm),
+      {},
+      {{"rms_mm", result.ball_rms_mm}}};
   if (result.found_tolerance_mm > 0) deviation.figures["tolerance_found_mm"] = result.found_tolerance_mm;
   (result.found_tolerance_mm > 0 ? result.warnings : result.notes).push_back(std::move(deviation));
 }

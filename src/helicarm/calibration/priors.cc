@@ -4,7 +4,6 @@
 #include <cmath>
 #include <vector>
 
-#include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/rotation.h"
 
 namespace helicarm::calibration {
@@ -59,9 +58,11 @@ class Rows {
       rows.row(i).segment<view_parameters>(view_parameters * Eigen::Index(view)) =
           quantities_[view].by_step.row(which) / unit;
     }
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Constant(count, count, variation.common * variation.common);
-    covariance.diagonal().array() += variation.of_view * variation.of_view;
-    const Eigen::MatrixXd whitens = geometry::whitening(covariance).value();
+    // The covariance has two eigenvalues: one along equal deviations, one across them.
+    const double along = 1 / std::hypot(variation.of_view, std::sqrt(double(count)) * variation.common);
+    const double across = 1 / variation.of_view;
+    Eigen::MatrixXd whitens = Eigen::MatrixXd::Constant(count, count, (along - across) / double(count));
+    whitens.diagonal().array() += across;
     residuals = (whitens * residuals).eval();
     rows = (whitens * rows).eval();
     for (Eigen::Index i = 0; i < count; ++i) {

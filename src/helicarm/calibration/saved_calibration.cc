@@ -32,6 +32,7 @@ CalibratedView view_from(JsonReader& reader) {
   view.dlt = geometry::factors_from_projection(projection);
   view.reprojection_rms_px = reader.optional_number("reprojection_rms_px", any_number).value_or(0);
   view.dof = int(reader.optional_number("dof", {0, 1e6}).value_or(0));
+  view.by_paper = reader.has("method") && reader.choice("method", {"best", "paper"}) == 1;
   return view;
 }
 
@@ -142,6 +143,7 @@ Json to_json(const SavedCalibration& calibration) {
                   {"camera_from_calibrator", geometry::json_rows(view.view.camera_from_world.matrix())},
                   {"reprojection_rms_px", view.reprojection_rms_px},
                   {"dof", view.dof},
+                  {"method", view.by_paper ? "paper" : "best"},
                   {"rectification", nullptr},
                   {"fiducials", Json::array()}};
     if (const auto& map = calibration.maps[i])

@@ -26,6 +26,7 @@ SavedCalibration saved_example() {
 TEST(SavedCalibration, RoundTripKeepsViewsCovarianceAndFiducials) {
   SavedCalibration given = saved_example();
   given.fiducials[1][2].status = fiducials::FiducialStatus::not_found;
+  given.views[1].by_paper = true;
   const auto read = saved_calibration_from_json(to_json(given), "calibration.json");
   ASSERT_TRUE(read) << read.error().message;
   EXPECT_TRUE(read->joint_covariance.isApprox(given.joint_covariance, 1e-12));
@@ -37,6 +38,7 @@ TEST(SavedCalibration, RoundTripKeepsViewsCovarianceAndFiducials) {
   EXPECT_EQ(read->fiducials[1][2].centre_in_calibrator, given.fiducials[1][2].centre_in_calibrator);
   EXPECT_EQ(read->fiducials[0][5].uv, given.fiducials[0][5].uv);
   EXPECT_EQ(read->dof, given.dof);
+  EXPECT_TRUE(!read->views[0].by_paper && read->views[1].by_paper);
 }
 
 TEST(SavedCalibration, FiducialsOfAResultTakeTheirCoordinatesFromItsBalls) {

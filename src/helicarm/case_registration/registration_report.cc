@@ -11,7 +11,6 @@
 #include "helicarm/image/png.h"
 #include "helicarm/report/markup.h"
 #include "helicarm/report/overlay.h"
-#include "helicarm/report/style.h"
 
 namespace helicarm::case_registration {
 namespace {
@@ -103,33 +102,23 @@ std::string overlay_png(const CaseRegistration& result, std::size_t index) {
 }
 
 std::string report_html(const CaseRegistration& result) {
-  std::string html = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\"/>\n<title>helicarm "
-      "registration</title>\n<style>{}</style>\n"
-      "</head>\n<body>\n<header>\n<h1>Registration</h1>\n<p class=\"notice\">Research instrument, not a "
-      "medical "
-      "device.</p>\n</header>\n<main>\n",
-      report::report_style);
+  std::string body;
   if (result.failure)
-    html += fmt::format("<p><span class=\"state refused\">refused: {}</span></p>\n<p>{}</p>\n",
+    body += fmt::format("<p><span class=\"state refused\">refused: {}</span></p>\n<p>{}</p>\n",
                         code(result.failure->reason), report::escaped(result.failure->message));
   for (const Warning& warning : result.warnings)
-    html +=
+    body +=
         fmt::format("<p class=\"soft\">{}: {}</p>\n", code(warning.reason), report::escaped(warning.message));
-  html += "<div class=\"views\">\n";
+  body += "<div class=\"views\">\n";
   for (std::size_t i = 0; i < result.loaded.views.size(); ++i)
-    html += fmt::format(
+    body += fmt::format(
         "<figure><img style=\"width:100%\" alt=\"{0}\" src=\"data:image/png;base64,{1}\"/><figcaption>{0}: "
         "outlines of "
         "the registered models</figcaption></figure>\n",
         report::escaped(result.loaded.views[i].name), report::base64(overlay_png(result, i)));
-  html += "</div>\n";
-  for (const RegisteredModel& model : result.models) html += model_section(model);
-  return html + fmt::format(
-                    "</main>\n<footer><p class=\"soft\">helicarm {}. Millimetres and pixels.</p></footer>\n"
-                    "</body>\n</html>\n",
-                    HELICARM_VERSION);
+  body += "</div>\n";
+  for (const RegisteredModel& model : result.models) body += model_section(model);
+  return report::page_html("helicarm registration", "Registration", body, ". Millimetres and pixels.");
 }
 
 Expected<void> write_registration(const CaseRegistration& result, const std::filesystem::path& folder) {

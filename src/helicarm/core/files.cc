@@ -91,8 +91,8 @@ Expected<void> write_file_with(const fs::path& path, const Write& write) {
   const fs::path folder = folder_of(path);
   fs::create_directories(folder, ec);
   if (!fs::is_directory(folder, ec))
-    return fail(Reason::cannot_write,
-                fmt::format("{}: is not a folder and cannot be created", folder.string()));
+    return fail(Reason::cannot_write, fmt::format("{}: is not a folder and cannot be created{}",
+                                                  folder.string(), ec ? ": " + ec.message() : ""));
   return replace_file(path, write);
 }
 

@@ -110,16 +110,24 @@ struct Pixel {
   double x, y, grey, weight;
 };
 
-/// Whether a pixel lies outside the field or in its blurred rim.
-bool at_the_rim(const xray::XrayImage& xray_image, int u, int v) {
-  constexpr int rim_px = 3;  // screen blur and the ramp at the field's edge
+constexpr int rim_px = 3;  // screen blur and the ramp at the field's edge
+
+/// Whether black pixels, outside the field, lie within `reach` px of a pixel along u and v.
+bool near_black(const xray::XrayImage& xray_image, int u, int v, int reach) {
   const float black =
       xray_image.lowest + 0.002f * (xray_image.highest - xray_image.lowest);  // as in usable.cc
   const image::Image<float>& image = xray_image.pixels;
-  for (int y = -rim_px; y <= rim_px; ++y)
-    for (int x = -rim_px; x <= rim_px; ++x)
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x)
       if (image.contains(u + x, v + y) && image(u + x, v + y) <= black) return true;
   return false;
+}
+
+/// Whether the shadow where the wires cross (1.5 half widths with its blur) reaches the field's rim. Its
+/// slope moves such a crossing by up to 9 px on simulated images.
+bool reaches_rim(const xray::XrayImage& xray_image, const Dot& cross) {
+  const Eigen::Vector2i at = cross.centre_px.array().round().matrix().cast<int>();
+  return near_black(xray_image, at.x(), at.y(), rim_px + int(std::lround(1.5 * cross.radius_px)));
 }
 
 std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& start, double half_width,
@@ -137,7 +145,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
         const bool hidden = std::any_of(discs.begin(), discs.end(), [&](const Disc& disc) {
           return (disc.centre - Vector2d(u0 + x, v0 + y)).squaredNorm() < disc.radius * disc.radius;
         });
-        if (hidden || at_the_rim(xray_image, u0 + x, v0 + y)) continue;
+        if (hidden || near_black(xray_image, u0 + x, v0 + y, rim_px)) continue;
         pixels.push_back({double(x), double(y), double(image(u0 + x, v0 + y)), 1});
         mean += pixels.back().grey;
       }
@@ -219,6 +227,7 @@ std::optional<Dot> fit_wires(const xray::XrayImage& xray_image, const Vector2d& 
   cross.radius_px = 1.25 * p[12];
   cross.contrast = 0.5 * (p[6] + p[9]);
   cross.misfit = std::sqrt(variance) / fainter;
+  if (reaches_rim(xray_image, cross)) return std::nullopt;
   return cross;
 }
 

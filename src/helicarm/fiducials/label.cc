@@ -193,7 +193,8 @@ Hypothesis best_by_own_errors(const LabelSearch& search, const LabellingOptions&
 /// Whether `rival` labels more fiducials and is almost as good if the source distance is wrong, for which the
 /// prior odds are 1 to 1000: then labels of a helix shifted by one, which keep the handedness, may fit better
 /// than the true ones.
-bool explains_more(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
+bool fits_another_distance(const Scene& scene, const Hypothesis& h, const Hypothesis& rival,
+                           double required) {
   constexpr double wrong_focal_sigma = 0.1;  // relative
   constexpr double wrong_log_odds = -6.9;
   if (rival.matched <= h.matched || rival.mirrored() != h.mirrored()) return false;
@@ -204,7 +205,7 @@ bool explains_more(const Scene& scene, const Hypothesis& h, const Hypothesis& ri
 
 /// Whether `h` does not exceed `rival` by the required log odds.
 bool is_close(const Scene& scene, const Hypothesis& h, const Hypothesis& rival, double required) {
-  if (explains_more(scene, h, rival, required)) return true;
+  if (fits_another_distance(scene, h, rival, required)) return true;
   const double margin = h.log_odds - rival.log_odds;
   if (margin >= comparison_width * required) return false;
   const auto fine = fine_margin(scene, h, rival);

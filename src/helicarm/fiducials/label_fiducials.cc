@@ -10,8 +10,8 @@
 #include "helicarm/detection/find_dots.h"
 #include "helicarm/fiducials/centre_offset.h"
 #include "helicarm/fiducials/label.h"
+#include "helicarm/fiducials/paper_circles.h"
 #include "helicarm/rectification/intrinsics_prior.h"
-#include "helicarm/rectification/paper_dots.h"
 
 namespace helicarm::fiducials {
 namespace {
@@ -152,24 +152,30 @@ bool explains_more(const Labelling& loose, const Failure& without) {
          (matched != without.figures.end() && loose.matched > matched->second);
 }
 
-/// `--method paper` takes the Hough transform's circle centres.
-std::vector<detection::Dot> hough_circles(const xray::XrayImage& xray_image,
-                                          const std::vector<detection::Dot>& labelled_dots) {
-  double least = 1e9;
-  double most = 0;
-  for (const detection::Dot& dot : labelled_dots) {
-    least = std::min(least, dot.radius_px);
-    most = std::max(most, dot.radius_px);
-  }
-  return rectification::find_dots_paper(xray_image.pixels, xray_image.lowest, xray_image.highest, 0.8 * least,
-                                        1.2 * most);
+/// Circles of `--method paper`, as large as the labelled dots.
+std::vector<detection::Dot> circles_like(const std::vector<detection::Dot>& labelled_dots,
+                                         const xray::XrayImage& xray_image,
+                                         const rectification::DistortionMap& map) {
+  const auto [least, most] =
+      std::ranges::minmax(labelled_dots | std::views::transform(&detection::Dot::radius_px));
+  return find_circles_paper(xray_image, map, {0.8 * least, 1.2 * most});
 }
 
-std::optional<detection::Dot> circle_near(const std::vector<detection::Dot>& circles,
-                                          const detection::Dot& dot) {
+/// Sets the fiducial's pixels to the circle at its dot, if there is one.
+void set_circle(Fiducial& fiducial, const std::vector<detection::Dot>& circles, const detection::Dot& dot,
+                const rectification::DistortionMap& map) {
+  const auto uv = map.rectified_from_raw(dot.centre_px);
+  if (!uv) return;
   for (const detection::Dot& circle : circles)
-    if ((circle.centre_px - dot.centre_px).norm() < 0.3 * dot.radius_px) return circle;
-  return std::nullopt;
+    if ((circle.centre_px - *uv).norm() < 0.3 * dot.radius_px) {
+      const ImagePoint point = point_of_circle(circle, map);
+      fiducial.status = FiducialStatus::used;
+      fiducial.uv_raw = point.uv_raw;
+      fiducial.uv = point.uv;
+      fiducial.sigma_px = point.sigma_px;
+      fiducial.radius_px = circle.radius_px;
+      return;
+    }
 }
 
 /// What the labelling works on.
@@ -242,7 +248,6 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
                                             const phantom::Calibrator& calibrator,
                                             const FiducialOptions& options) {
   const rectification::DistortionMap& map = rectification.map;
-  const rectification::Method method = options.method;
   const auto [balls, rectified, prior, given_options] =
       labelling_input(xray_image, map, candidates, calibrator, options);
   LabellingOptions labelling_options = given_options;
@@ -270,9 +275,9 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
     if (candidate >= 0) labelled_dots.push_back(balls[static_cast<std::size_t>(candidate)]);
   const BallFitter fitter(xray_image, rectification, candidates, labelled_dots);
   const double tolerance_mm = std::hypot(calibrator.tolerance_mm, labelling_options.tolerance_mm);
-  const std::vector<detection::Dot> circles = method == rectification::Method::paper
-                                                  ? hough_circles(xray_image, labelled_dots)
-                                                  : std::vector<detection::Dot>{};
+  const bool by_circles = options.method == rectification::Method::paper;
+  const std::vector<detection::Dot> circles =
+      by_circles ? circles_like(labelled_dots, xray_image, map) : std::vector<detection::Dot>{};
 
   for (std::size_t k = 0; k < calibrator.balls.size(); ++k) {
     const phantom::CalibratorBall& ball = calibrator.balls[k];
@@ -288,8 +293,10 @@ Expected<LabelledFiducials> label_fiducials(const xray::XrayImage& xray_image,
     else if (inside(xray_image, raw, 2))
       dot = fitter.fit_at_prediction(
           raw, radius, prediction_reach_px + tolerance_sigmas * tolerance_mm * 2 * radius / ball.diameter_mm);
-    if (dot && method == rectification::Method::paper) dot = circle_near(circles, *dot);
-    if (dot) set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
+    if (dot && by_circles)
+      set_circle(fiducial, circles, *dot, map);
+    else if (dot)
+      set_pixels(fiducial, *dot, map, found.view, ball.diameter_mm);
     if (fiducial.status != FiducialStatus::used)
       fiducial.status = status_if_absent(xray_image, fitter, raw, radius, labelled_dots);
     found.fiducials.push_back(fiducial);

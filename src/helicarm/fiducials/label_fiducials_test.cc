@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/fiducials/paper_circles.h"
 #include "helicarm/rectification/simulated_image_test.h"
 
 namespace helicarm::fiducials {
@@ -157,6 +158,24 @@ TEST(LabelFiducials, PaperMethodMeasuresWithinAPixelAndAHalf) {
     EXPECT_LT((found.fiducials[k].uv_raw - sound_case().views[0].balls[k].raw).norm(), 1.5);
   }
   EXPECT_GE(used, 6);
+}
+
+TEST(LabelFiducials, PaperMethodTakesTheCirclesOfTheRectifiedImage) {
+  const xray::XrayImage xray_image = exposure_of(sound_case().views[0]);
+  const auto map =
+      rectification::rectify(xray_image, phantom::plate48(), {rectification::Method::paper, {}})->map;
+  const LabelledFiducials found = found_in(sound_case(), sound_case().views[0], rectification::Method::paper);
+  int checked = 0;
+  for (const Fiducial& fiducial : found.fiducials) {
+    if (fiducial.status != FiducialStatus::used || ++checked > 3) continue;
+    const auto circle = circle_near(xray_image, map, fiducial.uv, fiducial.radius_px);
+    ASSERT_TRUE(circle) << fiducial.label;
+    EXPECT_LT((circle->uv - fiducial.uv).norm(), 1) << fiducial.label;  // other radii: another Hough image
+    EXPECT_LT((map.raw_from_rectified(fiducial.uv) - fiducial.uv_raw).norm(), 1e-9);
+  }
+  const auto nowhere = circle_near(xray_image, map, {30, 30}, 12);
+  ASSERT_FALSE(nowhere);
+  EXPECT_EQ(nowhere.error().reason, Reason::target_not_found);
 }
 
 }  // namespace

@@ -89,7 +89,27 @@ std::vector<double> section(const std::string& text, const std::string& title, s
   return numbers;
 }
 
-ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin) {
+std::string without_line_ends(std::string text) {
+  std::ranges::replace(text, '\n', ' ');
+  return text;
+}
+
+/// XMALab's lens model: OpenCV's k1, k2, p1, p2, k3 to k6 beside K.
+void check_undistorted(const std::string& text, const std::string& origin, const ImportOptions& options) {
+  if (options.undistorted || text.find("undistortion") == std::string::npos) return;
+  const std::string after = text.substr(text.find("undistortion") + std::string("undistortion").size());
+  auto coefficients = numbers_in(without_line_ends(after), origin + ": undistortion");
+  coefficients.resize(std::max<std::size_t>(coefficients.size(), 2));
+  if (std::ranges::all_of(coefficients, [](double c) { return c == 0; })) return;
+  throw BadInput(Reason::unsupported,
+                 fmt::format("{}: undistortion: the camera has a lens distortion (k1 {:g}, k2 {:g}); export "
+                             "undistorted images, and state that they are (--undistorted)",
+                             origin, coefficients[0], coefficients[1]));
+}
+
+ImportedMatrix parse_maya_cam(const std::string& text, const std::string& origin,
+                              const ImportOptions& options) {
+  check_undistorted(text, origin, options);
   using Rows = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
   const auto k_numbers = section(text, "camera matrix", 9, origin);
   const auto r_numbers = section(text, "rotation", 9, origin);
@@ -165,13 +185,46 @@ ImportedMatrix parse_json_matrix(const std::string& text, const std::string& ori
   return result;
 }
 
-ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin) {
+/// L1 to L11 of one camera (XMALab's MergedDlts).
+ImportedMatrix from_dlt(const std::vector<std::vector<double>>& rows, const std::string& origin,
+                        const ImportOptions& options) {
+  const std::size_t cameras = rows.front().size();
+  for (const auto& row : rows)
+    if (row.size() != cameras)
+      throw BadInput(Reason::bad_size,
+                     fmt::format("{}: the rows of DLT coefficients differ in length", origin));
+  if (!options.image_size || (cameras > 1 && !options.column))
+    throw BadInput(
+        Reason::usage,
+        fmt::format("{}: DLT coefficients of {} camera(s): give the image's size, whose rows they count "
+                    "upwards from 1{}",
+                    origin, cameras, cameras > 1 ? ", and the column" : ""));
+  const int column = options.column.value_or(1);
+  if (column < 1 || std::size_t(column) > cameras)
+    throw BadInput(Reason::bad_value, fmt::format("{}: column {}, must be 1 to {}", origin, column, cameras));
+  Eigen::Matrix<double, 12, 1> l;
+  for (std::size_t i = 0; i < rows.size(); ++i) l[Eigen::Index(i)] = rows[i][std::size_t(column) - 1];
+  l[11] = 1;
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> projection =
+      xmalab_from_pixels(options.image_size->y()).inverse() *
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(l.data());
+  ImportedMatrix result = imported({projection.data(), projection.data() + projection.size()}, origin);
+  result.image_size = options.image_size;
+  return result;
+}
+
+ImportedMatrix parse_text_matrix(const std::string& text, const std::string& origin,
+                                 const ImportOptions& options) {
+  constexpr std::size_t dlt_rows = 11, most_rows = 12;
   std::istringstream lines(text);
+  std::vector<std::vector<double>> rows;
+  for (std::string line; rows.size() <= most_rows && std::getline(lines, line);)
+    if (!line.starts_with('#'))
+      if (auto row = numbers_in(line, origin); !row.empty()) rows.push_back(std::move(row));
+  if (rows.size() == dlt_rows) return from_dlt(rows, origin, options);
   std::vector<double> numbers;
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with('#')) continue;
-    const auto row = numbers_in(line, origin);
-    if (!row.empty() && row.size() != 4 && row.size() != 12)
+  for (const auto& row : rows) {
+    if (row.size() != 4 && row.size() != 12)
       throw BadInput(Reason::bad_size,
                      fmt::format("{}: a row of {} numbers, a 3x4 matrix has rows of 4", origin, row.size()));
     numbers.insert(numbers.end(), row.begin(), row.end());
@@ -179,26 +232,49 @@ ImportedMatrix parse_text_matrix(const std::string& text, const std::string& ori
   return imported(numbers, origin);
 }
 
-ImportedMatrix parse(const std::string& text, const std::string& origin) {
+/// Names what is not read, where the beginning of the text tells.
+void refuse_other_formats(const std::string& text, const std::string& origin) {
+  constexpr std::pair<std::string_view, std::string_view> formats[] = {
+      {"RTKThreeDCircularGeometry", "an RTK geometry"},
+      {"opencv_storage", "an OpenCV file"},
+      {"%YAML", "a YAML file, such as OpenCV writes"},
+      {"#Insight Transform File", "an ITK transform"},
+      {"\x89HDF", "an HDF5 file"},
+      {"<?xml", "an XML file"}};
+  const std::string_view beginning = std::string_view(text).substr(0, 1000);
+  for (const auto& [mark, name] : formats)
+    if (beginning.find(mark) != beginning.npos)
+      throw BadInput(Reason::unsupported,
+                     fmt::format("{}: is {}; give its 3x4 matrix from mm to pixels as text", origin, name));
+}
+
+ImportedMatrix parse(const std::string& text, const std::string& origin, const ImportOptions& options) {
   const auto first = text.find_first_not_of(" \t\r\n");
   if (first == std::string::npos) throw BadInput(Reason::truncated, fmt::format("{}: is empty", origin));
   if (text.starts_with("NRRD")) return parse_nrrd(text, origin);
+  refuse_other_formats(text, origin);
   if (text.find('\0') != std::string::npos)
     throw BadInput(Reason::unsupported,
                    fmt::format("{}: neither MayaCam 2, NRRD, JSON nor a text matrix", origin));
-  if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin);
+  if (text.find("camera matrix") != std::string::npos) return parse_maya_cam(text, origin, options);
   if (text[first] == '{' || text.substr(first).starts_with("[[")) return parse_json_matrix(text, origin);
-  return parse_text_matrix(text, origin);
+  return parse_text_matrix(text, origin, options);
 }
 
 }  // namespace
 
-Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double mm_per_unit) {
+Eigen::Matrix3d xmalab_from_pixels(int image_height) {
+  Eigen::Matrix3d pixels;
+  pixels << 1, 0, 1, 0, -1, image_height, 0, 0, 1;
+  return pixels;
+}
+
+Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options) {
   const auto text = read_file(path, max_bytes);
   if (!text) return tl::unexpected<Failure>(text.error());
   return guarded([&] {
-    ImportedMatrix result = parse(*text, path.filename().string());
-    result.view.camera_from_world.translation *= mm_per_unit;
+    ImportedMatrix result = parse(*text, path.filename().string(), options);
+    result.view.camera_from_world.translation *= options.mm_per_unit;
     if (!result.view.camera_from_world.translation.allFinite())
       throw BadInput(Reason::not_finite,
                      fmt::format("{}: the translation is not finite in mm", path.filename().string()));

@@ -18,9 +18,22 @@ struct ImportedMatrix {
   std::optional<Eigen::Vector2i> image_size;  ///< width, height; if the file states them
 };
 
-/// Reads a MayaCam 2 camera (text), an NRRD header with a "Projection Matrix", or a 3x4 matrix as text or
-/// JSON (rows, or an object's "projection"). `mm_per_unit` is the file's unit of length: 10 for cm. Fails
-/// with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`, `bad_size` or `unsupported`.
-Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, double mm_per_unit = 1);
+struct ImportOptions {
+  double mm_per_unit = 1;                          ///< the file's unit of length: 10 for cm
+  std::optional<int> column = {};                  ///< of a table of DLT coefficients, from 1
+  std::optional<Eigen::Vector2i> image_size = {};  ///< width, height; needed for DLT coefficients
+  /// The images are free of distortion: a lens distortion that the file states is not refused.
+  bool undistorted = false;
+};
+
+/// Reads a MayaCam 2 camera (text), an NRRD header with a "Projection Matrix", a 3x4 matrix as text or JSON
+/// (rows, or an object's "projection"), or 11 rows of DLT coefficients, a column for each camera, in XMALab's
+/// pixels (u + 1, height - v). Fails with `missing_file`, `truncated`, `bad_json`, `bad_value`, `not_finite`,
+/// `bad_size`, `unsupported` (another format, or a lens distortion) or `usage` (DLT coefficients without
+/// column or size).
+Expected<ImportedMatrix> import_matrix(const std::filesystem::path& path, const ImportOptions& options = {});
+
+/// From this program's pixels to XMALab's, (u + 1, height - v): the first pixel is 1, v counts upwards.
+Eigen::Matrix3d xmalab_from_pixels(int image_height);
 
 }  // namespace helicarm::geometry

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/geometry/import_matrix.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -11,11 +12,11 @@ namespace helicarm::geometry {
 namespace {
 namespace fs = std::filesystem;
 
-Expected<ImportedMatrix> import_text(const std::string& text, double mm_per_unit = 1) {
+Expected<ImportedMatrix> import_text(const std::string& text, const ImportOptions& options = {}) {
   const fs::path path =
       fs::temp_directory_path() / ("helicarm_import_" + std::to_string(::getpid()) + ".txt");
   EXPECT_TRUE(write_file(path, text));
-  auto result = import_matrix(path, mm_per_unit);
+  auto result = import_matrix(path, options);
   fs::remove(path);
   return result;
 }
@@ -31,13 +32,64 @@ const std::string maya_cam =
     "rotation\n0,0,1\n-0.6,-0.8,0\n0.8,-0.6,0\n\ntranslation\n-68.5\n125.25\n136.75\n";
 
 TEST(ImportMatrix, MayaCamValuesAreKept) {
-  const auto result = import_text(maya_cam, 10);
+  const auto result = import_text(maya_cam, {.mm_per_unit = 10});
   ASSERT_TRUE(result.has_value()) << result.error().message;
   EXPECT_EQ(result->view.intrinsics.fx, 8000.5);
   EXPECT_EQ(result->view.intrinsics.v0, 866.5);
   EXPECT_EQ(result->view.camera_from_world.rotation(1, 0), -0.6);
   EXPECT_EQ(result->view.camera_from_world.translation, Eigen::Vector3d(-685, 1252.5, 1367.5));
   EXPECT_EQ(*result->image_size, Eigen::Vector2i(1760, 1700));
+}
+
+TEST(ImportMatrix, LensDistortionIsRefusedUnlessTheImagesAreUndistorted) {
+  const std::string none = "\nundistortion\n0\n0\n0\n0\n0\n0\n0\n0\n";
+  EXPECT_TRUE(import_text(maya_cam + none));
+  const std::string lens = maya_cam + "\nundistortion\n-0.12\n0.03\n0\n0\n0\n0\n0\n0\n";
+  const auto refused = import_text(lens);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::unsupported);
+  EXPECT_NE(refused.error().message.find("k1 -0.12"), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(import_text(lens, {.undistorted = true}));
+}
+
+TEST(ImportMatrix, OtherProgramsFormatsAreNamed) {
+  for (const auto& [text, name] :
+       {std::pair{
+            "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">",
+            "RTK"},
+        {"%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n", "YAML"},
+        {"#Insight Transform File V1.0\n#Transform 0\n", "ITK"}}) {
+    const auto refused = import_text(text);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::unsupported);
+    EXPECT_NE(refused.error().message.find(name), std::string::npos) << refused.error().message;
+  }
+}
+
+/// The steps of XMALab's export by hand: pixels (u + 1, height - v), divided by the last coefficient.
+TEST(ImportMatrix, DltCoefficientsOfXmalabAreTurnedIntoPixels) {
+  const auto camera = import_text(maya_cam);
+  ASSERT_TRUE(camera);
+  constexpr int height = 1700;
+  const Eigen::Vector3d points[] = {{1, 2, 3},    {-20, 5, 12}, {7, -30, 4},
+                                    {15, 11, -9}, {0, 25, 6},   {-4, -8, 21}};
+  const auto column = [&](const View& view) {
+    const Projection p = view.projection();
+    Projection flipped = p;
+    flipped.row(0) = p.row(0) + p.row(2);
+    flipped.row(1) = height * p.row(2) - p.row(1);
+    return Projection(flipped / flipped(2, 3));
+  };
+  const Projection l = column(camera->view);
+  std::string table;
+  for (int i = 0; i < 11; ++i) table += fmt::format("0.5,{}\n", l(i / 4, i % 4));
+  EXPECT_EQ(reason_of(table), Reason::usage);
+  EXPECT_EQ(import_text(table, {.column = 3, .image_size = Eigen::Vector2i(1760, height)}).error().reason,
+            Reason::bad_value);
+  const auto read = import_text(table, {.column = 2, .image_size = Eigen::Vector2i(1760, height)});
+  ASSERT_TRUE(read) << read.error().message;
+  for (const Eigen::Vector3d& point : points)
+    EXPECT_LT((read->view.project(point) - camera->view.project(point)).norm(), 1e-6);
 }
 
 TEST(ImportMatrix, BrokenMayaCamIsNamed) {
@@ -94,8 +146,8 @@ TEST(ImportMatrix, NegativeScaleIsRemovedAndAMirroredImageKept) {
 TEST(ImportMatrix, TranslationThatOverflowsInMillimetresIsNotFinite) {
   std::string far = maya_cam;
   far.replace(far.find("125.25"), 6, "1e308");
-  EXPECT_TRUE(import_text(far, 1).has_value());
-  EXPECT_EQ(import_text(far, 10).error().reason, Reason::not_finite);
+  EXPECT_TRUE(import_text(far).has_value());
+  EXPECT_EQ(import_text(far, {.mm_per_unit = 10}).error().reason, Reason::not_finite);
 }
 
 TEST(ImportMatrix, BadFilesAreNamed) {

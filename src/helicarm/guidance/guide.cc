@@ -102,18 +102,28 @@ PointInFrames guide(const localization::LocatedPoint& point, std::optional<Bone>
     in_tracker_now = in_tracker_then;
   }
 
-  if (in_tracker_then && then.tracker_from_femur)
-    put(leave_tracker(*in_tracker_then, *then.tracker_from_femur, readings.at(Marker::femur, 0)),
-        guided.in_femur, guided.covariance_in_femur);
-  if (in_tracker_then && then.tracker_from_tibia)
-    put(leave_tracker(*in_tracker_then, *then.tracker_from_tibia, readings.at(Marker::tibia, 0)),
-        guided.in_tibia, guided.covariance_in_tibia);
+  if (in_tracker_then && then.tracker_from_femur) {
+    guided.propagated_to_femur =
+        leave_tracker(*in_tracker_then, *then.tracker_from_femur, readings.at(Marker::femur, 0));
+    put(*guided.propagated_to_femur, guided.in_femur, guided.covariance_in_femur);
+  }
+  if (in_tracker_then && then.tracker_from_tibia) {
+    guided.propagated_to_tibia =
+        leave_tracker(*in_tracker_then, *then.tracker_from_tibia, readings.at(Marker::tibia, 0));
+    put(*guided.propagated_to_tibia, guided.in_tibia, guided.covariance_in_tibia);
+  }
   if (in_tracker_now && now.tracker_from_tool) {
     guided.propagated_to_tool =
         leave_tracker(*in_tracker_now, *now.tracker_from_tool, readings.at(Marker::tool, present));
     put(*guided.propagated_to_tool, guided.in_tool, guided.covariance_in_tool);
   }
   return guided;
+}
+
+PropagatedPoint to_tool(PropagatedPoint in_bone, Bone bone, const geometry::RigidTransform& tracker_from_bone,
+                        const geometry::RigidTransform& tracker_from_tool) {
+  return leave_tracker(enter_tracker(std::move(in_bone), tracker_from_bone, {marker_of(bone), present}),
+                       tracker_from_tool, {Marker::tool, present});
 }
 
 }  // namespace helicarm::guidance

@@ -31,7 +31,13 @@ struct PointInFrames {
   std::optional<Eigen::Matrix3d> covariance_in_femur;
   std::optional<Eigen::Matrix3d> covariance_in_tibia;
   std::optional<Eigen::Matrix3d> covariance_in_tool;
-  std::optional<PropagatedPoint> propagated_to_tool;  ///< with all errors it shares with other points
+  std::optional<PropagatedPoint> propagated_to_tool;        ///< with all errors it shares with other points
+  std::optional<PropagatedPoint> propagated_to_femur = {};  ///< likewise, in the bone's frame
+  std::optional<PropagatedPoint> propagated_to_tibia = {};
+
+  const std::optional<PropagatedPoint>& propagated_to(Bone bone) const {
+    return bone == Bone::femur ? propagated_to_femur : propagated_to_tibia;
+  }
 };
 
 /// The same view in a bone's frame: world = bone. Intersection of such views accounts for bone motion between
@@ -49,5 +55,10 @@ Eigen::Matrix3d noise_of_poses(const Eigen::Vector3d& point_in_bone, Bone bone, 
 /// tracker's frame since the first view.
 PointInFrames guide(const localization::LocatedPoint& point, std::optional<Bone> anchor,
                     std::span<const DatedView> views, const Poses& now, const TrackerNoise& noise);
+
+/// Carries a point from a bone's frame to that of the tool by their present readings, which are independent
+/// of those at the acquisitions (Eq. 16's last two factors).
+PropagatedPoint to_tool(PropagatedPoint in_bone, Bone bone, const geometry::RigidTransform& tracker_from_bone,
+                        const geometry::RigidTransform& tracker_from_tool);
 
 }  // namespace helicarm::guidance

@@ -105,6 +105,34 @@ TEST(Guide, SharedReadingOfABoneCancelsInTheTool) {
   EXPECT_NEAR(guide(point, poses, {0.1, 0.05, Samples::shared}).covariance_in_calibrator.trace(), 0, 1e-12);
 }
 
+TEST(Guide, PointInTheBoneReachesTheToolWithTheSameErrors) {
+  const TrackerNoise noise{0.12, 0.05, Samples::independent};
+  const Poses poses = all_poses();
+  const PointInFrames guided = guide(femoral_point(poses, poses), poses, noise);
+  const PropagatedPoint in_tool =
+      to_tool(*guided.propagated_to(Bone::femur), Bone::femur, tracker_from_femur, tracker_from_tool);
+  EXPECT_TRUE(in_tool.point.isApprox(*guided.in_tool, 1e-12));
+  EXPECT_TRUE(in_tool.total_covariance(noise).isApprox(*guided.covariance_in_tool, 1e-9));
+}
+
+TEST(Guide, PointHalfWayBetweenTwoHasTheErrorsThatTheirDifferenceLacks) {
+  const TrackerNoise noise{0.12, 0.05, Samples::independent};
+  const Poses poses = all_poses();
+  PointInViews one = femoral_point(poses, poses), other = one;
+  other.point_in_anchor += Eigen::Vector3d(5, 30, -10);
+  const Eigen::MatrixXd calibration = Eigen::Vector2d(0.04, 0.09).asDiagonal();
+  one.by_calibration = (Eigen::MatrixXd(3, 2) << 0.5, -1, 2, 0.3, -0.7, 1.1).finished();
+  other.by_calibration = (Eigen::MatrixXd(3, 2) << 0.2, 1, -1.5, 0.4, 0.9, -0.6).finished();
+  for (PointInViews* point : {&one, &other})
+    point->covariance_in_anchor += point->by_calibration * calibration * point->by_calibration.transpose();
+  const PropagatedPoint from = *guide(one, poses, noise).propagated_to(Bone::femur);
+  const PropagatedPoint to = *guide(other, poses, noise).propagated_to(Bone::femur);
+  const Eigen::Matrix3d half = point_between(from, to, 0.5, calibration).total_covariance(noise);
+  const Eigen::Matrix3d difference = covariance_between(from, to, calibration, noise);
+  EXPECT_TRUE((4 * half + difference)
+                  .isApprox(2 * (from.total_covariance(noise) + to.total_covariance(noise)), 1e-9));
+}
+
 /// Draws one noisy reading from the covariance's noise model.
 geometry::RigidTransform noisy(const geometry::RigidTransform& pose, const TrackerNoise& noise,
                                RandomStream& stream) {

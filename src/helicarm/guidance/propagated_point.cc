@@ -65,6 +65,23 @@ Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const Propagated
   return covariance;
 }
 
+PropagatedPoint point_between(const PropagatedPoint& from, const PropagatedPoint& to, double share,
+                              const Eigen::MatrixXd& calibration_covariance) {
+  const double rest = 1 - share;
+  PropagatedPoint between{rest * from.point + share * to.point,
+                          rest * rest * from.covariance + share * share * to.covariance,
+                          {}};
+  if (const Eigen::Index shared = calibration_covariance.cols();
+      shared > 0 && from.by_calibration.cols() == shared && to.by_calibration.cols() == shared) {
+    const Eigen::Matrix3d both = from.by_calibration * calibration_covariance * to.by_calibration.transpose();
+    between.covariance += rest * share * (both + both.transpose());
+    between.by_calibration = rest * from.by_calibration + share * to.by_calibration;
+  }
+  for (const auto& [reading, effect] : from.by_reading) effect_at(between, reading) += rest * effect;
+  for (const auto& [reading, effect] : to.by_reading) effect_at(between, reading) += share * effect;
+  return between;
+}
+
 PropagatedPoint enter_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading) {
   effect_at(point, reading) += effect_of_motion(point.point);

@@ -31,6 +31,11 @@ struct PropagatedPoint {
 Eigen::Matrix3d covariance_between(const PropagatedPoint& from, const PropagatedPoint& to,
                                    const Eigen::MatrixXd& calibration_covariance, const TrackerNoise& noise);
 
+/// The point at this share of the way from one point to another in the same frame, with the errors of both;
+/// its `covariance` contains that of the calibration they share.
+PropagatedPoint point_between(const PropagatedPoint& from, const PropagatedPoint& to, double share,
+                              const Eigen::MatrixXd& calibration_covariance);
+
 /// From a marker's frame to the tracker's.
 PropagatedPoint enter_tracker(PropagatedPoint point, const geometry::RigidTransform& tracker_from_marker,
                               Reading reading);

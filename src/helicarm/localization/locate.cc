@@ -77,6 +77,18 @@ Eigen::MatrixXd noise_of_views(std::span<const PointObservation> observations,
   return noise;
 }
 
+/// Eq. 8 as published: 1 is the projections' last element, and all equations have one weight.
+Expected<Eigen::Vector3d> published_point(std::span<const geometry::RayObservation> observations) {
+  std::vector<geometry::Projection> projections;
+  std::vector<Eigen::Vector2d> pixels;
+  for (const geometry::RayObservation& ray : observations) {
+    const geometry::Projection projection = ray.view.projection();
+    projections.push_back(projection / projection(2, 3));
+    pixels.push_back(ray.pixel);
+  }
+  return geometry::intersect_linear(projections, pixels);
+}
+
 void inflate_if_rays_miss(LocatedPoint& located) {
   constexpr double largest_excess = 9;  // three standard deviations
   const double excess = located.chi2 / double(2 * located.views.size() - 3);
@@ -130,12 +142,18 @@ Expected<LocatedPoint> locate(const std::string& name, PointSource source,
     found = geometry::intersect(ray_observations, noise);
     if (found) located.by_calibration = -found->by_pixels * slopes;
   } else if (found) {
-    const Eigen::Vector3d point = found->point;  // of Eq. 8: the views' residuals do not weight the rays
+    const Eigen::Vector3d point = found->point;  // the views' residuals do not weight the rays
     noise += noise_of_views(observations, calibration);
     found = geometry::intersect(ray_observations, noise);
     if (found && motion_sigma_mm == 0) found->point = point;
   }
   if (!found) return tl::unexpected<Failure>(found.error());
+  if (std::ranges::all_of(observations,
+                          [&](const PointObservation& o) { return calibration.views[o.view].by_paper; })) {
+    const auto published = published_point(ray_observations);
+    if (!published) return tl::unexpected<Failure>(published.error());
+    found->point = *published;
+  }
   located.point_in_anchor = found->point;
   located.covariance_in_anchor = found->covariance;
   located.ray_gap_mm = found->ray_gap_mm;

@@ -45,7 +45,8 @@ struct LocatedPoint {
 };
 
 /// Triangulates from n >= 2 views by least weighted reprojection error; the weights include the observations'
-/// and the calibration's covariance, or the views' reprojection errors if it has none.
+/// and the calibration's covariance, or the views' reprojection errors if it has none. Views `by_paper` give
+/// the point of Eq. 8, with the covariance of the weighted one.
 /// `motion_sigma_mm` (per axis): motion of the point between the first view's acquisition and each later one.
 /// If chi2 per degree of freedom exceeds 9 (three standard deviations), the covariance is inflated by it and
 /// `missing_rays` is set. The 95 % length is at least half the ray gap. Refuses as `intersect`.

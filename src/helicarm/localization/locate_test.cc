@@ -159,6 +159,26 @@ TEST(Locate, ResidualsOfAPaperCalibrationChangeOnlyTheCovariance) {
   EXPECT_GT(after->predicted_rms_mm(), 2 * before->predicted_rms_mm());
 }
 
+TEST(Locate, PointOfAPaperCalibrationIsThatOfEq8) {
+  RandomStream random(5, 3);
+  const auto calibration = calibration::calibrate_paper(noisy_fiducials(1, random), {});
+  ASSERT_TRUE(calibration);
+  const auto observations = images_of(target, 1, random);
+  Eigen::Matrix<double, 4, 3> left;
+  Eigen::Vector4d right;
+  for (int i = 0; i < 2; ++i) {
+    const geometry::DltFactors& a = *calibration->views[std::size_t(i)].dlt;  // a(k - 1) is A_k
+    const double u = observations[std::size_t(i)].uv.x(), v = observations[std::size_t(i)].uv.y();
+    left.row(2 * i) << a(4) * u - a(0), a(5) * u - a(1), a(6) * u - a(2);
+    left.row(2 * i + 1) << a(4) * v - a(7), a(5) * v - a(8), a(6) * v - a(9);
+    right.segment<2>(2 * i) << a(3) - u, a(10) - v;
+  }
+  const Eigen::Vector3d printed = (left.transpose() * left).ldlt().solve(left.transpose() * right);
+  const auto point = locate("T", PointSource::pick, observations, *calibration);
+  ASSERT_TRUE(point);
+  EXPECT_LT((point->point_in_anchor - printed).norm(), 1e-6);
+}
+
 TEST(Locate, RayGapsOfPaperCalibrationsAreWhatTheirErrorsExplain) {
   constexpr int trials = 400;
   double chi2 = 0;

@@ -53,15 +53,14 @@ Expected<void> write_operation_case(const fs::path& folder, const OperationPlan&
                                     const std::vector<CaseImage>& images, const guidance::Poses& now,
                                     const std::vector<verification::ToolLine>& tool_lines) {
   return guarded([&] {
+    const guidance::TrackerNoise noise = plan.tracker.noise();
     Json json = {{"format", "helicarm-case/1"},
                  {"calibrator", brought_along(plan.calibrator, folder)},
                  {"plate", plan.plate ? Json(brought_along(*plan.plate, folder)) : Json()},
                  {"views", Json::array()},
                  {"poses_now", without(to_json(now), "tracker_from_calibrator")},
                  {"tracker",
-                  {{"sigma_mm", plan.tracker.sigma_mm},
-                   {"sigma_deg", plan.tracker.sigma_deg},
-                   {"samples", "independent"}}},
+                  {{"sigma_mm", noise.sigma_mm}, {"sigma_deg", noise.sigma_deg}, {"samples", "independent"}}},
                  {"picks", plan.picks},
                  {"tunnels", Json::array()},
                  {"tool_lines", Json::array()}};

@@ -29,15 +29,22 @@ tracker::PoseBoardOptions board_options(const FreshnessLimits& limits) {
 
 Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
                          const FreshnessLimits& limits)
-    : inbox_(std::move(inbox)), board_(board_options(limits)), robot_(config_of(plan.robot, limits)) {
+    : inbox_(std::move(inbox)), board_(board_options(limits)) {
+  if (!plan.drill) robot_ = std::make_unique<robot::RobotLink>(config_of(plan.robot, limits));
   tracker::IgtlClientOptions options;
   options.address = plan.tracker.address;
   options.port = plan.tracker.port;
   options.ask_for_tracking = true;
+  options.interval_ms = static_cast<int>(1000 / plan.tracker.rate_hz);
   tracker_ = value_or_throw(tracker::IgtlClient::start(
       options,
       [this](const tracker::IgtlMessage& message, double arrival_s) { board_.take(message, arrival_s); },
       [this] { board_.forget_time(); }));
+}
+
+robot::RobotLink& Connections::robot() {
+  if (!robot_) throw BadInput(Reason::usage, "the plan has a hand-held drill and no robot");
+  return *robot_;
 }
 
 Expected<void> Connections::listen(const receiver::ReceiverOptions& options) {

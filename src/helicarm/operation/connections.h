@@ -35,7 +35,8 @@ struct FreshnessLimits {
   double heartbeat_s = 0.1;  ///< ends this long after the program's last poll
 };
 
-/// The three devices of a plan. Tracker and robot are connected at the start and reconnected after a loss.
+/// The devices of a plan: C-arm, tracker and, without a hand-held drill, robot. Tracker and robot are
+/// connected at the start and reconnected after a loss.
 class Connections {
  public:
   /// Throws BadInput for invalid addresses.
@@ -50,7 +51,8 @@ class Connections {
   std::optional<DatedArrival> next_image(double patience_s);
 
   const tracker::PoseBoard& board() const { return board_; }
-  robot::RobotLink& robot() { return robot_; }
+  /// Throws BadInput (usage) for a plan with a hand-held drill.
+  robot::RobotLink& robot();
   /// State before `listen`: no image received.
   CArmStatus c_arm() const;
 
@@ -64,7 +66,7 @@ class Connections {
   CArmStatus c_arm_;
   std::uint64_t broken_before_ = 0;  ///< connections lost before the last image
   tracker::PoseBoard board_;
-  robot::RobotLink robot_;
+  std::unique_ptr<robot::RobotLink> robot_;  ///< null for a hand-held drill
   std::unique_ptr<tracker::IgtlClient> tracker_;
   std::unique_ptr<receiver::DicomReceiver> receiver_;
 };

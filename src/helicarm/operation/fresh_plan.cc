@@ -32,7 +32,7 @@ robot::Watch Operation::sees_tool() const {
 
 robot::Watch Operation::in_place(PlanWatch watch) const {
   return [this, watch = std::move(watch)] {
-    return watch.in_place(board_, robot_.track(), tracker::monotonic_seconds());
+    return watch.in_place(board_, robot().track(), tracker::monotonic_seconds());
   };
 }
 
@@ -72,7 +72,7 @@ Expected<void> Operation::check_plan(const robot::RobotOrder& order) {
           Reason::plan_stale,
           order.name + ": is not the last plan to this tunnel: confirm the last one or plan again");
     if (plan.stale) throw BadInput(*plan.stale);
-    const auto holds = plan.watch.holds(board_, robot_.track(), tracker::monotonic_seconds());
+    const auto holds = plan.watch.holds(board_, robot().track(), tracker::monotonic_seconds());
     if (!holds && holds.error().reason == Reason::plan_stale) {
       planned_.at(order.name).stale = holds.error();
       in_place_.clear();  // what moved may be a marker on its bone
@@ -89,7 +89,7 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
     const PlannedTunnel& tunnel = tunnel_named(order.name);
     if (!result_ || !hand_eye_) throw BadInput(Reason::usage, "no measurement or no registration yet");
     const PoseWindow window = look("withdraw");
-    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanWatch watch(plan_.limits, plan_.tracker, basis_of(tunnel, window, present));
     robot::RobotOrder back = order;
     back.start = present.joints;
@@ -102,7 +102,7 @@ Expected<void> Operation::withdraw(const robot::RobotOrder& order, const robot::
     back = robot::slowed_for_joints(std::move(back), plan_.robot.approach.limits);
     record("order", robot::to_json(back));
     const std::string token = value_or_throw(confirm(back));
-    value_or_throw(watch.holds(board_, robot_.track(), tracker::monotonic_seconds()));
+    value_or_throw(watch.holds(board_, robot().track(), tracker::monotonic_seconds()));
     carry_out(back, token, {}, in_place(watch));
   });
 }

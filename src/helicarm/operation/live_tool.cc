@@ -10,16 +10,34 @@
 
 namespace helicarm::operation {
 
+namespace {
+
+constexpr double degrees_per_rad = 180 / std::numbers::pi;
+
+const guidance::PropagatedPoint* located_in(const pipeline::Result& result, const std::string& name,
+                                            guidance::Bone bone) {
+  const auto point = std::ranges::find(result.points, name, &pipeline::PointResult::name);
+  if (point == result.points.end() || !point->place) return nullptr;
+  const auto& in_bone = point->place->propagated_to(bone);
+  return in_bone ? &*in_bone : nullptr;
+}
+
+}  // namespace
+
 LiveTool::LiveTool(const OperationPlan& plan, const pipeline::Result& result,
-                   const std::vector<guidance::Poses>& exposures, const tracker::HandEye& hand_eye)
-    : tracker_(plan.tracker), marker_from_tip_(marker_from_tcp(hand_eye, plan.robot.tool)) {
+                   const std::vector<guidance::Poses>& exposures, const TrackedTool& tool)
+    : tracker_(plan.tracker), tool_(tool), calibration_covariance_(result.joint_covariance) {
   for (std::size_t i = 0; i < exposures.size(); ++i) {
     const auto& calibrated = result.views[i].calibrated;
     views_.push_back(
         {result.views[i].name, calibrated ? std::optional(calibrated->view) : std::nullopt, exposures[i]});
   }
-  for (const PlannedTunnel& tunnel : plan.tunnels)
-    if (const auto in_bone = tunnel_in_bone(result, tunnel)) tunnels_.emplace(tunnel.name, *in_bone);
+  for (const PlannedTunnel& tunnel : plan.tunnels) {
+    const auto* enter = located_in(result, tunnel.start, tunnel.bone);
+    const auto* leave = located_in(result, tunnel.end, tunnel.bone);
+    if (tunnel.enter_at == TunnelEnd::end) std::swap(enter, leave);
+    if (enter && leave) tunnels_.emplace(tunnel.name, Located{tunnel.bone, *enter, *leave});
+  }
 }
 
 LiveTool::Now LiveTool::newest(const tracker::PoseBoard& board, guidance::Bone bone) const {
@@ -54,34 +72,77 @@ Expected<ToolOverlay> LiveTool::overlay(const guidance::Poses& now, guidance::Bo
     const auto placed = guidance::calibrator_from(bone, then),
                other_placed = guidance::calibrator_from(other, then);
     if (placed)
-      overlay.calibrator_from_tip = *placed * bone_from_tracker * *now.tracker_from_tool * marker_from_tip_;
+      overlay.calibrator_from_tip =
+          *placed * bone_from_tracker * *now.tracker_from_tool * tool_.marker_from_tip;
     if (placed && other_placed && now.tracker_from(other))
       overlay.other_bone_moved =
           *placed * bone_from_tracker * *now.tracker_from(other) * other_placed->inverse();
   }
   for (const Shown& shown : views_) {
-    const auto line = tool_line("", bone, shown.poses, now, marker_from_tip_);
+    const auto line = tool_line("", bone, shown.poses, now, tool_.marker_from_tip);
     if (!line || !shown.view) continue;
     if (const auto seen = verification::line_in_xray(*shown.view, *line)) overlay.by_view[shown.name] = *seen;
   }
   return overlay;
 }
 
+const LiveTool::Located& LiveTool::located(const std::string& name) const {
+  const auto tunnel = tunnels_.find(name);
+  if (tunnel == tunnels_.end())
+    throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located; check its picks", name));
+  return tunnel->second;
+}
+
+Expected<std::vector<Eigen::Vector3d>> LiveTool::ends_in_bone(const std::string& name) const {
+  return guarded([&] {
+    const Located& tunnel = located(name);
+    return std::vector{tunnel.enter.point, tunnel.leave.point};
+  });
+}
+
 Expected<TunnelAim> LiveTool::aim(const tracker::PoseBoard& board, const std::string& name) const {
   return guarded([&] {
-    const auto tunnel = tunnels_.find(name);
-    if (tunnel == tunnels_.end())
-      throw BadInput(Reason::not_seen, fmt::format("tunnel {}: is not located; check its picks", name));
-    const auto& [bone, enter, leave] = tunnel->second;
-    const Now now = newest(board, bone);
-    const geometry::RigidTransform bone_from_tip =
-        now.poses.tracker_from(bone)->inverse() * *now.poses.tracker_from_tool * marker_from_tip_;
-    const Eigen::Vector3d axis = (leave - enter).normalized();
-    const Eigen::Vector3d from_entry = bone_from_tip.translation - enter;
-    const Eigen::Vector3d tool = bone_from_tip.rotation.col(2);
-    const double angle = std::atan2(tool.cross(axis).norm(), tool.dot(axis));
-    return TunnelAim{from_entry.cross(axis).norm(), angle * 180 / std::numbers::pi, from_entry.dot(axis),
-                     (leave - enter).norm()};
+    const guidance::Bone bone = located(name).bone;
+    const guidance::Poses now = newest(board, bone).poses;
+    return value_or_throw(aim(*now.tracker_from(bone), *now.tracker_from_tool, name));
+  });
+}
+
+Expected<TunnelAim> LiveTool::aim(const geometry::RigidTransform& tracker_from_bone,
+                                  const geometry::RigidTransform& tracker_from_tool,
+                                  const std::string& name) const {
+  return guarded([&] {
+    const auto& [bone, in_bone_enter, in_bone_leave] = located(name);
+    const guidance::TrackerNoise noise = tracker_.noise();
+    const guidance::PropagatedPoint enter =
+        guidance::to_tool(in_bone_enter, bone, tracker_from_bone, tracker_from_tool);
+    const guidance::PropagatedPoint leave =
+        guidance::to_tool(in_bone_leave, bone, tracker_from_bone, tracker_from_tool);
+    const Eigen::Vector3d way = leave.point - enter.point;
+    const double length = way.norm();
+    const Eigen::Vector3d axis_in_marker = way / length;
+    const double depth = axis_in_marker.dot(tool_.marker_from_tip.translation - enter.point);
+    const guidance::PropagatedPoint foot =
+        guidance::point_between(enter, leave, depth / length, calibration_covariance_);
+    const PointAtTip off = at_tip(foot.point, foot.total_covariance(noise), tool_);
+
+    const Eigen::Vector3d axis = tool_.marker_from_tip.rotation.transpose() * axis_in_marker;
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    const Eigen::Matrix3d of_way =
+        guidance::covariance_between(enter, leave, calibration_covariance_, noise) / (length * length);
+    const Eigen::Matrix3d of_axis =
+        tool_.marker_from_tip.rotation.transpose() * of_way * tool_.marker_from_tip.rotation;
+    const double angle_variance =
+        (across * of_axis * across).trace() + tool_.covariance.diagonal().segment<2>(3).sum();
+    return TunnelAim{off.point.norm(),
+                     std::atan2(axis.head<2>().norm(), axis.z()) * degrees_per_rad,
+                     depth,
+                     length,
+                     std::sqrt((across * off.covariance * across).trace()),
+                     std::sqrt(angle_variance) * degrees_per_rad,
+                     std::sqrt(axis.dot(off.covariance * axis)),
+                     off.point,
+                     axis};
   });
 }
 

@@ -17,6 +17,13 @@ struct TunnelAim {
   double angle_deg;    ///< between the tool and the axis
   double depth_mm;     ///< of the tip along the axis beyond the entry point; negative: before it
   double length_mm;    ///< of the tunnel
+  /// Standard deviations by X-ray images, tracker and tool calibration; without the scatter of single
+  /// samples.
+  double distance_sigma_mm;  ///< root of the trace across the axis
+  double angle_sigma_deg;
+  double depth_sigma_mm;
+  Eigen::Vector3d to_axis_mm;  ///< from the tip to the nearest point of the axis, in the tip's frame
+  Eigen::Vector3d axis;        ///< unit, from entry to end, in the tip's frame; (0, 0, 1) if aligned
 };
 
 /// The tool at the newest poses.
@@ -34,9 +41,12 @@ struct ToolOverlay {
 /// Projects the tool into measured X-ray images. A value: any thread may use a copy during the operation.
 class LiveTool {
  public:
-  /// `acquisitions`: of each view of the result, in its order.
+  /// `exposures`: of each view of the result, in its order.
   LiveTool(const OperationPlan& plan, const pipeline::Result& result,
-           const std::vector<guidance::Poses>& exposures, const tracker::HandEye& hand_eye);
+           const std::vector<guidance::Poses>& exposures, const TrackedTool& tool);
+  LiveTool(const OperationPlan& plan, const pipeline::Result& result,
+           const std::vector<guidance::Poses>& exposures, const tracker::HandEye& hand_eye)
+      : LiveTool(plan, result, exposures, tracked_tool(hand_eye, plan.robot.tool)) {}
 
   /// The tool's line in each X-ray image, relative to this bone. Refuses no_pose, and stale_pose for a pose
   /// older than 0.1 s.
@@ -46,6 +56,13 @@ class LiveTool {
 
   /// Refuses as `overlay`, and not_seen for a tunnel that is not located.
   Expected<TunnelAim> aim(const tracker::PoseBoard& board, const std::string& tunnel) const;
+  Expected<TunnelAim> aim(const geometry::RigidTransform& tracker_from_bone,
+                          const geometry::RigidTransform& tracker_from_tool, const std::string& tunnel) const;
+
+  /// Where the drill enters and leaves, mm. Refuses not_seen.
+  Expected<std::vector<Eigen::Vector3d>> ends_in_bone(const std::string& tunnel) const;
+
+  const geometry::RigidTransform& marker_from_tip() const { return tool_.marker_from_tip; }
 
  private:
   struct Shown {
@@ -57,12 +74,19 @@ class LiveTool {
     guidance::Poses poses;
     double age_s;
   };
+  struct Located {
+    guidance::Bone bone;
+    guidance::PropagatedPoint enter, leave;  ///< in the bone's frame
+  };
   Now newest(const tracker::PoseBoard& board, guidance::Bone bone) const;
 
+  const Located& located(const std::string& tunnel) const;
+
   TrackerPlan tracker_;
-  geometry::RigidTransform marker_from_tip_;
+  TrackedTool tool_;
   std::vector<Shown> views_;
-  std::map<std::string, TunnelInBone> tunnels_;
+  std::map<std::string, Located> tunnels_;
+  Eigen::MatrixXd calibration_covariance_;  ///< of all views' parameters
 };
 
 }  // namespace helicarm::operation

@@ -31,6 +31,8 @@ pipeline::Result measured() {
     pipeline::PointResult point{
         name, localization::PointSource::pick, guidance::Bone::femur, {}, guidance::PointInFrames{}, 0, {}};
     point.place->in_femur = at;
+    point.place->propagated_to_femur =
+        guidance::PropagatedPoint{at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
     result.points.push_back(point);
   }
   pipeline::ViewResult view;
@@ -71,6 +73,13 @@ TEST(LiveTool, ReportsPositionAngleAndDepthAtThePresentBonePose) {
   EXPECT_NEAR(aim.depth_mm, 12, 1e-6);
   EXPECT_NEAR(aim.angle_deg, 0.2 * 180 / EIGEN_PI, 1e-6);
   EXPECT_NEAR(aim.length_mm, 40, 1e-9);
+
+  // Tunnel: 0.1 mm per axis at each end. Two readings of 0.12 mm and 0.05 degrees.
+  const double lever = entry.norm(), turn = 0.05 * EIGEN_PI / 180;
+  EXPECT_NEAR(aim.depth_sigma_mm, std::sqrt(0.0063 + 2 * 0.12 * 0.12), 0.08);
+  EXPECT_GT(aim.distance_sigma_mm, std::sqrt(2) * std::hypot(0.07, std::sqrt(2) * 0.12, 0 * lever));
+  EXPECT_LT(aim.distance_sigma_mm, std::sqrt(2) * std::hypot(0.1, 0.17, 250 * turn * 1.5));
+  EXPECT_NEAR(aim.angle_sigma_deg, std::hypot(0.2 / 40 * 180 / EIGEN_PI, 0.1), 0.02);
 
   const ToolOverlay overlay = live.overlay(board, guidance::Bone::femur).value();
   const Vector3d tip =

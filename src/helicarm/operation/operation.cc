@@ -40,6 +40,30 @@ std::string_view name_of(Step step) {
 Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const fs::path& folder,
                                                       const tracker::PoseBoard& board,
                                                       robot::RobotLink& robot, Notify notify) {
+  return begin(std::move(plan), folder, board, &robot, std::move(notify));
+}
+
+Expected<std::unique_ptr<Operation>> Operation::begin_freehand(OperationPlan plan, const fs::path& folder,
+                                                               const tracker::PoseBoard& board,
+                                                               Notify notify) {
+  if (!plan.drill) return fail(Reason::bad_value, "the plan has no \"drill\"");
+  return begin(std::move(plan), folder, board, nullptr, std::move(notify));
+}
+
+robot::RobotLink& Operation::robot() const {
+  if (!robot_) throw BadInput(Reason::usage, "the plan has a hand-held drill and no robot");
+  return *robot_;
+}
+
+TrackedTool Operation::tool() const {
+  if (plan_.drill) return tracked_tool(*plan_.drill);
+  if (!hand_eye_) throw BadInput(Reason::usage, "the robot is not registered; register it first");
+  return tracked_tool(*hand_eye_, plan_.robot.tool);
+}
+
+Expected<std::unique_ptr<Operation>> Operation::begin(OperationPlan plan, const fs::path& folder,
+                                                      const tracker::PoseBoard& board,
+                                                      robot::RobotLink* robot, Notify notify) {
   return guarded([&] {
     std::unique_ptr<Operation> operation(
         new Operation(std::move(plan), folder, board, robot, std::move(notify)));
@@ -83,7 +107,7 @@ std::vector<robot::Miss> Operation::carry_out(const robot::RobotOrder& order, co
                                               const robot::Measure& measure, const robot::Watch& watch) {
   record("confirmed",
          {{"order", order.name}, {"digest", xray::digest(to_text(robot::to_json(order)))}, {"by", who_}});
-  auto misses = robot_.execute(order, token, measure, watch);
+  auto misses = robot().execute(order, token, measure, watch);
   if (!misses) record_halt(order, misses.error());
   return value_or_throw(std::move(misses));
 }
@@ -118,7 +142,7 @@ Expected<void> Operation::measure() {
 
 Expected<std::vector<robot::RobotOrder>> Operation::preview_tour() const {
   return guarded([&] {
-    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     std::vector<robot::RobotOrder> orders;
     for (const geometry::RigidTransform& pose : hand_eye_tour(present.base_from_tcp))
       orders.push_back(tour_order(plan_.robot, present, pose));
@@ -130,10 +154,10 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
   return guarded([&] {
     notify_(Step::register_robot, "hand-eye calibration");
     std::vector<tracker::HandEyePair> pairs;
-    const robot::RobotState begin = value_or_throw(robot_.wait_connected(robot_patience));
+    const robot::RobotState begin = value_or_throw(robot().wait_connected(robot_patience));
     const std::vector<geometry::RigidTransform> tour = hand_eye_tour(begin.base_from_tcp);
     for (const geometry::RigidTransform& pose : tour) {
-      const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+      const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
       const robot::RobotOrder order = tour_order(plan_.robot, present, pose);
       const PlanWatch age(plan_.limits, plan_.tracker, {.time_s = tracker::monotonic_seconds()});
       record("order", robot::to_json(order));
@@ -141,7 +165,7 @@ Expected<void> Operation::register_robot(const Confirm& confirm) {
       value_or_throw(age.young(tracker::monotonic_seconds()));
       carry_out(order, token, {}, sees_tool());
       const SeenPose seen = value_or_throw(see_tool(look("hand-eye"), plan_.tracker, plan_.tracker.tool));
-      const robot::RobotState at_rest = value_or_throw(robot_.wait_connected(robot_patience));
+      const robot::RobotState at_rest = value_or_throw(robot().wait_connected(robot_patience));
       pairs.push_back(
           {at_rest.base_from_tcp * plan_.robot.tool.flange_from_tcp.inverse(), seen.tracker_from_marker});
       notify_(Step::register_robot, fmt::format("pose {} of {}", pairs.size(), tour.size()));
@@ -170,7 +194,7 @@ Expected<robot::RobotOrder> Operation::plan_tunnel(const std::string& name) {
     const guidance::Poses now = value_or_throw(poses_now(window, plan_.tracker));
     const robot::TunnelAxis axis =
         axis_in_base(value_or_throw(tunnel_in_bone(*result_, tunnel)), now, *hand_eye_);
-    const robot::RobotState present = value_or_throw(robot_.wait_connected(robot_patience));
+    const robot::RobotState present = value_or_throw(robot().wait_connected(robot_patience));
     const PlanBasis basis = basis_of(tunnel, window, present);
     value_or_throw(refuse_moved_base(*hand_eye_, basis, present, plan_.limits));
     robot::RobotOrder order =
@@ -208,8 +232,10 @@ std::vector<guidance::Poses> Operation::exposures() const {
 }
 
 Expected<LiveTool> Operation::live_tool() const {
-  if (!result_ || !hand_eye_) return fail(Reason::usage, "no measurement or no registration yet");
-  return LiveTool(plan_, *result_, exposures(), *hand_eye_);
+  return guarded([&] {
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    return LiveTool(plan_, *result_, exposures(), tool());
+  });
 }
 
 Expected<PathPreview> Operation::preview(const robot::RobotOrder& order) const {
@@ -267,14 +293,15 @@ Expected<TunnelOutcome> Operation::go(const robot::RobotOrder& order, const std:
 
 TunnelOutcome Operation::check(const PlannedTunnel& tunnel) {
   const guidance::Poses now = value_or_throw(poses_now(look("verify"), plan_.tracker));
-  const verification::ToolLine line = value_or_throw(tool_line(
-      tunnel.name, tunnel.bone, views_.front().poses, now, marker_from_tcp(*hand_eye_, plan_.robot.tool)));
+  const TrackedTool tracked = tool();
+  const verification::ToolLine line =
+      value_or_throw(tool_line(tunnel.name, tunnel.bone, views_.front().poses, now, tracked.marker_from_tip));
   const pipeline::Result checked = run(now, {line});
   const auto end = [&](const std::string& name) {
     const auto point = std::ranges::find(checked.points, name, &pipeline::PointResult::name);
     if (point == checked.points.end() || !point->place || !point->place->in_tool)
       throw BadInput(Reason::not_seen, fmt::format("{}: is not located in the tool marker's frame", name));
-    return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, *hand_eye_, plan_.robot.tool);
+    return end_miss(*point->place->in_tool, *point->place->covariance_in_tool, tracked);
   };
   TunnelOutcome outcome{tunnel.name, {}, end(tunnel.start), end(tunnel.end), {}};
   if (!checked.verifications.empty()) outcome.verification = checked.verifications.front();

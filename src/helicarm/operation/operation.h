@@ -12,6 +12,7 @@
 
 #include "helicarm/devices/receiver/inbox.h"
 #include "helicarm/devices/robot/robot_link.h"
+#include "helicarm/operation/freehand.h"
 #include "helicarm/operation/image_delays.h"
 #include "helicarm/operation/live_tool.h"
 #include "helicarm/operation/plan_watch.h"
@@ -52,6 +53,10 @@ class Operation {
   static Expected<std::unique_ptr<Operation>> begin(
       OperationPlan plan, const std::filesystem::path& folder, const tracker::PoseBoard& board,
       robot::RobotLink& robot, Notify notify = [](Step, const std::string&) {});
+  /// For a plan with a hand-held drill: members that need a robot refuse (usage).
+  static Expected<std::unique_ptr<Operation>> begin_freehand(
+      OperationPlan plan, const std::filesystem::path& folder, const tracker::PoseBoard& board,
+      Notify notify = [](Step, const std::string&) {});
 
   const OperationPlan& plan() const { return plan_; }
   /// Name of the person who confirms orders from now on; goes into the session log.
@@ -129,6 +134,18 @@ class Operation {
   Expected<void> withdraw(const robot::RobotOrder& order, const robot::RobotState& rest,
                           const Confirm& confirm);
 
+  /// Begins to guide a hand-held drill to a tunnel, at the poses of the next 0.75 s. Refuses (usage) before
+  /// the measurement and before the bone's check points were touched; not_seen for a tunnel that is not
+  /// located; no_pose.
+  Expected<void> guide(const std::string& tunnel, double oldest_pose_s = FreehandGuide::oldest_pose_s);
+  /// The drill at the newest poses. A new decision is recorded with its samples before it is returned. Once
+  /// plan_stale, it stays so until `guide` is called again, and check points must be touched again. Refuses
+  /// (usage) before `guide`.
+  Expected<Guidance> guidance();
+  /// Compares the drill, held still in the drilled tunnel or along it, with the tunnel in the tracker's frame
+  /// and in the X-ray images. Ends its guidance.
+  Expected<TunnelOutcome> verify_drilled(const std::string& tunnel);
+
  private:
   static constexpr std::chrono::seconds robot_patience{5};
 
@@ -148,13 +165,18 @@ class Operation {
   };
 
   Operation(OperationPlan plan, std::filesystem::path folder, const tracker::PoseBoard& board,
-            robot::RobotLink& robot, Notify notify)
+            robot::RobotLink* robot, Notify notify)
       : plan_(std::move(plan)),
         folder_(std::move(folder)),
         board_(board),
         robot_(robot),
         notify_(std::move(notify)) {}
 
+  static Expected<std::unique_ptr<Operation>> begin(OperationPlan plan, const std::filesystem::path& folder,
+                                                    const tracker::PoseBoard& board, robot::RobotLink* robot,
+                                                    Notify notify);
+  robot::RobotLink& robot() const;
+  TrackedTool tool() const;
   const PlannedTunnel& tunnel_named(const std::string& name) const;
   void record(const std::string& kind, Json content);
   PoseWindow look(const char* why);
@@ -178,7 +200,7 @@ class Operation {
   OperationPlan plan_;
   std::filesystem::path folder_;
   const tracker::PoseBoard& board_;
-  robot::RobotLink& robot_;
+  robot::RobotLink* robot_;  ///< null for a hand-held drill
   Notify notify_;
   std::stop_source end_;
   std::unique_ptr<session::SessionLog> log_;
@@ -193,6 +215,8 @@ class Operation {
   std::optional<pipeline::Result> result_, newest_;
   std::optional<tracker::HandEye> hand_eye_;
   std::map<std::string, Planned> planned_;  ///< by tunnel
+  std::optional<FreehandGuide> guide_;
+  std::optional<Guidance> guided_;  ///< the last recorded decision
 };
 
 }  // namespace helicarm::operation

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/operation/plan.h"
 
+#include <algorithm>
+#include <cmath>
 #include <set>
 
 #include <fmt/format.h>
@@ -67,12 +69,15 @@ TrackerPlan tracker_from(JsonReader reader) {
   TrackerPlan tracker;
   tracker.address = reader.text("address");
   tracker.port = port_from(reader, "port");
+  tracker.rate_hz = reader.optional_number("rate_hz", {1, 1000}).value_or(tracker.rate_hz);
   tracker.femur = reader.text("femur");
   tracker.tibia = reader.text("tibia");
   tracker.tool = reader.text("tool");
   std::set<std::string> names;
   for (JsonReader& entry : reader.objects("facets", true, 16)) {
     tracker::Facet facet{entry.text("name"), pose_from(entry, "calibrator_from_facet")};
+    facet.sigma_mm = entry.optional_number("sigma_mm", {0, 10}).value_or(0);
+    facet.sigma_deg = entry.optional_number("sigma_deg", {0, 10}).value_or(0);
     take_once(entry, names, facet.name);
     entry.finish();
     tracker.facets.push_back(std::move(facet));
@@ -113,6 +118,20 @@ RobotPlan robot_from(JsonReader reader) {
   return robot;
 }
 
+HandDrill drill_from(JsonReader reader) {
+  HandDrill drill{Eigen::Vector3d(reader.numbers("tip_in_tool", 3, millimetres).data()),
+                  Eigen::Vector3d(reader.numbers("back_in_tool", 3, millimetres).data())};
+  drill.sigma_mm = reader.optional_number("sigma_mm", {0.001, 10}).value_or(drill.sigma_mm);
+  drill.tolerance_mm = reader.optional_number("tolerance_mm", {0.1, 10}).value_or(drill.tolerance_mm);
+  drill.tolerance_deg = reader.optional_number("tolerance_deg", {0.1, 45}).value_or(drill.tolerance_deg);
+  constexpr double shortest_mm = 20;
+  if ((drill.tip_in_tool - drill.back_in_tool).norm() < shortest_mm)
+    reader.refuse(Reason::bad_value, "back_in_tool",
+                  fmt::format("must be at least {:g} mm from \"tip_in_tool\"", shortest_mm));
+  reader.finish();
+  return drill;
+}
+
 PlannedTunnel tunnel_from(JsonReader& reader) {
   PlannedTunnel tunnel{reader.text("name"),
                        static_cast<guidance::Bone>(reader.choice("bone", {"femur", "tibia"})),
@@ -142,9 +161,12 @@ Json json_of(const TrackerPlan& tracker) {
   Json facets = Json::array();
   for (const tracker::Facet& facet : tracker.facets)
     facets.push_back({{"name", facet.name},
-                      {"calibrator_from_facet", geometry::json_rows(facet.calibrator_from_facet.matrix())}});
+                      {"calibrator_from_facet", geometry::json_rows(facet.calibrator_from_facet.matrix())},
+                      {"sigma_mm", facet.sigma_mm},
+                      {"sigma_deg", facet.sigma_deg}});
   return {{"address", tracker.address},
           {"port", tracker.port},
+          {"rate_hz", tracker.rate_hz},
           {"femur", tracker.femur},
           {"tibia", tracker.tibia},
           {"tool", tracker.tool},
@@ -155,6 +177,14 @@ Json json_of(const TrackerPlan& tracker) {
                           ? Json{{"name", tracker.pointer->name},
                                  {"tip_in_pointer", geometry::json_list(tracker.pointer->tip_in_pointer)}}
                           : Json()}};
+}
+
+Json json_of(const HandDrill& drill) {
+  return {{"tip_in_tool", geometry::json_list(drill.tip_in_tool)},
+          {"back_in_tool", geometry::json_list(drill.back_in_tool)},
+          {"sigma_mm", drill.sigma_mm},
+          {"tolerance_mm", drill.tolerance_mm},
+          {"tolerance_deg", drill.tolerance_deg}};
 }
 
 Json json_of(const RobotPlan& robot) {
@@ -181,6 +211,15 @@ Json json_of(const RobotPlan& robot) {
 
 }  // namespace
 
+guidance::TrackerNoise TrackerPlan::noise() const {
+  double mount_mm = 0, mount_deg = 0;
+  for (const tracker::Facet& facet : facets) {
+    mount_mm = std::max(mount_mm, facet.sigma_mm);
+    mount_deg = std::max(mount_deg, facet.sigma_deg);
+  }
+  return {std::hypot(sigma_mm, mount_mm), std::hypot(sigma_deg, mount_deg), guidance::Samples::independent};
+}
+
 Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
   return guarded([&] {
     JsonReader reader(json, origin);
@@ -190,7 +229,11 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
     plan.plate = reader.optional_text("plate");
     plan.views = views_from(reader);
     plan.tracker = tracker_from(reader.object("tracker"));
-    plan.robot = robot_from(reader.object("robot"));
+    if (!reader.raw("drill").is_null()) plan.drill = drill_from(reader.object("drill"));
+    if (!plan.drill)
+      plan.robot = robot_from(reader.object("robot"));
+    else if (!reader.raw("robot").is_null())
+      reader.refuse(Reason::bad_value, "robot", "must be null if \"drill\" is given");
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("tunnels", true, 20)) {
       plan.tunnels.push_back(tunnel_from(entry));
@@ -232,7 +275,8 @@ Json to_json(const OperationPlan& plan) {
           {"plate", plan.plate ? Json(*plan.plate) : Json()},
           {"views", plan.views},
           {"tracker", json_of(plan.tracker)},
-          {"robot", json_of(plan.robot)},
+          {"robot", plan.drill ? Json() : json_of(plan.robot)},
+          {"drill", plan.drill ? json_of(*plan.drill) : Json()},
           {"tunnels", std::move(tunnels)},
           {"check_points", std::move(check_points)},
           {"picks", plan.picks},

@@ -32,6 +32,7 @@ struct PlannedCheck {
 struct TrackerPlan {
   std::string address = "127.0.0.1";
   std::uint16_t port = 18944;
+  double rate_hz = 60;  ///< requested from the tracker
   std::string femur = "femur";
   std::string tibia = "tibia";
   std::string tool = "tool";
@@ -39,6 +40,9 @@ struct TrackerPlan {
   std::optional<Pointer> pointer;
   double sigma_mm = 0.12;  ///< error of a pose averaged over 1 s, per axis
   double sigma_deg = 0.05;
+
+  /// Of every reading, with the largest error of a facet's mount: it acts as one of the calibrator's reading.
+  guidance::TrackerNoise noise() const;
 
   const std::string& marker_of(guidance::Bone bone) const {
     return bone == guidance::Bone::femur ? femur : tibia;
@@ -53,6 +57,16 @@ struct RobotPlan {
   std::uint16_t script_port = 30002;
   robot::RobotTool tool;
   robot::ApproachOptions approach;
+};
+
+/// A tracked drill in a person's hand, instead of a robot: two points of its axis in the frame of its marker,
+/// each by pivoting (a long and a short bit) or touched by the pointer.
+struct HandDrill {
+  Eigen::Vector3d tip_in_tool;   ///< mm
+  Eigen::Vector3d back_in_tool;  ///< mm, at least 20 mm behind the tip
+  double sigma_mm = 0.2;         ///< of each point, per axis
+  double tolerance_mm = 1;       ///< of the tip's distance from the tunnel's axis
+  double tolerance_deg = 2;      ///< of the angle between drill and axis
 };
 
 enum class TunnelEnd { start, end };
@@ -79,6 +93,7 @@ struct OperationPlan {
   std::vector<std::string> views{"AP", "LAT"};  ///< in order of acquisition
   TrackerPlan tracker;
   RobotPlan robot;
+  std::optional<HandDrill> drill;  ///< if given, no robot is used
   std::vector<PlannedTunnel> tunnels;
   std::vector<PlannedCheck> check_points;
   Json picks = Json::array();  ///< as in case.json; may be set after the acquisition

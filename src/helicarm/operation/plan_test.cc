@@ -23,6 +23,35 @@ TEST(Plan, WrittenPlanReadsBackEqual) {
   EXPECT_EQ(to_json(*read), json);
 }
 
+TEST(Plan, HandHeldDrillTakesThePlaceOfTheRobot) {
+  OperationPlan freehand = plan();
+  freehand.drill = HandDrill{{1, -140, 3}, {2, -20, 5}, 0.15, 1.5, 3};
+  Json json = to_json(freehand);
+  EXPECT_TRUE(json["robot"].is_null());
+  const auto read = plan_from(json, "plan.json");
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(to_json(*read), json);
+  json["robot"] = to_json(plan())["robot"];
+  EXPECT_EQ(plan_from(json, "plan.json").error().reason, Reason::bad_value);
+}
+
+TEST(Plan, DrillWhosePointsCoincideIsRefused) {
+  OperationPlan freehand = plan();
+  freehand.drill = HandDrill{{1, -140, 3}, {1, -135, 3}};
+  EXPECT_EQ(plan_from(to_json(freehand), "plan.json").error().reason, Reason::bad_value);
+}
+
+TEST(Plan, ErrorOfAMountIsAddedToThatOfTheReadings) {
+  OperationPlan mounted = plan();
+  mounted.tracker.sigma_mm = 0.12;
+  mounted.tracker.facets[0].sigma_mm = 0.35;
+  mounted.tracker.facets[0].sigma_deg = 0.2;
+  const OperationPlan read = plan_from(to_json(mounted), "plan.json").value();
+  EXPECT_NEAR(read.tracker.noise().sigma_mm, 0.37, 1e-12);
+  EXPECT_NEAR(read.tracker.noise().sigma_deg, std::hypot(0.05, 0.2), 1e-12);
+  EXPECT_EQ(plan().tracker.noise().sigma_mm, 0.12);
+}
+
 TEST(Plan, UnknownKeyIsRefused) {
   Json json = to_json(plan());
   json["robot"]["speed"] = 1;

@@ -88,6 +88,19 @@ Motion motion_of(const Vector3d& point, const geometry::RigidTransform& from,
   return size_of(step_of(point, from, to));
 }
 
+Motion motion_since(const geometry::RigidTransform& then, std::span<const tracker::PoseSample> samples,
+                    std::span<const Vector3d> points) {
+  Motion most;
+  for (const Vector3d& point : points) {
+    std::vector<Vector6d> steps;
+    for (const tracker::PoseSample& sample : samples)
+      steps.push_back(step_of(point, then, sample.tracker_from_tool));
+    const Motion motion = size_of(median_of(steps));
+    most = {std::max(most.distance_mm, motion.distance_mm), motion.turn_deg};
+  }
+  return most;
+}
+
 Expected<void> check_motion(const std::string& what, const Motion& motion, const PlanLimits& limits,
                             const std::string& since, const std::string& then) {
   if (motion.distance_mm <= limits.distance_mm && motion.turn_deg <= limits.turn_deg) return {};
@@ -112,16 +125,8 @@ Expected<void> PlanWatch::young(double now_s) const {
 
 Expected<Motion> PlanWatch::bone_motion(const tracker::PoseBoard& board, double now_s) const {
   return guarded([&] {
-    const std::vector<tracker::PoseSample> samples = recent(board, basis_.bone, now_s, of_bone);
-    Motion most;
-    for (const Vector3d& point : basis_.points_in_bone) {
-      std::vector<Vector6d> steps;
-      for (const tracker::PoseSample& sample : samples)
-        steps.push_back(step_of(point, basis_.tracker_from_bone, sample.tracker_from_tool));
-      const Motion motion = size_of(median_of(steps));
-      most = {std::max(most.distance_mm, motion.distance_mm), motion.turn_deg};
-    }
-    return most;
+    return motion_since(basis_.tracker_from_bone, recent(board, basis_.bone, now_s, of_bone),
+                        basis_.points_in_bone);
   });
 }
 

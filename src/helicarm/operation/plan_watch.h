@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,10 @@ inline geometry::RigidTransform base_by_tool(const geometry::RigidTransform& tra
 /// Motion of this point of a body between two poses.
 Motion motion_of(const Eigen::Vector3d& point, const geometry::RigidTransform& from,
                  const geometry::RigidTransform& to);
+
+/// Componentwise median of a body's samples against its earlier pose, at the point that moved most.
+Motion motion_since(const geometry::RigidTransform& then, std::span<const tracker::PoseSample> samples,
+                    std::span<const Eigen::Vector3d> points);
 
 /// Above the limits: plan_stale with the values and the name of what moved. `since` and `then` are parts of
 /// the message.

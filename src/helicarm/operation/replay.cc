@@ -9,6 +9,7 @@
 #include "helicarm/core/files.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/case_of.h"
+#include "helicarm/operation/freehand.h"
 #include "helicarm/operation/records.h"
 #include "helicarm/session/session_log.h"
 #include "helicarm/xray/digest.h"
@@ -47,6 +48,8 @@ class Replay {
     if (record.kind == "end") report.finished = true;
     if (record.kind == "result") result(record, origin);
     if (record.kind == "hand_eye") hand_eye(record, origin);
+    if (record.kind == "guide") guide(record, origin);
+    if (record.kind == "guided") guided(record, origin);
   }
 
   ReplayReport report;
@@ -106,6 +109,7 @@ class Replay {
     const std::filesystem::path inside = value_or_throw(path_inside(session_, folder));
     const auto run = recompute_case(inside, plan_, cache_);
     if (!run) return differ(origin, run.error().message);
+    result_ = run->result;
     if (record.content.at("digest") == run->digest) return;
     const auto then = read_json(inside / "result.json");
     differ(origin,
@@ -121,8 +125,30 @@ class Replay {
     compare(record.content.at("found"), found ? to_json(*found) : Json(), origin, "hand-eye calibration");
   }
 
+  void guide(const session::SessionRecord& record, const std::string& origin) {
+    guide_.reset();
+    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
+    if (!plan_.drill || !result_) return differ(origin, "guidance without a drill or a measurement");
+    const auto begun = guarded([&] {
+      return value_or_throw(FreehandGuide::begin(
+          plan_, LiveTool(plan_, *result_, {}, tracked_tool(*plan_.drill)),
+          record.content.at("tunnel").get<std::string>(), value_or_throw(poses_now(window, plan_.tracker)),
+          record.content.at("oldest_pose_s").get<double>()));
+    });
+    if (begun) guide_ = *begun;  // the operation refused it as well and recorded no decision
+  }
+
+  void guided(const session::SessionRecord& record, const std::string& origin) {
+    ++report.decisions;
+    if (!guide_) return differ(origin, "a decision before guidance began");
+    const PoseWindow window = value_or_throw(pose_window_from(record.content.at("window"), origin));
+    compare(record.content.at("guidance"), to_json(guide_->at(window)), origin, "decision");
+  }
+
   std::filesystem::path session_;
   OperationPlan plan_;
+  std::optional<pipeline::Result> result_;
+  std::optional<FreehandGuide> guide_;
   pipeline::CalibrationCache cache_;
   std::map<std::string, std::string> image_digests_;
 };

@@ -18,6 +18,7 @@ struct ReplayReport {
   std::size_t images = 0;
   std::size_t results = 0;
   std::size_t hand_eyes = 0;
+  std::size_t decisions = 0;             ///< on a hand-held drill
   std::vector<std::string> differences;  ///< recomputed values that differ from the record
 };
 
@@ -25,7 +26,8 @@ struct ReplayReport {
 using GoOn = std::function<bool(std::size_t done, std::size_t all)>;
 
 /// Recomputes an operation from its record: acquisition poses from the tracker samples, each case from its
-/// images (which must be the recorded ones), the hand-eye calibration from its pairs; all must agree to the
+/// images (which must be the recorded ones), the hand-eye calibration from its pairs, decisions
+/// on a hand-held drill from the samples; all must agree to the
 /// last bit. Refuses as `read_session`; an empty record (bad_value); a stop by the callback (interrupted).
 Expected<ReplayReport> replay(
     const std::filesystem::path& session, const GoOn& go_on = [](std::size_t, std::size_t) { return true; });

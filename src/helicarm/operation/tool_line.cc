@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 namespace helicarm::operation {
@@ -64,6 +65,28 @@ geometry::RigidTransform marker_from_tcp(const tracker::HandEye& hand_eye, const
   return hand_eye.flange_from_marker.inverse() * tool.flange_from_tcp;
 }
 
+TrackedTool tracked_tool(const tracker::HandEye& hand_eye, const robot::RobotTool& tool) {
+  Matrix6d into_tip = Matrix6d::Zero();
+  into_tip.topLeftCorner<3, 3>() = into_tip.bottomRightCorner<3, 3>() =
+      tool.flange_from_tcp.rotation.transpose();
+  return {marker_from_tcp(hand_eye, tool),
+          into_tip * hand_eye.covariance.topLeftCorner<6, 6>() * into_tip.transpose()};
+}
+
+TrackedTool tracked_tool(const HandDrill& drill) {
+  const Vector3d along = drill.tip_in_tool - drill.back_in_tool;
+  const geometry::RigidTransform marker_from_tip{
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), along).toRotationMatrix(), drill.tip_in_tool};
+  // Errors e_t, e_b of tip and back along the tip's axes turn the axis by w = z x (e_t - e_b) / length and
+  // move a point x of the tip's frame by -e_t - w x x.
+  const Eigen::Matrix3d turn = cross_matrix(Vector3d::UnitZ()) / along.norm();
+  const Vector3d marker = marker_from_tip.inverse().translation;
+  Matrix6d effect;
+  effect << -Eigen::Matrix3d::Identity() + cross_matrix(marker) * turn, -cross_matrix(marker) * turn, -turn,
+      turn;
+  return {marker_from_tip, drill.sigma_mm * drill.sigma_mm * effect * effect.transpose()};
+}
+
 Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
                                               const tracker::HandEye& hand_eye, guidance::Bone bone,
                                               const geometry::RigidTransform& bone_from_target) {
@@ -101,18 +124,19 @@ Expected<verification::ToolLine> tool_line(const std::string& tunnel, guidance::
   });
 }
 
+PointAtTip at_tip(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
+                  const TrackedTool& tool) {
+  const geometry::RigidTransform tip_from_marker = tool.marker_from_tip.inverse();
+  const Eigen::Matrix3d& turn = tip_from_marker.rotation;
+  const Eigen::Matrix<double, 3, 6> effect = carried(turn * point_in_marker).topRows<3>();
+  return {tip_from_marker * point_in_marker,
+          turn * covariance * turn.transpose() + effect * tool.covariance * effect.transpose()};
+}
+
 EndMiss end_miss(const Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
-                 const tracker::HandEye& hand_eye, const robot::RobotTool& tool) {
-  const geometry::RigidTransform& flange_from_marker = hand_eye.flange_from_marker;
-  const Eigen::Matrix3d tcp_from_flange = tool.flange_from_tcp.rotation.transpose();
-  const Vector3d in_tcp = tool.flange_from_tcp.inverse() * (flange_from_marker * point_in_marker);
-  const Eigen::Matrix<double, 3, 6> effect =
-      carried(flange_from_marker.rotation * point_in_marker).topRows<3>();
-  const Eigen::Matrix3d in_flange =
-      flange_from_marker.rotation * covariance * flange_from_marker.rotation.transpose() +
-      effect * hand_eye.covariance.topLeftCorner<6, 6>() * effect.transpose();
-  return {in_tcp.head<2>(),
-          (tcp_from_flange * in_flange * tcp_from_flange.transpose()).topLeftCorner<2, 2>()};
+                 const TrackedTool& tool) {
+  const PointAtTip end = at_tip(point_in_marker, covariance, tool);
+  return {end.point.head<2>(), end.covariance.topLeftCorner<2, 2>()};
 }
 
 }  // namespace helicarm::operation

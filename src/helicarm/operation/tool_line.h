@@ -27,6 +27,23 @@ robot::TunnelAxis axis_in_base(const TunnelInBone& tunnel, const guidance::Poses
 /// The tool's tip (z along it) in its marker's frame.
 geometry::RigidTransform marker_from_tcp(const tracker::HandEye& hand_eye, const robot::RobotTool& tool);
 
+/// A tool with a marker, held by a robot or by hand.
+struct TrackedTool {
+  geometry::RigidTransform marker_from_tip;  ///< z along the tool
+  /// Error of tip_from_marker: shift (mm) and rotation (rad) about the marker's origin, along the tip's axes.
+  tracker::PoseCovariance covariance;
+};
+TrackedTool tracked_tool(const tracker::HandEye& hand_eye, const robot::RobotTool& tool);
+TrackedTool tracked_tool(const HandDrill& drill);
+
+/// A point of the marker's frame in that of the tip.
+struct PointAtTip {
+  Eigen::Vector3d point;       ///< mm
+  Eigen::Matrix3d covariance;  ///< of the point and of the tool's calibration, mm^2
+};
+PointAtTip at_tip(const Eigen::Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
+                  const TrackedTool& tool);
+
 /// Poses of the target's bone and of the tool in this window; covariance: scatter of the samples.
 Expected<robot::ToolMeasurement> measure_tool(const PoseWindow& window, const OperationPlan& plan,
                                               const tracker::HandEye& hand_eye, guidance::Bone bone,
@@ -49,6 +66,6 @@ struct EndMiss {
 
 /// `point_in_marker` and its covariance are "in_tool" of `PointInFrames`.
 EndMiss end_miss(const Eigen::Vector3d& point_in_marker, const Eigen::Matrix3d& covariance,
-                 const tracker::HandEye& hand_eye, const robot::RobotTool& tool);
+                 const TrackedTool& tool);
 
 }  // namespace helicarm::operation

@@ -16,18 +16,18 @@ using Eigen::Vector3d;
 
 robot::RobotTool drill() { return {{geometry::rotation_from_euler(0, 0.1, 0), {3, -2, 150}}, 1.2}; }
 
+TrackedTool tool() { return tracked_tool(exact_hand_eye(), drill()); }
+
 TEST(ToolLine, ToolOnTheTunnelHasNoMiss) {
   const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
-  const EndMiss miss =
-      end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
+  const EndMiss miss = end_miss(marker_from_tip * Vector3d(0, 0, 35), Eigen::Matrix3d::Zero(), tool());
   EXPECT_NEAR(miss.distance_mm(), 0, 1e-9);
   EXPECT_NEAR(miss.predicted_mm(), 0, 1e-9);
 }
 
 TEST(ToolLine, MissIsMeasuredAcrossTheAxisOnly) {
   const geometry::RigidTransform marker_from_tip = marker_from_tcp(exact_hand_eye(), drill());
-  const EndMiss miss =
-      end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), exact_hand_eye(), drill());
+  const EndMiss miss = end_miss(marker_from_tip * Vector3d(0.3, -0.4, 20), Eigen::Matrix3d::Zero(), tool());
   EXPECT_NEAR(miss.distance_mm(), 0.5, 1e-9);
   EXPECT_TRUE(miss.across_mm.isApprox(Eigen::Vector2d(0.3, -0.4), 1e-9));
 }
@@ -38,7 +38,7 @@ TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
   const Eigen::Matrix3d of_point = Vector3d(0.04, 0.01, 0.09).asDiagonal();
   known.covariance.topLeftCorner<3, 3>().diagonal().setConstant(0.01);
   known.covariance.block<3, 3>(3, 3).diagonal().setConstant(1e-6);
-  const EndMiss expected = end_miss(point, of_point, known, drill());
+  const EndMiss expected = end_miss(point, of_point, tracked_tool(known, drill()));
   RandomStream random(3, 1);
   const auto normal = [&] { return Vector3d(random.normal(), random.normal(), random.normal()); };
   Eigen::Matrix2d drawn = Eigen::Matrix2d::Zero();
@@ -50,7 +50,26 @@ TEST(ToolLine, CovarianceOfAMissAgreesWithSampledErrors) {
         geometry::rotation_from_vector(1e-3 * normal()) * off.flange_from_marker.rotation;
     const Vector3d at = point + of_point.cwiseSqrt() * normal();
     const Eigen::Vector2d error =
-        end_miss(at, Eigen::Matrix3d::Zero(), off, drill()).across_mm - expected.across_mm;
+        end_miss(at, Eigen::Matrix3d::Zero(), tracked_tool(off, drill())).across_mm - expected.across_mm;
+    drawn += error * error.transpose() / trials;
+  }
+  EXPECT_LT((drawn - expected.covariance).norm(), 0.04 * expected.covariance.norm());
+}
+
+TEST(ToolLine, CovarianceOfAHandDrillAgreesWithSampledPoints) {
+  // Along the marker's z: the arbitrary rotation about the drill's axis then does not vary.
+  const HandDrill known{{10, -5, 140}, {10, -5, 20}, 0.3};
+  const Vector3d point(20, 2, 190);
+  const PointAtTip expected = at_tip(point, Eigen::Matrix3d::Zero(), tracked_tool(known));
+  RandomStream random(4, 1);
+  const auto normal = [&] { return Vector3d(random.normal(), random.normal(), random.normal()); };
+  Eigen::Matrix3d drawn = Eigen::Matrix3d::Zero();
+  constexpr int trials = 20000;
+  for (int i = 0; i < trials; ++i) {
+    HandDrill off = known;
+    off.tip_in_tool += known.sigma_mm * normal();
+    off.back_in_tool += known.sigma_mm * normal();
+    const Vector3d error = at_tip(point, Eigen::Matrix3d::Zero(), tracked_tool(off)).point - expected.point;
     drawn += error * error.transpose() / trials;
   }
   EXPECT_LT((drawn - expected.covariance).norm(), 0.04 * expected.covariance.norm());

@@ -158,6 +158,9 @@ std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double lea
     of_fiducial[rejected.image.fiducial].push_back(&rejected);
   std::optional<MovedFiducial> most;
   for (const auto& [fiducial, images] : of_fiducial) {
+    // What moved stays moved: a single image between others is disturbed, such as by another ball beside it.
+    const bool inner = images.front()->view > 0 && images.front()->view + 1 < fit.problem.views.size();
+    if (images.size() == 1 && inner) continue;
     const Eigen::Vector3d& centre = fit.fit.centres[fiducial];
     MovedFiducial moved{fiducial, 0, {}};
     std::vector<geometry::RayObservation> ray_observations;

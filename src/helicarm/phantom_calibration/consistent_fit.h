@@ -39,7 +39,7 @@ struct MovedFiducial {
 };
 
 /// The fiducial that moved most, of those with two rejected images or more that agree with each other, or one
-/// that is off by more than `least_mm`.
+/// in the first or last view, that is off by more than `least_mm`. The views are in the order of acquisition.
 std::optional<MovedFiducial> moved_fiducial(const ConsistentFit& fit, double least_mm);
 
 }  // namespace helicarm::phantom_calibration

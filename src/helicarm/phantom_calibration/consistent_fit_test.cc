@@ -37,6 +37,15 @@ TEST(ConsistentFit, FiducialThatMovedBeforeTheLastTwoViewsIsNamedWithItsMotion) 
   EXPECT_NEAR(moved->moved_mm, std::sqrt(1.25), 0.2);
 }
 
+TEST(ConsistentFit, SingleDisturbedImageBetweenOthersIsNoMotion) {
+  BundleProblem problem = synthetic_problem(helix_centres(), 6, noise_px, 2);
+  move(problem, 3, {0.6, -0.8, 0.5});
+  const auto fit = adjust_without_outliers(std::move(problem));
+  ASSERT_TRUE(fit) << fit.error().message;
+  EXPECT_EQ(fit->rejected.size(), 1u);
+  EXPECT_FALSE(moved_fiducial(*fit, least_mm));
+}
+
 TEST(ConsistentFit, MotionBelowTheLimitIsNoRefusal) {
   BundleProblem problem = synthetic_problem(helix_centres(), 6, noise_px, 3);
   move(problem, 5, {0.1, 0.1, 0});

@@ -359,7 +359,11 @@ Expected<PhantomResult> measure_phantom(const pipeline::Case& given, const Phant
   if (!options.from_scratch) result.nominal = given.calibrator;
   result.calibrator = result.nominal.value_or(phantom::Calibrator{});
   result.calibrator.tolerance_mm = 0;
-  if (options.from_scratch) result.calibrator.name = "measured";
+  constexpr std::string_view mark = "-measured";
+  if (options.from_scratch)
+    result.calibrator.name = "measured";
+  else if (!result.calibrator.name.ends_with(mark))
+    result.calibrator.name += mark;
   const auto refuse = [&](const Failure& failure) -> Expected<PhantomResult> {
     if (exit_code(failure.reason) == 2) return tl::unexpected<Failure>(failure);
     result.failure = failure;

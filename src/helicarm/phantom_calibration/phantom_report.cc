@@ -11,7 +11,6 @@
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/image/png.h"
 #include "helicarm/report/markup.h"
-#include "helicarm/report/style.h"
 
 namespace helicarm::phantom_calibration {
 namespace {
@@ -236,21 +235,10 @@ double predicted_tre_mm(const std::vector<Vector3d>& balls, double ball_rms_mm, 
 }
 
 std::string phantom_report_html(const PhantomResult& result) {
-  std::string html = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
-      "content=\"width=device-width, initial-scale=1\"/>\n<title>helicarm "
-      "phantom</title>\n<style>{}</style>\n"
-      "</head>\n<body>\n<header>\n<h1>Phantom {}</h1>\n<p class=\"notice\">Research instrument, not a "
-      "medical "
-      "device.</p>\n</header>\n<main>\n",
-      report::report_style, report::escaped(result.calibrator.name));
-  html += summary(result) + warnings(result) + nominal_section(result) + balls_section(result) +
-          views_section(result);
-  return html +
-         fmt::format(
-             "</main>\n<footer><p class=\"soft\">helicarm {}. Millimetres and pixels.</p></footer>\n</body>\n"
-             "</html>\n",
-             HELICARM_VERSION);
+  return report::page_html("helicarm phantom", "Phantom " + result.calibrator.name,
+                           summary(result) + warnings(result) + nominal_section(result) +
+                               balls_section(result) + views_section(result),
+                           ". Millimetres and pixels.");
 }
 
 Expected<void> write_phantom(const PhantomResult& result, const std::filesystem::path& folder) {

@@ -49,7 +49,7 @@ Advice of_ambiguous_labels(const Result& result) {
   Advice advice{
       {"the calibrator looks alike from this side: `helicarm phantom check` names its symmetries",
        "too few of its balls are in the field, or metal hides them",
-       "the calibrator's file deviates from the phantom by more than its tolerance"},
+       "calibrator.json describes another phantom, or deviates from it by more than its tolerance"},
       "turn the C-arm by 10 to 15 degrees and acquire the view again, with the whole calibrator in the "
       "field"};
   if (has_figure(*result.failure, "mirror_differs")) {
@@ -75,7 +75,11 @@ Advice of_mismatch(const Result& result) {
   if (has_figure(*result.failure, "fitting_pixel_mm") ||
       has_figure(*result.failure, "fitting_source_detector_mm")) {
     std::swap(advice.causes[0], advice.causes[1]);
-    advice.next = "correct the pixel size or the source distance as the message states";
+    advice.next =
+        "compare the calibrator with its file first (number, diameter and places of the balls); correct the "
+        "pixel "
+        "size or the source distance only if another source, such as the C-arm's manual, confirms the new "
+        "value";
   }
   return advice;
 }

@@ -62,6 +62,23 @@ Eigen::Vector3d centre_of(const calibration::CalibrationResult& calibration) {
   return sum / count;
 }
 
+/// As `check_views_apart`, in the calibrator's frame or in the tracker's: a calibrator on the receiver turns
+/// with the C-arm and looks alike in all views.
+Expected<void> check_apart(const calibration::CalibrationResult& calibration, const Case& given) {
+  const Eigen::Vector3d centre = centre_of(calibration);
+  auto apart = calibration::check_views_apart(calibration.views, centre);
+  const auto pose = [](const CaseView& view) { return view.poses.tracker_from_calibrator; };
+  if (apart ||
+      !std::ranges::all_of(given.views, [&](const CaseView& view) { return pose(view).has_value(); }))
+    return apart;
+  std::vector<calibration::CalibratedView> views = calibration.views;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    geometry::RigidTransform& camera_from_world = views[i].view.camera_from_world;
+    camera_from_world = camera_from_world * pose(given.views[i])->inverse();
+  }
+  return calibration::check_views_apart(views, *pose(given.views.front()) * centre);
+}
+
 Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& given,
                                      const RunOptions& options) {
   std::optional<calibration::LearnedIntrinsics> history;
@@ -83,7 +100,7 @@ Expected<CaseCalibration> calibrated(const LabelledViews& views, const Case& giv
   return (options.method == rectification::Method::paper ? calibration::calibrate_paper(fiducials, how)
                                                          : calibration::calibrate(fiducials, how))
       .and_then([&](calibration::CalibrationResult result) {
-        return calibration::check_views_apart(result.views, centre_of(result)).map([&] {
+        return check_apart(result, given).map([&] {
           return CaseCalibration{std::move(result), {}, history, {}, {}};
         });
       });

@@ -137,6 +137,15 @@ Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
         {{"file_over_true", 1 + scale.excess}, {"sigma", sigma}}};
     if (std::abs(scale.excess) > refuse_sigmas * sigma)
       return tl::unexpected<Failure>(std::move(disagreement));
+    if (calibration.found_tolerance_mm > 0)
+      return tl::unexpected<Failure>(
+          {Reason::calibrator_mismatch,
+           fmt::format(
+               "the fiducials deviate by {:.2g} mm rms from the calibrator's file, and {}: the case names "
+               "another calibrator than the one in the images, or its file is wrong",
+               calibration.ball_rms_mm, disagreement.message),
+           {},
+           disagreement.figures});
     calibration.warnings.push_back(std::move(disagreement));
   }
   for (Warning& warning : displaced_balls(calibration, images, given.calibrator))
@@ -185,10 +194,13 @@ std::vector<Warning> scale_notes(const Case& given, const CaseCalibration& calib
     strain = fmt::format(", nor strains of it below {:.2g} %", 100 * warn_sigmas * calibration.strain_sigma);
   }
   note.message = fmt::format(
-      "images do not show the calibrator's absolute size{}: an error of 1 % of its file moves points by "
-      "up to {:.2g} mm. Measure it and state scale_sigma, or compare the distances of the fiducials' centre "
-      "from the source with a tape measure: {}",
-      strain, most, distances);
+      "images do not show the calibrator's absolute size{}: an error of 1 % of its file moves points by {}. "
+      "Measure "
+      "it and state scale_sigma, or compare the distances of the fiducials' centre from the source with a "
+      "tape "
+      "measure: {}",
+      strain, points.empty() ? "1 % of their distance from its middle" : fmt::format("up to {:.2g} mm", most),
+      distances);
   return {note};
 }
 

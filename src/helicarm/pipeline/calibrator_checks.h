@@ -24,8 +24,9 @@ bool is_mirrored_without_statement(bool is_mirrored, const xray::XrayImage& xray
 /// Checks the calibrator's file against the images. Refuses `ambiguous_labels` if a third of the fiducials
 /// and as many candidates are unexplained, `ambiguous_handedness` if every image is mirrored without a tag or
 /// `mirrored` in the case, `scale_disagrees` if the scale deviates by ten sigma, `calibrator_mismatch` if
-/// labels required an assumed tolerance and the offsets differ between views. Warns if the scale deviates by
-/// three sigma, and of displaced or exchanged fiducials.
+/// labels required an assumed tolerance and the offsets differ between views, or if the fiducials deviate
+/// from the file and the scale by three sigma. Warns if the scale deviates by three sigma, and of displaced
+/// or exchanged fiducials.
 Expected<CaseCalibration> check_calibrator(CaseCalibration calibration,
                                            const std::vector<LabelledView>& images, const Case& given);
 

@@ -68,15 +68,48 @@ guidance::Poses poses_from(JsonReader reader, bool now) {
   return poses;
 }
 
+fs::path file_named(const std::string& name, const JsonReader& reader, const char* key,
+                    const fs::path& folder) {
+  const auto path = path_inside(folder, name);
+  if (!path) reader.refuse(path.error().reason, key, path.error().message);
+  return *path;
+}
+
 std::optional<fs::path> file_from(JsonReader& reader, const char* key, const fs::path& folder) {
   const auto name = reader.optional_text(key, 1000);
-  if (!name) return std::nullopt;
-  return value_or_throw(path_inside(folder, *name));
+  return name ? std::optional(file_named(*name, reader, key, folder)) : std::nullopt;
+}
+
+/// A pose whose translation is in metres: turned against the tracker's frame, yet within 10 mm of its origin.
+/// A frame that is a marker's own, or follows one, is not turned.
+bool looks_like_metres(const geometry::RigidTransform& pose) {
+  constexpr double least_mm = 10, jitter_mm = 0.1, least_turn_rad = 0.1;
+  const double distance = pose.translation.norm();
+  return distance > jitter_mm && distance < least_mm &&
+         Eigen::AngleAxisd(pose.rotation).angle() > least_turn_rad;
+}
+
+void refuse_metres_in(const guidance::Poses& poses, const std::string& where) {
+  for (const auto& [key, pose] : {std::pair{"tracker_from_calibrator", &poses.tracker_from_calibrator},
+                                  {"tracker_from_femur", &poses.tracker_from_femur},
+                                  {"tracker_from_tibia", &poses.tracker_from_tibia},
+                                  {"tracker_from_tool", &poses.tracker_from_tool}})
+    if (*pose && looks_like_metres(**pose))
+      throw BadInput(
+          {Reason::bad_value,
+           fmt::format("case.json: {}: \"{}\" is {:.3g} mm from the tracker's origin, at least 10 mm are "
+                       "expected: give translations in mm, not in metres",
+                       where, key, (*pose)->translation.norm()),
+           {},
+           {{"distance_mm", (*pose)->translation.norm()}}});
 }
 
 /// Refuses poses in metres: no tracker measures within 10 mm of its origin, and all measure within 10 m.
 void refuse_metres(const Case& read) {
   constexpr double least_mm = 10;
+  for (std::size_t i = 0; i < read.views.size(); ++i)
+    refuse_metres_in(read.views[i].poses, fmt::format("views[{}].poses", i));
+  refuse_metres_in(read.poses_now, "poses_now");
   double farthest = 0;
   const auto update = [&](const guidance::Poses& poses) {
     for (const auto* pose : {&poses.tracker_from_calibrator, &poses.tracker_from_femur,
@@ -98,16 +131,23 @@ void refuse_metres(const Case& read) {
 CaseView view_from(JsonReader reader, const fs::path& folder) {
   CaseView view;
   view.name = name_from(reader, "name");
-  view.image = value_or_throw(path_inside(folder, reader.text("image", 1000)));
+  view.image = file_named(reader.text("image", 1000), reader, "image", folder);
   if (!reader.raw("frame").is_null()) view.frame = reader.integer("frame", 1, 100000);
   view.plate_image = file_from(reader, "plate_image", folder);
   view.map = file_from(reader, "map", folder);
   if (view.plate_image && view.map)
     reader.refuse(Reason::bad_value, "map", "cannot be combined with \"plate_image\"");
-  if (reader.has("mirrored")) view.mirrored = reader.boolean("mirrored", false);
+  if (!reader.raw("mirrored").is_null()) view.mirrored = reader.boolean("mirrored", false);
   if (!reader.raw("poses").is_null()) view.poses = poses_from(reader.object("poses"), false);
   reader.finish();
   return view;
+}
+
+BoneLabel bone_from(JsonReader reader) {
+  BoneLabel bone{name_from(reader, "name")};
+  if (!reader.raw("side").is_null()) bone.side = static_cast<Side>(reader.choice("side", {"left", "right"}));
+  reader.finish();
+  return bone;
 }
 
 Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
@@ -122,6 +162,7 @@ Pick pick_from(JsonReader reader, const std::vector<CaseView>& views) {
   pick.sigma_px = reader.optional_number("sigma_px", {0, 100});
   if (!reader.raw("moves_with").is_null())
     pick.moves_with = static_cast<guidance::Bone>(reader.choice("moves_with", {"femur", "tibia"}));
+  if (!reader.raw("bone").is_null()) pick.bone = bone_from(reader.object("bone"));
   reader.finish();
   return pick;
 }
@@ -245,6 +286,7 @@ Case case_of(const Json& json, const std::string& origin, const fs::path& folder
   JsonReader reader(json, origin);
   reader.choice("format", {"helicarm-case/1"});
   reader.optional_text("notes", most_note_characters);
+  reader.raw("models");  // of the registration
   Case read;
   read.folder = folder;
   read_calibrator_of(read, reader, purpose);
@@ -276,6 +318,10 @@ Json to_json(const Pick& pick) {
   if (pick.snap == Snap::ball) json["snap"] = "ball", json["diameter_mm"] = pick.diameter_mm;
   if (pick.sigma_px) json["sigma_px"] = *pick.sigma_px;
   if (pick.moves_with) json["moves_with"] = *pick.moves_with == guidance::Bone::femur ? "femur" : "tibia";
+  if (pick.bone) {
+    json["bone"] = {{"name", pick.bone->name}};
+    if (pick.bone->side) json["bone"]["side"] = *pick.bone->side == Side::left ? "left" : "right";
+  }
   return json;
 }
 

@@ -30,6 +30,16 @@ struct CaseView {
 
 enum class Snap { none, ball };
 
+enum class Side { left, right };
+
+/// What a point lies on, in the user's words; it changes no result, unlike `moves_with`.
+struct BoneLabel {
+  std::string name;
+  std::optional<Side> side = {};
+
+  bool operator==(const BoneLabel&) const = default;
+};
+
 /// A pick in one view, raw pixels. Picks of one name in several views are one point.
 struct Pick {
   std::string name;
@@ -39,6 +49,7 @@ struct Pick {
   double diameter_mm = 3;          ///< of the ball to snap to
   std::optional<double> sigma_px;  ///< per axis; 0: exact
   std::optional<guidance::Bone> moves_with;
+  std::optional<BoneLabel> bone = {};
 };
 
 /// An element of case.json's "picks".

@@ -22,7 +22,8 @@ Json& picks_of(Json& json) {
 Json new_pick(const Json& picks, const std::string& name, const std::string& view) {
   Json pick = {{"name", name}, {"view", view}, {"uv", nullptr}};
   for (const Json& other : picks)
-    if (is_named(other, name) && other.contains("moves_with")) pick["moves_with"] = other["moves_with"];
+    for (const char* key : {"moves_with", "bone"})
+      if (is_named(other, name) && other.contains(key)) pick[key] = other[key];
   return pick;
 }
 

@@ -16,9 +16,9 @@ struct PickedCase {
 };
 
 /// Adds the picks of a table name, view, u_px, v_px[, sigma_px] (raw px) to a case.json. A pick of the same
-/// name and view takes the table's pixel and keeps its other keys; a new one takes `moves_with` from the
-/// picks of its name. Refuses what `case_from_json` refuses of the result, and a table without rows or that
-/// gives a pick twice.
+/// name and view takes the table's pixel and keeps its other keys; a new one takes `moves_with` and
+/// `bone` from the picks of its name. Refuses what `case_from_json` refuses of the result, and a table
+/// without rows or that gives a pick twice.
 Expected<PickedCase> with_picks(Json json, const CsvTable& table, const std::filesystem::path& folder);
 
 /// A case.json with these picks in place of its own, and with those tunnels that it does not name and whose

@@ -75,6 +75,25 @@ TEST_F(CaseFile, PosesInMetresAreRefused) {
   EXPECT_TRUE(read().has_value());
 }
 
+TEST_F(CaseFile, SinglePoseInMetresIsRefusedByName) {
+  json_["views"][0]["poses"]["tracker_from_femur"] = Json::parse("[[1,0,0,300],[0,1,0,200],[0,0,1,1500]]");
+  json_["views"][0]["poses"]["tracker_from_calibrator"] =
+      Json::parse("[[0,-1,0,0.3],[1,0,0,0.2],[0,0,1,1.5]]");
+  EXPECT_EQ(failure().reason, Reason::bad_value);
+  EXPECT_NE(failure().message.find("tracker_from_calibrator"), std::string::npos) << failure().message;
+  // Small, but not turned: the tracker's frame follows this marker.
+  json_["views"][0]["poses"]["tracker_from_calibrator"] =
+      Json::parse("[[1,0,0,0.3],[0,1,0,0.2],[0,0,1,1.5]]");
+  EXPECT_TRUE(read().has_value());
+}
+
+TEST_F(CaseFile, NullMeansNotStated) {
+  json_["views"][1]["mirrored"] = nullptr;
+  const auto read_back = read();
+  ASSERT_TRUE(read_back.has_value()) << read_back.error().message;
+  EXPECT_FALSE(read_back->views[1].mirrored);
+}
+
 TEST_F(CaseFile, ReadsAllValues) {
   json_["views"][0]["poses"]["tracker_from_calibrator"] = Json::parse("[[0,-1,0,5],[1,0,0,6],[0,0,1,7]]");
   json_["tracker"] = Json::parse(R"({"sigma_mm": 0.12, "sigma_deg": 0.05, "samples": "shared"})");
@@ -262,13 +281,21 @@ TEST_F(CaseFile, NegativeSigmaOfAPickIsRefused) {
 TEST(Case, RoundTripOfPicks) {
   std::vector<Pick> picks{{"FS", "AP", {512.25, 300.5}, Snap::ball, 3, {}, guidance::Bone::femur},
                           {"FS", "LAT", {401, 299}, Snap::none, 3, 0.5, guidance::Bone::femur}};
+  picks[0].bone = {"condyle", Side::right};
+  picks[1].bone = {"femur"};
   Json json = Json::array();
   for (const Pick& pick : picks) json.push_back(to_json(pick));
   std::vector<CaseView> views(2);
   views[0].name = "AP", views[1].name = "LAT";
   const auto again = picks_from(json, "plan", views).value();
   ASSERT_EQ(again.size(), 2U);
-  for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(to_json(again[i]), to_json(picks[i]));
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(to_json(again[i]), to_json(picks[i]));
+    EXPECT_EQ(again[i].bone, picks[i].bone);
+  }
+  json[0]["bone"]["side"] = "medial";
+  EXPECT_EQ(picks_from(json, "plan", views).error().reason, Reason::bad_value);
+  json[0]["bone"]["side"] = "left";
   views.pop_back();
   EXPECT_EQ(picks_from(json, "plan", views).error().reason, Reason::bad_value);
 }

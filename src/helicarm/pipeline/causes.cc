@@ -94,8 +94,10 @@ std::optional<FittedFocal> fitted_focal(const Trial& trial, unsigned threads) {
 }
 
 void add_pixel(Failure& failure, double file_mm, double fitting_mm) {
-  failure.message += fmt::format(". A pixel size of {:.4g} mm fits, the file has {:.4g} mm: correct it",
-                                 fitting_mm, file_mm);
+  failure.message += fmt::format(
+      ". A pixel size of {:.4g} mm fits, the file has {:.4g} mm: either it is wrong, or the case names "
+      "another plate or calibrator than the one in the image",
+      fitting_mm, file_mm);
   failure.figures["file_pixel_mm"] = file_mm;
   failure.figures["fitting_pixel_mm"] = fitting_mm;
 }
@@ -112,7 +114,7 @@ void add_distance(Failure& failure, double file_mm, double fitting_mm, std::opti
     failure.figures["file_pixel_mm"] = *file_pixel_mm;
     failure.figures["fitting_pixel_mm"] = fitting_pixel_mm;
   }
-  failure.message += ": correct it";
+  failure.message += ": either it is wrong, or the case names another calibrator than the one in the image";
 }
 
 /// The image with its columns resampled, as wide as `factor` times.

@@ -98,7 +98,8 @@ Expected<Result> locate_case(const Case& given, const CaseCalibration& calibrati
   append(result.notes, scale_notes(given, calibration, result.points));
   result.tunnel_ends = tunnel_ends(given.tunnels, result.points);
   const auto done =
-      plan_tunnels(given, result)  // Eq. 16
+      check_picks_agree(result)
+          .and_then([&] { return plan_tunnels(given, result); })  // Eq. 16
           .and_then([&](std::vector<guidance::Tunnel> tunnels) {
             result.tunnels = std::move(tunnels);
             return verify_tool_lines(given, calibration.views, result);  // Eq. 17

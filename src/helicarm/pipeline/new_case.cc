@@ -140,6 +140,9 @@ void set_plate(NewCase& made, const std::vector<InspectedImage>& images, const N
                const fs::path& folder) {
   PlateChoice choice{options.plate, "as given"};
   if (!choice.plate && options.maps.size() == images.size()) choice = {"none", "every view has a map"};
+  if (!choice.plate && !options.plate_images.empty())
+    throw BadInput(Reason::usage,
+                   "--plate is missing: --plate-image needs the file of its plate, plate.json or plate48");
   if (!choice.plate) choice = choose_plate(images);
   if (!choice.plate)
     throw BadInput(

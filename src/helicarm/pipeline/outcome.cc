@@ -87,6 +87,40 @@ Expected<std::vector<verification::Verification>> verify_tool_lines(
   });
 }
 
+Expected<void> check_picks_agree(const Result& result) {
+  constexpr std::size_t least_picks = 2;
+  const bool deviates = std::ranges::any_of(result.warnings, [](const Warning& warning) {
+    return warning.reason == Reason::calibrator_deviates || warning.reason == Reason::calibrator_strained ||
+           warning.reason == Reason::scale_disagrees;
+  });
+  std::vector<double> gaps;
+  std::size_t missed = 0;
+  for (const PointResult& point : result.points)
+    if (point.place && point.source == localization::PointSource::pick) {
+      gaps.push_back(point.ray_gap_mm);
+      missed += point.rays_miss;
+    }
+  if (!deviates || gaps.size() < least_picks || missed < gaps.size()) return {};
+  const auto [least, largest] = std::ranges::minmax(gaps);
+  return fail(
+      Reason::calibrator_mismatch,
+      fmt::format("every picked point contradicts the calibration (ray gaps of {:.3g} to {:.3g} mm), and the "
+                  "fiducials deviate from the calibrator's file: the case names another calibrator than the "
+                  "one in the images, or its file is wrong",
+                  least, largest),
+      {{"picks", double(gaps.size())}, {"least_gap_mm", least}, {"largest_gap_mm", largest}});
+}
+
+std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::string& tunnel, bool start) {
+  const auto found =
+      std::ranges::find(result.tunnels, tunnel, &guidance::Tunnel::name) - result.tunnels.begin();
+  if (std::size_t(found) >= result.tunnel_ends.size()) return {};
+  const TunnelEnds& ends = result.tunnel_ends[std::size_t(found)];
+  const auto& place = result.points[start ? ends.start : ends.end].place;
+  if (!place || !place->covariance_in_tool) return {};
+  return localization::length_at_95(*place->covariance_in_tool);
+}
+
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
   std::vector<Warning> warnings;
   const auto uid_of = [](const ViewResult& view) {
@@ -94,7 +128,9 @@ std::vector<Warning> reused_uids(const std::vector<ViewResult>& views) {
   };
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t j = 0; j < i; ++j)
-      if (const std::string uid = uid_of(views[i]); !uid.empty() && uid == uid_of(views[j]))
+      if (const std::string uid = uid_of(views[i]);
+          !uid.empty() && uid == uid_of(views[j]) &&
+          views[i].xray_image->acquisition.instance_key != views[j].xray_image->acquisition.instance_key)
         warnings.push_back({Reason::uid_reused,
                             fmt::format("{} and {} differ, but have the same SOP Instance UID (0008,0018)",
                                         views[j].name, views[i].name)});
@@ -157,10 +193,14 @@ Expected<std::vector<Warning>> check_certain(const std::vector<PointResult>& poi
   std::vector<Warning> warnings;
   for (const PointResult& point : points) {
     if (!point.place) continue;
-    const double error = localization::length_at_95(point.place->covariance_in_calibrator);
+    const auto& in_tool = point.place->covariance_in_tool;
+    double error = localization::length_at_95(point.place->covariance_in_calibrator);
+    const bool worse_in_tool = in_tool && localization::length_at_95(*in_tool) > error;
+    if (worse_in_tool) error = localization::length_at_95(*in_tool);
     if (error <= limit) continue;
-    const std::string message = fmt::format(
-        "the 95 % error of \"{}\" is {:.3g} mm, over the limit of {:g} mm", point.name, error, limit);
+    const std::string message =
+        fmt::format("the 95 % error of \"{}\"{} is {:.3g} mm, over the limit of {:g} mm", point.name,
+                    worse_in_tool ? " in the tool's frame" : "", error, limit);
     const std::map<std::string, double> figures{{"error_95_mm", error}, {"limit_mm", limit}};
     if (max_error_mm) return fail(Reason::uncertain, message, figures);
     warnings.push_back({Reason::uncertain, message, {}, figures});

@@ -26,6 +26,13 @@ Expected<std::vector<guidance::Tunnel>> plan_tunnels(const Case& given, const Re
 Expected<std::vector<verification::Verification>> verify_tool_lines(
     const Case& given, const std::vector<calibration::CalibratedView>& views, const Result& result);
 
+/// 95 % error (mm) of a tunnel's start or end in the tool's frame; nothing if it is not known there.
+std::optional<double> tunnel_end_error_in_tool(const Result& result, const std::string& tunnel, bool start);
+
+/// Refuses (calibrator_mismatch) where every one of two or more picked points contradicts the calibration,
+/// and the fiducials deviate from the calibrator's file: another calibrator, whose labels fit by chance.
+Expected<void> check_picks_agree(const Result& result);
+
 /// Different images with one SOP Instance UID (uid_reused).
 std::vector<Warning> reused_uids(const std::vector<ViewResult>& views);
 

@@ -8,18 +8,37 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/parallel.h"
+#include "helicarm/fiducials/paper_circles.h"
 
 namespace helicarm::pipeline {
 namespace {
 
 constexpr double least_sigma_px = 0.01;  ///< of an exact pick among other rays
 
+double radius_px(double diameter_mm, const geometry::View& camera, const Eigen::Vector3d& place) {
+  return 0.5 * diameter_mm * std::abs(camera.intrinsics.fy) / camera.depth(place);
+}
+
+Expected<fiducials::ImagePoint> ball_at(const Pick& pick, const LabelledView& image,
+                                        const calibration::CalibratedView& calibrated,
+                                        const Eigen::Vector3d& centre) {
+  const rectification::DistortionMap& map = image.rectification.map;
+  const geometry::View& camera = calibrated.view;
+  if (!calibrated.by_paper)
+    return fiducials::snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
+                                   pick.diameter_mm, image.rectification.noise);
+  return fiducials::point_of_click(map, pick.uv_raw, 0).and_then([&](const fiducials::ImagePoint& click) {
+    return fiducials::circle_near(*image.xray_image, map, click.uv,
+                                  radius_px(pick.diameter_mm, camera, centre));
+  });
+}
+
 Expected<fiducials::ImagePoint> observe_pick(const Pick& pick, const LabelledView& image,
-                                             const geometry::View& camera, const Eigen::Vector3d& centre) {
+                                             const calibration::CalibratedView& calibrated,
+                                             const Eigen::Vector3d& centre) {
   const rectification::DistortionMap& map = image.rectification.map;
   if (pick.snap == Snap::ball) {
-    auto seen = fiducials::snap_to_ball(*image.xray_image, map, camera, camera.depth(centre), pick.uv_raw,
-                                        pick.diameter_mm, image.rectification.noise);
+    auto seen = ball_at(pick, image, calibrated, centre);
     if (seen && pick.sigma_px) seen->sigma_px = *pick.sigma_px;
     return seen;
   }
@@ -50,6 +69,22 @@ std::vector<detection::Disc> detections_of(const LabelledView& image, const geom
       discs.push_back({ball.uv_raw, (1 + rim_share) * 0.5 * calibrator.balls[k].diameter_mm * px_per_mm});
     }
   return discs;
+}
+
+Expected<fiducials::ImagePoint> observe_target(const phantom::CalibratorTarget& target,
+                                               const LabelledView& image,
+                                               const calibration::CalibratedView& calibrated,
+                                               const std::vector<fiducials::Fiducial>& fiducials,
+                                               const phantom::Calibrator& calibrator) {
+  const rectification::DistortionMap& map = image.rectification.map;
+  const geometry::View& camera = calibrated.view;
+  const Eigen::Vector3d& place = target.point_in_calibrator;
+  if (calibrated.by_paper && target.kind == phantom::TargetKind::ball && camera.depth(place) > 0)
+    return fiducials::circle_near(*image.xray_image, map, camera.project(place),
+                                  radius_px(target.diameter_mm, camera, place));
+  return fiducials::find_target(*image.xray_image, map, camera, target,
+                                detections_of(image, camera, fiducials, calibrator),
+                                image.rectification.noise);
 }
 
 /// A pick or a target in one view.
@@ -150,13 +185,10 @@ Expected<std::vector<PointResult>> observe_points(const Case& given, const CaseC
   parallel_for(tasks.size(), threads, [&](std::size_t i) {
     const Task& task = tasks[i];
     const LabelledView& image = calibration.images[task.view];
-    const geometry::View& camera = calibration.views[task.view].view;
-    const auto seen =
-        task.pick ? observe_pick(*task.pick, image, camera, centre)
-                  : fiducials::find_target(
-                        *image.xray_image, image.rectification.map, camera, *task.target,
-                        detections_of(image, camera, calibration.fiducials[task.view], given.calibrator),
-                        image.rectification.noise);
+    const calibration::CalibratedView& view = calibration.views[task.view];
+    const auto seen = task.pick ? observe_pick(*task.pick, image, view, centre)
+                                : observe_target(*task.target, image, view, calibration.fiducials[task.view],
+                                                 given.calibrator);
     if (seen)
       points[task.point].seen[task.view] = *seen;
     else

@@ -116,7 +116,7 @@ Json json_of(const ViewResult& view) {
                                         {"runner_up_rms_px", view.found->runner_up_rms_px}}
                                  : Json(nullptr);
   for (const char* key : {"projection", "dlt", "intrinsics", "camera_from_calibrator", "reprojection_rms_px",
-                          "chi2", "dof", "condition"})
+                          "chi2", "dof", "condition", "method"})
     json[key] = nullptr;
   if (const auto& calibrated = view.calibrated) {
     json["projection"] = matrix(calibrated->view.projection());
@@ -127,6 +127,7 @@ Json json_of(const ViewResult& view) {
     json["chi2"] = number(calibrated->chi2);
     json["dof"] = calibrated->dof;
     json["condition"] = number(calibrated->condition);
+    json["method"] = calibrated->by_paper ? "paper" : "best";
   }
   return json;
 }

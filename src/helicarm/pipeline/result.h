@@ -29,8 +29,9 @@ namespace helicarm::pipeline {
 
 struct RunOptions {
   rectification::Method method = rectification::Method::best;
-  std::optional<double> max_error_mm;  ///< refuse (uncertain) if a point's 95 % error exceeds it
-  unsigned threads = 0;                ///< 0: all cores
+  std::optional<double>
+      max_error_mm;      ///< refuse (uncertain) if a point's 95 % error, also in the tool's frame, exceeds it
+  unsigned threads = 0;  ///< 0: all cores
   std::optional<calibration::CArmHistory> history = {};  ///< C-arm history, used as prior
   /// Motion of an untracked bone between the acquisitions, per axis; in the covariance of its points.
   double motion_sigma_mm = 0;

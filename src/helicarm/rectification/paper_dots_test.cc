@@ -33,5 +33,24 @@ TEST(FindDotsPaper, EmptyFieldHasNone) {
   EXPECT_TRUE(find_dots_paper(image::Image<float>(128, 128, 2000), 0, 4095, 6, 10).empty());
 }
 
+TEST(PaperStages, ShowTheCirclesWhereTheyWereFound) {
+  image::Image<float> image(120, 90);
+  for (float& pixel : image.pixels()) pixel = 1000;
+  detection::Dot circle;
+  circle.centre_px = {70.25, 40.5};
+  circle.radius_px = 8;
+  for (int y = 0; y < 90; ++y)
+    for (int x = 0; x < 120; ++x)
+      if ((Eigen::Vector2d(x, y) - circle.centre_px).norm() < 8) image(x, y) = 300;
+  const PaperStages stages = paper_stages(image, 0, 1000, {circle});
+  EXPECT_EQ(stages.raw(5, 5), 255);
+  EXPECT_EQ(stages.median(70, 40), stages.raw(70, 40));
+  EXPECT_EQ(stages.circles(70, 40), 255);
+  EXPECT_EQ(stages.circles(82, 40), 0);
+  EXPECT_EQ(stages.edges(70, 40), 0);
+  const auto edges = stages.edges.pixels();
+  EXPECT_GT(std::count(edges.begin(), edges.end(), 255), 30);
+}
+
 }  // namespace
 }  // namespace helicarm::rectification

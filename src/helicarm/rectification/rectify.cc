@@ -317,6 +317,7 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
             map.is_identity() ? "there is no map, but distortion bends" : "the map does not fit",
             fit->map.residual_rms_px, limit),
         {{"residual_rms_px", fit->map.residual_rms_px}});
+  result.map_confirmed = fit.has_value();
   result.other_dots = detection::dots_except(*result.other_dots, members);
   return result;
 }

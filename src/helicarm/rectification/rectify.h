@@ -29,6 +29,7 @@ struct Rectification {
   detection::Polarity metal = detection::Polarity::dark;  ///< polarity of metal in this image
   /// Metal dots that are not the plate's; nothing if metal was not searched for.
   std::optional<std::vector<detection::Dot>> other_dots;
+  bool map_confirmed = false;         ///< of a given map: a plate in the image is straight in it
   double other_dots_from_px = 2;      ///< smallest radius that was searched for them
   detection::NoiseCorrelation noise;  ///< of the image
   std::vector<Warning> warnings;

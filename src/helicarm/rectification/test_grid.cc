@@ -24,9 +24,14 @@ using Eigen::Vector2i;
 using Complex = std::complex<double>;
 using Points = std::vector<Complex>;
 
+struct IdealGrid {
+  Points places;
+  double pitch = 0;
+};
+
 /// In the plane a similarity is w = scale z + shift with complex numbers; its least-squares fit is one
 /// division.
-Points ideal_places(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
+IdealGrid ideal_grid(const Points& ideal, const Points& seen, const std::vector<std::size_t>& central) {
   Complex ideal_middle;
   Complex seen_middle;
   for (const std::size_t k : central) {
@@ -40,9 +45,9 @@ Points ideal_places(const Points& ideal, const Points& seen, const std::vector<s
     squares += std::norm(ideal[k] - ideal_middle);
   }
   const Complex scale = mixed / squares;
-  Points places;
-  for (const Complex& place : ideal) places.push_back(seen_middle + scale * (place - ideal_middle));
-  return places;
+  IdealGrid grid{{}, std::abs(scale)};
+  for (const Complex& place : ideal) grid.places.push_back(seen_middle + scale * (place - ideal_middle));
+  return grid;
 }
 
 std::vector<double> distances(const Points& p, const Points& q) {
@@ -82,26 +87,32 @@ std::optional<Vector2d> predicted(const Grid& grid, const Vector2i& at, const Ve
 }
 
 /// All wires of a grid have one width. False crossings (a wire at the edge of the field, a wire behind a
-/// plate dot) are wider or much less sharp; the factors separate both kinds on simulated images.
+/// plate dot) are wider, much less sharp or fitted badly; the factors separate both kinds on simulated
+/// images.
 struct Likeness {
   double radius_px = 0;
   double sigma_px = 0;
+  double misfit = 0;
 
   explicit Likeness(const std::vector<detection::Dot>& crosses) {
     std::vector<double> radii;
     std::vector<double> sigmas;
+    std::vector<double> misfits;
     for (const detection::Dot& cross : crosses) {
       radii.push_back(cross.radius_px);
       sigmas.push_back(cross.sigma_px);
+      misfits.push_back(cross.misfit);
     }
     if (crosses.empty()) return;
     radius_px = middle_of(radii);
     sigma_px = middle_of(sigmas);
+    misfit = middle_of(misfits);
   }
-  bool width_fits(const detection::Dot& cross) const {
-    return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px;
+  bool fits(const detection::Dot& cross) const {
+    return cross.radius_px > 0.6 * radius_px && cross.radius_px < 1.7 * radius_px &&
+           cross.misfit < 2 * misfit;
   }
-  bool holds(const detection::Dot& cross) const { return width_fits(cross) && cross.sigma_px < 4 * sigma_px; }
+  bool holds(const detection::Dot& cross) const { return fits(cross) && cross.sigma_px < 4 * sigma_px; }
 
  private:
   static double middle_of(std::vector<double> values) {
@@ -186,7 +197,7 @@ std::vector<detection::Dot> find_grid(const xray::XrayImage& xray_image) {
       const auto cross = detection::fit_cross(xray_image, start, angle_of({1, 0}, 0),
                                               angle_of({0, 1}, std::numbers::pi / 2), dots);
       if (cross && (cross->centre_px - start.centre_px).norm() < 0.05 * lattice.pitch_px &&
-          cross->sigma_px < 0.5 && alike.width_fits(*cross))
+          cross->sigma_px < 0.5 && alike.fits(*cross))
         complete.push_back(*cross);
     }
   return complete;
@@ -236,13 +247,35 @@ Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses,
     raw.push_back(complex_of(grid.raw_px[k]));
     rectified.push_back(complex_of(grid.rectified_px[k]));
   }
-  const Points raw_ideal = ideal_places(ideal, raw, central);
+  const Points raw_ideal = ideal_grid(ideal, raw, central).places;
   for (const Complex& place : raw_ideal) grid.raw_ideal_px.emplace_back(place.real(), place.imag());
   grid.raw_error_px = distances(raw, raw_ideal);
-  grid.rectified_error_px = distances(rectified, ideal_places(ideal, rectified, central));
+  const IdealGrid rectified_ideal = ideal_grid(ideal, rectified, central);
+  grid.rectified_pitch_px = rectified_ideal.pitch;
+  grid.rectified_error_px = distances(rectified, rectified_ideal.places);
   grid.raw = summed(grid.raw_error_px);
   grid.rectified = summed(grid.rectified_error_px);
   return grid;
+}
+
+Expected<void> check_pitch(const TestGrid& grid, double pitch_mm, const DistortionMap& map,
+                           std::optional<double> source_detector_mm) {
+  constexpr double highest_mm = 150;
+  constexpr double nearest_source_mm = 700;  // of C-arms, where the image does not state it
+  constexpr double pixel_tolerance = 0.05;   // of the nominal pixel size, and from plate to receiver
+  if (!map.rectified_pixel_mm) return {};
+  const double at_receiver_mm = grid.rectified_pitch_px * *map.rectified_pixel_mm;
+  const double least_mm = (1 - pixel_tolerance) * at_receiver_mm *
+                          (1 - highest_mm / source_detector_mm.value_or(nearest_source_mm));
+  const double most_mm = (1 + pixel_tolerance) * at_receiver_mm;
+  if (pitch_mm >= least_mm && pitch_mm <= most_mm) return {};
+  return fail(
+      Reason::bad_value,
+      fmt::format("test grid: pitch {} mm, but the crossings are {:.1f} to {:.1f} mm apart for a grid 0 "
+                  "to {} mm in front of the receiver; state the grid's pitch, or make the map of this "
+                  "C-arm's plate",
+                  pitch_mm, least_mm, most_mm, highest_mm),
+      {{"pitch_mm", pitch_mm}, {"least_mm", least_mm}, {"most_mm", most_mm}});
 }
 
 }  // namespace helicarm::rectification

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,6 +24,7 @@ struct TestGrid {
   GridError raw;
   GridError rectified;
   int crosses = 0;
+  double rectified_pitch_px = 0;        ///< of the ideal grid
   std::vector<Eigen::Vector2d> raw_px;  ///< the crossings on the grid
   std::vector<Eigen::Vector2d> rectified_px;
   std::vector<Eigen::Vector2d> raw_ideal_px;  ///< Eq. 14 in the raw image
@@ -42,5 +44,10 @@ enum class GridFit { nine, all };
 /// nine.
 Expected<TestGrid> measure_test_grid(const std::vector<detection::Dot>& crosses, const DistortionMap& map,
                                      GridFit fit = GridFit::nine);
+
+/// bad_value if a grid of this pitch, 0 to 150 mm in front of the receiver, cannot have the measured one. Not
+/// checked where the map has no pixel size.
+Expected<void> check_pitch(const TestGrid& grid, double pitch_mm, const DistortionMap& map,
+                           std::optional<double> source_detector_mm);
 
 }  // namespace helicarm::rectification

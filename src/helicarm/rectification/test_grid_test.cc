@@ -154,6 +154,45 @@ TEST(FindGrid, PlateDotsAndFieldRimDoNotMoveCrossings) {
   }
 }
 
+TEST(FindGrid, CrossingOnTheFieldRimOrUnderAPlateDotIsLeftOut) {
+  for (const std::uint64_t seed : {519, 540}) {  // one at the rim was 3.7 px off, one under a dot 1 px
+    simulation::SimulationOptions options;
+    options.seed = seed;
+    options.kind = simulation::CaseKind::grid;
+    options.grid_distances_mm = {25.0 + double((seed - 500) * 37 % 126)};
+    const simulation::SimulatedView view = simulation::simulate_case(options)->views[1];
+    const std::vector<detection::Dot> crosses = find_grid(exposure_of(view));
+    int kept = 0;
+    int in_field = 0;
+    for (const simulation::TruePoint& truth : view.crosses) {
+      const bool inside = truth.visibility != simulation::Visibility::outside;
+      in_field += inside;
+      for (const detection::Dot& cross : crosses)
+        if (const double error = (truth.raw - cross.centre_px).norm(); error < 20) {
+          EXPECT_LT(error, 0.2) << truth.name;
+          kept += inside;
+        }
+    }
+    EXPECT_GE(kept, in_field - 2);
+  }
+}
+
+TEST(TestGridPitch, ContradictionToThePixelSizeIsNamed) {
+  DistortionMap map = identity_map(side, side, 0.7);
+  const auto measured = measure_test_grid(grid(), map);
+  ASSERT_TRUE(measured);
+  EXPECT_NEAR(measured->rectified_pitch_px, 30, 1e-9);
+  EXPECT_TRUE(check_pitch(*measured, 21, map, 1000));  // at the receiver
+  EXPECT_TRUE(check_pitch(*measured, 18, map, 1000));  // 143 mm in front of it
+  for (const double wrong : {7.0, 16.0, 23.0}) {
+    const auto checked = check_pitch(*measured, wrong, map, 1000);
+    ASSERT_FALSE(checked) << wrong;
+    EXPECT_EQ(checked.error().reason, Reason::bad_value);
+  }
+  map.rectified_pixel_mm = {};
+  EXPECT_TRUE(check_pitch(*measured, 7, map, 1000));
+}
+
 TEST(FindGrid, EmptyFieldHasNoCrossings) {
   EXPECT_TRUE(find_grid(noisy(detection::drawn::Shade(side, side))).empty());
 }

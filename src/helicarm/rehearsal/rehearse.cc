@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "helicarm/core/random.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/connections.h"
 
@@ -20,9 +21,14 @@ using virtual_devices::VirtualDevices;
 constexpr std::chrono::seconds patience{20};
 constexpr double image_patience_s = 20;
 constexpr int most_attempts = 3;
+constexpr std::chrono::seconds drilling_patience{60};
+constexpr double raise_s = 2;  ///< to the next tunnel
 /// The pose window of an acquisition is the 1.5 s before an image's arrival.
 constexpr std::chrono::milliseconds before_exposure{1800};
 constexpr double chi2_95_of_two = 5.991;
+
+constexpr std::uint32_t drill_stream = 2901;
+constexpr double drill_sigma_mm = 0.1;
 
 /// Of virtual_tracker: rms drift per axis, and rotation error after averaging over 1 s.
 constexpr double kept_sigma_mm = 0.114;
@@ -81,22 +87,109 @@ Expected<void> expose(const std::string& view, VirtualDevices& virtual_or, opera
   return taken;
 }
 
+operation::RobotPlan robot_plan(const robot::VirtualUr& robot,
+                                const virtual_devices::SimulatedScene& simulated_scene) {
+  operation::RobotPlan plan;
+  plan.rtde_port = robot.rtde_port();
+  plan.dashboard_port = robot.dashboard_port();
+  plan.script_port = robot.script_port();
+  plan.tool = simulated_scene.tool();
+  plan.approach.corrections.most = 8;
+  plan.approach.corrections.tolerance_mm = 0.25;
+  plan.approach.corrections.tolerance_deg = 0.25;
+  return plan;
+}
+
+/// As two pivot calibrations of the drill would find it: with errors of its own standard deviation.
+operation::HandDrill calibrated_drill(const virtual_devices::HeldDrill& drill) {
+  RandomStream random(drill.seed(), drill_stream);
+  const auto error = [&] {
+    return Eigen::Vector3d(drill_sigma_mm *
+                           Eigen::Vector3d(random.normal(), random.normal(), random.normal()));
+  };
+  const geometry::RigidTransform& marker_from_tip = drill.marker_from_tip();
+  return {marker_from_tip.translation + error(), marker_from_tip * Eigen::Vector3d(0, 0, -120) + error(),
+          drill_sigma_mm};
+}
+
+void add_ends(Rehearsal& done, const operation::PlannedTunnel& tunnel,
+              const operation::TunnelOutcome& outcome, VirtualDevices& virtual_or) {
+  using verification::Verification, verification::LineError;
+  const auto in_xrays = [&](const std::optional<LineError> Verification::*end) {
+    return outcome.verification ? (*outcome.verification).*end : std::nullopt;
+  };
+  done.ends.push_back(end_error(tunnel.start, outcome.start, in_xrays(&Verification::start), virtual_or));
+  done.ends.push_back(end_error(tunnel.end, outcome.end, in_xrays(&Verification::end), virtual_or));
+}
+
+/// Virtual devices and an operation on them, after its measurement.
+struct Stage {
+  Stage(std::uint64_t seed, const std::filesystem::path& folder, const RehearsalOptions& options,
+        bool freehand) {
+    options.notify("starting the virtual devices");
+    virtual_devices::VirtualDevicesOptions ports{seed, options.image_size, options.tracker_rate_hz, 0, 0, 0,
+                                                 0};
+    ports.freehand = freehand;
+    virtual_or = value_or_throw(VirtualDevices::open(ports));
+    const operation::OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
+    devices = std::make_unique<operation::Connections>(
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
+    receiver::ReceiverOptions receiving;
+    receiving.port = 0;
+    value_or_throw(devices->listen(receiving));
+    const auto notify = [say = options.notify](operation::Step step, const std::string& what) {
+      say(fmt::format("{}: {}", operation::name_of(step), what));
+    };
+    using operation::Operation;
+    operation =
+        value_or_throw(freehand ? Operation::begin_freehand(plan, folder, devices->board(), notify)
+                                : Operation::begin(plan, folder, devices->board(), devices->robot(), notify));
+    operation->confirmed_by("the rehearsal");
+    for (const std::string& view : plan.views)
+      value_or_throw(expose(view, *virtual_or, *devices, *operation));
+    value_or_throw(operation->measure());
+  }
+
+  std::unique_ptr<VirtualDevices> virtual_or;
+  std::unique_ptr<operation::Connections> devices;
+  std::unique_ptr<operation::Operation> operation;
+};
+
+/// A person who turns and shifts the drill by half of what is shown, and advances while on target.
+void drill_by_guidance(operation::Operation& operation, virtual_devices::HeldDrill& drill) {
+  constexpr double look_s = 0.1, part = 0.5, advance_mm = 1.5;
+  const auto until = std::chrono::steady_clock::now() + drilling_patience;
+  for (;;) {
+    const operation::Guidance shown = value_or_throw(operation.guidance());
+    if (shown.aim && shown.aim->depth_mm >= shown.aim->length_mm) return;
+    if (std::chrono::steady_clock::now() > until)
+      throw BadInput(Reason::off_target, fmt::format("the tunnel was not drilled in {} s; last decision: {}",
+                                                     drilling_patience.count(), shown.decision()));
+    if (const auto& aim = shown.aim) {
+      const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), aim->axis));
+      const double way_mm = shown.why_not ? 0 : advance_mm;
+      drill.correct({Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix(),
+                     part * aim->to_axis_mm + way_mm * aim->axis},
+                    look_s);
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(look_s));
+  }
+}
+
 }  // namespace
 
 operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t tracker_port) {
   operation::OperationPlan plan;
   plan.tracker.port = tracker_port;
+  plan.tracker.rate_hz = virtual_or.tracker().rate_hz();
   for (const virtual_devices::TrackedFacet& facet : virtual_devices::calibrator_facets())
     plan.tracker.facets.push_back({facet.name, facet.calibrator_from_facet});
   plan.tracker.sigma_mm = kept_sigma_mm;
   plan.tracker.sigma_deg = kept_sigma_deg;
-  plan.robot.rtde_port = virtual_or.robot().rtde_port();
-  plan.robot.dashboard_port = virtual_or.robot().dashboard_port();
-  plan.robot.script_port = virtual_or.robot().script_port();
-  plan.robot.tool = virtual_or.simulated_scene().tool();
-  plan.robot.approach.corrections.most = 8;
-  plan.robot.approach.corrections.tolerance_mm = 0.25;
-  plan.robot.approach.corrections.tolerance_deg = 0.25;
+  if (const robot::VirtualUr* robot = virtual_or.robot_if_any())
+    plan.robot = robot_plan(*robot, virtual_or.simulated_scene());
+  else
+    plan.drill = calibrated_drill(virtual_or.drill());
   // Both tunnels are drilled from outside the joint.
   plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", operation::TunnelEnd::end},
                   {"tibia", guidance::Bone::tibia, "TS", "TE", operation::TunnelEnd::start}};
@@ -108,53 +201,50 @@ operation::OperationPlan plan_for(VirtualDevices& virtual_or, std::uint16_t trac
 Expected<Rehearsal> rehearse(std::uint64_t seed, const std::filesystem::path& folder,
                              const RehearsalOptions& options) {
   return guarded([&] {
-    options.notify("starting the virtual devices");
-    virtual_devices::VirtualDevicesOptions ports{seed, options.image_size, options.tracker_rate_hz, 0, 0, 0,
-                                                 0};
-    const auto virtual_or = value_or_throw(VirtualDevices::open(ports));
-    const operation::OperationPlan plan = plan_for(*virtual_or, virtual_or->tracker().port());
-
-    operation::Connections devices(plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
-    receiver::ReceiverOptions receiving;
-    receiving.port = 0;
-    value_or_throw(devices.listen(receiving));
-    robot::RobotLink& robot = devices.robot();
-    const auto operation = value_or_throw(operation::Operation::begin(
-        plan, folder, devices.board(), robot, [&](operation::Step step, const std::string& what) {
-          options.notify(fmt::format("{}: {}", operation::name_of(step), what));
-        }));
-
-    for (const std::string& view : plan.views) value_or_throw(expose(view, *virtual_or, devices, *operation));
-    value_or_throw(operation->measure());
-
+    const Stage stage(seed, folder, options, false);
+    operation::Operation& operation = *stage.operation;
+    robot::RobotLink& robot = stage.devices->robot();
     const auto nod = [&](const robot::RobotOrder& order) -> Expected<std::string> {
       return robot.confirm(order);
     };
     value_or_throw(robot.wait_connected(patience));
-    operation->confirmed_by("the rehearsal");
     value_or_throw(robot.unlock("the rehearsal"));
-    value_or_throw(operation->register_robot(nod));
-    if (options.move_bones) stir(virtual_or->simulated_scene());
+    value_or_throw(operation.register_robot(nod));
+    if (options.move_bones) stir(stage.virtual_or->simulated_scene());
     std::this_thread::sleep_for(before_exposure);  // until the gate accepts the bones again
 
-    Rehearsal done{seed, {}, operation->hand_eye().rms_mm, 0};
-    for (const operation::PlannedTunnel& tunnel : plan.tunnels) {
+    Rehearsal done{seed, {}, operation.hand_eye().rms_mm};
+    for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
       const robot::RobotState rest = value_or_throw(robot.wait_connected(patience));
-      const robot::RobotOrder order = value_or_throw(operation->plan_tunnel(tunnel.name));
-      value_or_throw(value_or_throw(operation->live_tool()).overlay(devices.board(), tunnel.bone));
-      const operation::TunnelOutcome outcome = value_or_throw(operation->go(order, robot.confirm(order)));
-      const auto in_xrays = [&](const std::optional<verification::LineError> verification::Verification::*end)
-          -> std::optional<verification::LineError> {
-        return outcome.verification ? (*outcome.verification).*end : std::nullopt;
-      };
-      done.ends.push_back(
-          end_error(tunnel.start, outcome.start, in_xrays(&verification::Verification::start), *virtual_or));
-      done.ends.push_back(
-          end_error(tunnel.end, outcome.end, in_xrays(&verification::Verification::end), *virtual_or));
+      const robot::RobotOrder order = value_or_throw(operation.plan_tunnel(tunnel.name));
+      value_or_throw(value_or_throw(operation.live_tool()).overlay(stage.devices->board(), tunnel.bone));
+      const operation::TunnelOutcome outcome = value_or_throw(operation.go(order, robot.confirm(order)));
+      add_ends(done, tunnel, outcome, *stage.virtual_or);
       done.corrections += static_cast<int>(outcome.loop.size()) - 1;
-      value_or_throw(operation->withdraw(order, rest, nod));
+      value_or_throw(operation.withdraw(order, rest, nod));
     }
-    value_or_throw(operation->finish());
+    value_or_throw(operation.finish());
+    return done;
+  });
+}
+
+Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem::path& folder,
+                                      const RehearsalOptions& options) {
+  return guarded([&] {
+    const Stage stage(seed, folder, options, true);
+    operation::Operation& operation = *stage.operation;
+    virtual_devices::HeldDrill& drill = stage.virtual_or->drill();
+    if (options.move_bones) stir(stage.virtual_or->simulated_scene());
+    Rehearsal done{seed, {}};
+    for (const operation::PlannedTunnel& tunnel : operation.plan().tunnels) {
+      const std::string bone = tunnel.bone == guidance::Bone::femur ? "femur" : "tibia";
+      drill.move(bone, drill.on_tunnel(bone, -40, 4, 5), raise_s);
+      std::this_thread::sleep_for(std::chrono::duration<double>(raise_s) + before_exposure);
+      value_or_throw(operation.guide(tunnel.name));
+      drill_by_guidance(operation, drill);
+      add_ends(done, tunnel, value_or_throw(operation.verify_drilled(tunnel.name)), *stage.virtual_or);
+    }
+    value_or_throw(operation.finish());
     return done;
   });
 }

@@ -34,11 +34,17 @@ struct Rehearsal {
   std::vector<EndError> ends;
   double hand_eye_rms_mm = 0;
   int corrections = 0;  ///< of the closed loops
+  int attempts = 1;     ///< 1 + operations that a busy machine aborted before
 };
 
 /// The plan for an operation with the virtual devices; the picks lie near the balls, as a surgeon's clicks
 /// would.
 operation::OperationPlan plan_for(virtual_devices::VirtualDevices& virtual_or, std::uint16_t tracker_port);
+
+/// The same without a robot: a virtual person turns and shifts the drill as the guidance shows, and advances
+/// it while it is on target. `hand_eye_rms_mm` and `corrections` are 0.
+Expected<Rehearsal> rehearse_freehand(std::uint64_t seed, const std::filesystem::path& folder,
+                                      const RehearsalOptions& options);
 
 /// One pair of bones from the first X-ray image to verification, over the real protocols through sockets:
 /// C-STORE, OpenIGTLink, RTDE, dashboard and script. `folder` holds the session. Fails with the first

@@ -10,6 +10,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/core/files.h"
 #include "helicarm/core/json.h"
+#include "helicarm/geometry/import_matrix.h"
 #include "helicarm/rectification/rectified_dicom.h"
 #include "helicarm/report/overlay.h"
 
@@ -107,13 +108,14 @@ std::string matrix_text(const pipeline::ViewResult& view) {
          rows_of(view.calibrated->view.projection(), " ");
 }
 
-/// L1 to L11, one column per view: u = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y + L11 z + 1), v with L5 to
-/// L8.
+/// L1 to L11, one column per view, in XMALab's pixels: u + 1 = (L1 x + L2 y + L3 z + L4) / (L9 x + L10 y +
+/// L11 z + 1), height - v with L5 to L8.
 std::string dlt_csv(const std::vector<const pipeline::ViewResult*>& views) {
   Eigen::MatrixXd columns(11, Eigen::Index(views.size()));
   for (Eigen::Index i = 0; i < columns.cols(); ++i) {
     const pipeline::ViewResult& view = *views[std::size_t(i)];
-    const geometry::Projection p = view.calibrated->view.projection();
+    const geometry::Projection p =
+        geometry::xmalab_from_pixels(view.xray_image->pixels.height()) * view.calibrated->view.projection();
     if (!geometry::factors_from_projection(p))
       throw BadInput(
           {Reason::point_at_infinity,

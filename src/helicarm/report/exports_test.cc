@@ -103,7 +103,7 @@ TEST_F(Exports, MatrixReadsBack) {
   }
 }
 
-TEST_F(Exports, DltCoefficientsProject) {
+TEST_F(Exports, DltCoefficientsProjectIntoXmalabsPixels) {
   ASSERT_TRUE(write_exports(result_, folder_));
   std::istringstream lines(text("dlt.csv"));
   Eigen::Matrix<double, 11, 2> l;
@@ -115,7 +115,10 @@ TEST_F(Exports, DltCoefficientsProject) {
     const double w = l.col(i).segment<3>(8).dot(p) + 1;
     const Eigen::Vector2d uv((l.col(i).head<3>().dot(p) + l(3, i)) / w,
                              (l.col(i).segment<3>(4).dot(p) + l(7, i)) / w);
-    EXPECT_LT((uv - result_.views[std::size_t(i)].calibrated->view.project(p)).norm(), 1e-9);
+    const pipeline::ViewResult& view = result_.views[std::size_t(i)];
+    const Eigen::Vector2d pixel = view.calibrated->view.project(p);
+    const double height = view.xray_image->pixels.height();
+    EXPECT_LT((uv - Eigen::Vector2d(pixel.x() + 1, height - pixel.y())).norm(), 1e-9);
   }
 }
 

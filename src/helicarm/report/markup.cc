@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/report/style.h"
+
 namespace helicarm::report {
 
 std::string escaped(std::string_view text) {
@@ -36,6 +38,17 @@ std::string escaped(std::string_view text) {
     }
   }
   return safe;
+}
+
+std::string page_html(std::string_view title, std::string_view heading, std::string_view body,
+                      std::string_view footer) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n<style>{}</style>\n</head>\n"
+      "<body>\n<header>\n<h1>{}</h1>\n<p class=\"notice\">Research instrument, not a medical device.</p>\n"
+      "</header>\n<main>\n{}</main>\n<footer><p class=\"soft\">helicarm "
+      "{}{}</p></footer>\n</body>\n</html>\n",
+      escaped(title), report_style, escaped(heading), body, HELICARM_VERSION, footer);
 }
 
 std::string base64(std::string_view bytes) {

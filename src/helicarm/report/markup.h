@@ -13,6 +13,11 @@ std::string escaped(std::string_view text);
 
 std::string base64(std::string_view bytes);
 
+/// A page with the reports' style. `title` and `heading` are plain text; `body` and `footer` are HTML,
+/// `footer` follows the program's version.
+std::string page_html(std::string_view title, std::string_view heading, std::string_view body,
+                      std::string_view footer);
+
 /// `digits` decimals, or an en dash without a value.
 std::string fixed(std::optional<double> value, int digits);
 

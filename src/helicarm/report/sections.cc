@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/pipeline/advice.h"
+#include "helicarm/pipeline/outcome.h"
 #include "helicarm/report/figures.h"
 #include "helicarm/report/markup.h"
 
@@ -158,10 +159,13 @@ std::string accuracy_section(const pipeline::Result& result) {
 
 std::string guidance_section(const pipeline::Result& result) {
   std::string html;
-  HtmlTable tunnels(
-      {"Tunnel", "Start in tool, mm", "End in tool, mm", "Axis in tool", "#Axis ±, °", "#Length, mm"});
+  HtmlTable tunnels({"Tunnel", "Start in tool, mm", "#95 %, mm", "End in tool, mm", "#95 %, mm",
+                     "Axis in tool", "#Axis ±, °", "#Length, mm"});
   for (const guidance::Tunnel& tunnel : result.tunnels)
-    tunnels.row({escaped(tunnel.name), coordinates(tunnel.start_in_tool), coordinates(tunnel.end_in_tool),
+    tunnels.row({escaped(tunnel.name), coordinates(tunnel.start_in_tool),
+                 fixed(pipeline::tunnel_end_error_in_tool(result, tunnel.name, true), 3),
+                 coordinates(tunnel.end_in_tool),
+                 fixed(pipeline::tunnel_end_error_in_tool(result, tunnel.name, false), 3),
                  tunnel.axis_in_tool ? fmt::format("{:.4f}, {:.4f}, {:.4f}", tunnel.axis_in_tool->x(),
                                                    tunnel.axis_in_tool->y(), tunnel.axis_in_tool->z())
                                      : std::string("–"),

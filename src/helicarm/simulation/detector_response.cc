@@ -13,9 +13,6 @@
 namespace helicarm::simulation {
 namespace {
 
-/// Logarithmic images: this fraction of the open beam is black.
-constexpr double floor_signal = 0.004;
-
 void blur(image::Image<float>& image, double sigma_px) {
   if (sigma_px <= 0) return;
   cv::Mat mat = image::as_mat(image);

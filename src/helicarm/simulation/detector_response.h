@@ -7,6 +7,9 @@
 
 namespace helicarm::simulation {
 
+/// Logarithmic images: this fraction of the open beam is black.
+inline constexpr double floor_signal = 0.004;
+
 /// Detector parameters from the beam behind the patient to the stored grey values.
 struct Imaging {
   double quanta_per_pixel = 1000;  ///< mean over the field: set point of the automatic exposure control

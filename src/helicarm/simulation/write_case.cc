@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/simulation/write_case.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
@@ -89,6 +91,7 @@ xray::DerivedImage dicom_of(const SimulatedCase& simulated, std::size_t number) 
   image.acquisition.secondary_angle_deg = true_view.secondary_angle_deg;
   image.acquisition.flip_hint = true_view.mirrored;
   image.acquisition.logarithmic = true_view.imaging.logarithmic;
+  image.log_range = -std::log(floor_signal);
   image.acquisition.modality = "XA";
   image.derived = false;
   image.series_description = true_view.name;

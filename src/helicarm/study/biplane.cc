@@ -64,6 +64,20 @@ std::vector<Eigen::Vector3d> surface_targets() {
   return {{side, 0, half}, {-side, 0, half}, {15, 0, cone_height_mm}, {-15, 0, cone_height_mm}};
 }
 
+/// The most nearly square lattice of n points, at least 2 x 2, in the square of +-1; empty if n has none.
+std::vector<Eigen::Vector2d> lattice(int n) {
+  for (int columns = int(std::ceil(std::sqrt(n))); 2 * columns <= n; ++columns) {
+    if (n % columns != 0) continue;
+    const int rows = n / columns;
+    std::vector<Eigen::Vector2d> points;
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i)
+        points.emplace_back(2.0 * i / (columns - 1) - 1, 2.0 * j / (rows - 1) - 1);
+    return points;
+  }
+  return {};
+}
+
 class BiplaneTrials {
  public:
   explicit BiplaneTrials(const BiplaneOptions& options) : options_(options) {
@@ -95,16 +109,16 @@ class BiplaneTrials {
 
   std::vector<Eigen::Vector3d> plates_in_world(const geometry::View& view) const {
     std::vector<Eigen::Vector3d> balls;
-    const int n = options_.balls_a_side;
-    for (const double depth : {options_.near_plate_mm, options_.far_plate_mm})
-      for (int j = 0; j < n; ++j)
-        for (int i = 0; i < n; ++i) {
-          const Eigen::Vector2d share(2.0 * i / (n - 1) - 1, 2.0 * j / (n - 1) - 1);
-          Eigen::Vector3d in_camera;
-          in_camera << share * options_.half_plate_mm * depth / focal_length_mm, depth;
-          balls.push_back(view.camera_from_world.rotation.transpose() *
-                          (in_camera - view.camera_from_world.translation));
-        }
+    for (const bool far : {false, true})
+      for (Eigen::Vector2d share : lattice(options_.balls / 2)) {
+        // Turned by 45 degrees and smaller, so that no ball hides another.
+        if (far) share = 0.4 * Eigen::Vector2d(share.x() - share.y(), share.x() + share.y());
+        const double depth = far ? options_.far_plate_mm : options_.near_plate_mm;
+        Eigen::Vector3d in_camera;
+        in_camera << share * options_.half_plate_mm * depth / focal_length_mm, depth;
+        balls.push_back(view.camera_from_world.rotation.transpose() *
+                        (in_camera - view.camera_from_world.translation));
+      }
     return balls;
   }
 
@@ -188,11 +202,18 @@ class BiplaneTrials {
 
 Expected<void> check(const BiplaneOptions& o) {
   if (o.groups < 1) return fail(Reason::bad_value, "groups: 0, at least 1 is required");
-  if (o.balls_a_side < 2 || o.balls_a_side > 5)
-    return fail(Reason::bad_value, fmt::format("balls_a_side: {}, limits 2 and 5", o.balls_a_side));
-  if (!(o.cone_mm > 0 && o.near_plate_mm > 0 && o.far_plate_mm > o.near_plate_mm))
-    return fail(Reason::bad_value,
-                "cone_mm, near_plate_mm and far_plate_mm must be positive, far_plate_mm the larger one");
+  if (o.balls % 2 != 0 || o.balls < biplane_balls.low || o.balls > biplane_balls.high ||
+      lattice(o.balls / 2).empty())
+    return fail(
+        Reason::bad_value,
+        fmt::format("balls: {}; biplane takes an even number from {} to {} whose half fills a lattice "
+                    "of at least 2 x 2, such as 8, 12, 32",
+                    o.balls, biplane_balls.low, biplane_balls.high));
+  if (auto checked = check_fields<BiplaneOptions>(biplane_fields, o, "study biplane"); !checked)
+    return checked;
+  if (!(o.far_plate_mm > o.near_plate_mm))
+    return fail(Reason::bad_value, fmt::format("far_plate_mm: {}, must exceed near_plate_mm, {}",
+                                               o.far_plate_mm, o.near_plate_mm));
   return {};
 }
 
@@ -224,7 +245,7 @@ Expected<std::vector<BiplaneRow>> study_biplane(const BiplaneOptions& options, c
       fmt::format("biplane {} groups {} seed {} sigma {} fle {} lengths {} {} {} {} balls {} tracker {} {}",
                   HELICARM_VERSION, options.groups, options.seed, name_of(options.sigma), options.fle,
                   options.cone_mm, options.near_plate_mm, options.far_plate_mm, options.half_plate_mm,
-                  options.balls_a_side, options.tracker_sigma_mm, options.tracker_sigma_deg);
+                  options.balls, options.tracker_sigma_mm, options.tracker_sigma_deg);
   return run_study({setting}, identity, engine, ranks).map([&](const auto& kept) {
     if (kept.empty()) return std::vector<BiplaneRow>{};
     std::vector<BiplaneRow> rows(table_1.begin(), table_1.end());

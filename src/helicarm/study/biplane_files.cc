@@ -73,7 +73,8 @@ StudyFiles files_of(const std::vector<BiplaneRow>& rows, const BiplaneOptions& o
   files.json = study_json("biplane", options);
   files.json.update({{"cone_mm", options.cone_mm},
                      {"plates_mm", {options.near_plate_mm, options.far_plate_mm}},
-                     {"balls_of_biplane", 2 * options.balls_a_side * options.balls_a_side},
+                     {"half_plate_mm", options.half_plate_mm},
+                     {"balls_of_biplane", options.balls},
                      {"tracker_sigma_mm", options.tracker_sigma_mm},
                      {"tracker_sigma_deg", options.tracker_sigma_deg},
                      {"summary", files.summary},

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "helicarm/core/failure.h"
+#include "helicarm/core/field.h"
 #include "helicarm/study/engine.h"
 #include "helicarm/study/study_files.h"
 
@@ -14,13 +15,30 @@ namespace helicarm::study {
 
 /// Table 1's columns of UDCSC and Fig. 14 from images: tests of 3.2 with simulated scenes (intensifier,
 /// plate, knee, calibrator with five check targets), each measured by the published method and by the best
-/// one.
+/// one. The errors of a real bench, which the paper does not state, are options.
 struct CalibrationStudyOptions {
   std::size_t groups = 10;  ///< tests, each with an AP and a lateral image
   std::uint64_t seed = 1;
   int size_px = 1024;            ///< 512 or 1024
   std::filesystem::path folder;  ///< for the temporary cases
+  /// Per axis, of each ball and check target as made against the design, to which TRE refers.
+  double tolerance_mm = 0;
+  double click_sigma_px = 0;  ///< per axis, of clicks on the check targets; 0: they are found by templates
 };
+
+inline constexpr std::array<Field<CalibrationStudyOptions>, 2> calibration_fields{
+    helicarm::bound<&CalibrationStudyOptions::tolerance_mm>(
+        {.name = "tolerance_mm",
+         .flag = "--tolerance",
+         .unit = "mm",
+         .range = {0, 2},
+         .help = "calibration: balls and targets as made against the design, per axis, mm"}),
+    helicarm::bound<&CalibrationStudyOptions::click_sigma_px>(
+        {.name = "click_sigma_px",
+         .flag = "--click",
+         .unit = "px",
+         .range = {0, 20},
+         .help = "calibration: error of clicks on the targets per axis, px; 0: found by the program"})};
 
 /// One test by one method, mm; NaN for what was refused or not located.
 struct CalibrationTest {

@@ -35,6 +35,7 @@ inline constexpr std::uint32_t biplane_stream = 20300;   // and the next nine
 inline constexpr std::uint32_t calibration_stream = 20400;
 inline constexpr std::uint32_t design_stream = 20500;  // and the next three
 inline constexpr std::uint32_t rectification_stream = 20600;
+inline constexpr std::uint32_t bench_stream = 20700;  // of the study of calibration
 
 inline constexpr double cone_height_mm = 87.5;  // 2.3.1
 inline constexpr double cone_base_mm = 60;      // radii

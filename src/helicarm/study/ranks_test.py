@@ -24,7 +24,7 @@ def studies(ranks, *command):
 
 
 alone = studies(1)
-assert len(alone) == 9 and all(alone.values()), alone.keys()
+assert len(alone) == 10 and all(alone.values()), alone.keys()
 for ranks in (2, 3):
     shared = studies(ranks, mpirun, "-n", str(ranks))
     assert shared.keys() == alone.keys(), shared.keys()

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "helicarm/study/biplane.h"
+#include "helicarm/study/biplane_images.h"
 #include "helicarm/study/calibration_study.h"
 #include "helicarm/study/centres.h"
 #include "helicarm/study/design.h"
@@ -48,6 +49,8 @@ inline std::vector<SmallStudy> small_studies() {
       small<study_uniformity>("uniformity", 3, 2, 70, UniformityOptions{.draws = 3}),
       small<study_location>("location", 3, 2, 300, LocationOptions{.balls = {}, .step_mm = 50}),
       small<study_biplane>("biplane", 3, 2, 150, BiplaneOptions{}),
+      small<study_biplane_images>("biplane_images", 2, 1, 2,
+                                  BiplaneImagesOptions{.size_px = 512, .folder = {}}),
       small<study_calibration>("calibration", 2, 1, 2, CalibrationStudyOptions{.size_px = 512, .folder = {}}),
       small<study_rectification>("rectification", 2, 1, 2,
                                  RectificationStudyOptions{.size_px = 512, .distances_mm = {45}}),

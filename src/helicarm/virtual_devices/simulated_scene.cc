@@ -23,6 +23,20 @@ Eigen::Matrix3d facing(const Vector3d& direction) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), direction).toRotationMatrix();
 }
 
+const phantom::CalibratorBall* ball_named(const phantom::Calibrator& calibrator, const std::string& label) {
+  const auto ball = std::ranges::find(calibrator.balls, label, &phantom::CalibratorBall::label);
+  return ball == calibrator.balls.end() ? nullptr : &*ball;
+}
+
+/// Pointer on a ball: its marker faces the tracker within 30 degrees, and successive touches come from three
+/// sides, all from the tracker's half.
+Eigen::Matrix3d pointer_at(const Vector3d& ball_in_tracker, int touch) {
+  constexpr double tilt_rad = 0.5;
+  return facing(-ball_in_tracker) * (Eigen::AngleAxisd(touch * 2 * EIGEN_PI / 3, Vector3d::UnitZ()) *
+                                     Eigen::AngleAxisd(tilt_rad, Vector3d::UnitX()))
+                                        .toRotationMatrix();
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<SimulatedScene>> SimulatedScene::set_up(std::uint64_t seed, int image_size) {
@@ -59,17 +73,26 @@ void SimulatedScene::bump_marker(const std::string& bone, const Vector3d& shift_
 }
 
 geometry::RigidTransform SimulatedScene::tracker_from_pointer() const {
-  const std::string bone = [&] {
+  const auto [touched, touches] = [&] {
     const std::lock_guard lock(mutex_);
-    return touched_;
+    return std::pair(touched_, touches_);
   }();
-  const Eigen::Matrix3d turn = tracker_from(bone).rotation;  // as observed by the tracker
-  return {turn, point_in_tracker(bone == "femur" ? "FE" : "TS") - turn * tip_in_pointer};
+  if (const auto* ball = ball_named(simulated_case_.calibrator, touched)) {
+    const Vector3d centre = tracker_from("calibrator") * ball->centre_in_calibrator;
+    const Eigen::Matrix3d turn = pointer_at(centre, touches);
+    const Vector3d side = (turn * -tip_in_pointer).normalized();
+    return {turn, centre + ball->diameter_mm / 2 * side - turn * tip_in_pointer};
+  }
+  const Eigen::Matrix3d turn = tracker_from(touched).rotation;  // as observed by the tracker
+  return {turn, point_in_tracker(touched == "femur" ? "FE" : "TS") - turn * tip_in_pointer};
 }
 
-void SimulatedScene::touch(const std::string& bone) {
+bool SimulatedScene::touch(const std::string& what) {
+  if (what != "femur" && what != "tibia" && !ball_named(simulated_case_.calibrator, what)) return false;
   const std::lock_guard lock(mutex_);
-  touched_ = bone;
+  touched_ = what;
+  ++touches_;
+  return true;
 }
 
 void SimulatedScene::move_bone(const std::string& bone, const geometry::RigidTransform& motion_in_tracker) {

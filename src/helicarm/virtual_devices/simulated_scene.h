@@ -38,9 +38,11 @@ class SimulatedScene {
   /// Present position of a ball at a tunnel's end (FS, FE, TS, TE).
   Eigen::Vector3d point_in_tracker(const std::string& name) const;
 
-  /// A pointer with its tip on a tunnel's outer end in this bone; it moves with the bone.
+  /// A pointer with its tip on a tunnel's outer end in a bone, or on the surface of a ball of the calibrator,
+  /// on the side from which it is held; it moves with the body. Touches of one ball alternate between sides.
   geometry::RigidTransform tracker_from_pointer() const;
-  void touch(const std::string& bone);
+  /// "femur", "tibia" or a ball's label; returns whether there is one.
+  bool touch(const std::string& what);
 
   geometry::RigidTransform tracker_from_base() const;
   /// Moves the robot's base, e.g. after a push against its table (tracker's axes).
@@ -59,6 +61,7 @@ class SimulatedScene {
   std::map<std::string, geometry::RigidTransform> tracker_from_;
   std::map<std::string, Eigen::Vector3d> marker_in_bone_;  ///< of bumped markers
   std::string touched_ = "femur";
+  int touches_ = 0;
 };
 
 /// From the centre of its markers to its tip.

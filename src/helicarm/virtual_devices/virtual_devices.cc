@@ -18,6 +18,18 @@ robot::RobotModel arm_as_built() {
   return arm;
 }
 
+robot::VirtualUrOptions robot_options(const VirtualDevicesOptions& options, const SimulatedScene& scene) {
+  robot::VirtualUrOptions robot;
+  robot.arm = arm_as_built();
+  robot.tool = scene.tool();
+  robot.rtde_port = options.rtde_port;
+  robot.dashboard_port = options.dashboard_port;
+  robot.script_port = options.script_port;
+  robot.primary_port = options.primary_port;
+  robot.on_notice = [notice = options.on_notice](const std::string& line) { notice("robot: " + line); };
+  return robot;
+}
+
 /// In the order of TrackerFault.
 constexpr std::array<std::string_view, 7> tracker_fault_words = {
     "frozen", "identity", "not_finite_poses", "time_jump", "silent", "swapped_bones", "swapped_calibrator"};
@@ -36,23 +48,19 @@ Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevi
     virtual_or->simulated_scene_ = value_or_throw(SimulatedScene::set_up(options.seed, options.image_size));
     SimulatedScene& simulated_scene = *virtual_or->simulated_scene_;
 
-    robot::VirtualUrOptions robot;
-    robot.arm = arm_as_built();
-    robot.tool = simulated_scene.tool();
-    robot.rtde_port = options.rtde_port;
-    robot.dashboard_port = options.dashboard_port;
-    robot.script_port = options.script_port;
-    robot.on_notice = [notice = options.on_notice](const std::string& line) { notice("robot: " + line); };
-    virtual_or->robot_ = value_or_throw(robot::VirtualUr::start(robot));
+    if (options.freehand)
+      virtual_or->drill_ = std::make_unique<HeldDrill>(simulated_scene, options.seed);
+    else
+      virtual_or->robot_ = value_or_throw(robot::VirtualUr::start(robot_options(options, simulated_scene)));
 
     std::vector<FollowedBody> bodies;
     for (const char* bone : {"femur", "tibia"})
       bodies.push_back({bone, simulation::marker_array(),
                         [&simulated_scene, bone] { return simulated_scene.tracker_from_marker(bone); }});
-    bodies.push_back({tool_marker, tool_markers(), [&simulated_scene, robot = virtual_or->robot_.get()] {
-                        return simulated_scene.tracker_from_base() * robot->truth().base_from_tip *
-                               simulated_scene.tool().flange_from_tcp.inverse() *
-                               simulated_scene.flange_from_marker();
+    bodies.push_back({tool_marker, tool_markers(), [&devices = *virtual_or] {
+                        const SimulatedScene& scene = *devices.simulated_scene_;
+                        return devices.tracker_from_tip() * scene.tool().flange_from_tcp.inverse() *
+                               scene.flange_from_marker();
                       }});
     for (const TrackedFacet& facet : calibrator_facets())
       bodies.push_back({facet.name, facet.body, [&simulated_scene, from_facet = facet.calibrator_from_facet] {
@@ -74,6 +82,7 @@ Expected<std::unique_ptr<VirtualDevices>> VirtualDevices::open(const VirtualDevi
 }
 
 geometry::RigidTransform VirtualDevices::tracker_from_tip() {
+  if (drill_) return drill_->tracker_from_tip();
   return simulated_scene_->tracker_from_base() * robot_->truth().base_from_tip;
 }
 
@@ -93,19 +102,21 @@ Expected<void> VirtualDevices::set_fault(const std::string& name, bool on) {
     return {};
   }
   const auto fault = robot::robot_fault(name);
-  if (!fault) return unknown(virtual_fault_names());
+  if (!fault || !robot_) return unknown(virtual_fault_names());
   robot_->set(*fault, on);
   return {};
 }
 
-void VirtualDevices::touch(const std::string& bone) {
-  simulated_scene_->touch(bone);
+bool VirtualDevices::touch(const std::string& what) {
+  if (!simulated_scene_->touch(what)) return false;
   tracker_->hide(pointer_marker, false);
+  return true;
 }
 
 void VirtualDevices::lift_pointer() { tracker_->hide(pointer_marker, true); }
 
 std::string VirtualDevices::power_on() {
+  if (!robot_) throw BadInput(Reason::usage, "there is no robot");
   return fmt::format("{}; {}", robot_->dashboard("power on"), robot_->dashboard("brake release"));
 }
 

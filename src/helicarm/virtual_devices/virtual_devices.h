@@ -6,6 +6,7 @@
 #include <string>
 
 #include "helicarm/devices/robot/virtual_ur.h"
+#include "helicarm/virtual_devices/held_drill.h"
 #include "helicarm/virtual_devices/virtual_c_arm.h"
 #include "helicarm/virtual_devices/virtual_tracker.h"
 
@@ -21,10 +22,12 @@ struct VirtualDevicesOptions {
   std::uint16_t script_port = 30002;
   /// Log line for each disconnected client of tracker or robot; called on their threads.
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
+  bool freehand = false;  ///< a person holds the drill; there is no robot
+  std::uint16_t primary_port = 0;
 };
 
-/// A simulated scene with running tracker and robot; the C-arm sends by `shoot`. All servers listen on the
-/// local host only.
+/// A simulated scene with a running tracker and a robot or a hand-held drill; the C-arm sends by `shoot`. All
+/// servers listen on the local host only.
 class VirtualDevices {
  public:
   /// Refuses as `SimulatedScene::set_up`, VirtualTracker and VirtualUr.
@@ -32,7 +35,11 @@ class VirtualDevices {
 
   SimulatedScene& simulated_scene() { return *simulated_scene_; }
   VirtualTracker& tracker() { return *tracker_; }
+  /// Null if freehand.
+  robot::VirtualUr* robot_if_any() { return robot_.get(); }
   robot::VirtualUr& robot() { return *robot_; }
+  /// Only if freehand.
+  HeldDrill& drill() { return *drill_; }
 
   /// True pose of the tool's tip; z is its axis.
   geometry::RigidTransform tracker_from_tip();
@@ -40,11 +47,13 @@ class VirtualDevices {
   /// Switches a fault on or off by name, one of `virtual_fault_names`. An unknown one is bad_value.
   Expected<void> set_fault(const std::string& name, bool on);
 
-  /// Holds the pointer's tip on a bone ("femur" or "tibia") at rest; before and after, it is not visible.
-  void touch(const std::string& bone);
+  /// Holds the pointer's tip on a bone ("femur" or "tibia") or a ball of the calibrator at rest; before and
+  /// after, it is not visible. Returns whether there is such a thing.
+  bool touch(const std::string& what);
   void lift_pointer();
 
   /// Recovery at the robot after an emergency stop: power on, brakes open. Returns the robot's answers.
+  /// Throws BadInput (usage) without a robot.
   std::string power_on();
 
  private:
@@ -52,6 +61,7 @@ class VirtualDevices {
 
   std::unique_ptr<SimulatedScene> simulated_scene_;
   std::unique_ptr<robot::VirtualUr> robot_;
+  std::unique_ptr<HeldDrill> drill_;
   std::unique_ptr<VirtualTracker> tracker_;
 };
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/virtual_devices/virtual_devices.h"
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -10,7 +12,9 @@
 #include "helicarm/core/temporary_folder.h"
 #include "helicarm/devices/receiver/receiver.h"
 #include "helicarm/devices/tracker/igtl_client.h"
+#include "helicarm/devices/tracker/mount_calibration.h"
 #include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/geometry/pose_step.h"
 
 namespace helicarm::virtual_devices {
 namespace {
@@ -161,6 +165,56 @@ TEST_F(Acquisitions, AbortedAssociationLeavesNothing) {
   EXPECT_FALSE(acquired_view("AP", CArmFault::breaks_off));
   ASSERT_TRUE(acquired_view("AP"));
   EXPECT_EQ(receiver_->counters().stored, 1u);
+}
+
+/// Mean of 36 samples of a body at rest; nothing if it is not visible.
+std::optional<geometry::RigidTransform> tracked(const simulation::TrackedBody& body,
+                                                const geometry::RigidTransform& truth, std::uint64_t seed,
+                                                std::uint32_t stream, double from_s) {
+  const auto samples = simulation::track(
+      simulation::virtual_tracker(), body, [&](double) { return truth; },
+      simulation::steady_times(60, 36, from_s), seed, stream);
+  return simulation::mean_pose(samples);
+}
+
+TEST_F(VirtualDevicesTest, TouchedBallsGiveTheMountWithinItsCovariance) {
+  constexpr double chi2_95_of_six = 12.592;
+  constexpr int trials = 40;
+  SimulatedScene& scene = virtual_or_->simulated_scene();
+  const auto facets = calibrator_facets();
+  const auto pose_of = [&](const TrackedFacet& facet) {
+    return scene.tracker_from("calibrator") * facet.calibrator_from_facet;
+  };
+  const auto facet = std::ranges::find_if(
+      facets, [&](const TrackedFacet& one) { return tracked(one.body, pose_of(one), 1, 1, 0).has_value(); });
+  ASSERT_NE(facet, facets.end());
+  std::map<std::string, tracker::MountPlace> places;
+  for (const auto& ball : scene.simulated_case().calibrator.balls)
+    places[ball.label] = {ball.centre_in_calibrator, ball.diameter_mm / 2};
+  tracker::MountOptions options;
+  options.sigma_mm = 0.114;
+  options.sigma_deg = 0.03;
+  int covered = 0;
+  for (std::uint64_t seed = 0; seed < trials; ++seed) {
+    std::vector<tracker::MountObservation> touches;
+    for (const char* label : {"P1", "P4", "P7", "P10", "P12"})
+      for (int i = 0; i < 3; ++i) {
+        ASSERT_TRUE(scene.touch(label));
+        const double from_s = 3 * double(touches.size());
+        const auto pointer =
+            tracked(simulation::marker_array(), scene.tracker_from_pointer(), seed, 10, from_s);
+        const auto mount = tracked(facet->body, pose_of(*facet), seed, 20, from_s);
+        ASSERT_TRUE(pointer && mount) << label;
+        touches.push_back(tracker::touched_place(label, *mount, *pointer, tip_in_pointer, options));
+      }
+    const auto found = tracker::calibrate_mount(places, touches, options);
+    ASSERT_TRUE(found) << found.error().message;
+    const geometry::PoseStep error =
+        geometry::step_between(found->calibrator_from_facet, facet->calibrator_from_facet);
+    covered += error.dot(found->covariance.llt().solve(error)) <= chi2_95_of_six;
+  }
+  EXPECT_FALSE(scene.touch("P99"));
+  EXPECT_GE(covered, 34);  // of 40: three standard deviations below 95 %
 }
 
 }  // namespace

@@ -49,6 +49,7 @@ class VirtualTracker {
                                                          std::vector<FollowedBody> bodies);
 
   std::uint16_t port() const { return server_->port(); }
+  double rate_hz() const { return options_.rate_hz; }
   /// Names of all tracked bodies.
   std::vector<std::string> bodies() const;
   /// Covers a body's markers; returns whether the body exists.

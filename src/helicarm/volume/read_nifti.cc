@@ -85,24 +85,44 @@ Eigen::Matrix3d rotation_of(const NiftiHeader& header) {
   return Eigen::Quaterniond(w, v.x(), v.y(), v.z()).normalized().toRotationMatrix();
 }
 
+Vector3d spacing_of(const NiftiHeader& header) {
+  return {header.real(80, "pixdim[1]"), header.real(84, "pixdim[2]"), header.real(88, "pixdim[3]")};
+}
+
+Eigen::Affine3d sform_of(const NiftiHeader& header) {
+  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      place.matrix()(row, column) = header.real(
+          280 + 16 * static_cast<std::size_t>(row) + 4 * static_cast<std::size_t>(column), "srow");
+  return place;
+}
+
+Eigen::Affine3d qform_of(const NiftiHeader& header) {
+  Eigen::Affine3d place = Eigen::Affine3d::Identity();
+  const double side = header.real(76, "pixdim[0]") < 0 ? -1 : 1;
+  place.linear() = rotation_of(header) * spacing_of(header).cwiseProduct(Vector3d(1, 1, side)).asDiagonal();
+  place.translation() =
+      Vector3d(header.real(268, "qoffset_x"), header.real(272, "qoffset_y"), header.real(276, "qoffset_z"));
+  return place;
+}
+
 /// The file's world frame is R, A, S.
 Eigen::Affine3d place_of(const NiftiHeader& header, std::vector<Warning>& warnings) {
   Eigen::Affine3d place = Eigen::Affine3d::Identity();
-  const Vector3d spacing(header.real(80, "pixdim[1]"), header.real(84, "pixdim[2]"),
-                         header.real(88, "pixdim[3]"));
-  if (header.at<std::int16_t>(254) > 0) {
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        place.matrix()(row, column) = header.real(
-            280 + 16 * static_cast<std::size_t>(row) + 4 * static_cast<std::size_t>(column), "srow");
-  } else if (header.at<std::int16_t>(252) > 0) {
-    const double side = header.real(76, "pixdim[0]") < 0 ? -1 : 1;
-    place.linear() =
-        rotation_of(header) * Vector3d(spacing.x(), spacing.y(), side * spacing.z()).asDiagonal();
-    place.translation() =
-        Vector3d(header.real(268, "qoffset_x"), header.real(272, "qoffset_y"), header.real(276, "qoffset_z"));
+  const bool has_sform = header.at<std::int16_t>(254) > 0, has_qform = header.at<std::int16_t>(252) > 0;
+  if (has_sform && has_qform &&
+      sform_of(header).linear().determinant() * qform_of(header).linear().determinant() < 0)
+    throw BadInput(Reason::bad_value,
+                   header.origin +
+                       ": sform and qform differ in handedness: one of them exchanges left and right; "
+                       "set the code of the wrong one to 0");
+  if (has_sform) {
+    place = sform_of(header);
+  } else if (has_qform) {
+    place = qform_of(header);
   } else {
-    place.linear() = spacing.asDiagonal();
+    place.linear() = spacing_of(header).asDiagonal();
     warnings.push_back({Reason::spacing_missing,
                         header.origin + ": neither sform nor qform: the patient's orientation is unknown"});
   }
@@ -115,6 +135,9 @@ Volume read_nifti(const std::filesystem::path& path, std::string_view bytes) {
   const std::string origin = path.string();
   const bool packed = bytes.starts_with("\x1f\x8b");
   const std::string unpacked_header = packed ? inflate(bytes, header_bytes, origin) : "";
+  const auto nifti_2 = [](std::string_view head) { return head.size() >= 8 && head.substr(4, 3) == "n+2"; };
+  if (nifti_2(packed ? std::string_view(unpacked_header) : bytes))
+    throw BadInput(Reason::unsupported, origin + ": is NIfTI-2; convert it to NIfTI-1");
   NiftiHeader header{packed ? std::string_view(unpacked_header) : bytes, false, origin};
   if (header.bytes.size() < header_bytes)
     throw BadInput(Reason::truncated,

@@ -17,7 +17,7 @@ bool is_metaimage(std::string_view bytes) {
 }
 
 bool is_nifti(std::string_view bytes) {
-  return bytes.starts_with("\x1f\x8b") ||
+  return bytes.starts_with("\x1f\x8b") || (bytes.size() >= 8 && bytes.substr(4, 3) == "n+2") ||
          (bytes.size() >= 348 && (bytes.substr(344, 3) == "n+1" || bytes.substr(344, 3) == "ni1"));
 }
 

@@ -257,6 +257,24 @@ TEST_F(ReadVolume, NiftiWithQuaternionAndWithoutOrientation) {
   EXPECT_EQ(bare->warnings.size(), 1u);
 }
 
+TEST_F(ReadVolume, NiftiWhoseOrientationsDifferInHandednessIsRefused) {
+  Nifti both;
+  both.set<std::int16_t>(252, 1).set(76, 1.0F);
+  EXPECT_TRUE(read("a.nii", both.bytes).has_value());
+  both.set(76, -1.0F);
+  EXPECT_EQ(refusal(both.bytes), Reason::bad_value);
+  EXPECT_TRUE(read("a.nii", both.set<std::int16_t>(252, 0).bytes).has_value());
+}
+
+TEST_F(ReadVolume, SecondVersionOfNiftiIsNamed) {
+  std::string file(600, '\0');
+  file.replace(0, 8, std::string("\x1c\x02\0\0n+2\0", 8));
+  const auto refused = read("a.nii", file);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().reason, Reason::unsupported);
+  EXPECT_NE(refused.error().message.find("NIfTI-2"), std::string::npos);
+}
+
 TEST_F(ReadVolume, InvalidNiftisAreRefused) {
   EXPECT_EQ(refusal(Nifti().bytes.substr(0, 357)), Reason::truncated);
   EXPECT_EQ(refusal(Nifti().set<std::int16_t>(42, -2).bytes), Reason::bad_size);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include <charls/charls.h>
 #include <dcmtk/config/osconfig.h>
 #include <dcmtk/dcmdata/dcistrmb.h>
 #include <dcmtk/dcmdata/dcostrmb.h>
@@ -14,9 +15,12 @@
 #include <dcmtk/dcmjpeg/djrploss.h>
 #include <dcmtk/oflog/oflog.h>
 #include <gtest/gtest.h>
+#include <openjpeg.h>
+#include <zlib.h>
 
 #include "helicarm/core/random.h"
 #include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/plain_bytes.h"
 #include "helicarm/xray/read_dicom.h"
 
 namespace helicarm::xray {
@@ -72,11 +76,72 @@ std::string compress(const std::string& bytes, E_TransferSyntax syntax,
   file.transferInit();
   EXPECT_TRUE(file.write(stream, syntax, EET_ExplicitLength, nullptr).good());
   file.transferEnd();
+  stream.flush();
   void* written = nullptr;
   offile_off_t size = 0;
   stream.flushBuffer(written, size);
   out.resize(static_cast<std::size_t>(size));
   return out;
+}
+
+/// Stored words of the builder's image, 16 bits allocated.
+std::vector<std::uint16_t> words_of(const DicomBuilder& builder) {
+  const auto xray_image = read_dicom(builder.bytes(), "x.dcm", {});
+  std::vector<std::uint16_t> words;
+  for (const float value : xray_image->pixels.pixels()) words.push_back(static_cast<std::uint16_t>(value));
+  return words;
+}
+
+std::string jpeg_ls(const DicomBuilder& builder, int bits, int near) {
+  std::vector<std::uint16_t> words = words_of(builder);
+  std::string bytes;
+  for (const std::uint16_t word : words) bytes += DicomBuilder::number(word, bits > 8 ? 2 : 1);
+  charls::jpegls_encoder encoder;
+  encoder.frame_info({width, height, bits, 1}).near_lossless(near);
+  std::string out(encoder.estimated_destination_size(), '\0');
+  encoder.destination(out.data(), out.size());
+  out.resize(encoder.encode(bytes.data(), bytes.size()));
+  return out;
+}
+
+/// Collects what OpenJPEG writes.
+OPJ_SIZE_T append(void* from, OPJ_SIZE_T size, void* to) {
+  static_cast<std::string*>(to)->append(static_cast<const char*>(from), size);
+  return size;
+}
+
+std::string jpeg_2000(const DicomBuilder& builder, int bits) {
+  opj_image_cmptparm_t component{};
+  component.dx = component.dy = 1;
+  component.w = width;
+  component.h = height;
+  component.prec = OPJ_UINT32(bits);
+  opj_image_t* image = opj_image_create(1, &component, OPJ_CLRSPC_GRAY);
+  image->x1 = width;
+  image->y1 = height;
+  std::ranges::copy(words_of(builder), image->comps[0].data);
+  opj_cparameters_t parameters;
+  opj_set_default_encoder_parameters(&parameters);
+  parameters.tcp_numlayers = 1;
+  parameters.tcp_rates[0] = 0;
+  parameters.cp_disto_alloc = 1;
+  parameters.numresolution = 3;
+  opj_codec_t* codec = opj_create_compress(OPJ_CODEC_J2K);
+  opj_setup_encoder(codec, &parameters, image);
+  std::string out;
+  opj_stream_t* stream = opj_stream_default_create(OPJ_FALSE);
+  opj_stream_set_user_data(stream, &out, nullptr);
+  opj_stream_set_write_function(stream, append);
+  EXPECT_TRUE(opj_start_compress(codec, image, stream) && opj_encode(codec, stream) &&
+              opj_end_compress(codec, stream));
+  opj_stream_destroy(stream);
+  opj_destroy_codec(codec);
+  opj_image_destroy(image);
+  return out;
+}
+
+std::string encapsulated(DicomBuilder builder, const char* syntax, const std::string& stream) {
+  return builder.syntax(syntax).fragments({stream}).bytes();
 }
 
 float greatest_difference(const XrayImage& a, const XrayImage& b) {
@@ -124,6 +189,73 @@ TEST_F(Compressed, InvalidScanHeaderOfASequentialJpegIsCorrected) {
   EXPECT_EQ(greatest_difference(*xray_image, *read_dicom(sound, "x.dcm", {})), 0);
   ASSERT_FALSE(xray_image->warnings.empty());
   EXPECT_EQ(xray_image->warnings[0].reason, Reason::lossy_image);
+}
+
+TEST_F(Compressed, LosslessJpegLsIsExact) {
+  for (int bits : {8, 10, 12, 16}) {
+    const DicomBuilder plain = grey_image(bits);
+    const auto decoded =
+        read_dicom(encapsulated(plain, "1.2.840.10008.1.2.4.80", jpeg_ls(plain, bits, 0)), "x.dcm", {});
+    ASSERT_TRUE(decoded) << bits << ": " << decoded.error().message;
+    EXPECT_EQ(greatest_difference(*decoded, *read_dicom(plain.bytes(), "x.dcm", {})), 0) << bits;
+  }
+}
+
+TEST_F(Compressed, NearLosslessJpegLsIsCloseWithAWarning) {
+  const DicomBuilder plain = grey_image(12);
+  const auto decoded =
+      read_dicom(encapsulated(plain, "1.2.840.10008.1.2.4.81", jpeg_ls(plain, 12, 3)), "x.dcm", {});
+  ASSERT_TRUE(decoded) << decoded.error().message;
+  EXPECT_LE(greatest_difference(*decoded, *read_dicom(plain.bytes(), "x.dcm", {})), 3);
+  ASSERT_FALSE(decoded->warnings.empty());
+  EXPECT_EQ(decoded->warnings[0].reason, Reason::lossy_image);
+}
+
+TEST_F(Compressed, LosslessJpeg2000IsExact) {
+  for (int bits : {8, 10, 12, 16}) {
+    const DicomBuilder plain = grey_image(bits);
+    const auto decoded =
+        read_dicom(encapsulated(plain, "1.2.840.10008.1.2.4.90", jpeg_2000(plain, bits)), "x.dcm", {});
+    ASSERT_TRUE(decoded) << bits << ": " << decoded.error().message;
+    EXPECT_EQ(greatest_difference(*decoded, *read_dicom(plain.bytes(), "x.dcm", {})), 0) << bits;
+  }
+}
+
+TEST_F(Compressed, DeflatedAndBigEndianFilesAreExact) {
+  for (int bits : {8, 12, 16}) {
+    expect_close(bits, EXS_DeflatedLittleEndianExplicit, nullptr, 0);
+    expect_close(bits, EXS_BigEndianExplicit, nullptr, 0);
+  }
+}
+
+TEST_F(Compressed, TruncatedOrTooLargeDeflatedDataAreRefused) {
+  const std::string file = compress(grey_image(12).bytes(), EXS_DeflatedLittleEndianExplicit, nullptr);
+  EXPECT_EQ(read_dicom(file.substr(0, file.size() - 40), "x.dcm", {}).error().reason, Reason::truncated);
+  const std::string large(1 << 20, '\0');
+  std::string deflated(1 << 16, '\0');
+  z_stream stream{};
+  ASSERT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(large.data()));
+  stream.avail_in = uInt(large.size());
+  stream.next_out = reinterpret_cast<Bytef*>(deflated.data());
+  stream.avail_out = uInt(deflated.size());
+  ASSERT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  deflateEnd(&stream);
+  EXPECT_EQ(inflated(deflated, "x.dcm")->size(), large.size());
+  EXPECT_EQ(inflated(deflated, "x.dcm", 1000).error().reason, Reason::bad_value);
+}
+
+TEST_F(Compressed, CodestreamOfAnotherSizeIsRefused) {
+  const DicomBuilder plain = grey_image(12);
+  DicomBuilder other(plain);
+  other.word(0x00280010, height + 2);
+  for (const auto& [syntax, stream] : {std::pair{"1.2.840.10008.1.2.4.80", jpeg_ls(plain, 12, 0)},
+                                       {"1.2.840.10008.1.2.4.90", jpeg_2000(plain, 12)}}) {
+    const auto refused = read_dicom(encapsulated(other, syntax, stream), "x.dcm", {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().reason, Reason::bad_value);
+    EXPECT_FALSE(read_dicom(encapsulated(plain, syntax, stream.substr(0, stream.size() / 2)), "x.dcm", {}));
+  }
 }
 
 TEST_F(Compressed, FramesAreFoundByCountAndByOffsetTable) {
@@ -201,9 +333,14 @@ TEST_F(Compressed, MutationsNeverCrash) {
   const DJ_RPLossless first_order(1, 0);
   const DJ_RPLossy quality(90);
   const std::vector<std::string> files = {
-      grey_image(12).bytes(), compress(grey_image(12).bytes(), EXS_RLELossless, nullptr),
+      grey_image(12).bytes(),
+      compress(grey_image(12).bytes(), EXS_RLELossless, nullptr),
       compress(grey_image(12).bytes(), EXS_JPEGProcess14SV1, &first_order),
-      compress(grey_image(8).bytes(), EXS_JPEGProcess1, &quality)};
+      compress(grey_image(8).bytes(), EXS_JPEGProcess1, &quality),
+      compress(grey_image(12).bytes(), EXS_DeflatedLittleEndianExplicit, nullptr),
+      compress(grey_image(12).bytes(), EXS_BigEndianExplicit, nullptr),
+      encapsulated(grey_image(12), "1.2.840.10008.1.2.4.80", jpeg_ls(grey_image(12), 12, 0)),
+      encapsulated(grey_image(12), "1.2.840.10008.1.2.4.90", jpeg_2000(grey_image(12), 12))};
   RandomStream random(11, 1);
   for (const std::string& file : files)
     for (int trial = 0; trial < 1500; ++trial) {

@@ -7,6 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/xray/read_dicom.h"
+#include "helicarm/xray/uid.h"
+
 namespace helicarm::xray {
 namespace {
 
@@ -30,20 +33,29 @@ DerivedImage derived_image(const XrayImage& source, const image::Image<float>& p
     return static_cast<std::uint16_t>(std::clamp(std::lround(double(value) - source.lowest), 0l, range));
   });
   image.acquisition = source.acquisition;
-  image.series_description = std::move(description);
+  image.derivation = image.series_description = std::move(description);
+  const Acquisition& a = source.acquisition;
+  if (!a.uid_key.empty()) image.source_instance_uid = uid_of(a.uid_key);
+  const std::string content =
+      text_key(fmt::format("{} {} {}", a.uid_key, image.derivation, image_key(pixels)));
+  image.instance_uid = uid_of(content);
+  image.series_uid = uid_of(text_key(content + " series"));
+  image.study_uid = uid_of(a.study_key.empty() ? text_key(content + " study") : a.study_key);
   return image;
 }
 
 DerivedImage DeIdentification::operator()(const XrayImage& source) {
   DerivedImage image = derived_image(source, source.pixels, "de-identified");
   image.acquisition.acquired.reset();
+  image.acquisition.technique.clear();
   const Acquisition& a = source.acquisition;
   image.patient_id = fmt::format("ANON{}", number_of(patients_, a.patient_key));
-  image.study_uid = fmt::format("2.25.1{:04}", number_of(studies_, a.study_key));
   // A file without a UID shares none with another.
-  const std::size_t instance = number_of(instances_, a.uid_key.empty() ? a.instance_key : a.uid_key);
-  image.series_uid = fmt::format("2.25.2{:04}", instance);
-  image.instance_uid = fmt::format("2.25.3{:04}", instance);
+  const std::string key = a.uid_key.empty() ? a.instance_key : a.uid_key;
+  image.study_uid = uid_of(a.study_key.empty() ? text_key(key + " study") : a.study_key);
+  image.series_uid = uid_of(text_key(key + " series"));
+  image.instance_uid = uid_of(key);
+  image.source_instance_uid.clear();
   return image;
 }
 

@@ -5,12 +5,11 @@
 
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/dicom_time.h"
-#include "helicarm/xray/digest.h"
+#include "helicarm/xray/transfer_syntax.h"
+#include "helicarm/xray/uid.h"
 
 namespace helicarm::xray {
 namespace {
-
-std::string key_of(std::string_view text) { return text.empty() ? std::string{} : digest(text); }
 
 std::optional<double> one(const DicomElements& elements, DicomTag tag, double low, double high) {
   const auto value = elements.numbers(tag, 1, low, high);
@@ -48,11 +47,23 @@ bool flipped(const DicomElements& elements) {
   return flip == "YES";
 }
 
-/// JPEG processes 1, 2 and 4, in this file or an earlier one.
+/// In this file or an earlier one. JPEG-LS and JPEG 2000 may be lossless in the syntaxes that allow loss.
 bool lossy(const DicomElements& elements) {
-  return elements.text(tags::lossy_compression) == "01" ||
-         elements.transfer_syntax == "1.2.840.10008.1.2.4.50" ||
-         elements.transfer_syntax == "1.2.840.10008.1.2.4.51";
+  const std::string_view stated = elements.text(tags::lossy_compression);
+  const TransferSyntax& syntax = *transfer_syntax(elements.transfer_syntax);
+  return stated == "01" || (syntax.may_be_lossy && (stated != "00" || syntax.coding == Coding::jpeg));
+}
+
+/// Elements that cannot name a person: codes and numbers of a limited length.
+std::map<std::uint32_t, std::string> technique(const DicomElements& elements) {
+  constexpr std::size_t longest = 64;
+  std::map<std::uint32_t, std::string> values;
+  for (const DicomTag tag : tags::technique) {
+    const std::string_view value = elements.text(tag);
+    const bool is_code = value.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.+-\\") == value.npos;
+    if (!value.empty() && value.size() <= longest && is_code) values.emplace(tag.number, value);
+  }
+  return values;
 }
 
 }  // namespace
@@ -79,9 +90,10 @@ Expected<AcquisitionRead> read_acquisition(const DicomElements& elements) {
     if (relationship == "LOG" || relationship == "LIN") a.logarithmic = relationship == "LOG";
     a.modality = elements.text(tags::modality);
     const std::string_view id = elements.text(tags::patient_id), name = elements.text(tags::patient_name);
-    if (!id.empty() || !name.empty()) a.patient_key = digest(fmt::format("{}\n{}", id, name));
-    a.study_key = key_of(elements.text(tags::study));
-    a.frame_of_reference_key = key_of(elements.text(tags::frame_of_reference));
+    if (!id.empty() || !name.empty()) a.patient_key = text_key(fmt::format("{}\n{}", id, name));
+    a.study_key = text_key(elements.text(tags::study));
+    a.frame_of_reference_key = text_key(elements.text(tags::frame_of_reference));
+    a.technique = technique(elements);
     return read;
   });
 }

@@ -15,11 +15,13 @@ namespace {
 constexpr int max_side = 16384;
 constexpr std::size_t max_frame_bytes = std::size_t{64} << 20;
 
-/// XA, RF, CR, DX (for presentation and processing), secondary capture (single, multi-frame byte and word).
-constexpr std::array<std::string_view, 8> xray_classes = {
-    "1.2.840.10008.5.1.4.1.1.12.1", "1.2.840.10008.5.1.4.1.1.12.2",  "1.2.840.10008.5.1.4.1.1.1",
-    "1.2.840.10008.5.1.4.1.1.1.1",  "1.2.840.10008.5.1.4.1.1.1.1.1", "1.2.840.10008.5.1.4.1.1.7",
-    "1.2.840.10008.5.1.4.1.1.7.2",  "1.2.840.10008.5.1.4.1.1.7.3"};
+/// XA, RF, enhanced XA and XRF, CR, DX (for presentation and processing), secondary capture (single,
+/// multi-frame byte and word).
+constexpr std::array<std::string_view, 10> xray_classes = {
+    "1.2.840.10008.5.1.4.1.1.12.1",   "1.2.840.10008.5.1.4.1.1.12.2", "1.2.840.10008.5.1.4.1.1.12.1.1",
+    "1.2.840.10008.5.1.4.1.1.12.2.1", "1.2.840.10008.5.1.4.1.1.1",    "1.2.840.10008.5.1.4.1.1.1.1",
+    "1.2.840.10008.5.1.4.1.1.1.1.1",  "1.2.840.10008.5.1.4.1.1.7",    "1.2.840.10008.5.1.4.1.1.7.2",
+    "1.2.840.10008.5.1.4.1.1.7.3"};
 
 /// A secondary capture may have any content; these modalities can be X-ray images.
 constexpr std::array<std::string_view, 9> xray_modalities = {"XA", "RF", "CR", "DX", "DR",

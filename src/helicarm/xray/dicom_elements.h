@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,6 +31,8 @@ struct DicomElements {
   std::string transfer_syntax;
   std::vector<DicomElement> elements;
   std::vector<std::string_view> fragments;  ///< of encapsulated Pixel Data; the first is the offset table
+  /// What the values point into where the file's bytes had to be inflated or reordered.
+  std::shared_ptr<const std::string> converted = {};
 
   const DicomElement* find(DicomTag tag) const;
   /// Without padding at either end; empty if absent.
@@ -47,10 +50,18 @@ struct DicomElements {
 /// At most 40 printable characters of a file's value, for a message.
 std::string quote(std::string_view value);
 
-/// Walks the structure of a whole DICOM file in memory and checks every length. Little endian only, at most
-/// 64 levels of nesting. Refuses: not_an_image (no preamble), truncated, bad_value (odd or invalid length,
-/// unknown VR, duplicate or unordered element, invalid UID), unsupported (big endian, deflated, unknown
-/// transfer syntax). `origin` begins each message.
+/// Walks the structure of a whole DICOM file in memory and checks every length; at most 64 levels of nesting.
+/// Refuses: not_an_image (no preamble), truncated, bad_value (odd or invalid length, unknown VR, duplicate or
+/// unordered element, invalid UID, damaged deflated data), unsupported (unknown transfer syntax). `origin`
+/// begins each message.
 Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin);
+
+/// The items of a sequence that `walk_dicom` has walked, each with its elements; none if it is absent. Throws
+/// BadInput (bad_value) if an item's elements are not in ascending order.
+std::vector<DicomElements> sequence_items(const DicomElements& of, DicomTag sequence);
+
+/// With the elements of a frame's functional groups (0-based; PS3.3 C.7.6.16) at top level, as in a file of
+/// one frame: spacing, distances, angles, flip, grey scale, time of the enhanced X-ray images.
+DicomElements frame_elements(const DicomElements& of, int frame);
 
 }  // namespace helicarm::xray

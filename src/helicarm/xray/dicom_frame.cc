@@ -6,7 +6,10 @@
 #include "helicarm/xray/bytes.h"
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/jpeg.h"
+#include "helicarm/xray/jpeg_2000.h"
+#include "helicarm/xray/jpeg_ls.h"
 #include "helicarm/xray/rle.h"
+#include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::xray {
 namespace {
@@ -44,11 +47,18 @@ std::string decompressed(const DicomOutline& outline, int frame) {
   const std::size_t pixels =
       static_cast<std::size_t>(outline.rows) * static_cast<std::size_t>(outline.columns);
   const std::string& origin = outline.elements.origin;
-  if (outline.elements.transfer_syntax == "1.2.840.10008.1.2.5")
-    return value_or_throw(decode_rle(bytes, pixels, outline.bits_allocated / 8, origin));
-  const bool lossless = outline.elements.transfer_syntax >= "1.2.840.10008.1.2.4.57";
-  return value_or_throw(decode_jpeg(std::move(bytes), lossless, outline.columns, outline.rows,
-                                    outline.bits_allocated / 8, origin));
+  const int width = outline.columns, height = outline.rows, word_bytes = outline.bits_allocated / 8;
+  switch (const Coding coding = transfer_syntax(outline.elements.transfer_syntax)->coding) {
+    case Coding::rle:
+      return value_or_throw(decode_rle(bytes, pixels, word_bytes, origin));
+    case Coding::jpeg_ls:
+      return value_or_throw(decode_jpeg_ls(bytes, width, height, word_bytes, origin));
+    case Coding::jpeg_2000:
+      return value_or_throw(decode_jpeg_2000(bytes, width, height, word_bytes, origin));
+    default:
+      return value_or_throw(
+          decode_jpeg(std::move(bytes), coding == Coding::jpeg_lossless, width, height, word_bytes, origin));
+  }
 }
 
 template <class Word>

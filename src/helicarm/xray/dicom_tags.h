@@ -47,6 +47,43 @@ inline constexpr DicomTag intensity_relationship{0x00281040, "Pixel Intensity Re
 inline constexpr DicomTag intensity_sign{0x00281041, "Pixel Intensity Relationship Sign"};
 inline constexpr DicomTag lossy_compression{0x00282110, "Lossy Image Compression"};
 inline constexpr DicomTag lut_shape{0x20500020, "Presentation LUT Shape"};
+inline constexpr DicomTag shared_groups{0x52009229, "Shared Functional Groups Sequence"};
+inline constexpr DicomTag frame_groups{0x52009230, "Per-Frame Functional Groups Sequence"};
+inline constexpr DicomTag frame_content{0x00209111, "Frame Content Sequence"};
+inline constexpr DicomTag frame_acquired{0x00189074, "Frame Acquisition DateTime"};
+inline constexpr DicomTag frame_pixels{0x00289443, "Frame Pixel Data Properties Sequence"};
+inline constexpr DicomTag field_of_view{0x00189432, "Field of View Sequence"};
+inline constexpr DicomTag positioner_position{0x00189405, "Positioner Position Sequence"};
+inline constexpr DicomTag xray_geometry{0x00189476, "X-Ray Geometry Sequence"};
 inline constexpr DicomTag pixel_data{0x7FE00010, "Pixel Data"};
+
+/// Exposure, body part, orientation and compression: codes and decimal numbers.
+inline constexpr std::array technique = {DicomTag{0x00180015, "Body Part Examined"},
+                                         DicomTag{0x00180060, "KVP"},
+                                         DicomTag{0x00181150, "Exposure Time"},
+                                         DicomTag{0x00181151, "X-Ray Tube Current"},
+                                         DicomTag{0x00181152, "Exposure"},
+                                         DicomTag{0x00181155, "Radiation Setting"},
+                                         DicomTag{0x00185101, "View Position"},
+                                         DicomTag{0x00187004, "Detector Type"},
+                                         DicomTag{0x00200020, "Patient Orientation"},
+                                         DicomTag{0x00200060, "Laterality"},
+                                         DicomTag{0x00200062, "Image Laterality"},
+                                         DicomTag{0x00280301, "Burned In Annotation"},
+                                         DicomTag{0x00282110, "Lossy Image Compression"}};
+
+/// Patient and General Study modules, with the character set of their text.
+inline constexpr std::array patient_study = {DicomTag{0x00080005, "Specific Character Set"},
+                                             DicomTag{0x00080020, "Study Date"},
+                                             DicomTag{0x00080030, "Study Time"},
+                                             DicomTag{0x00080050, "Accession Number"},
+                                             DicomTag{0x00080090, "Referring Physician's Name"},
+                                             DicomTag{0x00081030, "Study Description"},
+                                             patient_name,
+                                             patient_id,
+                                             DicomTag{0x00100030, "Patient's Birth Date"},
+                                             DicomTag{0x00100040, "Patient's Sex"},
+                                             study,
+                                             DicomTag{0x00200010, "Study ID"}};
 
 }  // namespace helicarm::xray::tags

@@ -5,6 +5,8 @@
 
 #include "helicarm/xray/dicom_elements.h"
 #include "helicarm/xray/dicom_tags.h"
+#include "helicarm/xray/plain_bytes.h"
+#include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::xray {
 namespace {
@@ -34,32 +36,48 @@ struct Header {
 
 class Walker {
  public:
-  Walker(std::string_view bytes, DicomElements& into) : bytes_(bytes), into_(into) {}
+  Walker(std::string_view bytes, DicomElements& into) : bytes_(bytes), into_(&into) {}
 
   void file() {
-    const std::size_t meta_end = meta();
-    at_ = meta_end;
-    encapsulated_ = choose_syntax();
-    const bool explicit_vr = into_.transfer_syntax != "1.2.840.10008.1.2";
-    into_.elements.clear();
-    elements(bytes_.size(), false, explicit_vr, 0);
-    if (into_.find(tags::pixel_data) && encapsulated_ && into_.fragments.empty())
-      into_.refuse(Reason::bad_value, tags::pixel_data,
-                   "is not encapsulated, but the transfer syntax says so");
+    at_ = meta();
+    const TransferSyntax& syntax = chosen_syntax();
+    encapsulated_ = syntax.coding != Coding::native;
+    if (syntax.deflated) inflate();
+    big_endian_ = syntax.big_endian;
+    into_->elements.clear();
+    elements(bytes_.size(), false, syntax.explicit_vr, 0);
+    if (into_->find(tags::pixel_data) && encapsulated_ && into_->fragments.empty())
+      into_->refuse(Reason::bad_value, tags::pixel_data,
+                    "is not encapsulated, but the transfer syntax says so");
     check_uids({tags::sop_class.number, tags::sop_instance.number, tags::study.number, tags::series.number,
                 tags::frame_of_reference.number});
   }
 
+  /// Of a sequence's value. `into` gives the origin for messages.
+  std::vector<DicomElements> items(bool explicit_vr) {
+    std::vector<DicomElements> items;
+    const DicomElements about = *into_;
+    while (at_ < bytes_.size()) {
+      const Header next = header(explicit_vr, bytes_.size());
+      if (next.tag == sequence_end) break;
+      into_ = &items.emplace_back(about);
+      const bool delimited = next.length == undefined;
+      elements(delimited ? bytes_.size() : at_ + next.length, delimited, explicit_vr, 0);
+    }
+    return items;
+  }
+
  private:
   [[noreturn]] void refuse(Reason reason, std::string_view problem) const {
-    throw BadInput(reason, fmt::format("{}: byte {}: {}", into_.origin, at_, problem));
+    throw BadInput(reason, fmt::format("{}: byte {}: {}", into_->origin, at_, problem));
   }
 
   std::uint32_t number(std::size_t size, std::size_t end) {
     need(size, end);
     std::uint32_t value = 0;
     for (std::size_t i = 0; i < size; ++i)
-      value |= std::uint32_t{static_cast<unsigned char>(bytes_[at_ + i])} << (8 * i);
+      value |= std::uint32_t{static_cast<unsigned char>(bytes_[at_ + i])}
+               << 8 * (big_endian_ ? size - 1 - i : i);
     at_ += size;
     return value;
   }
@@ -105,17 +123,18 @@ class Walker {
   }
 
   void keep(const Header& header, std::string_view value) {
-    if (!into_.elements.empty() && header.tag <= into_.elements.back().tag)
+    if (!into_->elements.empty() && header.tag <= into_->elements.back().tag)
       refuse(Reason::bad_value, fmt::format("({:04X},{:04X}) is given twice or out of order",
                                             header.tag >> 16, header.tag & 0xFFFF));
-    if (into_.elements.size() == max_elements)
+    if (into_->elements.size() == max_elements)
       refuse(Reason::bad_value, fmt::format("more than {} elements", max_elements));
-    into_.elements.push_back({header.tag, header.vr, value});
+    into_->elements.push_back({header.tag, header.vr, value});
   }
 
   std::size_t meta() {
     if (bytes_.size() <= meta_start || bytes_.substr(128, 4) != "DICM")
-      throw BadInput(Reason::not_an_image, fmt::format("{}: not a DICOM file with a preamble", into_.origin));
+      throw BadInput(Reason::not_an_image,
+                     fmt::format("{}: not a DICOM file with a preamble", into_->origin));
     at_ = meta_start;
     const Header first = header(true, bytes_.size());
     if (first.tag != tags::meta_length.number || first.vr_text() != "UL" || first.length != 4)
@@ -129,7 +148,7 @@ class Walker {
       keep(next, value(next.length, end));
     }
     check_uids({0x00020002, 0x00020003, tags::transfer_syntax.number});
-    into_.transfer_syntax = uid(into_.find(tags::transfer_syntax));
+    into_->transfer_syntax = uid(into_->find(tags::transfer_syntax));
     return end;
   }
 
@@ -142,24 +161,31 @@ class Walker {
 
   void check_uids(std::initializer_list<std::uint32_t> tags) const {
     for (std::uint32_t tag : tags) {
-      const std::string_view text = uid(into_.find({tag, ""}));
+      const std::string_view text = uid(into_->find({tag, ""}));
       if (text.size() > 64 || text.find_first_not_of("0123456789.") != std::string_view::npos)
-        into_.refuse(Reason::bad_value, {tag, "UID"},
-                     fmt::format("is {}, must be at most 64 digits and points", quote(text)));
+        into_->refuse(Reason::bad_value, {tag, "UID"},
+                      fmt::format("is {}, must be at most 64 digits and points", quote(text)));
     }
   }
 
-  /// Whether the syntax is encapsulated.
-  bool choose_syntax() const {
-    const std::string& syntax = into_.transfer_syntax;
-    if (syntax.empty()) into_.refuse(Reason::bad_value, tags::transfer_syntax, "is missing");
-    if (syntax == "1.2.840.10008.1.2" || syntax == "1.2.840.10008.1.2.1") return false;
-    for (std::string_view known : {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
-                                   "1.2.840.10008.1.2.4.57", "1.2.840.10008.1.2.4.70", "1.2.840.10008.1.2.5"})
-      if (syntax == known) return true;
-    into_.refuse(
-        Reason::unsupported, tags::transfer_syntax,
-        fmt::format("is {}; read are little endian, RLE and JPEG (processes 1, 2, 4 and 14)", syntax));
+  const TransferSyntax& chosen_syntax() const {
+    const std::string& uid = into_->transfer_syntax;
+    if (uid.empty()) into_->refuse(Reason::bad_value, tags::transfer_syntax, "is missing");
+    const TransferSyntax* syntax = transfer_syntax(uid);
+    if (!syntax)
+      into_->refuse(
+          Reason::unsupported, tags::transfer_syntax,
+          fmt::format("is {}; read are uncompressed, deflated, RLE, JPEG (processes 1, 2, 4 and 14), "
+                      "JPEG-LS and JPEG 2000",
+                      uid));
+    return *syntax;
+  }
+
+  void inflate() {
+    into_->converted =
+        std::make_shared<const std::string>(value_or_throw(inflated(bytes_.substr(at_), into_->origin)));
+    bytes_ = *into_->converted;
+    at_ = 0;
   }
 
   /// Elements up to `end` or, if `delimited`, up to the item's delimiter.
@@ -218,27 +244,47 @@ class Walker {
       if (next.tag != item_tag || next.length == undefined)
         refuse(Reason::bad_value, "a fragment of Pixel Data was expected");
       const std::string_view fragment = value(next.length, end);
-      if (into_.fragments.size() == max_fragments)
+      if (into_->fragments.size() == max_fragments)
         refuse(Reason::bad_value, "too many fragments of Pixel Data");
-      if (depth == 0) into_.fragments.push_back(fragment);
+      if (depth == 0) into_->fragments.push_back(fragment);
     }
   }
 
   std::string_view bytes_;
-  DicomElements& into_;
+  DicomElements* into_;
   std::size_t at_ = 0;
   bool encapsulated_ = false;
+  bool big_endian_ = false;
 };
+
+DicomElements walked(std::string_view bytes, const std::string& origin) {
+  DicomElements found;
+  found.origin = origin;
+  Walker(bytes, found).file();
+  return found;
+}
 
 }  // namespace
 
 Expected<DicomElements> walk_dicom(std::string_view bytes, const std::string& origin) {
   return guarded([&] {
-    DicomElements found;
-    found.origin = origin;
-    Walker(bytes, found).file();
+    DicomElements found = walked(bytes, origin);
+    if (!transfer_syntax(found.transfer_syntax)->big_endian) return found;
+    const auto converted =
+        std::make_shared<const std::string>(value_or_throw(as_little_endian(bytes, origin)));
+    found = walked(*converted, origin);
+    found.converted = converted;
     return found;
   });
+}
+
+std::vector<DicomElements> sequence_items(const DicomElements& of, DicomTag sequence) {
+  const DicomElement* element = of.find(sequence);
+  if (!element) return {};
+  DicomElements about;
+  about.origin = of.origin;
+  about.transfer_syntax = of.transfer_syntax;
+  return Walker(element->value, about).items(transfer_syntax(of.transfer_syntax)->explicit_vr);
 }
 
 }  // namespace helicarm::xray

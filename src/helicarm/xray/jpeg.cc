@@ -8,6 +8,8 @@
 #include <dcmtk/dcmjpeg/djdijg8.h>
 #include <fmt/format.h>
 
+#include "helicarm/xray/words.h"
+
 namespace helicarm::xray {
 namespace {
 
@@ -100,9 +102,7 @@ Expected<std::string> decode_jpeg(std::string jpeg, bool lossless, int width, in
                                       : decode<DJDecompressIJG16Bit>(jpeg, out);
   if (!good) return damaged("damaged");
   if (precision > 8 || word_bytes == 1) return out;
-  std::string wide(2 * pixels, '\0');
-  for (std::size_t i = 0; i < pixels; ++i) wide[2 * i] = out[i];
-  return wide;
+  return widened(out);
 }
 
 }  // namespace helicarm::xray

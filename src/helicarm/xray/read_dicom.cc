@@ -8,6 +8,7 @@
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/polarity.h"
+#include "helicarm/xray/uid.h"
 
 namespace helicarm::xray {
 
@@ -51,10 +52,11 @@ std::string image_key(const image::Image<float>& pixels) {
 
 Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin, std::optional<int> frame) {
   return guarded([&] {
-    const DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
+    DicomOutline outline = value_or_throw(check_dicom(bytes, origin));
+    const int index = value_or_throw(choose_frame(origin, outline.frames, frame));
+    outline.elements = frame_elements(outline.elements, index);
     auto [acquisition, warnings] = value_or_throw(read_acquisition(outline.elements));
     const Polarity polarity = value_or_throw(read_polarity(outline));
-    const int index = value_or_throw(choose_frame(origin, outline.frames, frame));
 
     XrayImage xray_image;
     xray_image.pixels = value_or_throw(decode_frame(outline, index));
@@ -68,7 +70,7 @@ Expected<XrayImage> read_dicom(std::string_view bytes, const std::string& origin
     if (!polarity.certain) make_metal_dark(xray_image, origin);
     xray_image.acquisition.instance_key = image_key(xray_image.pixels);
     xray_image.acquisition.uid_key =
-        digest(fmt::format("{} {}", outline.elements.text(tags::sop_instance), index));
+        text_key(fmt::format("{} {}", outline.elements.text(tags::sop_instance), index));
     return xray_image;
   });
 }

@@ -16,8 +16,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::uintmax_t max_file_bytes = 256u << 20;
-
 Acquisition read_sidecar(const fs::path& path) {
   const Json json = value_or_throw(read_json(path));
   JsonReader reader(json, path.filename().string());
@@ -58,7 +56,7 @@ BadInput not_an_image(std::string_view bytes, const std::string& origin) {
 }
 
 XrayImage read_by_content(const fs::path& path, std::optional<int> frame) {
-  const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
+  const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
   const std::string origin = path.filename().string();
   if (is_dicom(bytes)) return value_or_throw(read_dicom(bytes, origin, frame));
   if (image::is_png(bytes)) {
@@ -87,7 +85,7 @@ std::optional<fs::path> sidecar_of(const fs::path& image) {
 
 Expected<int> count_frames(const fs::path& path) {
   return guarded([&] {
-    const std::string bytes = value_or_throw(read_file(path, max_file_bytes));
+    const std::string bytes = value_or_throw(read_file(path, max_image_file_bytes));
     const std::string origin = path.filename().string();
     if (is_dicom(bytes)) return value_or_throw(check_dicom(bytes, origin)).frames;
     if (image::is_png(bytes)) return 1;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,9 @@
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::xray {
+
+/// Limit for an image file.
+inline constexpr std::uintmax_t max_image_file_bytes = 256u << 20;
 
 /// Reads a DICOM, PNG or TIFF X-ray image; the format is detected by content. `frame` is 1-based and needed
 /// only if the file has several. PNG and TIFF may have a sidecar NAME.json (or NAME.png.json) with `pixel_mm`

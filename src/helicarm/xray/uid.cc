@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <stdexcept>
 #include <system_error>
 
+#include <fmt/format.h>
+#include <openssl/evp.h>
 #include <sys/random.h>
 
 namespace helicarm::xray {
@@ -31,6 +34,24 @@ std::string uid_of(Words words) {
 }
 
 }  // namespace
+
+std::string uid_of(const std::string& key) {
+  Words words;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    words[i] = static_cast<std::uint32_t>(std::stoul(key.substr(8 * i, 8), nullptr, 16));
+  return uid_of(words);
+}
+
+std::string text_key(std::string_view text) {
+  if (text.empty()) return {};
+  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
+  unsigned size = 0;
+  if (EVP_Digest(text.data(), text.size(), hash.data(), &size, EVP_sha256(), nullptr) != 1)
+    throw std::runtime_error("SHA-256 is not available");
+  std::string key;
+  for (std::size_t i = 0; i < 16; ++i) key += fmt::format("{:02x}", hash[i]);
+  return key;
+}
 
 std::string make_uid() {
   Words words;

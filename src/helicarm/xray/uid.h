@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "helicarm/core/random.h"
 
@@ -13,5 +14,12 @@ std::string make_uid();
 
 /// Reproducible variant.
 std::string make_uid(RandomStream& random);
+
+/// The UID of a key of 32 hexadecimal digits: the same for the same key.
+std::string uid_of(const std::string& key);
+
+/// First 128 bits of the SHA-256 of a text, as 32 hexadecimal digits: compares identifiers without keeping
+/// them. Empty for an empty text.
+std::string text_key(std::string_view text);
 
 }  // namespace helicarm::xray

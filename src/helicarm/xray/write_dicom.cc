@@ -2,6 +2,8 @@
 #include "helicarm/xray/write_dicom.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -47,47 +49,170 @@ std::string decimal(double value) { return fmt::format("{:.10g}", value); }
 
 std::string decimal(std::optional<double> value) { return value ? decimal(*value) : std::string{}; }
 
-void put_identity(DcmDataset& dataset, const DerivedImage& image) {
+struct SopClass {
+  std::string_view modality;
+  const char* uid;
+};
+constexpr SopClass xa{"XA", UID_XRayAngiographicImageStorage};
+constexpr SopClass dx{"DX", UID_DigitalXRayImageStorageForPresentation};
+constexpr std::array sop_classes = {xa, SopClass{"RF", UID_XRayRadiofluoroscopicImageStorage},
+                                    SopClass{"CR", UID_ComputedRadiographyImageStorage}, dx};
+
+SopClass class_of(const DerivedImage& image) {
+  const auto found = std::ranges::find(sop_classes, image.acquisition.modality, &SopClass::modality);
+  if (found == sop_classes.end() || (found->modality == dx.modality && !image.acquisition.pixel_mm))
+    return xa;
+  return *found;
+}
+
+DcmTagKey key_of(std::uint32_t number) {
+  return {static_cast<Uint16>(number >> 16), static_cast<Uint16>(number & 0xFFFF)};
+}
+
+/// Type 2: must be present, may be empty.
+void put_empty(DcmDataset& dataset, std::initializer_list<DcmTagKey> tags) {
+  for (const DcmTagKey& tag : tags)
+    if (!dataset.tagExists(tag)) must(dataset.insertEmptyElement(tag), "empty element");
+}
+
+/// General modules, and of the image's class those without a value.
+void put_required(DcmDataset& dataset, const SopClass& sop_class) {
+  put_empty(dataset, {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName,
+                      DCM_PatientBirthDate, DCM_PatientSex, DCM_StudyID, DCM_PatientOrientation});
+  if (sop_class.modality == "DX")
+    dataset.findAndDeleteElement(DCM_Laterality);
+  else
+    put_empty(dataset, {DCM_Laterality});
+  if (sop_class.modality == "XA" || sop_class.modality == "RF")
+    put_empty(dataset, {DCM_KVP, DCM_XRayTubeCurrent, DCM_ExposureTime, DCM_Exposure});
+  if (sop_class.modality == "CR") put_empty(dataset, {DCM_BodyPartExamined, DCM_ViewPosition});
+}
+
+void put_source(DcmDataset& dataset, const DerivedImage& image, const SopClass& sop_class) {
+  const auto& kept = image.patient_study;
+  const std::string& uid = kept ? kept->sop_instance_uid : image.source_instance_uid;
+  if (uid.empty()) return;
+  DcmItem* item = nullptr;
+  must(dataset.findOrCreateSequenceItem(DCM_SourceImageSequence, item, 0), "source image");
+  must(
+      item->putAndInsertString(DCM_ReferencedSOPClassUID, kept ? kept->sop_class_uid.c_str() : sop_class.uid),
+      "source image");
+  must(item->putAndInsertString(DCM_ReferencedSOPInstanceUID, uid.c_str()), "source image");
+}
+
+void put_identity(DcmDataset& dataset, const DerivedImage& image, const SopClass& sop_class) {
   const auto or_fresh = [](const std::string& uid) { return uid.empty() ? make_uid() : uid; };
+  const bool planes = sop_class.modality == "XA" || sop_class.modality == "RF";
   put(dataset, DCM_SpecificCharacterSet, "ISO_IR 192");
   put(dataset, DCM_ImageType,
-      image.derived ? "DERIVED\\SECONDARY\\SINGLE PLANE" : "ORIGINAL\\PRIMARY\\SINGLE PLANE");
-  put(dataset, DCM_SOPClassUID, UID_XRayAngiographicImageStorage);
+      fmt::format("{}{}", image.derived ? "DERIVED\\SECONDARY" : "ORIGINAL\\PRIMARY",
+                  planes ? "\\SINGLE PLANE" : ""));
+  put(dataset, DCM_SOPClassUID, sop_class.uid);
   put(dataset, DCM_SOPInstanceUID, or_fresh(image.instance_uid));
-  put(dataset, DCM_StudyInstanceUID, or_fresh(image.study_uid));
   put(dataset, DCM_SeriesInstanceUID, or_fresh(image.series_uid));
-  put(dataset, DCM_Modality, "XA");
+  put(dataset, DCM_Modality, std::string(sop_class.modality));
   put(dataset, DCM_Manufacturer, "helicarm");
   put(dataset, DCM_SoftwareVersions, HELICARM_VERSION);
   put(dataset, DCM_SeriesDescription, image.series_description);
-  put(dataset, DCM_PatientName, image.patient_name);
-  put(dataset, DCM_PatientID, image.patient_id);
   put(dataset, DCM_SeriesNumber, "1");
   put(dataset, DCM_InstanceNumber, "1");
-  // Type 2: must be present, may be empty.
-  for (const DcmTagKey& tag :
-       {DCM_StudyDate, DCM_StudyTime, DCM_AccessionNumber, DCM_ReferringPhysicianName, DCM_PatientBirthDate,
-        DCM_PatientSex, DCM_StudyID, DCM_PatientOrientation, DCM_KVP})
-    put(dataset, tag, "");
+  for (const auto& [number, value] : image.acquisition.technique) put(dataset, key_of(number), value);
+  if (!image.derivation.empty()) put(dataset, DCM_DerivationDescription, image.derivation);
+  put_source(dataset, image, sop_class);
+  if (image.patient_study) {
+    for (const auto& [number, value] : image.patient_study->elements) put(dataset, key_of(number), value);
+    return;
+  }
+  put(dataset, DCM_PatientName, image.patient_name);
+  put(dataset, DCM_PatientID, image.patient_id);
+  put(dataset, DCM_StudyInstanceUID, or_fresh(image.study_uid));
   if (!image.derived) return;
   put(dataset, DCM_PatientIdentityRemoved, "YES");
   put(dataset, DCM_DeidentificationMethod, "Nothing of the source but geometry and pixels");
 }
 
-void put_acquisition(DcmDataset& dataset, const Acquisition& a) {
-  put(dataset, DCM_RadiationSetting, "GR");
+/// The table by which logarithmic values become proportional to the dose (PS3.3 C.8.7.1.1.3 and C.11.1).
+void put_dose_table(DcmDataset& dataset, const DerivedImage& image) {
+  const std::size_t entries = std::size_t{1} << image.bits_stored;
+  std::vector<Uint16> doses(entries);
+  for (std::size_t i = 0; i < entries; ++i)
+    doses[i] = static_cast<Uint16>(
+        std::lround(65535 * std::exp(image.log_range * (double(i) / double(entries - 1) - 1))));
+  DcmItem* item = nullptr;
+  must(dataset.findOrCreateSequenceItem(DCM_ModalityLUTSequence, item, 0), "modality table");
+  const std::array<Uint16, 3> descriptor = {static_cast<Uint16>(entries & 0xFFFF), 0, 16};
+  must(item->putAndInsertUint16Array(DCM_LUTDescriptor, descriptor.data(), descriptor.size()),
+       "modality table");
+  must(item->putAndInsertString(DCM_ModalityLUTType, "US"), "modality table");
+  must(item->putAndInsertString(DCM_LUTExplanation,
+                                fmt::format("dose by exp, range {:.3f}{}", image.log_range,
+                                            image.log_range == nominal_log_range ? " (nominal)" : "")
+                                    .c_str()),
+       "modality table");
+  DcmTag words(DCM_LUTData);
+  words.setVR(EVR_OW);
+  auto data = std::make_unique<DcmOtherByteOtherWord>(words);
+  must(data->putUint16Array(doses.data(), doses.size()), "modality table");
+  must(item->insert(data.get(), true), "modality table");
+  static_cast<void>(data.release());
+}
+
+void put_intensity(DcmDataset& dataset, const DerivedImage& image) {
+  const auto& logarithmic = image.acquisition.logarithmic;
+  put(dataset, DCM_PixelIntensityRelationship, !logarithmic ? "DISP" : *logarithmic ? "LOG" : "LIN");
+  if (logarithmic.value_or(false)) put_dose_table(dataset, image);
+}
+
+void put_acquisition(DcmDataset& dataset, const DerivedImage& image, const SopClass& sop_class) {
+  const Acquisition& a = image.acquisition;
   if (a.pixel_mm)
     put(dataset, DCM_ImagerPixelSpacing,
         fmt::format("{}\\{}", decimal(a.pixel_mm->y()), decimal(a.pixel_mm->x())));
   if (a.source_detector_mm) put(dataset, DCM_DistanceSourceToDetector, decimal(*a.source_detector_mm));
   if (a.source_patient_mm) put(dataset, DCM_DistanceSourceToPatient, decimal(*a.source_patient_mm));
-  put(dataset, DCM_PositionerPrimaryAngle, decimal(a.primary_angle_deg));
-  put(dataset, DCM_PositionerSecondaryAngle, decimal(a.secondary_angle_deg));
-  put(dataset, DCM_PositionerMotion, "STATIC");
   if (a.acquired) put(dataset, DCM_AcquisitionDateTime, dicom_date_time(a.acquired->seconds));
+  if (sop_class.modality == "CR") return;
   if (a.flip_hint) put(dataset, DCM_FieldOfViewHorizontalFlip, "YES");
-  put(dataset, DCM_PixelIntensityRelationship, !a.logarithmic ? "DISP" : *a.logarithmic ? "LOG" : "LIN");
+  if (sop_class.modality != "RF" || a.primary_angle_deg || a.secondary_angle_deg) {
+    put(dataset, DCM_PositionerPrimaryAngle, decimal(a.primary_angle_deg));
+    put(dataset, DCM_PositionerSecondaryAngle, decimal(a.secondary_angle_deg));
+  }
+}
+
+/// X-Ray Image and Acquisition modules.
+void put_projection(DcmDataset& dataset, const DerivedImage& image) {
+  if (!dataset.tagExists(DCM_RadiationSetting)) put(dataset, DCM_RadiationSetting, "GR");
+  put_intensity(dataset, image);
+}
+
+/// DX modules, PS3.3 C.8.11.
+void put_digital(DcmDataset& dataset, const DerivedImage& image) {
+  const double levels = double(1 << image.bits_stored);
+  put(dataset, DCM_PresentationIntentType, "FOR PRESENTATION");
+  put(dataset, DCM_PositionerType, "CARM");
+  if (!dataset.tagExists(DCM_ImageLaterality)) put(dataset, DCM_ImageLaterality, "U");
+  if (!dataset.tagExists(DCM_BurnedInAnnotation)) put(dataset, DCM_BurnedInAnnotation, "YES");
+  if (!dataset.tagExists(DCM_LossyImageCompression)) put(dataset, DCM_LossyImageCompression, "00");
+  put_empty(dataset, {DCM_AnatomicRegionSequence, DCM_AcquisitionContextSequence, DCM_DetectorType});
+  put(dataset, DCM_RescaleIntercept, "0");
+  put(dataset, DCM_RescaleSlope, "1");
+  put(dataset, DCM_RescaleType, "US");
+  put(dataset, DCM_PresentationLUTShape, "IDENTITY");
+  put(dataset, DCM_WindowCenter, decimal(levels / 2));
+  put(dataset, DCM_WindowWidth, decimal(levels));
+  const auto& logarithmic = image.acquisition.logarithmic;
+  put(dataset, DCM_PixelIntensityRelationship, logarithmic.value_or(true) ? "LOG" : "LIN");
   must(dataset.putAndInsertSint16(DCM_PixelIntensityRelationshipSign, 1), "sign");
+}
+
+void put_modules(DcmDataset& dataset, const DerivedImage& image) {
+  const SopClass sop_class = class_of(image);
+  put_identity(dataset, image, sop_class);
+  put_acquisition(dataset, image, sop_class);
+  if (sop_class.modality == "XA") put(dataset, DCM_PositionerMotion, "STATIC");
+  if (sop_class.modality == "XA" || sop_class.modality == "RF") put_projection(dataset, image);
+  if (sop_class.modality == "DX") put_digital(dataset, image);
+  put_required(dataset, sop_class);
 }
 
 void put_pixels(DcmDataset& dataset, const DerivedImage& image) {
@@ -130,8 +255,7 @@ Expected<void> write_dicom(const fs::path& path, const DerivedImage& image) {
     prepare_dcmtk();
     auto made = std::make_unique<DcmFileFormat>();
     DcmDataset& dataset = *made->getDataset();
-    put_identity(dataset, image);
-    put_acquisition(dataset, image.acquisition);
+    put_modules(dataset, image);
     put_pixels(dataset, image);
     must(dataset.chooseRepresentation(syntax, nullptr), "compression");
     return made;

@@ -7,11 +7,16 @@
 
 #include "helicarm/core/failure.h"
 #include "helicarm/image/image.h"
+#include "helicarm/xray/patient_study.h"
 #include "helicarm/xray/xray_image.h"
 
 namespace helicarm::xray {
 
-/// An image to be written as DICOM. Contains no patient data except the fields below.
+/// Three decades, where the range of a logarithmic image is not known.
+inline constexpr double nominal_log_range = 6.908;
+
+/// An image to be written as DICOM: XA, or RF, CR or DX by `acquisition.modality`. Contains no patient data
+/// except the fields below.
 struct DerivedImage {
   image::Image<std::uint16_t> pixels;
   int bits_stored = 16;  ///< 8 .. 16; up to 8 bits are written as one byte per pixel
@@ -19,16 +24,22 @@ struct DerivedImage {
       acquisition;      ///< spacing, source distance, angles, time, flip, logarithmic; keys are not written
   bool derived = true;  ///< DERIVED, patient identity removed; else ORIGINAL
   std::string series_description = {};
+  std::string derivation = {};  ///< what was done to the source, one sentence
   std::string patient_name = "ANON";
   std::string patient_id = "ANON";
   std::string study_uid = {};  ///< each UID: empty for a new random one (see make_uid)
   std::string series_uid = {};
   std::string instance_uid = {};
+  std::string source_instance_uid = {};  ///< of the image this one was made of; empty: none is named
+  /// Of the source: written in place of the patient's name and ID, the study's UID and the source's UID.
+  std::optional<PatientStudy> patient_study = {};
+  /// Of a logarithmic image: natural logarithm of the ratio of dose between the highest and the lowest value.
+  double log_range = nominal_log_range;
   bool rle = false;  ///< RLE lossless instead of uncompressed
 };
 
-/// Writes an X-ray angiographic image, MONOCHROME2, atomically. Refuses: bad_size (empty, or a side over
-/// 16384), bad_value (a pixel over 2^bits_stored - 1), cannot_write.
+/// Writes an X-ray image, MONOCHROME2, atomically. A DX image without pixel size becomes XA. Refuses:
+/// bad_size (empty, or a side over 16384), bad_value (a pixel over 2^bits_stored - 1), cannot_write.
 Expected<void> write_dicom(const std::filesystem::path& path, const DerivedImage& image);
 
 }  // namespace helicarm::xray

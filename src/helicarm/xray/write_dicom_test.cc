@@ -1,10 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/xray/write_dicom.h"
 
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+
+#include <dcmtk/config/osconfig.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/xray/derived_image.h"
+#include "helicarm/xray/dicom_builder.h"
+#include "helicarm/xray/read_dicom.h"
 #include "helicarm/xray/read_xray_image.h"
 #include "helicarm/xray/uid.h"
 
@@ -69,6 +79,103 @@ TEST_F(WriteDicom, ImageOutsideTheLimitsIsRefused) {
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", image).error().reason, Reason::bad_value);
   EXPECT_EQ(write_dicom(folder_ / "a.dcm", DerivedImage{}).error().reason, Reason::bad_size);
   EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+/// Lines with an error of dicom3tools' validator; nothing where it is not installed.
+std::optional<std::string> validated(const fs::path& file) {
+  if (std::system("command -v dciodvfy >/dev/null 2>&1") != 0) return {};
+  const std::string log = file.string() + ".log";
+  if (std::system(fmt::format("dciodvfy '{}' >'{}' 2>&1", file.string(), log).c_str()) == -1) return {};
+  std::istringstream lines(*read_file(log, 1 << 20));
+  std::string errors;
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("Error")) errors += line + '\n';
+  return errors;
+}
+
+TEST_F(WriteDicom, FilesConformToTheStandard) {
+  for (const char* modality : {"XA", "RF", "CR", "DX", "SC", ""})
+    for (const bool derived : {false, true})
+      for (const std::optional<bool> logarithmic : {std::optional<bool>{}, {false}, {true}}) {
+        DerivedImage image = grey_image(12);
+        image.derived = derived;
+        image.acquisition.modality = modality;
+        image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.3);
+        image.acquisition.source_detector_mm = 1000;
+        image.acquisition.primary_angle_deg = 30;
+        image.acquisition.logarithmic = logarithmic;
+        if (image.acquisition.modality == "DX") image.acquisition.technique[0x00200020] = "L\\F";
+        if (derived) image.derivation = "rectified";
+        if (derived) image.source_instance_uid = make_uid();
+        ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
+        const auto errors = validated(folder_ / "a.dcm");
+        if (!errors) GTEST_SKIP() << "dciodvfy (dicom3tools) is not installed";
+        EXPECT_EQ(*errors, "") << modality << derived;
+      }
+}
+
+TEST_F(WriteDicom, ModalityIsKept) {
+  for (const char* modality : {"XA", "RF", "CR", "DX"}) {
+    DerivedImage image = grey_image(12);
+    image.acquisition.modality = modality;
+    image.acquisition.pixel_mm = Eigen::Vector2d(0.2, 0.3);
+    ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
+    EXPECT_EQ(read_xray_image(folder_ / "a.dcm", "AP", {})->acquisition.modality, modality);
+  }
+}
+
+TEST_F(WriteDicom, DoseTableUndoesTheLogarithm) {
+  DerivedImage image = grey_image(12);
+  image.acquisition.logarithmic = true;
+  image.log_range = std::log(100);
+  ASSERT_TRUE(write_dicom(folder_ / "a.dcm", image));
+  DcmFileFormat file;
+  ASSERT_TRUE(file.loadFile((folder_ / "a.dcm").c_str()).good());
+  DcmItem* table = nullptr;
+  ASSERT_TRUE(file.getDataset()->findAndGetSequenceItem(DCM_ModalityLUTSequence, table).good());
+  const Uint16* doses = nullptr;
+  unsigned long count = 0;
+  ASSERT_TRUE(table->findAndGetUint16Array(DCM_LUTData, doses, &count).good());
+  ASSERT_EQ(count, 4096u);
+  EXPECT_EQ(doses[4095], 65535);
+  EXPECT_NEAR(doses[0], 655.35, 0.5);
+  EXPECT_NEAR(doses[2048] / 6553.5, 1, 0.002);  // half the range, a tenth of the dose
+}
+
+TEST_F(WriteDicom, ImageIsStoredWithItsPatientWhereAsked) {
+  DicomBuilder source;
+  source.text(0x00080005, "CS", "ISO_IR 100").text(0x00100010, "PN", "M\xFCLLER^EVA");
+  source.text(0x0020000D, "UI", "1.2.76543.21")
+      .text(0x00080050, "SH", "A17")
+      .text(0x00100030, "DA", "19410203");
+  ASSERT_TRUE(write_file(folder_ / "source.dcm", source.bytes()));
+  const auto xray_image = read_xray_image(folder_ / "source.dcm", "AP", {});
+  ASSERT_TRUE(xray_image);
+  DerivedImage image = derived_image(*xray_image, xray_image->pixels, "rectified");
+  ASSERT_TRUE(write_dicom(folder_ / "plain.dcm", image));
+  image.patient_study = *read_patient_study(folder_ / "source.dcm");
+  ASSERT_TRUE(write_dicom(folder_ / "kept.dcm", image));
+
+  const auto kept = read_patient_study(folder_ / "kept.dcm");
+  for (const auto& [number, value] : image.patient_study->elements)
+    EXPECT_EQ(kept->elements.at(number), value);
+  const std::string bytes = *read_file(folder_ / "kept.dcm", 1 << 20);
+  EXPECT_NE(bytes.find("2.25.17"), bytes.npos);  // the source's UID
+  EXPECT_EQ(bytes.find("Nothing of the source"), bytes.npos);
+  const std::string plain = *read_file(folder_ / "plain.dcm", 1 << 20);
+  for (const char* word : {"LLER", "76543", "A17", "1941"}) EXPECT_EQ(plain.find(word), plain.npos) << word;
+}
+
+TEST(DerivedImages, OfOneStudyStayInOneStudy) {
+  DicomBuilder file;
+  file.text(0x0020000D, "UI", "1.2.76543.21");
+  const auto source = read_dicom(file.bytes(), "test", {});
+  const DerivedImage rectified = derived_image(*source, source->pixels, "rectified");
+  const DerivedImage inpainted = derived_image(*source, source->pixels, "inpainted");
+  EXPECT_EQ(rectified.study_uid, inpainted.study_uid);
+  EXPECT_EQ(rectified.source_instance_uid, inpainted.source_instance_uid);
+  EXPECT_NE(rectified.instance_uid, inpainted.instance_uid);
+  EXPECT_EQ(rectified.instance_uid, derived_image(*source, source->pixels, "rectified").instance_uid);
 }
 
 TEST(Uid, IsARandomUuidInDecimal) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,11 +34,13 @@ struct Acquisition {
   double rotation_hint_deg = 0;
   std::optional<bool> logarithmic;  ///< grey value is the logarithm of the dose, if the file states it
   std::string modality;
-  std::string patient_key;             ///< digest of patient ID and name: compare, do not print; may be empty
-  std::string study_key;               ///< digest of the study's UID; empty if the file has none
+  /// Exposure, body part and orientation as in the file, by the DICOM elements' numbers.
+  std::map<std::uint32_t, std::string> technique = {};
+  std::string patient_key;             ///< key of patient ID and name: compare, do not print; may be empty
+  std::string study_key;               ///< key of the study's UID (see text_key); empty if the file has none
   std::string frame_of_reference_key;  ///< likewise
   std::string instance_key;            ///< digest of the pixels
-  std::string uid_key;  ///< digest of SOP Instance UID and frame; empty if the file is not DICOM
+  std::string uid_key;                 ///< key of SOP Instance UID and frame; empty if the file is not DICOM
 };
 
 /// One X-ray image as stored. Grey values are the displayed ones: MONOCHROME1 is inverted so that metal is

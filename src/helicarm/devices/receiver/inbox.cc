@@ -15,6 +15,7 @@
 #include "helicarm/xray/dicom_tags.h"
 #include "helicarm/xray/digest.h"
 #include "helicarm/xray/read_dicom.h"
+#include "helicarm/xray/same_image.h"
 
 namespace helicarm::receiver {
 namespace fs = std::filesystem;
@@ -92,7 +93,8 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
       arrival.path = folder_ / (version == 1 ? uid + ".dcm" : fmt::format("{}~{}.dcm", uid, version));
       std::error_code ec;
       if (!fs::exists(arrival.path, ec)) break;
-      if (read_file(arrival.path, most_file_bytes) == file) {
+      const auto stored = read_file(arrival.path, most_file_bytes);
+      if (stored && (*stored == file || xray::same_image(*stored, file))) {
         arrival.repeated = true;
         return arrival;
       }
@@ -118,7 +120,8 @@ std::string dicom_file(std::string_view sop_class, std::string_view sop_instance
                            meta_element(0x0002, "UI", std::string(sop_class)) +
                            meta_element(0x0003, "UI", std::string(sop_instance)) +
                            meta_element(0x0010, "UI", std::string(transfer_syntax)) +
-                           meta_element(0x0012, "UI", std::string(dicom::implementation_uid));
+                           meta_element(0x0012, "UI", std::string(dicom::implementation_uid)) +
+                           meta_element(0x0013, "SH", std::string(dicom::implementation_name));
   std::string size;
   for (int i = 0; i < 4; ++i) size += static_cast<char>(meta.size() >> (8 * i));
   std::string file = std::string(128, '\0') + "DICM" + meta_element(0x0000, "UL", size) + meta;

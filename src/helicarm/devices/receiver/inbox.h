@@ -16,7 +16,7 @@ namespace helicarm::receiver {
 struct Arrival {
   std::filesystem::path path;
   std::string digest;     ///< of the file's bytes
-  bool repeated = false;  ///< identical bytes were already stored
+  bool repeated = false;  ///< the same image was already stored
   std::vector<Warning> warnings;
 };
 
@@ -31,10 +31,11 @@ class Inbox {
   Inbox(const Inbox&) = delete;
   Inbox& operator=(const Inbox&) = delete;
 
-  /// Checks a whole DICOM file like `read_dicom` and stores it atomically as SOP-INSTANCE-UID.dcm. Different
-  /// bytes under a known UID keep both files, the new one as UID~2.dcm, with the warning uid_reused. If the
-  /// folder or its lock was deleted or replaced during operation, this and all later calls fail with
-  /// cannot_write; it is not recreated. `origin` begins each message; no message contains patient data.
+  /// Checks a whole DICOM file like `read_dicom` and stores it atomically as SOP-INSTANCE-UID.dcm. The same
+  /// image in another transfer syntax is a repetition; another image under a known UID keeps both files, the
+  /// new one as UID~2.dcm, with the warning uid_reused. If the folder or its lock was deleted or replaced
+  /// during operation, this and all later calls fail with cannot_write; it is not recreated. `origin` begins
+  /// each message; no message contains patient data.
   Expected<Arrival> store(std::string_view file, const std::string& origin);
 
   const std::filesystem::path& folder() const { return folder_; }

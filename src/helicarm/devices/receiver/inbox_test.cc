@@ -37,6 +37,23 @@ TEST_F(InboxOnDisk, SameImageAgainIsTheSameArrival) {
   EXPECT_FALSE(fs::exists(folder_ / "2.25.17~2.dcm"));
 }
 
+TEST_F(InboxOnDisk, SameImageInAnotherTransferSyntaxIsTheSameArrival) {
+  inbox_->store(xray::DicomBuilder().bytes(), "test").value();
+  const Arrival again =
+      inbox_->store(xray::DicomBuilder().syntax("1.2.840.10008.1.2").bytes(), "test").value();
+  EXPECT_TRUE(again.repeated);
+  EXPECT_TRUE(again.warnings.empty());
+}
+
+TEST_F(InboxOnDisk, OtherPixelsInAnotherTransferSyntaxAreAnotherImage) {
+  inbox_->store(xray::DicomBuilder().bytes(), "test").value();
+  const std::string other =
+      xray::DicomBuilder().syntax("1.2.840.10008.1.2").pixels(std::vector<std::uint16_t>(48, 7)).bytes();
+  const Arrival arrival = inbox_->store(other, "test").value();
+  EXPECT_FALSE(arrival.repeated);
+  EXPECT_EQ(arrival.warnings.size(), 1u);
+}
+
 TEST_F(InboxOnDisk, OtherBytesUnderOneUidAreBothKeptWithAWarning) {
   inbox_->store(xray::DicomBuilder().bytes(), "test").value();
   const std::string other = xray::DicomBuilder().text(0x00181110, "DS", "990").bytes();

@@ -5,17 +5,13 @@
 #include <array>
 
 #include "helicarm/xray/dicom_check.h"
+#include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::receiver::dicom {
 namespace {
 
 constexpr std::string_view dicom_application = "1.2.840.10008.3.1.1.1";
 constexpr std::string_view verification = "1.2.840.10008.1.1";
-
-/// Cheapest to decode first, lossy ones last.
-constexpr std::array<std::string_view, 7> transfer_syntaxes{
-    "1.2.840.10008.1.2.1",    "1.2.840.10008.1.2",      "1.2.840.10008.1.2.5",   "1.2.840.10008.1.2.4.70",
-    "1.2.840.10008.1.2.4.57", "1.2.840.10008.1.2.4.51", "1.2.840.10008.1.2.4.50"};
 
 constexpr Rejection version_not_supported{1, 2, 2};
 constexpr Rejection application_not_supported{1, 1, 2};
@@ -33,13 +29,13 @@ ContextAnswer answer(const PresentationContext& context) {
     answer.result = ContextResult::abstract_syntax_unknown;
     return answer;
   }
-  const auto best = std::ranges::find_if(transfer_syntaxes, [&](std::string_view syntax) {
-    return std::ranges::count(context.transfer_syntaxes, syntax) > 0;
+  const auto best = std::ranges::find_if(xray::transfer_syntaxes, [&](const xray::TransferSyntax& syntax) {
+    return std::ranges::count(context.transfer_syntaxes, syntax.uid) > 0;
   });
-  if (best == transfer_syntaxes.end())
+  if (best == xray::transfer_syntaxes.end())
     answer.result = ContextResult::transfer_syntaxes_unknown;
   else
-    answer.transfer_syntax = *best;
+    answer.transfer_syntax = best->uid;
   return answer;
 }
 

@@ -21,7 +21,8 @@ enum Item : std::uint8_t {
   transfer_syntax_item = 0x40,
   user_information_item = 0x50,
   most_pdu_bytes_item = 0x51,
-  implementation_item = 0x52
+  implementation_item = 0x52,
+  implementation_name_item = 0x55
 };
 
 /// Calls `use(type, content)` for each item.
@@ -162,7 +163,8 @@ std::string associate_accept(const AssociationRequest& request, const std::vecto
                                              .bytes()));
   body.put(
       item(user_information_item, item(most_pdu_bytes_item, BigEndianWriter().put(most_pdu_bytes).bytes()) +
-                                      item(implementation_item, implementation_uid)));
+                                      item(implementation_item, implementation_uid) +
+                                      item(implementation_name_item, implementation_name)));
   return pdu(PduType::associate_accept, body.bytes());
 }
 

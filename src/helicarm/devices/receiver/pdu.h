@@ -24,6 +24,7 @@ enum class PduType : std::uint8_t {
 inline constexpr std::size_t pdu_header_bytes = 6;
 
 /// Identifies this implementation (PS3.7, D.3.3.2).
+inline constexpr std::string_view implementation_name = "HELICARM_" HELICARM_VERSION;
 inline constexpr std::string_view implementation_uid = "2.25.91283404923874650913245760233914825573";
 
 struct PduHeader {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/virtual_controller.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -66,6 +67,30 @@ std::uint32_t bits_of(SafetyMode mode) {
     default:
       return 1u << 9;
   }
+}
+
+/// Commands of the dashboard that change nothing here, with a real controller's answers.
+std::optional<std::string_view> answer_without_effect(std::string_view command) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 12> answers = {
+      {{"close safety popup", "closing safety popup"},
+       {"close popup", "closing popup"},
+       {"get loaded program", "No program loaded"},
+       {"is program saved", "true <unnamed>"},
+       {"get operational mode", "NONE"},
+       {"get serial number", "20260000001"},
+       {"clear operational mode",
+        "No longer controlling the operational mode. Current operational mode: "
+        "'NONE'."},
+       {"play", "Failed to execute: play"},
+       {"pause", "Failed to execute: pause"},
+       {"quit", "Disconnected"},
+       {"version", "helicarm virtual robot"},
+       {"get user role", "PROGRAMMER"}}};
+  if (command.starts_with("popup ")) return "showing popup";
+  if (command.starts_with("addToLog ")) return "Added log message";
+  const auto found =
+      std::ranges::find(answers, command, &std::pair<std::string_view, std::string_view>::first);
+  return found == answers.end() ? std::nullopt : std::optional(found->second);
 }
 
 }  // namespace
@@ -187,8 +212,10 @@ std::string VirtualController::dashboard(std::string_view command) {
   if (command == "programState") return script_ ? "PLAYING helicarm" : "STOPPED helicarm";
   if (command == "running") return fmt::format("Program running: {}", script_.has_value());
   if (command == "is in remote control") return has(RobotFault::local_mode) ? "false" : "true";
-  if (command == "PolyscopeVersion") return "URSoftware 5.25.1.0 (virtual)";
-  if (command == "close safety popup") return "closing safety popup";
+  if (command == "PolyscopeVersion") return fmt::format("URSoftware {} (virtual)", fmt::join(version(), "."));
+  if (const auto answer = answer_without_effect(command)) return std::string(*answer);
+  if (command == "get robot model") return model_.name;
+  if (command.starts_with("load ")) return fmt::format("File not found: {}", command.substr(5, 100));
   if (command == "stop") {
     end_program();
     return "Stopped";
@@ -210,6 +237,11 @@ std::string VirtualController::dashboard(std::string_view command) {
     }
     return "Restarting safety";
   }
+  if (command == "power off") {
+    end_program();
+    if (mode_ >= RobotMode::power_on) mode_ = RobotMode::power_off;
+    return "Powering off";
+  }
   if (command == "power on") {
     if (mode_ == RobotMode::power_off) mode_ = RobotMode::idle;
     return "Powering on";
@@ -219,6 +251,11 @@ std::string VirtualController::dashboard(std::string_view command) {
     return "Brake releasing";
   }
   return fmt::format("could not understand: '{}'", command.substr(0, 100));
+}
+
+std::array<std::uint32_t, 4> VirtualController::version() const {
+  const bool cb3 = model_.rate_hz < 200;
+  return cb3 ? std::array{3u, 15u, 8u, 0u} : std::array{5u, 25u, 1u, 0u};
 }
 
 void VirtualController::start_motion(const std::string& command, const std::vector<UrValue>& arguments,

@@ -61,8 +61,10 @@ class VirtualController : public UrScriptHost {
   /// list is empty.
   void delay_scripts(std::vector<double> delays_s) { script_delays_s_ = std::move(delays_s); }
   std::size_t waiting_scripts() const { return waiting_scripts_.size(); }
-  /// Answer to one dashboard command, without line end.
+  /// Answer to one dashboard command, without line end. The virtual robot holds no program files.
   std::string dashboard(std::string_view command);
+  /// Of the controller's software, on every port: major, minor, bugfix, build.
+  std::array<std::uint32_t, 4> version() const;
   void set_heartbeat(const Heartbeat& heartbeat) { heartbeat_ = heartbeat; }
 
   RobotState state() const;

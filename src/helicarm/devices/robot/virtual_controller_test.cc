@@ -152,6 +152,17 @@ TEST(VirtualController, RegisterRefusesNumbersBeyondItsBits) {
   }
 }
 
+TEST(VirtualController, DashboardKnowsTheCommandsOfOtherClients) {
+  VirtualController controller = robot();
+  EXPECT_EQ(controller.dashboard("get robot model"), "UR5");
+  EXPECT_EQ(controller.dashboard("load external_control.urp"), "File not found: external_control.urp");
+  EXPECT_EQ(controller.dashboard("play"), "Failed to execute: play");
+  EXPECT_EQ(controller.dashboard("popup hello"), "showing popup");
+  EXPECT_EQ(controller.dashboard("power off"), "Powering off");
+  EXPECT_EQ(controller.state().robot_mode, RobotMode::power_off);
+  EXPECT_EQ(controller.dashboard("power on"), "Powering on");
+}
+
 TEST(VirtualController, FaultsHaveNames) {
   EXPECT_EQ(*robot_fault("cut_cable"), RobotFault::cut_cable);
   EXPECT_EQ(*robot_fault("not_finite"), RobotFault::not_finite);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <future>
 #include <list>
 #include <thread>
@@ -24,6 +25,56 @@ using asio::ip::tcp;
 constexpr std::chrono::milliseconds retry_delay{100};
 constexpr std::uint8_t state_recipe = 1, heartbeat_recipe = 2;
 constexpr std::string_view empty_robot_state("\0\0\0\5\x10", 5);
+constexpr std::size_t ports = 4, primary = 3;
+
+/// Size and type before a message or package of the client interface.
+std::string framed(std::uint8_t type, const std::string& content) {
+  return BigEndianWriter().put(static_cast<std::uint32_t>(content.size() + 5)).put(type).put(content).bytes();
+}
+
+/// Version message of the primary port (Universal Robots, client interface).
+std::string version_message(const std::array<std::uint32_t, 4>& version) {
+  constexpr std::uint8_t robot_message = 20, from_robot = 254, version_kind = 3;
+  const std::string project = "URControl", date = "virtual";
+  return framed(robot_message, BigEndianWriter()
+                                   .put(std::uint64_t{0})
+                                   .put(from_robot)
+                                   .put(version_kind)
+                                   .put(static_cast<std::uint8_t>(project.size()))
+                                   .put(project)
+                                   .put(static_cast<std::uint8_t>(version[0]))
+                                   .put(static_cast<std::uint8_t>(version[1]))
+                                   .put(version[2])
+                                   .put(version[3])
+                                   .put(date)
+                                   .bytes());
+}
+
+/// Robot state message with robot mode data as its only package.
+std::string modes_message(const RobotState& state) {
+  constexpr std::uint8_t robot_state = 16, mode_data = 0, position_control = 0;
+  const auto flag = [](bool on) { return static_cast<std::uint8_t>(on); };
+  const double slider = state.speed_scaling;
+  return framed(
+      robot_state,
+      framed(mode_data,
+             BigEndianWriter()
+                 .put(static_cast<std::uint64_t>(std::isfinite(state.time_s) ? 1e6 * state.time_s : 0))
+                 .put(flag(true))
+                 .put(flag(true))
+                 .put(flag(state.robot_mode >= RobotMode::power_on))
+                 .put(flag(state.safety_mode == SafetyMode::robot_emergency_stop))
+                 .put(flag(state.safety_mode == SafetyMode::protective_stop))
+                 .put(flag(state.runtime == RuntimeState::playing))
+                 .put(flag(false))
+                 .put(static_cast<std::uint8_t>(state.robot_mode))
+                 .put(position_control)
+                 .put(slider)
+                 .put(slider)
+                 .put(1.0)
+                 .put(std::uint8_t{0})
+                 .bytes()));
+}
 
 Heartbeat take_heartbeat(BigEndianReader& reader) {
   Heartbeat heartbeat;
@@ -45,10 +96,11 @@ class VirtualUr::Server {
 
   Expected<void> listen() {
     using Handle = void (Server::*)(VirtualUrClient&, std::string_view);
-    const std::array<std::pair<std::uint16_t, Handle>, 3> wanted = {
+    const std::array<std::pair<std::uint16_t, Handle>, ports> wanted = {
         {{options_.rtde_port, &Server::hear_rtde},
          {options_.dashboard_port, &Server::hear_dashboard},
-         {options_.script_port, &Server::hear_script}}};
+         {options_.script_port, &Server::hear_script},
+         {options_.primary_port, &Server::hear_script}}};
     std::error_code error;
     const auto ip = asio::ip::make_address(options_.address, error);
     if (error) return fail(Reason::bad_value, "\"" + options_.address + "\" is not an address");
@@ -89,6 +141,7 @@ class VirtualUr::Server {
   void step() {
     controller_.step();
     tell_state();
+    tell_modes();
   }
 
   std::string dashboard(const std::string& command) { return controller_.dashboard(command); }
@@ -146,6 +199,7 @@ class VirtualUr::Server {
     clients_.push_back(client);
     if (port == 1) client->send("Connected: Universal Robots Dashboard Server\n");
     if (port == 2) client->send(empty_robot_state);
+    if (port == primary) client->send(version_message(controller_.version()));
     read(client, handle);
   }
 
@@ -243,15 +297,16 @@ class VirtualUr::Server {
                          ? "\1"
                          : std::string(1, '\0'));
       case RtdeKind::controller_version: {
-        const bool cb3 = options_.controller.rate_hz < 200;
         BigEndianWriter version;
-        for (const std::uint32_t part : cb3 ? std::array{3u, 15u, 8u, 0u} : std::array{5u, 25u, 1u, 0u})
-          version.put(part);
+        for (const std::uint32_t part : controller_.version()) version.put(part);
         return reply(version.bytes());
       }
-      case RtdeKind::outputs:
-        reader.take<double>();
+      case RtdeKind::outputs: {
+        const double asked_hz = reader.take<double>(), most_hz = options_.controller.rate_hz;
+        client.interval_s = 1 / (asked_hz > 0 ? std::min(asked_hz, most_hz) : most_hz);
+        client.due_s = 0;
         return reply(outputs(client, reader.take(reader.left())));
+      }
       case RtdeKind::inputs: {
         const bool taken = controller_.has(RobotFault::input_in_use) ||
                            std::ranges::any_of(clients_, [](const auto& one) { return one->commands; });
@@ -302,7 +357,9 @@ class VirtualUr::Server {
     if (controller_.has(RobotFault::frozen_states) || controller_.has(RobotFault::cut_cable)) return;
     const RobotState state = controller_.state();
     for (const auto& client : clients_) {
-      if (!client->started || !client->socket.is_open()) continue;
+      if (!client->started || !client->socket.is_open() ||
+          !client->takes(controller_.time_s(), 1 / options_.controller.rate_hz))
+        continue;
       std::string bytes = to_bytes(state_message(state_recipe, state, client->names));
       if (controller_.has(RobotFault::half_packet)) bytes.resize(bytes.size() / 2);
       if (controller_.has(RobotFault::huge_packet)) bytes = "\xff\xffU";
@@ -313,13 +370,27 @@ class VirtualUr::Server {
     if (controller_.has(RobotFault::half_packet)) controller_.set(RobotFault::frozen_states, true);
   }
 
+  /// To the clients of the primary port.
+  void tell_modes() {
+    constexpr double interval_s = 0.1;
+    const double now_s = controller_.time_s();
+    if (now_s < modes_due_s_ && modes_due_s_ <= now_s + interval_s) return;
+    modes_due_s_ = now_s + interval_s;
+    if (controller_.has(RobotFault::cut_cable)) return;
+    const std::string bytes = modes_message(controller_.state());
+    for (const auto& client : clients_)
+      if (client->port == primary) client->send(bytes);
+  }
+
   VirtualUrOptions options_;
   VirtualController controller_;
   asio::io_context io_;
-  std::array<tcp::acceptor, 3> acceptors_{tcp::acceptor(io_), tcp::acceptor(io_), tcp::acceptor(io_)};
+  std::array<tcp::acceptor, ports> acceptors_{tcp::acceptor(io_), tcp::acceptor(io_), tcp::acceptor(io_),
+                                              tcp::acceptor(io_)};
   asio::steady_timer timer_{io_};
-  std::array<asio::steady_timer, 3> retry_timers_{asio::steady_timer(io_), asio::steady_timer(io_),
-                                                  asio::steady_timer(io_)};
+  std::array<asio::steady_timer, ports> retry_timers_{asio::steady_timer(io_), asio::steady_timer(io_),
+                                                      asio::steady_timer(io_), asio::steady_timer(io_)};
+  double modes_due_s_ = 0;
   std::list<std::shared_ptr<VirtualUrClient>> clients_;
   VirtualUrCounters counters_;
   LineLimit lines_{20};
@@ -340,6 +411,7 @@ Expected<std::unique_ptr<VirtualUr>> VirtualUr::start(const VirtualUrOptions& op
 std::uint16_t VirtualUr::rtde_port() const { return server_->port(0); }
 std::uint16_t VirtualUr::dashboard_port() const { return server_->port(1); }
 std::uint16_t VirtualUr::script_port() const { return server_->port(2); }
+std::uint16_t VirtualUr::primary_port() const { return server_->port(primary); }
 
 void VirtualUr::set(RobotFault fault, bool on) {
   server_->there([&] { server_->set(fault, on); });

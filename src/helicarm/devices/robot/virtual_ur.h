@@ -21,6 +21,7 @@ struct VirtualUrOptions {
   std::uint16_t rtde_port = 30004;
   std::uint16_t dashboard_port = 29999;
   std::uint16_t script_port = 30002;
+  std::uint16_t primary_port = 0;  ///< 30001 on a real robot: scripts, version, and modes at 10 Hz
   /// The clock advances by one period per heartbeat message and by `advance`, not with wall time: results do
   /// not depend on the machine's speed.
   bool lockstep = false;
@@ -49,8 +50,8 @@ struct VirtualTruth {
   std::size_t waiting_questions = 0;  ///< dashboard commands while it is held
 };
 
-/// A UR5 or UR5e on this machine: RTDE, dashboard and secondary port, and a moving arm, on its own thread.
-/// Stops immediately.
+/// A UR5 or UR5e on this machine: RTDE, dashboard, primary and secondary port, and a moving arm, on its own
+/// thread. Stops immediately.
 class VirtualUr {
  public:
   /// Refuses an address that is not local (bad_value) and a port in use (`port_taken`).
@@ -60,6 +61,7 @@ class VirtualUr {
   std::uint16_t rtde_port() const;
   std::uint16_t dashboard_port() const;
   std::uint16_t script_port() const;
+  std::uint16_t primary_port() const;
 
   void set(RobotFault fault, bool on = true);
   /// On the robot's clock, independent of the machine's speed.

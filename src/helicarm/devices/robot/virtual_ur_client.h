@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -33,6 +34,14 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
     if (waiting.size() > longest_backlog) return cut("does not read");
     if (sending.empty()) send_waiting();
   }
+  /// Whether the state of this time is due at the requested rate.
+  bool takes(double now_s, double period_s) {
+    // At once at the beginning, after a jump of the clock, and always at the full rate.
+    if (interval_s < 1.5 * period_s || std::abs(due_s - now_s) > interval_s + period_s) due_s = now_s;
+    if (now_s < due_s - period_s / 2) return false;
+    due_s += interval_s;
+    return true;
+  }
   /// Closes the connection because of the client's behaviour.
   void cut(const std::string& why) {
     if (!socket.is_open()) return;
@@ -48,13 +57,15 @@ struct VirtualUrClient : std::enable_shared_from_this<VirtualUrClient> {
   }
 
   asio::ip::tcp::socket socket;
-  const std::size_t port;  ///< 0 RTDE, 1 dashboard, 2 script
+  const std::size_t port;  ///< 0 RTDE, 1 dashboard, 2 script, 3 primary
   std::string name;        ///< its address
   std::array<char, 4096> buffer{};
   std::string waiting, sending;
   std::string text;  ///< dashboard and script: received text
   RtdeStream stream;
   std::vector<std::string> names;  ///< RTDE: requested variables
+  double interval_s = 0;           ///< RTDE: requested between states
+  double due_s = 0;                ///< of the next state, on the robot's clock
   bool started = false;
   bool commands = false;
   int unanswered = 0;  ///< unanswered states, in lockstep

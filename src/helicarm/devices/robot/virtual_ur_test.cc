@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "helicarm/core/big_endian.h"
 #include "helicarm/devices/robot/dashboard.h"
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/rtde_message.h"
@@ -100,6 +101,49 @@ TEST(VirtualUr, RequestedFieldsAreInOrderAndUnknownOnesAreNotFound) {
   EXPECT_EQ(client.ask(request_start()).content, "\1");
   EXPECT_EQ(client.next().content, "\1\0\0\0\7"s + std::string(8, '\0'));
   EXPECT_EQ(client.ask(to_bytes({RtdeKind::inputs, "wish"})).content, "\2NOT_FOUND,NOT_FOUND,NOT_FOUND");
+}
+
+TEST(VirtualUr, StatesComeAtTheRequestedRate) {
+  const auto robot = robot_on_any_port();
+  RawClient client(*robot);
+  const std::string rate = BigEndianWriter().put(25.0).bytes();
+  robot->advance(2);
+  EXPECT_EQ(client.ask(to_bytes({RtdeKind::outputs, rate + "timestamp"})).content, "\1DOUBLE");
+  EXPECT_EQ(client.ask(request_start()).content, "\1");
+  robot->advance(1);
+  std::vector<double> times;
+  do {
+    const RtdeMessage message = client.next();
+    times.push_back(BigEndianReader(std::string_view(message.content).substr(1)).take<double>());
+  } while (times.back() < 2.95);
+  EXPECT_NEAR(double(times.size()), 25, 1);
+  for (std::size_t i = 1; i < times.size(); ++i) EXPECT_NEAR(times[i] - times[i - 1], 0.04, 1e-6);
+}
+
+TEST(VirtualUr, PrimaryPortReportsTheVersionOfTheOtherPortsAndModes) {
+  const auto robot = robot_on_any_port();
+  auto socket = TimedSocket::connect("127.0.0.1", robot->primary_port(), 10s).value();
+  std::string heard;
+  const auto receive = [&](std::size_t size) {
+    for (int i = 0; i < 1000 && heard.size() < size; ++i) heard += socket.receive(10ms).value();
+  };
+  constexpr std::size_t version_bytes = 5 + 8 + 2 + 10 + 2 + 8 + 7, modes_bytes = 5 + 47;
+  receive(version_bytes);
+  BigEndianReader version(heard);
+  EXPECT_EQ(version.take<std::uint32_t>(), version_bytes);
+  EXPECT_EQ(version.take<std::uint8_t>(), 20);
+  version.take(8 + 2 + 10);
+  EXPECT_EQ(version.take<std::uint8_t>(), 3);
+  EXPECT_EQ(version.take<std::uint8_t>(), 15);
+  EXPECT_EQ(robot->dashboard("PolyscopeVersion"), "URSoftware 3.15.8.0 (virtual)");
+  robot->advance(0.2);
+  receive(version_bytes + modes_bytes);
+  BigEndianReader modes(std::string_view(heard).substr(version_bytes));
+  EXPECT_EQ(modes.take<std::uint32_t>(), modes_bytes);
+  EXPECT_EQ(modes.take<std::uint8_t>(), 16);
+  EXPECT_EQ(modes.take<std::uint32_t>(), 47u);
+  modes.take(1 + 8 + 7);
+  EXPECT_EQ(modes.take<std::uint8_t>(), static_cast<std::uint8_t>(RobotMode::running));
 }
 
 TEST(VirtualUr, PortInUseIsReported) {

@@ -43,6 +43,8 @@ std::string_view code(PoseFault fault) {
       return "frozen";
     case PoseFault::jump:
       return "jump";
+    case PoseFault::no_rotation:
+      return "no_rotation";
     case PoseFault::name_twice:
       return "name_twice";
   }

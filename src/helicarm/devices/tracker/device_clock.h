@@ -25,6 +25,7 @@ enum class PoseFault {
   frozen,
   jump,
   name_twice,
+  no_rotation,
 };
 
 std::string_view code(PoseFault fault);

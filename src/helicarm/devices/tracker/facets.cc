@@ -8,18 +8,12 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "helicarm/devices/tracker/consistency.h"
 #include "helicarm/geometry/least_squares.h"
 #include "helicarm/geometry/pose_step.h"
 
 namespace helicarm::tracker {
 namespace {
-
-/// 99.9 % quantile of chi-square, Wilson and Hilferty's approximation.
-double chi2_limit(double dof) {
-  constexpr double normal_at_999 = 3.0902323061678132;
-  const double w = 2 / (9 * dof);
-  return dof * std::pow(1 - w + normal_at_999 * std::sqrt(w), 3);
-}
 
 struct SeenFacet {
   std::string name;
@@ -31,7 +25,6 @@ struct SeenFacet {
 std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const FacetPose> seen,
                              const FacetsOptions& options) {
   std::vector<SeenFacet> matched;
-  const double body_rad = options.body_deg * std::numbers::pi / 180;
   for (const FacetPose& pose : seen) {
     const auto facet = std::ranges::find(facets, pose.name, &Facet::name);
     if (facet == facets.end())
@@ -39,7 +32,9 @@ std::vector<SeenFacet> match(std::span<const Facet> facets, std::span<const Face
     if (std::ranges::count(seen, pose.name, &FacetPose::name) > 1)
       throw BadInput(Reason::name_clash, fmt::format("facet \"{}\" is given twice", pose.name));
     PoseCovariance covariance = pose.covariance;
-    covariance.diagonal().head<3>().array() += options.body_mm * options.body_mm;
+    const double body_mm = std::max(options.body_mm, facet->sigma_mm);
+    const double body_rad = std::max(options.body_deg, facet->sigma_deg) * std::numbers::pi / 180;
+    covariance.diagonal().head<3>().array() += body_mm * body_mm;
     covariance.diagonal().tail<3>().array() += body_rad * body_rad;
     matched.push_back({pose.name, facet->calibrator_from_facet, pose.tracker_from_facet,
                        covariance.llt().solve(PoseCovariance::Identity())});

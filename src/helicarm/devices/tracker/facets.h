@@ -14,6 +14,9 @@ namespace helicarm::tracker {
 struct Facet {
   std::string name;
   geometry::RigidTransform calibrator_from_facet;
+  double sigma_mm =
+      0;  ///< of the mount per axis, by `calibrate_mount`; at least that of FacetsOptions is used
+  double sigma_deg = 0;
 };
 
 struct FacetPose {

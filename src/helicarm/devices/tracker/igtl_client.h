@@ -17,8 +17,8 @@ struct IgtlClientOptions {
   std::string address = "127.0.0.1";  ///< numeric
   std::uint16_t port = 18944;
   bool ask_for_tracking = false;  ///< send STT_TDATA on each new connection; many servers need no request
-  int interval_ms = 0;            ///< requested interval; 0: as fast as the device
-  double first_pause_s = 0.1;     ///< before the second attempt to connect; doubled with each one
+  int interval_ms = 16;        ///< requested interval; 0: as fast as the device, for some without any limit
+  double first_pause_s = 0.1;  ///< before the second attempt to connect; doubled with each one
   double last_pause_s = 5;
   double connect_s = 2;  ///< timeout of an attempt
   double silence_s = 5;  ///< reconnect after this time without data; 0: never

@@ -75,16 +75,15 @@ IgtlQuaternions take_quaternions(BigEndianReader& in) {
   return tracking;
 }
 
-/// Bodies of 12 and 24 bytes are the protocol's short forms: no rotation, and a unit quaternion without its
-/// w.
+/// Bodies of 12 and 24 bytes are the protocol's short forms: a point, and a unit quaternion without its w.
 IgtlPosition take_position(BigEndianReader& in) {
   IgtlPosition position;
   const std::size_t size = in.left();
   position.position = take_floats<3>(in);
   if (size == 24) {
     const Eigen::Vector3d vector = take_floats<3>(in);
-    position.quaternion.head<3>() = vector;
-    position.quaternion.w() = std::sqrt(std::max(0.0, 1 - vector.squaredNorm()));
+    position.quaternion = Eigen::Vector4d(vector.x(), vector.y(), vector.z(),
+                                          std::sqrt(std::max(0.0, 1 - vector.squaredNorm())));
   } else if (size != 12) {
     position.quaternion = take_floats<4>(in);
   }

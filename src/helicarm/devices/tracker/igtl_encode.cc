@@ -46,7 +46,7 @@ struct ContentWriter {
   }
   void operator()(const IgtlPosition& position) const {
     put_floats(out, position.position);
-    put_floats(out, position.quaternion);
+    if (position.quaternion) put_floats(out, *position.quaternion);
   }
   void operator()(const IgtlStatus& status) const {
     out.put(status.code)

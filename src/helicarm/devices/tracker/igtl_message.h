@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -45,7 +46,7 @@ struct IgtlQuaternions {
 
 struct IgtlPosition {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector4d quaternion{0, 0, 0, 1};  ///< x y z w; identity if none is sent
+  std::optional<Eigen::Vector4d> quaternion = {};  ///< x y z w; without it the message is a point, not a pose
 };
 
 struct IgtlStatus {

@@ -22,7 +22,7 @@ inline std::vector<IgtlMessage> sample_messages() {
           {"tracker", stamp, IgtlTracking{{{"femur", 1, pose}, {"tibia", 2, pose}}}},
           {"tracker", stamp, IgtlTracking{}},
           {"tracker", stamp, IgtlQuaternions{{{"tool", 1, {1, 2, 3}, {0, 0, 0.5, 0.5}}}}},
-          {"tool", stamp, IgtlPosition{{1, 2, 3}, {0, 1, 0, 0}}},
+          {"tool", stamp, IgtlPosition{{1, 2, 3}, Eigen::Vector4d(0, 1, 0, 0)}},
           {"tracker", stamp, IgtlStatus{18, -5, "Hardware", "temperature"}},
           {"picture", stamp, image},
           {"points", stamp, IgtlPoints{{{"P1", "balls", {1, 2, 3, 4}, {1, 2, 3}, 4, "owner"}}}},

@@ -3,21 +3,65 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <list>
 #include <mutex>
 #include <thread>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include "helicarm/core/line_limit.h"
 #include "helicarm/devices/tracker/igtl_connection.h"
 #include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/devices/tracker/pose_gate.h"
 
 namespace helicarm::tracker {
 namespace {
 
-std::shared_ptr<const std::string> encoded(const IgtlMessage& message) {
-  return std::make_shared<const std::string>(encode(message));
+using Bytes = std::shared_ptr<const std::string>;
+
+Bytes encoded(const IgtlMessage& message) { return std::make_shared<const std::string>(encode(message)); }
+
+bool is_tracking(const std::string& type) { return type == "TDATA" || type == "QTDATA"; }
+
+/// Poses of TDATA or QTDATA.
+std::vector<IgtlTool> tools_of(const IgtlContent& content) {
+  if (const auto* tracking = std::get_if<IgtlTracking>(&content)) return tracking->tools;
+  std::vector<IgtlTool> tools;
+  for (const IgtlQuaternionTool& tool : std::get<IgtlQuaternions>(content).tools)
+    tools.push_back({tool.name, tool.type, matrix_from(tool.position, tool.quaternion)});
+  return tools;
+}
+
+IgtlQuaternions quaternions_of(const std::vector<IgtlTool>& tools) {
+  IgtlQuaternions quaternions;
+  for (const IgtlTool& tool : tools)
+    if (const auto pose = rigid_pose(tool.matrix, std::numeric_limits<double>::infinity()))
+      quaternions.tools.push_back(
+          {tool.name, tool.type, pose->translation, Eigen::Quaterniond(pose->rotation).coeffs()});
+  return quaternions;
+}
+
+/// Tracking of one type as another: "TDATA", "QTDATA", or "TRANSFORM" for each tool.
+std::vector<IgtlMessage> converted(const IgtlMessage& message, const std::string& type) {
+  const std::vector<IgtlTool> tools = tools_of(message.content);
+  IgtlMessage other = message;
+  if (type == "TDATA") {
+    other.content = IgtlTracking{tools};
+    return {other};
+  }
+  if (type == "QTDATA") {
+    other.content = quaternions_of(tools);
+    return {other};
+  }
+  std::vector<IgtlMessage> transforms;
+  for (const IgtlTool& tool : tools) {
+    other.device = tool.name;
+    other.content = IgtlTransform{tool.matrix};
+    transforms.push_back(other);
+  }
+  return transforms;
 }
 
 }  // namespace
@@ -25,12 +69,10 @@ std::shared_ptr<const std::string> encoded(const IgtlMessage& message) {
 struct IgtlServer::Impl {
   /// Whether a client requested one kind of tracking, and when the next message is due.
   struct Subscription {
-    bool wanted = false;
     double interval_s = 0;
     double due_s = 0;
 
     bool take(double now_s) {
-      if (!wanted) return false;
       // Tolerance for jitter: a source at exactly the requested rate must not lose every other pose.
       if (now_s < due_s - 0.1 * interval_s) return false;
       due_s = std::max(due_s, now_s - interval_s) + interval_s;
@@ -42,7 +84,8 @@ struct IgtlServer::Impl {
     std::shared_ptr<IgtlConnection> connection;
     std::string address;
     bool leaves = false;  ///< closed, and about to be removed from the list; used on the server's thread only
-    std::map<std::string, Subscription> tracking;  ///< TDATA and QTDATA
+    std::map<std::string, Subscription> tracking = {};  ///< TDATA and QTDATA
+    bool asks = false;                                  ///< has sent STT_ or STP_
   };
 
   Impl(const IgtlServerOptions& given, OnMessage message) : options(given), on_message(std::move(message)) {}
@@ -55,7 +98,7 @@ struct IgtlServer::Impl {
   void leave(std::list<Client>::iterator client, const std::string& why);
   void note(const std::string& line);
   void answer(Client& client, const IgtlMessage& message);
-  void distribute(const std::string& type, const std::shared_ptr<const std::string>& bytes);
+  void distribute(const IgtlMessage& message, const Bytes& bytes);
 
   const IgtlServerOptions options;
   const OnMessage on_message;
@@ -150,8 +193,8 @@ void IgtlServer::Impl::welcome(asio::ip::tcp::socket socket) {
   const ConnectionLimits limits{options.queue_messages, options.queue_bytes, options.stall_s,
                                 options.body_bytes};
   const std::lock_guard lock(mutex);
-  const auto client = clients.insert(
-      clients.end(), {std::make_shared<IgtlConnection>(std::move(socket), limits), address, false, {}});
+  const auto client =
+      clients.insert(clients.end(), {std::make_shared<IgtlConnection>(std::move(socket), limits), address});
   client->connection->start({[this, client](IgtlMessage&& message) {
                                answer(*client, message);
                                if (on_message) on_message(message);
@@ -164,21 +207,37 @@ void IgtlServer::Impl::answer(Client& client, const IgtlMessage& message) {
     client.connection->send(encoded({message.device, 0, std::move(content), message.version}));
   };
   if (const auto* start = std::get_if<IgtlStart>(&message.content)) {
-    client.tracking[start->what] = {true, std::max(0, start->interval_ms) / 1000.0};
+    client.asks = true;
+    client.tracking[start->what] = {std::max(0, start->interval_ms) / 1000.0};
     reply(IgtlReply{start->what, 0});
   } else if (const auto* stop = std::get_if<IgtlStop>(&message.content)) {
     client.tracking.erase(stop->what);
-    if (stop->what == "TDATA" || stop->what == "QTDATA") reply(IgtlReply{stop->what, 0});
+    client.asks = true;
+    if (is_tracking(stop->what)) reply(IgtlReply{stop->what, 0});
   } else if (const auto* get = std::get_if<IgtlGet>(&message.content); get && get->what == "STATUS") {
     reply(IgtlStatus{});
   }
 }
 
-void IgtlServer::Impl::distribute(const std::string& type, const std::shared_ptr<const std::string>& bytes) {
-  const bool tracking = options.tracking_on_request && (type == "TDATA" || type == "QTDATA");
+void IgtlServer::Impl::distribute(const IgtlMessage& message, const Bytes& bytes) {
+  const std::string own = type_of(message.content);
+  if (!options.tracking_on_request || !is_tracking(own)) {
+    for (Client& client : clients) client.connection->send(bytes);
+    return;
+  }
+  std::map<std::string, std::vector<Bytes>> forms{{own, {bytes}}};
+  const auto send = [&](Client& client, const std::string& type) {
+    const auto [form, is_new] = forms.try_emplace(type);
+    if (is_new)
+      for (const IgtlMessage& other : converted(message, type)) form->second.push_back(encoded(other));
+    for (const Bytes& each : form->second) client.connection->send(each);
+  };
   const double now = monotonic_seconds();
-  for (Client& client : clients)
-    if (!tracking || client.tracking[type].take(now)) client.connection->send(bytes);
+  for (Client& client : clients) {
+    for (auto& [type, subscription] : client.tracking)
+      if (subscription.take(now)) send(client, type);
+    if (!client.asks) send(client, "TRANSFORM");
+  }
 }
 
 IgtlServer::IgtlServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -202,9 +261,9 @@ void IgtlServer::send(const IgtlMessage& message) {
     --impl_->unsent;
     return impl_->count("unsent");
   }
-  asio::post(impl_->io, [impl = impl_.get(), type = type_of(message.content), bytes = encoded(message)] {
+  asio::post(impl_->io, [impl = impl_.get(), message, bytes = encoded(message)] {
     --impl->unsent;
-    impl->distribute(type, bytes);
+    impl->distribute(message, bytes);
   });
 }
 

@@ -22,7 +22,9 @@ struct IgtlServerOptions {
   double stall_s = 5;  ///< a client that reads nothing for this time is disconnected
   std::uint64_t body_bytes = std::uint64_t{1} << 20;  ///< of a client's message; beyond, it is disconnected
   std::size_t unsent_messages = 1024;  ///< queue to the server's thread; beyond, the newest are dropped
-  bool tracking_on_request = true;     ///< send TDATA and QTDATA only to clients that sent STT_
+  /// Send TDATA and QTDATA only to clients that sent STT_, of the type they asked for; others receive a
+  /// TRANSFORM for each tool. False: as they are, to all.
+  bool tracking_on_request = true;
   /// Log line for each client that was disconnected or rejected, at most 20 per second.
   std::function<void(const std::string&)> on_notice = [](const std::string&) {};
 };
@@ -47,7 +49,8 @@ class IgtlServer {
   ~IgtlServer();
 
   std::uint16_t port() const;
-  /// To all clients, tracking at most at the rate each requested. Thread-safe.
+  /// To all clients, tracking of the type and at most at the rate that each requested. A tool whose matrix is
+  /// no rigid motion is absent where a quaternion is sent. Thread-safe.
   void send(const IgtlMessage& message);
   IgtlServerStatus status() const;  ///< thread-safe
   /// Returns at once, with the thread ended and the port free; queued messages are not sent.

@@ -122,6 +122,33 @@ TEST(IgtlSockets, TrackingIsSentToSubscribers) {
   EXPECT_EQ(asks.last_device(), "end");
 }
 
+TEST(IgtlSockets, ClientThatAskedForNothingReceivesATransformOfEachTool) {
+  const auto server = a_server();
+  Listener listener(server->port());
+  ASSERT_TRUE(all_connected(*server, 1));
+  Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
+  pose(0, 3) = 7;
+  server->send({"tracker", 5, IgtlTracking{{{"femur", 1, pose}, {"tool", 1, pose}}}});
+  ASSERT_TRUE(eventually([&] { return listener.count == 2; }));
+  EXPECT_EQ(listener.bytes,
+            encode({"femur", 5, IgtlTransform{pose}}) + encode({"tool", 5, IgtlTransform{pose}}));
+}
+
+TEST(IgtlSockets, QuaternionsAreServedToTheirSubscribers) {
+  const auto server = a_server();
+  Listener listener(server->port());
+  ASSERT_TRUE(listener.connects());
+  listener.client->send({"", 0, IgtlStart{"QTDATA", 0}});
+  ASSERT_TRUE(eventually([&] { return listener.count == 1; }));  // RTS_QTDATA
+  Eigen::Matrix4d turned = Eigen::Matrix4d::Identity(), scaled = 2 * Eigen::Matrix4d::Identity();
+  turned.topLeftCorner<2, 2>() << -1, 0, 0, -1;
+  turned(2, 3) = 900;
+  server->send({"tracker", 5, IgtlTracking{{{"femur", 1, turned}, {"tool", 1, scaled}}}});
+  ASSERT_TRUE(eventually([&] { return listener.count == 2; }));
+  EXPECT_TRUE(listener.bytes.ends_with(
+      encode({"tracker", 5, IgtlQuaternions{{{"femur", 1, {0, 0, 900}, {0, 0, 1, 0}}}}})));
+}
+
 TEST(IgtlSockets, StatusIsAnswered) {
   const auto server = a_server();
   Listener listener(server->port());

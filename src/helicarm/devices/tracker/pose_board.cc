@@ -7,19 +7,9 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/devices/tracker/tool_status.h"
+
 namespace helicarm::tracker {
-namespace {
-
-bool is_visible(const IgtlMessage& message, const std::string& tool) {
-  for (const std::string& key : {std::string("TransformStatus"), tool + "TransformStatus"})
-    if (const auto found = message.metadata.find(key);
-        found != message.metadata.end() && found->second != "OK")
-      return false;
-  return true;
-}
-
-}  // namespace
-
 double monotonic_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -57,13 +47,21 @@ void PoseBoard::take_all(const Tools& tools, const IgtlMessage& message, double 
   }
 }
 
+void PoseBoard::take_position(const IgtlPosition& position, const IgtlMessage& message, double arrival_s) {
+  if (position.quaternion)
+    take_pose(tool_name(message), {matrix_from(position.position, *position.quaternion), 0, arrival_s},
+              message);
+  else if (Tool* const to = tool(tool_name(message)))
+    to->gate.reject(PoseFault::no_rotation);
+}
+
 void PoseBoard::take(const IgtlMessage& message, double arrival_s) {
   const std::lock_guard lock(mutex_);
   const IgtlContent& content = message.content;
   if (const auto* transform = std::get_if<IgtlTransform>(&content))
-    take_pose(message.device, {transform->matrix, 0, arrival_s}, message);
+    take_pose(tool_name(message), {transform->matrix, 0, arrival_s}, message);
   else if (const auto* position = std::get_if<IgtlPosition>(&content))
-    take_pose(message.device, {matrix_from(position->position, position->quaternion), 0, arrival_s}, message);
+    take_position(*position, message, arrival_s);
   else if (const auto* tracking = std::get_if<IgtlTracking>(&content))
     take_all(tracking->tools, message, arrival_s, [](const IgtlTool& one) { return one.matrix; });
   else if (const auto* quaternions = std::get_if<IgtlQuaternions>(&content))

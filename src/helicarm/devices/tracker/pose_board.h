@@ -69,6 +69,7 @@ class PoseBoard {
   };
   Tool* tool(const std::string& name);
   void take_pose(const std::string& name, RawPose raw, const IgtlMessage& message);
+  void take_position(const IgtlPosition& position, const IgtlMessage& message, double arrival_s);
   template <class Tools, class MatrixOf>
   void take_all(const Tools& tools, const IgtlMessage& message, double arrival_s, MatrixOf matrix_of);
   Expected<const Tool*> known(const std::string& name) const;

@@ -25,10 +25,17 @@ TEST(PoseBoard, EveryKindOfPoseIsAccepted) {
   board.take(stamped(IgtlTransform{pose_at(1)}, 1, "femur"), 1);
   board.take(stamped(IgtlTracking{{{"tibia", 1, pose_at(2)}, {"tool", 1, pose_at(3)}}}, 1), 1);
   board.take(stamped(IgtlQuaternions{{{"pointer", 1, {4, 0, 800}, {0, 0, 0, 1}}}}, 1), 1);
-  board.take(stamped(IgtlPosition{{5, 0, 800}}, 1, "robot"), 1);
+  board.take(stamped(IgtlPosition{{5, 0, 800}, Eigen::Vector4d(0, 0, 0, 1)}, 1, "robot"), 1);
   double x = 1;
   for (const char* tool : {"femur", "tibia", "tool", "pointer", "robot"})
     EXPECT_NEAR(board.latest(tool, 1.05)->tracker_from_tool.translation.x(), x++, 1e-6) << tool;
+}
+
+TEST(PoseBoard, PositionWithoutARotationIsAPointAndNoPose) {
+  PoseBoard board;
+  board.take(stamped(IgtlPosition{{5, 0, 800}}, 1, "robot"), 1);
+  EXPECT_EQ(board.latest("robot", 1.05).error().reason, Reason::no_pose);
+  EXPECT_EQ(board.tools(1.05).at(0).rejected.at("no_rotation"), 1u);
 }
 
 TEST(PoseBoard, OldPoseIsNeverReturned) {
@@ -71,6 +78,36 @@ TEST(PoseBoard, StatusOtherThanOkHidesTheTool) {
   board.take(message, 1);
   EXPECT_EQ(board.tools(1)[0].rejected.at("hidden"), 1u);
   EXPECT_FALSE(board.latest("tool", 1));
+}
+
+TEST(PoseBoard, StatusOfOneToolOfATrackingMessageHidesThisToolOnly) {
+  PoseBoard board;
+  IgtlMessage message = stamped(IgtlTracking{{{"FemurToTracker", 2, pose_at(1)},
+                                              {"ReferenceFacetOneToT", 2, pose_at(2)},
+                                              {"ToolToTracker", 2, pose_at(3)}}},
+                                1, "TDATA_3Elem");
+  message.version = 2;
+  message.metadata = {{"FemurToTrackerIndex", "0"},
+                      {"FemurToTrackerStatus", "OUT_OF_VIEW"},
+                      {"ReferenceFacetOneToTrackerIndex", "1"},
+                      {"ReferenceFacetOneToTrackerStatus", "MISSING"},
+                      {"ToolToTrackerIndex", "2"},
+                      {"ToolToTrackerStatus", "OK"}};
+  board.take(message, 1);
+  EXPECT_EQ(board.latest("FemurToTracker", 1.05).error().reason, Reason::no_pose);
+  EXPECT_EQ(board.latest("ReferenceFacetOneToT", 1.05).error().reason, Reason::no_pose);
+  EXPECT_TRUE(board.latest("ToolToTracker", 1.05));
+}
+
+TEST(PoseBoard, NameLongerThanItsFieldIsReadFromTheMetadata) {
+  PoseBoard board;
+  IgtlMessage message = stamped(IgtlTransform{pose_at(1)}, 1, "ReferenceFacetOneToT");
+  message.version = 2;
+  message.metadata = {{"IGTL_DEVICE_NAME", "ReferenceFacetOneToTracker"},
+                      {"TransformStatus", "OK"},
+                      {"TransformValid", "true"}};
+  board.take(message, 1);
+  EXPECT_TRUE(board.latest("ReferenceFacetOneToTracker", 1.05));
 }
 
 TEST(PoseBoard, SwappedToolsAreRejectedAndCounted) {

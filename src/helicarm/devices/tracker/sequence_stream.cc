@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/devices/tracker/tool_status.h"
 
 namespace helicarm::tracker {
 namespace {
@@ -29,17 +30,20 @@ double wall_seconds() {
 SequenceFrame frame_of(const IgtlMessage& message, double arrival_s) {
   SequenceFrame frame;
   frame.time_s = message.stamp == 0 ? arrival_s : seconds_from_stamp(message.stamp);
-  const auto status = message.metadata.find("TransformStatus");
-  const bool visible = status == message.metadata.end() || status->second == "OK";
+  const std::string device = tool_name(message);
   if (const auto* transform = std::get_if<IgtlTransform>(&message.content))
-    frame.poses[as_word(message.device)] = {transform->matrix, visible};
-  else if (const auto* position = std::get_if<IgtlPosition>(&message.content))
-    frame.poses[as_word(message.device)] = {matrix_from(position->position, position->quaternion), visible};
+    frame.poses[as_word(device)] = {transform->matrix, is_visible(message, device)};
+  else if (const auto* position = std::get_if<IgtlPosition>(&message.content);
+           position && position->quaternion)
+    frame.poses[as_word(device)] = {matrix_from(position->position, *position->quaternion),
+                                    is_visible(message, device)};
   else if (const auto* tracking = std::get_if<IgtlTracking>(&message.content))
-    for (const IgtlTool& tool : tracking->tools) frame.poses[as_word(tool.name)] = {tool.matrix, visible};
+    for (const IgtlTool& tool : tracking->tools)
+      frame.poses[as_word(tool.name)] = {tool.matrix, is_visible(message, tool.name)};
   else if (const auto* quaternions = std::get_if<IgtlQuaternions>(&message.content))
     for (const IgtlQuaternionTool& tool : quaternions->tools)
-      frame.poses[as_word(tool.name)] = {matrix_from(tool.position, tool.quaternion), visible};
+      frame.poses[as_word(tool.name)] = {matrix_from(tool.position, tool.quaternion),
+                                         is_visible(message, tool.name)};
   return frame;
 }
 

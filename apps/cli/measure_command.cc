@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "measure_command.h"
+
+#include <algorithm>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "helicarm/calibration/saved_calibration.h"
+#include "helicarm/core/csv.h"
+#include "helicarm/fiducials/find_target.h"
+#include "helicarm/measures/measure_json.h"
+
+namespace helicarm::cli {
+namespace {
+
+struct Point {
+  Eigen::Vector3d xyz_mm;
+  Eigen::Matrix3d covariance_mm2;
+  std::map<std::string, measures::Click> seen = {};  ///< by view
+};
+
+/// A calibration and the points located with it.
+struct Measured {
+  calibration::SavedCalibration calibration;
+  std::map<std::string, Point> points = {};
+};
+
+/// The images in which a point was picked or found.
+std::map<std::string, measures::Click> seen_in(JsonReader point, const std::string& name,
+                                               std::span<const calibration::CalibratedView> views) {
+  constexpr Range pixels{-1e6, 1e6};
+  std::map<std::string, measures::Click> seen;
+  for (const calibration::CalibratedView& view : views) {
+    if (!point.has(view.name.c_str())) continue;
+    JsonReader one = point.object(view.name.c_str());
+    const double sigma = one.number("sigma_px", {0, 1e6});
+    seen[view.name] = {name, Eigen::Vector2d(one.numbers("uv", 2, pixels).data()),
+                       sigma * sigma * Eigen::Matrix2d::Identity()};
+  }
+  return seen;
+}
+
+/// Whether the point's picks contradict each other: its covariance holds that, its images do not.
+bool rays_miss(JsonReader& point) {
+  for (JsonReader& warning : point.objects("warnings", false))
+    if (warning.text("code") == code(Reason::residual_too_large)) return true;
+  return false;
+}
+
+/// Adds the points that have a position and a covariance.
+void add_points(std::vector<JsonReader> entries, Measured& measured) {
+  constexpr Range numbers{-1e9, 1e9};
+  for (JsonReader& entry : entries) {
+    if (!entry.has("xyz_mm") || !entry.has("covariance_mm2")) continue;
+    const std::string name = entry.text("name");
+    Point point{Eigen::Vector3d(entry.numbers("xyz_mm", 3, numbers).data()),
+                Eigen::Map<const Eigen::Matrix3d>(entry.matrix("covariance_mm2", 3, 3, numbers).data())};
+    if (entry.has("seen") && !rays_miss(entry))
+      point.seen = seen_in(entry.object("seen"), name, measured.calibration.views);
+    if (!measured.points.emplace(name, std::move(point)).second)
+      entry.refuse(Reason::name_clash, "name", fmt::format("there is another point \"{}\"", name));
+  }
+}
+
+Measured measured_from(const MeasureArguments& arguments) {
+  const std::string origin = arguments.calibration->filename().string();
+  const Json json = value_or_throw(read_json(*arguments.calibration));
+  Measured measured{value_or_throw(calibration::saved_calibration_from_json(json, origin))};
+  add_points(JsonReader(json, origin).objects("points", false), measured);
+  if (!arguments.registration) return measured;
+  const Json registration = value_or_throw(read_json(*arguments.registration));
+  JsonReader models(registration, arguments.registration->filename().string());
+  for (JsonReader& model : models.objects("models", true))
+    add_points(model.objects("points", false), measured);
+  return measured;
+}
+
+std::size_t view_named(const Measured& measured, const std::string& name, const std::string& where) {
+  const auto& views = measured.calibration.views;
+  const auto found = std::ranges::find(views, name, &calibration::CalibratedView::name);
+  if (found == views.end())
+    throw BadInput(Reason::bad_value,
+                   fmt::format("{}: view: the calibration has no view \"{}\"", where, name));
+  return static_cast<std::size_t>(found - views.begin());
+}
+
+const Point& point_named(const Measured& measured, const std::string& name, const std::string& where) {
+  const auto found = measured.points.find(name);
+  if (found == measured.points.end())
+    throw BadInput(Reason::bad_value, fmt::format("{}: the result has no located point \"{}\"", where, name));
+  return found->second;
+}
+
+/// Nothing without fiducials, depth or point: lengths are then in pixels.
+std::optional<measures::ObjectPlane> plane_of(const MeasureArguments& arguments, const Measured& measured,
+                                              const calibration::CalibratedView& view) {
+  if (arguments.depth_mm) return measures::plane_at(view, *arguments.depth_mm, arguments.depth_sigma_mm);
+  if (arguments.at) {
+    const Point& point = point_named(measured, *arguments.at, "--at");
+    return value_or_throw(measures::plane_through(view, point.xyz_mm, point.covariance_mm2));
+  }
+  phantom::Calibrator calibrator;
+  calibrator.balls = measured.calibration.balls;
+  if (calibrator.balls.empty()) return std::nullopt;
+  return value_or_throw(measures::plane_through(view, phantom::middle_of(calibrator)));
+}
+
+/// The measures of the table, in the order of first occurrence.
+struct Wanted {
+  std::string name;
+  measures::Kind kind;
+  std::string view;
+  std::vector<measures::Click> clicks = {};
+};
+
+measures::Click click_from(const CsvTable& table, std::size_t row, const std::optional<Measured>& measured,
+                           bool raw) {
+  const std::string where = fmt::format("clicks: row {}", row + 1);
+  const std::string &name = table.text(row, "name"), &view_name = table.text(row, "view");
+  const auto u = table.optional_number(row, "u_px"), v = table.optional_number(row, "v_px");
+  const auto sigma = table.optional_number(row, "sigma_px");
+  if (sigma && *sigma < 0)
+    throw BadInput(Reason::bad_value, fmt::format("{}: sigma_px: {} is negative", where, *sigma));
+  if (!u || !v) {
+    if (!measured)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("{}: no pixels: a located point needs --calibration", where));
+    const Point& point = point_named(*measured, name, where);
+    if (const auto seen = point.seen.find(view_name); seen != point.seen.end()) return seen->second;
+    const auto& view = measured->calibration.views[view_named(*measured, view_name, where)].view;
+    return value_or_throw(measures::click_of(name, point.xyz_mm, point.covariance_mm2, view));
+  }
+  const Eigen::Vector2d uv{*u, *v};
+  double sigma_px = sigma.value_or(fiducials::click_sigma_px);
+  Eigen::Vector2d rectified = uv;
+  if (measured)
+    if (const auto& map = measured->calibration.maps[view_named(*measured, view_name, where)]; raw && map) {
+      const auto seen = value_or_throw(fiducials::point_of_click(*map, uv, sigma));
+      rectified = seen.uv;
+      sigma_px = seen.sigma_px;
+    }
+  return {name, rectified, sigma_px * sigma_px * Eigen::Matrix2d::Identity()};
+}
+
+std::vector<Wanted> wanted_measures(const CsvTable& table, const std::optional<Measured>& measured,
+                                    bool raw) {
+  std::vector<Wanted> all;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string &name = table.text(row, "measure"), &view = table.text(row, "view");
+    const auto kind = measures::kind_named(table.text(row, "kind"));
+    if (!kind) {
+      std::vector<std::string_view> words;
+      for (const measures::KindInfo& info : measures::kinds()) words.push_back(info.word);
+      throw BadInput(Reason::bad_value, fmt::format("clicks: row {}: kind: \"{}\" is none of: {}", row + 1,
+                                                    table.text(row, "kind"), fmt::join(words, ", ")));
+    }
+    auto wanted = std::ranges::find(all, name, &Wanted::name);
+    if (wanted == all.end()) wanted = all.insert(all.end(), {name, *kind, view});
+    if (wanted->kind != *kind || wanted->view != view)
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("clicks: row {}: measure \"{}\" has another kind or view before", row + 1, name));
+    wanted->clicks.push_back(click_from(table, row, measured, raw));
+  }
+  return all;
+}
+
+struct Answer {
+  std::string name, view;
+  measures::Measure measure;
+};
+
+std::vector<Answer> answers_to(const MeasureArguments& arguments) {
+  if (!arguments.calibration &&
+      (arguments.raw || arguments.depth_mm || arguments.at || arguments.registration))
+    throw BadInput(Reason::usage, "--raw, --depth, --at and --registration need --calibration");
+  if (arguments.depth_sigma_mm > 0 && !arguments.depth_mm)
+    throw BadInput(Reason::usage, "--depth-sigma needs --depth");
+  if (arguments.depth_mm && arguments.at)
+    throw BadInput(Reason::usage, "--depth and --at cannot be combined");
+  std::optional<Measured> measured;
+  if (arguments.calibration) measured = measured_from(arguments);
+  const auto table = value_or_throw(
+      read_csv(arguments.clicks, {"measure", "kind", "view", "name", "u_px", "v_px"}, {"sigma_px"}));
+  std::vector<Answer> answers;
+  for (const Wanted& wanted : wanted_measures(table, measured, arguments.raw)) {
+    std::optional<measures::ObjectPlane> plane;
+    if (measured)
+      plane = plane_of(arguments, *measured,
+                       measured->calibration.views[view_named(*measured, wanted.view, wanted.name)]);
+    auto measure = measures::measure(wanted.kind, wanted.clicks, plane);
+    if (!measure) {
+      Failure failure = std::move(measure).error();
+      failure.message = fmt::format("measure \"{}\": {}", wanted.name, failure.message);
+      failure.view = wanted.view;
+      throw BadInput(std::move(failure));
+    }
+    answers.push_back({wanted.name, wanted.view, *std::move(measure)});
+  }
+  return answers;
+}
+
+void print(const Answer& answer, std::ostream& out) {
+  const measures::Measure& measure = answer.measure;
+  out << fmt::format("{} ({}, {})\n", answer.name, measures::info_of(measure.kind).label, answer.view);
+  for (const measures::Quantity& quantity : measure.quantities)
+    out << "  " << measures::sentence_of(quantity) << '\n';
+  for (const measures::Position& position : measure.positions)
+    out << "  " << measures::sentence_of(measure.kind, position) << '\n';
+  if (measure.depth_mm)
+    out << fmt::format(
+        "  lengths in the plane {:.1f} mm from the source; 1 mm nearer to it they are {:.2f} % shorter\n",
+        *measure.depth_mm, 100 / *measure.depth_mm);
+}
+
+}  // namespace
+
+CommandResult measure_command(const MeasureArguments& arguments, Console& console) {
+  return guarded([&] {
+    const std::vector<Answer> answers = answers_to(arguments);
+    if (!console.json) {
+      for (const Answer& answer : answers) print(answer, console.out);
+      return;
+    }
+    Json all = Json::array();
+    for (const Answer& answer : answers) {
+      Json one{{"name", answer.name}, {"view", answer.view}};
+      one.update(measures::to_json(answer.measure));
+      all.push_back(std::move(one));
+    }
+    console.out << to_text({{"measures", std::move(all)}}) << '\n';
+  });
+}
+
+}  // namespace helicarm::cli

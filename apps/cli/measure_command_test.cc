@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "measure_command.h"
+
+#include <sstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/rectification/distortion_map.h"
+
+namespace helicarm::cli {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const geometry::View lateral{{6000, 6000, 512, 500, 0}, {Eigen::Matrix3d::Identity(), {0, 0, 800}}};
+
+/// One view, the located point FS, and two fiducials about the calibrator's origin.
+Json result_json() {
+  Json view{{"name", "LAT"}};
+  view["rectification"] = {
+      {"map", rectification::to_json(rectification::identity_map(1024, 1024, std::nullopt))}};
+  view["projection"] = geometry::json_rows(lateral.projection());
+  view["camera_from_calibrator"] = geometry::json_rows(lateral.camera_from_world.matrix());
+  const Json point{{"name", "FS"},
+                   {"xyz_mm", {4, 3, 20}},
+                   {"covariance_mm2", geometry::json_rows(0.01 * Eigen::Matrix3d::Identity())}};
+  Json seen = point;
+  seen["name"] = "TE";
+  seen["seen"] = {{"LAT", {{"uv_raw", {160, 500}}, {"uv", {160, 500}}, {"sigma_px", 0.4}}}};
+  Json missed = seen;
+  missed["name"] = "missed";
+  missed["warnings"] = {{{"code", "residual_too_large"}}};
+  return {{"format", "helicarm-result/1"},
+          {"status", "ok"},
+          {"views", {view}},
+          {"points",
+           {point, seen, missed, {{"name", "lost"}, {"xyz_mm", nullptr}, {"covariance_mm2", nullptr}}}}};
+}
+
+struct Answer {
+  CommandResult result;
+  std::string text;
+  Json measures() const { return (*parse_json(text, "out"))["measures"]; }
+};
+
+Answer measured(const std::string& rows, MeasureArguments arguments = {}, bool calibrated = true,
+                bool as_json = true) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("helicarm_measure_{}", ::getpid());
+  EXPECT_TRUE(write_file(folder / "result.json", result_json().dump()));
+  EXPECT_TRUE(write_file(folder / "clicks.csv", "measure,kind,view,name,u_px,v_px,sigma_px\n" + rows));
+  arguments.clicks = folder / "clicks.csv";
+  if (calibrated) arguments.calibration = folder / "result.json";
+  std::ostringstream out, progress;
+  Console console{out, progress};
+  console.json = as_json;
+  auto result = measure_command(arguments, console);
+  fs::remove_all(folder);
+  return {std::move(result), out.str()};
+}
+
+const std::string distance = "d,distance,LAT,from,100,100,0.5\nd,distance,LAT,to,400,500,0.5\n";
+const std::string quadrants =
+    "q,femoral_quadrants,LAT,blumensaat_posterior,400,500,0.5\n"
+    "q,femoral_quadrants,LAT,blumensaat_anterior,800,500,0.5\n"
+    "q,femoral_quadrants,LAT,inferior,600,700,0.5\n"
+    "q,femoral_quadrants,LAT,FS,,,\n";
+
+TEST(MeasureCommand, LengthsAreInMillimetresOfThePlane) {
+  MeasureArguments at_depth;
+  at_depth.depth_mm = 600;
+  EXPECT_NEAR(measured(distance, at_depth).measures()[0]["quantities"][0]["value"].get<double>(), 50, 1e-9);
+  MeasureArguments at_point;
+  at_point.at = "FS";
+  const Json at_fs = measured(distance, at_point).measures()[0];
+  EXPECT_NEAR(at_fs["depth_mm"].get<double>(), 820, 1e-9);
+  EXPECT_NEAR(at_fs["quantities"][0]["value"].get<double>(), 500 * 820 / 6000., 1e-9);
+}
+
+TEST(MeasureCommand, LengthsAreInPixelsWithoutACalibration) {
+  const Json length = measured(distance, {}, false).measures()[0]["quantities"][0];
+  EXPECT_EQ(length["unit"], "px");
+  EXPECT_NEAR(length["value"].get<double>(), 500, 1e-9);
+}
+
+TEST(MeasureCommand, LocatedPointIsGivenInPerCent) {
+  const Json position = measured(quadrants).measures()[0]["positions"][0];
+  const Eigen::Vector2d uv = lateral.project({4, 3, 20});
+  EXPECT_EQ(position["point"], "FS");
+  EXPECT_NEAR(position["percent"]["depth"].get<double>(), (uv.x() - 400) / 4, 1e-9);
+  EXPECT_NEAR(position["percent"]["height"].get<double>(), (uv.y() - 500) / 2, 1e-9);
+  EXPECT_EQ(position["covariance_percent2"].size(), 2u);
+}
+
+TEST(MeasureCommand, PointSeenInTheViewIsItsImage) {
+  const Json position = measured(
+                            "q,tibia_ml,LAT,medial,100,500,0\nq,tibia_ml,LAT,lateral,300,500,0\n"
+                            "q,tibia_ml,LAT,TE,,,\n")
+                            .measures()[0]["positions"][0];
+  EXPECT_NEAR(position["percent"]["from_medial"].get<double>(), 30, 1e-9);
+  EXPECT_NEAR(position["covariance_percent2"][0][0].get<double>(), 0.04, 1e-9);
+}
+
+TEST(MeasureCommand, PointWhoseRaysMissIsItsProjection) {
+  const Json position = measured(
+                            "q,tibia_ml,LAT,medial,100,500,0\nq,tibia_ml,LAT,lateral,300,500,0\n"
+                            "q,tibia_ml,LAT,missed,,,\n")
+                            .measures()[0]["positions"][0];
+  EXPECT_NEAR(position["percent"]["from_medial"].get<double>(), (lateral.project({4, 3, 20}).x() - 100) / 2,
+              1e-9);
+}
+
+TEST(MeasureCommand, PlannedPointOfARegistrationIsGivenInPerCent) {
+  const fs::path file = fs::temp_directory_path() / fmt::format("helicarm_registration_{}.json", ::getpid());
+  const Json planned{{"name", "planned"},
+                     {"xyz_mm", {4, 3, 20}},
+                     {"covariance_mm2", geometry::json_rows(0.01 * Eigen::Matrix3d::Identity())}};
+  ASSERT_TRUE(write_file(file, Json{{"models", {{{"name", "femur"}, {"points", {planned}}}}}}.dump()));
+  MeasureArguments arguments;
+  arguments.registration = file;
+  std::string rows = quadrants;
+  rows.replace(rows.find("FS,,,"), 2, "planned");
+  const Json by_plan = measured(rows, arguments).measures()[0]["positions"][0];
+  EXPECT_EQ(by_plan["percent"], measured(quadrants).measures()[0]["positions"][0]["percent"]);
+  fs::remove(file);
+}
+
+TEST(MeasureCommand, TableNamesPlaneAndSigma) {
+  MeasureArguments at_depth;
+  at_depth.depth_mm = 600;
+  EXPECT_THAT(
+      measured(distance, at_depth, true, false).text,
+      testing::AllOf(HasSubstr("length 50.00 mm, sigma 0.07"), HasSubstr("600.0 mm from the source")));
+}
+
+TEST(MeasureCommand, RefusalsNameTheRow) {
+  const auto refusal = [](const std::string& rows, bool calibrated = true) {
+    const Answer answer = measured(rows, {}, calibrated);
+    return answer.result ? "accepted" : answer.result.error().message;
+  };
+  EXPECT_THAT(refusal("d,length,LAT,from,1,2,\n"), HasSubstr("row 1: kind: \"length\""));
+  EXPECT_THAT(refusal("d,distance,AP,from,1,2,\n"), HasSubstr("no view \"AP\""));
+  EXPECT_THAT(refusal("q,tibia_ml,LAT,lost,,,\n"), HasSubstr("no located point \"lost\""));
+  EXPECT_THAT(refusal("q,tibia_ml,LAT,FS,,,\n", false), HasSubstr("needs --calibration"));
+  EXPECT_THAT(refusal("d,distance,LAT,from,1,2,\n"), HasSubstr("measure \"d\": distance: \"to\" is missing"));
+  EXPECT_THAT(refusal(distance + "d,angle,LAT,vertex,1,2,\n"), HasSubstr("another kind"));
+}
+
+}  // namespace
+}  // namespace helicarm::cli

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mount_command.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "helicarm/core/files.h"
+#include "helicarm/core/json.h"
+#include "helicarm/core/text.h"
+#include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/devices/tracker/sequence_stream.h"
+#include "helicarm/geometry/view_json.h"
+#include "helicarm/operation/plan.h"
+#include "helicarm/phantom/calibrator.h"
+#include "line_input.h"
+#include "stop_signal.h"
+#include "touch_points.h"
+
+namespace helicarm::cli {
+namespace {
+
+using geometry::RigidTransform;
+using Observations = std::vector<tracker::MountObservation>;
+
+struct CalibratedTip {
+  Eigen::Vector3d tip_in_pointer;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// "NAME=VALUE".
+std::pair<std::string, std::string> split(const std::string& option, const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == text.npos || equals == 0 || equals + 1 == text.size())
+    throw BadInput(Reason::usage,
+                   fmt::format("{}: \"{}\" is not NAME=VALUE", option, without_control_characters(text)));
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+CalibratedTip tip_of(const std::filesystem::path& file) {
+  const Json json = value_or_throw(read_json(file));
+  JsonReader reader(json, file.string());
+  CalibratedTip tip{Eigen::Vector3d(reader.numbers("tip_in_tool", 3, {-1000, 1000}).data())};
+  if (reader.has("covariance_mm2")) {
+    const auto numbers = reader.matrix("covariance_mm2", 6, 6, {-1000, 1000});
+    tip.covariance =
+        Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(numbers.data()).topLeftCorner<3, 3>();
+  }
+  return tip;
+}
+
+std::map<std::string, tracker::MountPlace> places_of(const phantom::Calibrator& calibrator,
+                                                     const MountArguments& arguments) {
+  std::map<std::string, tracker::MountPlace> places;
+  const auto covariances = phantom::ball_covariances(calibrator);
+  for (std::size_t i = 0; i < calibrator.balls.size(); ++i) {
+    const phantom::CalibratorBall& ball = calibrator.balls[i];
+    places[ball.label] = {ball.centre_in_calibrator, ball.diameter_mm / 2 + arguments.tip_radius_mm,
+                          covariances.empty() ? Eigen::Matrix3d(Eigen::Matrix3d::Zero()) : covariances[i]};
+  }
+  for (const std::string& divot : arguments.divots) {
+    const auto [name, text] = split("--divot", divot);
+    const std::string origin = "--divot " + without_control_characters(name);
+    const Json json = value_or_throw(parse_json(fmt::format("{{\"xyz_mm\": [{}]}}", text), origin));
+    const Eigen::Vector3d at(JsonReader(json, origin).numbers("xyz_mm", 3, {-1000, 1000}).data());
+    if (!places.emplace(name, tracker::MountPlace{at}).second)
+      throw BadInput(Reason::name_clash, fmt::format("--divot: \"{}\" is a place already", name));
+  }
+  return places;
+}
+
+/// Mean of a body at rest; the samples' times do not matter.
+RigidTransform at_rest(const std::vector<tracker::SequenceFrame>& frames, const std::string& tool,
+                       const std::string& file) {
+  constexpr double spacing_s = 0.02;
+  std::vector<tracker::PoseSample> samples;
+  for (const RigidTransform& pose : tracker::gated_poses(frames, tool).tracker_from_tool)
+    samples.push_back({spacing_s * static_cast<double>(samples.size()), 0, 0, pose});
+  tracker::ExposurePoseOptions whole;
+  whole.window_s = spacing_s * static_cast<double>(samples.size());
+  const auto mean = tracker::exposure_pose(samples, whole.window_s / 2, whole);
+  if (!mean) throw BadInput(mean.error().reason, fmt::format("{}: {}: {}", file, tool, mean.error().message));
+  return mean->tracker_from_tool;
+}
+
+void add_recorded(Observations& observations, const MountArguments& arguments, const CalibratedTip& tip) {
+  for (const std::string& one : arguments.recorded) {
+    const auto [label, file] = split("--recorded", one);
+    const auto frames = value_or_throw(tracker::read_sequence(file));
+    observations.push_back(tracker::touched_place(label, at_rest(frames, arguments.facet, file),
+                                                  at_rest(frames, arguments.pointer, file),
+                                                  tip.tip_in_pointer, arguments.options));
+  }
+  for (const std::string& one : arguments.pivoted) {
+    const auto [label, file] = split("--pivoted", one);
+    const auto frames = value_or_throw(tracker::read_sequence(file));
+    const auto pivot =
+        tracker::calibrate_pivot(tracker::gated_poses(frames, arguments.facet).tracker_from_tool,
+                                 {arguments.options.sigma_mm, arguments.options.sigma_deg});
+    if (!pivot) throw BadInput(pivot.error().reason, fmt::format("{}: {}", file, pivot.error().message));
+    observations.push_back(tracker::pivoted_place(label, *pivot));
+  }
+}
+
+/// Asks for each place at the terminal and reads both markers while the pointer is still.
+void add_touched(Observations& observations, const MountArguments& arguments, const CalibratedTip& tip,
+                 Console& console) {
+  constexpr double reading_s = 0.6;
+  StopSignal stop;
+  tracker::PoseBoard board;
+  const auto client = value_or_throw(tracker::IgtlClient::start(
+      value_or_throw(client_options(arguments.link)),
+      [&](const tracker::IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
+      [&] { board.forget_time(); }));
+  LineInput input(STDIN_FILENO);
+  const auto wait = [&](double seconds) {
+    if (stop.wait(seconds)) throw BadInput(Reason::interrupted, "stopped by signal");
+  };
+  for (const std::string& label : arguments.touch) {
+    for (bool done = false; !done;) {
+      console.progress << fmt::format("touch \"{}\" with the pointer, hold it still and press Enter\n",
+                                      without_control_characters(label))
+                       << std::flush;
+      while (!input.next(50)) wait(0.01);
+      wait(reading_s);
+      const double middle_s = tracker::monotonic_seconds() - reading_s / 2;
+      const auto facet = board.at(arguments.facet, middle_s), pointer = board.at(arguments.pointer, middle_s);
+      done = facet && pointer;
+      if (done) {
+        observations.push_back(tracker::touched_place(label, facet->tracker_from_tool,
+                                                      pointer->tracker_from_tool, tip.tip_in_pointer,
+                                                      arguments.options));
+        continue;
+      }
+      const Failure& why = facet ? pointer.error() : facet.error();
+      if (!is_of_poses(why)) throw BadInput(why);
+      console.progress << fmt::format("{}: {}; again\n", code(why.reason),
+                                      without_control_characters(why.message))
+                       << std::flush;
+    }
+  }
+}
+
+double per_axis(const tracker::PoseCovariance& covariance, Eigen::Index from) {
+  return std::sqrt(covariance.diagonal().segment<3>(from).sum() / 3);
+}
+
+/// The entry of "facets" in plan.json.
+Json facet_json(const tracker::MountCalibration& mount, const std::string& name) {
+  return {{"name", name},
+          {"calibrator_from_facet", geometry::json_rows(mount.calibrator_from_facet.matrix())},
+          {"sigma_mm", per_axis(mount.covariance, 0)},
+          {"sigma_deg", per_axis(mount.covariance, 3) * 180 / std::numbers::pi}};
+}
+
+Json mount_json(const tracker::MountCalibration& mount, const MountArguments& arguments,
+                const std::string& calibrator) {
+  Json residuals = Json::array();
+  for (const tracker::MountResidual& one : mount.residuals)
+    residuals.push_back({{"label", one.label}, {"distance_mm", one.distance_mm}});
+  return {{"format", "helicarm-mount/1"},
+          {"calibrator", calibrator},
+          {"facet", facet_json(mount, arguments.facet)},
+          {"covariance", geometry::json_rows(mount.covariance)},
+          {"fre_mm", mount.fre_mm},
+          {"chi2", mount.chi2},
+          {"dof", mount.dof},
+          {"tip_shift_mm", geometry::json_list(mount.tip_shift_mm)},
+          {"residuals", std::move(residuals)},
+          {"tre_mm", mount.tre_mm},
+          {"exchangeable", mount.exchangeable}};
+}
+
+void put_into_plan(const std::filesystem::path& file, const Json& facet) {
+  Json plan = value_or_throw(read_json(file));
+  value_or_throw(operation::plan_from(plan, file.string()));
+  Json& facets = plan["tracker"]["facets"];
+  const auto known =
+      std::ranges::find_if(facets, [&](const Json& one) { return one["name"] == facet["name"]; });
+  if (known == facets.end())
+    facets.push_back(facet);
+  else
+    *known = facet;
+  value_or_throw(write_file(file, to_text(plan)));
+}
+
+void print(const tracker::MountCalibration& mount, const MountArguments& arguments, Console& console) {
+  const auto worst =
+      std::ranges::max_element(mount.tre_mm, {}, &std::pair<const std::string, double>::second);
+  for (const tracker::MountResidual& one : mount.residuals)
+    console.out << fmt::format("  {:<8} {:.2f} mm\n", without_control_characters(one.label), one.distance_mm);
+  console.out << fmt::format(
+      "{} in the calibrator: FRE {:.2f} mm rms; predicted error at most {:.2f} mm rms (at {}), {:.2f} "
+      "degrees "
+      "per axis\n",
+      without_control_characters(arguments.facet), mount.fre_mm, worst->second, worst->first,
+      per_axis(mount.covariance, 3) * 180 / std::numbers::pi);
+  for (const auto& [a, b] : mount.exchangeable)
+    console.progress << fmt::format(
+        "warning: these places would not show an exchange of \"{}\" and \"{}\": touch further places\n",
+        without_control_characters(a), without_control_characters(b));
+  console.out << arguments.out.string() << " is written\n";
+  if (!arguments.plan.empty())
+    console.out << fmt::format("{} has the facet \"{}\" now\n", arguments.plan.string(),
+                               without_control_characters(arguments.facet));
+}
+
+}  // namespace
+
+CommandResult calibrate_mount_command(const MountArguments& arguments, Console& console) {
+  return guarded([&] {
+    if (arguments.link.peer.empty() != arguments.touch.empty())
+      throw BadInput(Reason::usage, "--touch and the tracker's address:port belong together");
+    const bool touches = !arguments.touch.empty() || !arguments.recorded.empty();
+    if (touches && arguments.tip.empty())
+      throw BadInput(Reason::usage, "touches need --tip: the file written by `tracker pivot --json`");
+    const phantom::Calibrator calibrator =
+        arguments.calibrator == phantom::udcsc().name
+            ? phantom::udcsc()
+            : value_or_throw(phantom::read_calibrator(arguments.calibrator));
+    const auto places = places_of(calibrator, arguments);
+    for (const std::string& label : arguments.touch)
+      if (!places.contains(label))
+        throw BadInput(Reason::bad_value, fmt::format("--touch: {} has no \"{}\"", calibrator.name,
+                                                      without_control_characters(label)));
+    tracker::MountOptions options = arguments.options;
+    const CalibratedTip tip = touches ? tip_of(arguments.tip) : CalibratedTip{Eigen::Vector3d::Zero()};
+    options.tip_covariance = tip.covariance;
+    Observations observations;
+    add_recorded(observations, arguments, tip);
+    if (!arguments.touch.empty()) add_touched(observations, arguments, tip, console);
+    const auto mount = value_or_throw(tracker::calibrate_mount(places, observations, options));
+    const Json json = mount_json(mount, arguments, calibrator.name);
+    value_or_throw(write_file(arguments.out, to_text(json)));
+    if (!arguments.plan.empty()) put_into_plan(arguments.plan, json["facet"]);
+    if (console.json)
+      console.out << to_text(json) << '\n';
+    else
+      print(mount, arguments, console);
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_models.h"
+
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "helicarm/case_registration/register_case.h"
+#include "helicarm/core/files.h"
+#include "helicarm/pipeline/case.h"
+#include "helicarm/pipeline/registration_case.h"
+#include "register_command.h"
+
+namespace helicarm::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+Json with_tunnels(Json result, const Json& registration) {
+  for (const Json& model : registration["models"]) {
+    if (model["status"] != "ok") continue;
+    for (const Json& tunnel : model["tunnels"]) result["tunnels"].push_back(tunnel);
+  }
+  return result;
+}
+
+}  // namespace
+
+bool has_models(const fs::path& folder) {
+  const auto json = read_json(pipeline::case_file(folder));
+  return json && json->is_object() && json->contains("models") && (*json)["models"].is_array() &&
+         !(*json)["models"].empty();
+}
+
+CommandResult run_with_models(const RunArguments& arguments, Console& console) {
+  return guarded([&] {
+    std::error_code ignored;
+    fs::remove(arguments.out / "registration.json", ignored);
+    std::ostringstream answer;
+    Console own{answer, console.progress, console.json, console.quiet, console.threads, console.seed};
+    value_or_throw(run_command(arguments, own));
+    if (!console.json) console.out << answer.str() << "\n  models\n";
+
+    RegisterArguments models;
+    models.folder = arguments.folder;
+    models.out = arguments.out / "registration";
+    std::ostringstream registered;
+    Console of_models{registered, console.progress, false, console.quiet, console.threads, console.seed};
+    const CommandResult done = register_command(models, of_models);
+    if (!console.json) console.out << registered.str();
+    const auto registration = read_json(models.out / "registration.json");
+    if (!registration) return value_or_throw(done);
+    value_or_throw(write_file(arguments.out / "registration.json", to_text(*registration) + "\n"));
+    const fs::path result_file = arguments.out / "result.json";
+    const Json result = with_tunnels(value_or_throw(read_json(result_file)), *registration);
+    value_or_throw(write_file(result_file, to_text(result) + "\n"));
+    value_or_throw(done);
+    if (console.json) console.out << to_text(result) << '\n';
+  });
+}
+
+}  // namespace helicarm::cli

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+#include "command.h"
+#include "consent.h"
+#include "helicarm/operation/operation.h"
+#include "line_input.h"
+
+namespace helicarm::cli {
+
+/// Repeating the reading may help.
+bool is_of_poses(const Failure& failure);
+
+/// Waits until the pointer is held still on the check point in view of the tracker. Throws BadInput as
+/// `Operation::touch`.
+void touch_point(operation::Operation& operation, const std::string& name, LineInput& input,
+                 const Ending& ending, Console& console);
+
+}  // namespace helicarm::cli

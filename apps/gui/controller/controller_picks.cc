@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// Picks: changes, undo and redo, and where they are kept.
+#include <algorithm>
+
+#include "gui/controller/controller.h"
+#include "gui/controller/steps.h"
+#include "gui/controller/unsaved_picks.h"
+
+namespace helicarm::gui {
+
+void Controller::change_picks(Picks picks, bool measurable) {
+  earlier_picks_.push_back(std::exchange(state_.picks, std::move(picks)));
+  later_picks_.clear();
+  keep_unsaved_picks();
+  picks_changed(measurable);
+}
+
+void Controller::step_picks(std::vector<Picks>& from, std::vector<Picks>& to) {
+  if (!takes_picks() || from.empty()) return;
+  to.push_back(std::exchange(state_.picks, std::move(from.back())));
+  from.pop_back();
+  keep_unsaved_picks();
+  picks_changed(has_all_images());
+}
+
+void Controller::keep_unsaved_picks() {
+  complete_landmarks(state_);
+  if (!state_.case_folder) return;
+  state_.has_unsaved_picks = true;
+  const auto kept = keep_unsaved(*state_.case_folder, state_.picks);
+  state_.picks_not_kept = kept ? std::nullopt : std::optional(kept.error());
+}
+
+void Controller::save_picks() {
+  if (!state_.case_folder || !takes_picks()) return;
+  std::vector<pipeline::TunnelPlan> tunnels;
+  for (const operation::PlannedTunnel& tunnel : state_.tunnels)
+    tunnels.push_back({tunnel.name, tunnel.start, tunnel.end});
+  const auto saved = gui::save_picks(*state_.case_folder, state_.picks, tunnels);
+  state_.has_unsaved_picks = !saved;
+  state_.picks_not_kept = saved ? std::nullopt : std::optional(saved.error());
+  emit changed();
+}
+
+void Controller::add_landmark(const std::string& name, std::optional<pipeline::BoneLabel> bone) {
+  if (state_.source != Source::files) return;
+  const bool is_taken =
+      std::ranges::find(state_.landmarks, name) != state_.landmarks.end() ||
+      std::ranges::any_of(state_.tunnels,
+                          [&](const operation::PlannedTunnel& tunnel) {
+                            return tunnel.start == name || tunnel.end == name;
+                          }) ||
+      std::ranges::find(state_.calibrator.targets, name, &phantom::CalibratorTarget::name) !=
+          state_.calibrator.targets.end();
+  if (name.empty() || is_taken)
+    return emit refused(Phase::plan, name.empty() ? tr("A landmark needs a name.")
+                                                  : tr("There is a point of this name already."));
+  state_.landmarks.push_back(name);
+  state_.bones_of.erase(name);
+  if (bone) state_.bones_of.emplace(name, *std::move(bone));
+  emit changed();
+}
+
+void Controller::picks_changed(bool measurable) {
+  state_.order.reset();
+  state_.path = {};
+  emit changed();
+  if (measurable) measure();
+}
+
+bool Controller::takes_picks() const { return !state_.busy || state_.busy == Phase::calibrate; }
+
+void Controller::pick(pipeline::Pick pick) {
+  if (!takes_picks()) return;
+  Picks picks = state_.picks;
+  for (const pipeline::Pick& other : picks)
+    if (other.name == pick.name) pick.moves_with = other.moves_with;
+  if (!pick.bone) pick.bone = bone_of(state_, pick.name);
+  std::erase_if(picks,
+                [&](const pipeline::Pick& old) { return old.name == pick.name && old.view == pick.view; });
+  const std::string point = pick.name;
+  picks.push_back(std::move(pick));
+  const bool completes = is_picked(picks, state_.views, point);
+  change_picks(std::move(picks), completes);  // shows its position and ray gap immediately
+}
+
+void Controller::take_offered_picks() {
+  if (takes_picks()) change_picks(state_.offered_picks, has_all_images());
+}
+
+void Controller::erase_picks(const std::string& point) {
+  Picks picks = state_.picks;
+  const auto erased = std::erase_if(picks, [&](const pipeline::Pick& pick) { return pick.name == point; });
+  if (!takes_picks()) return;
+  const auto forgotten = std::erase(state_.landmarks, point);
+  if (forgotten > 0 && erased == 0) emit changed();
+  if (erased > 0) change_picks(std::move(picks), has_all_images());
+}
+
+void Controller::clear_picks() {
+  if (takes_picks() && !state_.picks.empty()) change_picks({}, has_all_images());
+}
+
+}  // namespace helicarm::gui

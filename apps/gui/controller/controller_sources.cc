@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is opened: an operation with virtual or real devices, a case, or image files.
+#include <algorithm>
+
+#include "gui/controller/controller.h"
+#include "gui/controller/equipment.h"
+#include "gui/controller/unsaved_picks.h"
+#include "helicarm/operation/plan_fields.h"
+#include "helicarm/rehearsal/rehearse.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr double bone_step_mm = 5;
+
+/// Names and bones of a case's tunnels; the two of an ACL reconstruction if it has none.
+std::vector<operation::PlannedTunnel> tunnels_of(const pipeline::Case& given) {
+  std::vector<operation::PlannedTunnel> tunnels;
+  for (const pipeline::TunnelPlan& tunnel : given.tunnels) {
+    const auto pick = std::ranges::find(given.picks, tunnel.start, &pipeline::Pick::name);
+    const guidance::Bone bone =
+        pick == given.picks.end() ? guidance::Bone::femur : pick->moves_with.value_or(guidance::Bone::femur);
+    tunnels.push_back({tunnel.name, bone, tunnel.start, tunnel.end});
+  }
+  if (given.picks.empty() && tunnels.empty())
+    tunnels = {{"femur", guidance::Bone::femur, "FS", "FE"}, {"tibia", guidance::Bone::tibia, "TS", "TE"}};
+  return tunnels;
+}
+
+}  // namespace
+
+void Controller::open(Source source, const fs::path& folder, std::string doing,
+                      std::function<Change(Equipment&)> work) {
+  if (state_.busy) {
+    next_source_ = [=, this] { open(source, folder, doing, work); };
+    return cancel();
+  }
+  auto old = std::exchange(equipment_, nullptr);
+  live_tool_.reset();
+  earlier_picks_.clear();
+  later_picks_.clear();
+  state_ = ApplicationState{};
+  begin(Phase::acquire, std::move(doing),
+        [this, source, folder, work = std::move(work), old = std::move(old),
+         options = options_]() mutable -> Change {
+          old.reset();
+          auto equipment = std::make_shared<Equipment>();
+          equipment->options = options;
+          Change change = work(*equipment);
+          return [this, source, folder, equipment, change](ApplicationState& state) {
+            equipment_ = equipment;
+            state.source = source;
+            state.folder = folder;
+            change(state);
+          };
+        });
+}
+
+void Controller::start_operation(Equipment& equipment, operation::OperationPlan plan,
+                                 const fs::path& folder) {
+  equipment.tracker = plan.tracker;
+  equipment.operation = value_or_throw(operation::Operation::begin(
+      std::move(plan), folder, equipment.devices->board(), equipment.devices->robot(),
+      [this](operation::Step, const std::string& what) {
+        meanwhile([what](ApplicationState& state) { state.doing = what; });
+      }));
+  equipment.operation->confirmed_by("the person at the screen");
+}
+
+void Controller::open_virtual_or(const virtual_devices::VirtualDevicesOptions& options,
+                                 const operation::OperationPlan& wished, const fs::path& folder) {
+  const auto work = [=, this, freshness = freshness_](Equipment& equipment) -> Change {
+    equipment.virtual_or = value_or_throw(virtual_devices::VirtualDevices::open(options));
+    operation::OperationPlan plan =
+        rehearsal::plan_for(*equipment.virtual_or, equipment.virtual_or->tracker().port());
+    for (const auto& field : operation::plan_fields)
+      if (field.get(wished) != field.get(operation::OperationPlan())) field.set(plan, field.get(wished));
+    const Json offered = std::exchange(plan.picks, Json::array());
+    equipment.devices = std::make_unique<operation::Connections>(
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")), freshness);
+    receiver::ReceiverOptions receiver;
+    receiver.port = 0;
+    value_or_throw(equipment.devices->listen(receiver));
+    start_operation(equipment, plan, folder);
+    const auto bones = std::make_shared<const simulation::BoneMeshes>(simulation::moved(
+        simulation::bone_meshes(bone_step_mm),
+        equipment.virtual_or->simulated_scene().simulated_case().calibrator_from_knee.value()));
+    return [change = with_plan(plan, offered), bones](ApplicationState& state) {
+      change(state);
+      state.bones = bones;
+    };
+  };
+  open(Source::virtual_or, folder, "starting the virtual devices", work);
+}
+
+void Controller::open_devices(const fs::path& file, const receiver::ReceiverOptions& receiver,
+                              const fs::path& folder) {
+  open(Source::devices, folder, "connecting", [=, this](Equipment& equipment) -> Change {
+    operation::OperationPlan plan =
+        value_or_throw(operation::plan_from(value_or_throw(read_json(file)), file.string()));
+    const Json offered = std::exchange(plan.picks, Json::array());
+    equipment.devices = std::make_unique<operation::Connections>(
+        plan, value_or_throw(receiver::Inbox::open(folder / "inbox")));
+    value_or_throw(equipment.devices->listen(receiver));
+    start_operation(equipment, plan, folder);
+    return with_plan(plan, offered);
+  });
+}
+
+Controller::Change Controller::with_plan(const operation::OperationPlan& plan, const Json& offered) {
+  std::vector<pipeline::CaseView> views(plan.views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) views[i].name = plan.views[i];
+  const phantom::Calibrator calibrator = value_or_throw(phantom::calibrator_named(plan.calibrator, "."));
+  const std::vector<pipeline::Pick> picks = value_or_throw(pipeline::picks_from(offered, "plan", views));
+  return [=](ApplicationState& state) {
+    state.views = plan.views;
+    state.calibrator = calibrator;
+    state.tunnels = plan.tunnels;
+    for (const auto& point : plan.check_points) state.check_points.push_back(point.name);
+    state.offered_picks = picks;
+    Images none(plan.views.size());
+    for (std::size_t i = 0; i < none.size(); ++i) none[i].name = plan.views[i];
+    state.result = result_with(std::move(none));
+    state.next_view = missing_view(state);
+  };
+}
+
+void Controller::open_case(const fs::path& folder, bool keeps_picks) {
+  open(Source::files, folder, "reading " + folder.filename().string(),
+       [=, this](Equipment& equipment) -> Change {
+         pipeline::Case given = value_or_throw(pipeline::read_case(folder));
+         if (!keeps_picks) return with_case(std::move(given), equipment);
+         const auto unsaved = unsaved_picks(folder, given.views);
+         return [change = with_case(std::move(given), equipment, unsaved.value_or(std::nullopt)), folder,
+                 unsaved](ApplicationState& state) {
+           change(state);
+           if (unsaved)
+             state.case_folder = folder;
+           else
+             state.picks_not_kept = unsaved.error();
+         };
+       });
+}
+
+void Controller::open_images(const std::vector<fs::path>& files) {
+  const fs::path folder = files.empty() ? fs::path() : files.front().parent_path();
+  open(Source::images, folder, "reading the images", [files](Equipment&) -> Change {
+    return [loose = value_or_throw(read_loose_images(files))](ApplicationState& state) {
+      for (const pipeline::ViewResult& view : loose.images) state.views.push_back(view.name);
+      state.files = loose.files;
+      state.result = result_with(loose.images);
+      if (loose.unreadable) state.refusals.insert_or_assign(Phase::acquire, *loose.unreadable);
+    };
+  });
+}
+
+QString Controller::loss() const {
+  const bool operates = state_.source == Source::virtual_or || state_.source == Source::devices;
+  const bool has_images = state_.result && std::ranges::any_of(state_.result->views, [](const auto& view) {
+                            return view.xray_image != nullptr;
+                          });
+  if (operates && (has_images || state_.busy)) return tr("End this operation? Its record is kept.");
+  if (can_undo_picks() && (state_.picks_not_kept || !state_.case_folder))
+    return tr("The changed picks are not kept in a file. Discard them?");
+  return {};
+}
+
+Controller::Change Controller::with_case(pipeline::Case given, Equipment& equipment,
+                                         std::optional<Picks> unsaved) {
+  equipment.given = given;
+  const std::vector<ViewFile> files = files_of(given);
+  const Change found = measured(equipment, unsaved.value_or(given.picks));
+  return
+      [this, given = std::move(given), unsaved = std::move(unsaved), files, found](ApplicationState& state) {
+        for (const pipeline::CaseView& view : given.views) state.views.push_back(view.name);
+        state.files = files;
+        state.calibrator = given.calibrator;
+        state.tunnels = tunnels_of(given);
+        state.picks = unsaved.value_or(given.picks);
+        state.has_unsaved_picks = unsaved.has_value();
+        if (unsaved) earlier_picks_.push_back(given.picks);
+        complete_landmarks(state);
+        found(state);
+      };
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the window opens, and what it asks before.
+#include <QCloseEvent>
+#include <QDateTime>
+#include <QDockWidget>
+#include <QDragEnterEvent>
+#include <QMessageBox>
+#include <QMimeData>
+#include <algorithm>
+
+#include "gui/controller/equipment.h"
+#include "gui/window/ask_files.h"
+#include "gui/window/main_window.h"
+
+namespace helicarm::gui {
+namespace fs = std::filesystem;
+
+namespace {
+
+/// X-ray images in a folder without a case.json, by name.
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> images;
+  std::error_code unreadable;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, unreadable))
+    if (const fs::path kind = entry.path().extension();
+        kind == ".dcm" || kind == ".png" || kind == ".tif" || kind == ".tiff")
+      images.push_back(entry.path());
+  std::ranges::sort(images);
+  return images;
+}
+
+}  // namespace
+
+void MainWindow::remember(Folder kind, const fs::path& folder) {
+  remember_folder(recent_, kind, folder);
+  build_recent();
+}
+
+fs::path MainWindow::new_session() const {
+  const QString now = QDateTime::currentDateTime().toString("yyyy-MM-dd_HH-mm-ss-zzz");
+  return sessions_ / now.toStdString();
+}
+
+void MainWindow::ask_rehearsal() {
+  leave_then([this] { open_rehearsal(); });
+}
+
+void MainWindow::leave_then(std::function<void()> act) {
+  const QString loss = controller_.loss();
+  if (loss.isEmpty()) return act();
+  auto* question =
+      new QMessageBox(QMessageBox::Question, tr("Leave"), loss, QMessageBox::Yes | QMessageBox::No, this);
+  question->setObjectName("leaveQuestion");
+  question->setDefaultButton(QMessageBox::No);
+  connect(question, &QDialog::finished, this, [act = std::move(act)](int answer) {
+    if (answer == QMessageBox::Yes) act();
+  });
+  show_beside(question);
+}
+
+void MainWindow::leave_for(const std::vector<fs::path>& paths) {
+  leave_then([this, paths] { open_paths(paths); });
+}
+
+void MainWindow::ask_new_case() {
+  std::vector<pipeline::NewImage> images;
+  const ApplicationState& state = controller_.state();
+  if (state.source == Source::images)
+    for (std::size_t i = 0; i < state.files.size(); ++i)
+      images.push_back({state.files[i].file,
+                        state.files[i].frames > 1 ? std::optional(panels_->frame_of(i)) : std::nullopt});
+  offer_case(images);
+}
+
+void MainWindow::offer_case(const std::vector<pipeline::NewImage>& images) {
+  if (!new_case_) {
+    new_case_ = new NewCaseDialog(this);
+    connect(new_case_, &NewCaseDialog::created, this,
+            [this](const fs::path& folder) { leave_for({folder}); });
+    connect(panels_, &XrayPanels::frame_changed, new_case_, [this](std::size_t view, int frame) {
+      const ApplicationState& state = controller_.state();
+      if (state.source == Source::images) new_case_->choose_frame(state.files.at(view).file, frame);
+    });
+  }
+  new_case_->add_images(images);
+  show_beside(new_case_);
+  new_case_->raise();
+}
+
+void MainWindow::ask_folder() {
+  ask_files(this, tr("Case or session"), QFileDialog::Directory, {},
+            [this](const std::vector<fs::path>& chosen) { leave_for(chosen); });
+}
+
+void MainWindow::open_rehearsal() {
+  virtual_devices::VirtualDevicesOptions virtual_or = settings_.virtual_or;
+  virtual_or.tracker_port = virtual_or.rtde_port = virtual_or.dashboard_port = virtual_or.script_port = 0;
+  const fs::path folder = new_session();
+  controller_.open_virtual_or(virtual_or, settings_.plan, folder);
+}
+
+void MainWindow::open_plan(const fs::path& plan) {
+  controller_.open_devices(plan, settings_.receiver, new_session());
+}
+
+void MainWindow::open_paths(const std::vector<fs::path>& paths) {
+  const fs::path& first = paths.front();
+  const bool is_folder = paths.size() == 1 && fs::is_directory(first);
+  if (is_folder && fs::exists(first / "session.log")) return open_session(first);
+  if (!is_folder) return open_images(paths);
+  const std::vector<fs::path> loose =
+      fs::exists(first / "case.json") ? std::vector<fs::path>{} : images_in(first);
+  if (!loose.empty()) return open_images(loose);
+  remember(Folder::cases, first);
+  controller_.open_case(first);
+}
+
+void MainWindow::open_images(const std::vector<fs::path>& files) {
+  controller_.open_images(files);
+  if (files.size() < 2 || files.size() > most_loose_images) return;
+  std::vector<pipeline::NewImage> images;
+  for (const fs::path& file : files) images.push_back({file});
+  offer_case(images);
+}
+
+void MainWindow::open_session(const fs::path& session) {
+  if (const auto opened = replay_->open(session); !opened) return say(opened.error());
+  remember(Folder::sessions, session);
+  replay_dock_->show();
+  replay_dock_->raise();
+}
+
+void MainWindow::dragEnterEvent(QDragEnterEvent* event) {
+  if (event->mimeData()->hasUrls()) event->acceptProposedAction();
+}
+
+void MainWindow::dropEvent(QDropEvent* event) {
+  std::vector<fs::path> paths;
+  for (const QUrl& url : event->mimeData()->urls())
+    if (url.isLocalFile()) paths.push_back(url.toLocalFile().toStdString());
+  if (!paths.empty()) leave_for(paths);
+}
+
+void MainWindow::closeEvent(QCloseEvent* event) {
+  if (!may_close_ && !controller_.loss().isEmpty()) {
+    event->ignore();
+    return leave_then([this] {
+      may_close_ = true;
+      close();
+    });
+  }
+  controller_.stop();
+  QMainWindow::closeEvent(event);
+}
+
+}  // namespace helicarm::gui

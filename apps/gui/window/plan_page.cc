@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <QHBoxLayout>
+#include <QHeaderView>
+#include <QKeyEvent>
+#include <QLineEdit>
+#include <QVBoxLayout>
+#include <algorithm>
+
+#include "gui/controller/steps.h"
+#include "gui/window/page_parts.h"
+#include "gui/window/pages.h"
+#include "helicarm/localization/error_bound.h"
+
+namespace helicarm::gui {
+
+PlanPage::PlanPage(Controller& controller, QWidget* parent)
+    : Page(tr("Click each tunnel end in two X-ray images; the dashed line is the epipolar line of its click "
+              "in the "
+              "other one."),
+           controller, parent) {
+  next_ = new QLabel;
+  next_->setObjectName("nextPick");
+  next_->setWordWrap(true);
+  next_->setProperty("class", "attention");
+  layout()->addWidget(next_);
+  ends_ = add_table(
+      {{tr("Point"), tr("Name of the tunnel end, landmark or check target")},
+       {tr("Is"), tr("enters: where the drill enters; ends: where it stops; landmark; target")},
+       {tr("Clicked in"), tr("Views in which it is picked")},
+       {tr("x, y, z mm"), tr("Position in the calibrator's frame at the first view's acquisition, mm")},
+       {tr("±mm (95 %)"),
+        tr("Length that 95 % of the errors do not exceed, mm; of a target its error (TRE) and "
+           "that bound")},
+       {tr("Ray gap mm"), tr("Largest distance between two of the point's rays, mm")}},
+      "endTable");
+  for (const auto& [error, shown_at] : {std::pair(4, 1), {5, 2}})  // visible in a narrow window
+    ends_->horizontalHeader()->moveSection(error, shown_at);
+  connect(ends_, &QTableWidget::itemSelectionChanged, this, [this] {
+    const int row = ends_->currentRow();
+    chosen_.reset();
+    placed_of_chosen_ = 0;
+    if (ends_->selectionModel()->hasSelection() && row >= 0)
+      chosen_ = ends_->item(row, 0)->text().toStdString();
+    tell_next();
+    emit target_changed();
+  });
+  snap_ = new QCheckBox(tr("Snap to a &ball of 3 mm"));
+  snap_->setChecked(true);
+  layout()->addWidget(snap_);
+  auto* row = new QHBoxLayout;
+  offered_ =
+      add_button(tr("Use the &plan's picks"), "offeredPicks", [this] { controller_.take_offered_picks(); });
+  delete_ = add_button(tr("Delete selecte&d end"), "deletePick", [this] { delete_chosen(); });
+  delete_->setToolTip(tr("Removes the picks of the end selected in the table (Delete key)"));
+  ends_->installEventFilter(this);  // Delete
+  auto* clear = add_button(tr("&Clear all picks"), "clearPicks", [this] {
+    ends_->clearSelection();
+    controller_.clear_picks();
+  });
+  for (QWidget* button : {offered_, delete_, clear}) row->addWidget(button);
+  static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  add_landmark_row();
+  unsaved_ = new QLabel;
+  unsaved_->setObjectName("unsavedPicks");
+  unsaved_->setWordWrap(true);
+  layout()->addWidget(unsaved_);
+  add_map();
+}
+
+namespace {
+
+std::optional<pipeline::BoneLabel> bone_in(const QString& name, int side) {
+  if (name.trimmed().isEmpty()) return std::nullopt;
+  pipeline::BoneLabel bone{name.trimmed().toStdString()};
+  if (side > 0) bone.side = side == 1 ? pipeline::Side::left : pipeline::Side::right;
+  return bone;
+}
+
+QString words_of(const pipeline::BoneLabel& bone) {
+  if (!bone.side) return text(bone.name);
+  return (*bone.side == pipeline::Side::left ? PlanPage::tr("left %1") : PlanPage::tr("right %1"))
+      .arg(text(bone.name));
+}
+
+}  // namespace
+
+void PlanPage::add_landmark_row() {
+  landmark_row_ = new QWidget;
+  auto* row = new QHBoxLayout(landmark_row_);
+  row->setContentsMargins(0, 0, 0, 0);
+  auto* name = new QLineEdit;
+  name->setObjectName("landmarkName");
+  name->setPlaceholderText(tr("name of another point"));
+  name->setAccessibleName(tr("Name of the landmark"));
+  name->setMaxLength(64);
+  auto* bone = new QLineEdit;
+  bone->setObjectName("landmarkBone");
+  bone->setPlaceholderText(tr("bone"));
+  bone->setAccessibleName(tr("Bone of the landmark"));
+  bone->setMaxLength(64);
+  auto* side = new QComboBox;
+  side->setObjectName("landmarkSide");
+  side->setAccessibleName(tr("Side"));
+  side->addItems({tr("side"), tr("left"), tr("right")});
+  auto* add = new QPushButton(tr("&Add landmark"));
+  add->setObjectName("addLandmark");
+  const auto take = [this, name, bone, side] {
+    controller_.add_landmark(name->text().trimmed().toStdString(),
+                             bone_in(bone->text(), side->currentIndex()));
+    for (int i = 0; i < ends_->rowCount(); ++i)
+      if (ends_->item(i, 0)->text() == name->text().trimmed())
+        ends_->setCurrentCell(i, 0, QItemSelectionModel::ClearAndSelect | QItemSelectionModel::Rows);
+    name->clear();
+  };
+  connect(add, &QPushButton::clicked, this, take);
+  connect(name, &QLineEdit::returnPressed, this, take);
+  row->addWidget(name, 3);
+  row->addWidget(bone, 2);
+  row->addWidget(side);
+  row->addWidget(add);
+  layout()->addWidget(landmark_row_);
+}
+
+bool PlanPage::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() != QEvent::KeyPress || static_cast<QKeyEvent*>(event)->key() != Qt::Key_Delete)
+    return Page::eventFilter(watched, event);
+  delete_chosen();
+  return true;
+}
+
+void PlanPage::delete_chosen() {
+  if (!chosen_) return;
+  const std::string point = *chosen_;
+  ends_->clearSelection();
+  controller_.erase_picks(point);
+}
+
+void PlanPage::add_map() {
+  auto* row = new QHBoxLayout;
+  auto* map = new QCheckBox(tr("Predicted error (&TRE) in 3-D"));
+  map->setObjectName("treMap");
+  auto* axis = new QComboBox;
+  axis->setObjectName("treAxis");
+  axis->addItems({"x", "y", "z"});
+  axis->setCurrentIndex(2);
+  axis->setToolTip(tr("The slice is perpendicular to this axis of the calibrator"));
+  auto* place = new QSlider(Qt::Horizontal);
+  place->setObjectName("trePlace");
+  place->setRange(-int(tre_half_mm), int(tre_half_mm));
+  place->setAccessibleName(tr("Position of the slice"));
+  auto* words = new QLabel;
+  for (QWidget* part : std::initializer_list<QWidget*>{map, axis, place, words}) row->addWidget(part);
+  static_cast<QVBoxLayout*>(layout())->addLayout(row);
+  const auto notify = [this, map, axis, place, words] {
+    for (QWidget* part : std::initializer_list<QWidget*>{axis, place}) part->setEnabled(map->isChecked());
+    words->setText(tr("%1 mm").arg(place->value()));
+    emit map_wanted(map->isChecked()
+                        ? std::optional(TreCut{SliceAxis(axis->currentIndex()), double(place->value())})
+                        : std::nullopt);
+  };
+  connect(map, &QCheckBox::toggled, this, notify);
+  connect(axis, &QComboBox::currentIndexChanged, this, notify);
+  connect(place, &QSlider::valueChanged, this, notify);
+  notify();
+}
+
+std::optional<WantedPick> PlanPage::target() const {
+  const ApplicationState& state = controller_.state();
+  if (!chosen_) {
+    const auto end = next_pick(state);
+    return end ? end : next_landmark(state);
+  }
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+    if (tunnel.start == *chosen_ || tunnel.end == *chosen_) return WantedPick{*chosen_, "", tunnel.bone};
+  if (std::ranges::find(state.landmarks, *chosen_) != state.landmarks.end())
+    return WantedPick{*chosen_, "", {}};
+  return std::nullopt;
+}
+
+namespace {
+
+/// Columns of a point: where it is clicked, its place, 95 % error and ray gap, or why it is not located.
+QStringList columns_of(const ApplicationState& state, const std::string& name, const QString& kind) {
+  QStringList in;
+  for (const std::string& view : state.views)
+    if (pick_of(state, name, view) != nullptr) in << text(view);
+  QString place, within, gap;
+  if (state.result)
+    for (const pipeline::PointResult& point : state.result->points) {
+      if (point.name != name) continue;
+      if (point.reason) within = sentence_of(*point.reason);
+      if (!point.place) continue;
+      const Eigen::Vector3d& at = point.place->in_calibrator;
+      place = QString("%1, %2, %3").arg(number(at.x(), 2), number(at.y(), 2), number(at.z(), 2));
+      within = number(localization::length_at_95(point.place->covariance_in_calibrator), 2);
+      gap = number(point.ray_gap_mm, 2);
+    }
+  const auto bone = bone_of(state, name);
+  return {text(name), bone ? kind + ", " + words_of(*bone) : kind, in.join(", "), place, within, gap};
+}
+
+}  // namespace
+
+void PlanPage::show_state(const ApplicationState& state) {
+  std::vector<QStringList> rows;
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+    for (const std::string& end : {tunnel.start, tunnel.end}) {
+      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (end == tunnel.start);
+      rows.push_back(columns_of(state, end, enters ? tr("enters") : tr("ends")));
+    }
+  for (const std::string& landmark : state.landmarks)
+    rows.push_back(columns_of(state, landmark, tr("landmark")));
+  if (state.result)
+    for (const localization::TargetError& target : state.result->accuracy.targets) {
+      rows.push_back(columns_of(state, target.name, tr("target")));
+      rows.back()[4] =
+          tr("error %1 of %2").arg(number(target.error_mm, 3), number(target.predicted_95_mm, 3));
+    }
+  fill(ends_, rows);
+  offered_->setVisible(!state.offered_picks.empty());
+  landmark_row_->setVisible(state.source == Source::files);
+  unsaved_->setVisible(state.has_unsaved_picks || state.picks_not_kept);
+  unsaved_->setText(
+      state.picks_not_kept
+          ? tr("The picks are not kept in the case: %1").arg(sentence_of(*state.picks_not_kept))
+          : tr("These picks are not in case.json yet: Ctrl+S saves them. They are kept until then."));
+  tell_next();
+}
+
+namespace {
+
+/// What is wrong with the first point whose picks do not agree; empty if there is none.
+QString contradicting_pick(const ApplicationState& state) {
+  if (state.result)
+    for (const pipeline::PointResult& point : state.result->points) {
+      if (point.source != localization::PointSource::pick) continue;
+      if (point.reason)
+        return QObject::tr("%1 is not located: %2.").arg(text(point.name), sentence_of(*point.reason));
+      if (point.rays_miss)
+        return QObject::tr("The rays of %1 miss each other by %2 mm.")
+            .arg(text(point.name), number(point.ray_gap_mm, 2));
+    }
+  return {};
+}
+
+}  // namespace
+
+void PlanPage::tell_next() {
+  const ApplicationState& state = controller_.state();
+  delete_->setEnabled(chosen_.has_value() && controller_.takes_picks());
+  if (!state.measured)
+    return next_->setText(
+        state.refusals.empty()
+            ? tr("Acquire the X-ray images first.")
+            : tr("No points without a calibration: %1").arg(sentence_of(state.refusals.begin()->second)));
+  if (chosen_)
+    return next_->setText(
+        tr("%1 is selected: click its new position in each X-ray image.").arg(text(*chosen_)));
+  const auto wanted = next_pick(state);
+  if (const auto landmark = next_landmark(state); !wanted && landmark)
+    return next_->setText(tr("Click %1 in %2.").arg(text(landmark->point), text(landmark->view)));
+  if (const QString bad = contradicting_pick(state); !wanted && !bad.isEmpty())
+    return next_->setText(
+        tr("%1 Select it in the table and click it again, or undo the click (Ctrl+Z).").arg(bad));
+  if (!wanted)
+    return next_->setText(tr(
+        "All points are placed. To move one, drag it, or select it in the table and click its new position "
+        "in each X-ray image; further views make it more accurate."));
+  for (const operation::PlannedTunnel& tunnel : state.tunnels)
+    if (tunnel.start == wanted->point || tunnel.end == wanted->point) {
+      const bool enters = (tunnel.enter_at == operation::TunnelEnd::start) == (wanted->point == tunnel.start);
+      next_->setText((enters ? tr("Click %1 in %2: where the drill enters the %3.")
+                             : tr("Click %1 in %2: where the drill ends in the %3."))
+                         .arg(text(wanted->point), text(wanted->view), text(tunnel.name)));
+    }
+}
+
+void PlanPage::placed(const std::string& point) {
+  if (chosen_ != point || ++placed_of_chosen_ < controller_.state().views.size()) return;
+  ends_->clearSelection();
+}
+
+}  // namespace helicarm::gui

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+import helicarm
+
+FEMUR = {"blumensaat_posterior": (200.0, 240.0), "blumensaat_anterior": (280.0, 180.0), "inferior": (260.0, 257.5)}
+
+
+def test_distance_in_the_plane_of_a_point_is_numpys(pair):
+    calibration = pair.calibration()
+    rotation, _ = pair.pose["LAT"]
+    here = pair.xyz.mean(axis=0)
+    there = here + rotation.T @ (12, -9, 0)
+    uv = calibration.project(np.array([here, there]), "LAT")
+    found = helicarm.measure("distance", {"from": uv[0], "to": uv[1]}, calibration=calibration, view="LAT", at=here)
+    length = found["quantities"][0]
+    assert (length["name"], length["unit"]) == ("length", "mm")
+    assert length["value"] == pytest.approx(15, abs=1e-6)
+    assert found["depth_mm"] == pytest.approx(800, abs=1e-4)
+    by_fiducials = helicarm.measure("distance", {"from": uv[0], "to": uv[1]}, calibration=calibration, view="LAT")
+    assert by_fiducials == found
+
+
+def test_lengths_without_a_calibration_are_pixels():
+    length = helicarm.measure("distance", {"from": (1, 2), "to": (4, 6)}, sigma_px=0.2)["quantities"][0]
+    assert length == {"name": "length", "unit": "px", "value": pytest.approx(5), "sigma": pytest.approx(0.2 * 2**0.5)}
+
+
+def test_quadrants_of_a_click_and_of_a_located_point(pair):
+    calibration = pair.calibration()
+    point = np.array([3.0, 5.0, 40.0])
+    uv = calibration.project(point, "LAT")
+    covariance = np.diag([0.04, 0.09, 0.01])
+    found = helicarm.measure("femoral_quadrants", {**FEMUR, "clicked": uv}, calibration=calibration, view="LAT",
+                             points={"located": (point, covariance)})
+    origin, anterior, inferior = (np.array(FEMUR[name]) for name in FEMUR)
+
+    def percent(uv):
+        """In mm: the pixels are not square."""
+        scale = 1 / np.diag(pair.k)[:2]
+        along, way, down = ((end - origin) * scale for end in (anterior, uv, inferior))
+        return np.array([100 * along @ way / (along @ along), 100 * np.cross(along, way) / np.cross(along, down)])
+
+    for position in found["positions"]:
+        assert list(position["percent"].values()) == pytest.approx(percent(uv), abs=1e-9)
+    clicked, located = (np.array(p["covariance_percent2"]) for p in found["positions"])
+    by_point = np.array([(calibration.project(point + d, "LAT") - calibration.project(point - d, "LAT")) / 2e-4
+                         for d in 1e-4 * np.eye(3)]).T
+    by_pixel = np.array([(percent(uv + d) - percent(uv - d)) / 2 for d in np.eye(2)]).T
+    expected = by_pixel @ (by_point @ covariance @ by_point.T - 0.25 * np.eye(2)) @ by_pixel.T
+    assert located - clicked == pytest.approx(expected, abs=1e-4)
+
+
+def test_refusals_are_named(pair):
+    with pytest.raises(helicarm.InputError, match="\"lateral\" is missing"):
+        helicarm.measure("tibia_ml", {"medial": (1, 2)})
+    with pytest.raises(helicarm.InputError, match="kind"):
+        helicarm.measure("length", {})
+    with pytest.raises(helicarm.InputError, match="require a calibration"):
+        helicarm.measure("distance", {"from": (1, 2), "to": (4, 6)}, depth_mm=700)
+    with pytest.raises(helicarm.InputError, match="distortion map"):
+        helicarm.measure("distance", {"from": (1, 2), "to": (4, 6)}, calibration=pair.calibration(), view="AP",
+                         raw=True)

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/operation/freehand.h"
+
+#include <gtest/gtest.h>
+
+#include "helicarm/core/random.h"
+#include "helicarm/geometry/rotation.h"
+#include "helicarm/geometry/view_json.h"
+
+namespace helicarm::operation {
+namespace {
+
+using Eigen::Vector3d;
+using geometry::RigidTransform;
+
+const RigidTransform tracker_from_femur{geometry::rotation_from_euler(1, 0, 0), {-50, 0, 880}};
+/// In the femur marker's frame: the tunnel begins here and extends by 40 mm along z.
+const Vector3d entry(30, 5, -20);
+constexpr double end_s = 100;
+
+OperationPlan plan() {
+  OperationPlan plan;
+  plan.drill = HandDrill{{0, -140, 20}, {0, -20, 20}, 0.1};
+  plan.tunnels = {{"femur", guidance::Bone::femur, "FS", "FE", TunnelEnd::start}};
+  plan.tracker.sigma_mm = 0.1;
+  plan.tracker.sigma_deg = 0.03;
+  return plan;
+}
+
+pipeline::Result measured() {
+  pipeline::Result result;
+  for (const auto& [name, at] : {std::pair("FS", entry), {"FE", Vector3d(entry + Vector3d(0, 0, 40))}}) {
+    pipeline::PointResult point{
+        name, localization::PointSource::pick, guidance::Bone::femur, {}, guidance::PointInFrames{}, 0, {}};
+    point.place->propagated_to_femur =
+        guidance::PropagatedPoint{at, 0.01 * Eigen::Matrix3d::Identity(), {}, {}};
+    result.points.push_back(point);
+  }
+  return result;
+}
+
+/// The tip this far from the tunnel's axis and this deep, tilted.
+RigidTransform femur_from_tip(double off_mm, double depth_mm, double tilt_rad = 0) {
+  return {geometry::rotation_from_vector(Vector3d(tilt_rad, 0, 0)), entry + Vector3d(off_mm, 0, depth_mm)};
+}
+
+RigidTransform tracker_from_tool(const RigidTransform& tracker_from_bone,
+                                 const RigidTransform& bone_from_tip) {
+  return tracker_from_bone * bone_from_tip * tracked_tool(*plan().drill).marker_from_tip.inverse();
+}
+
+FreehandGuide guide() {
+  guidance::Poses basis;
+  basis.tracker_from_femur = tracker_from_femur;
+  basis.tracker_from_tool = tracker_from_tool(tracker_from_femur, femur_from_tip(0, -20));
+  return FreehandGuide::begin(plan(), LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)), "femur",
+                              basis)
+      .value();
+}
+
+/// Fifteen samples until `end_s`; `tip` by the sample's number.
+template <class Tip>
+PoseWindow window(const Tip& tip, const RigidTransform& tracker_from_bone = tracker_from_femur) {
+  PoseWindow window{end_s - 0.25, 0.25, {}};
+  for (int i = 0; i < 15; ++i) {
+    const double time_s = end_s - (14 - i) / 30.0;
+    window.samples["femur"].push_back({time_s, 0, time_s, tracker_from_bone});
+    window.samples["tool"].push_back({time_s, 0, time_s, tracker_from_tool(tracker_from_bone, tip(i))});
+  }
+  return window;
+}
+
+PoseWindow at_rest(const RigidTransform& tip, const RigidTransform& bone = tracker_from_femur) {
+  return window([&](int) { return tip; }, bone);
+}
+
+TEST(FreehandGuide, DrillOnTheAxisIsOnTarget) {
+  const Guidance now = guide().at(at_rest(femur_from_tip(0.3, 25, 0.01)));
+  EXPECT_EQ(now.decision(), "on_target");
+  EXPECT_NEAR(now.aim->distance_mm, 0.3, 1e-6);
+  EXPECT_NEAR(now.aim->depth_mm, 25, 1e-6);
+  EXPECT_NEAR(now.aim->to_axis_mm.norm(), 0.3, 1e-6);
+  EXPECT_NEAR(now.age_s.value(), 0, 1e-9);
+}
+
+TEST(FreehandGuide, CorrectionByTheAimBringsTheDrillOnTheAxis) {
+  const RigidTransform tip = femur_from_tip(3, 10, 0.1);
+  const TunnelAim aim = *guide().at(at_rest(tip)).aim;
+  const RigidTransform correction{
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), aim.axis).toRotationMatrix(), aim.to_axis_mm};
+  const Guidance corrected = guide().at(at_rest(tip * correction));
+  EXPECT_NEAR(corrected.aim->distance_mm, 0, 1e-6);
+  EXPECT_NEAR(corrected.aim->angle_deg, 0, 1e-6);
+}
+
+TEST(FreehandGuide, DrillBesideTiltedOrBeyondIsOffTarget) {
+  for (const RigidTransform& tip :
+       {femur_from_tip(1.5, 10), femur_from_tip(0, 10, 0.05), femur_from_tip(0, 42)})
+    EXPECT_EQ(guide().at(at_rest(tip)).decision(), "off_target");
+}
+
+TEST(FreehandGuide, MotionOfTheBoneWithinItsLimitMovesTheTarget) {
+  RigidTransform moved = tracker_from_femur;
+  moved.translation.x() += 0.6;
+  const Guidance now = guide().at(at_rest(femur_from_tip(0, 10), moved));
+  EXPECT_EQ(now.decision(), "on_target");
+  EXPECT_NEAR(now.bone_moved->distance_mm, 0.6, 1e-9);
+  EXPECT_NEAR(now.aim->distance_mm, 0, 1e-6);
+}
+
+TEST(FreehandGuide, MotionOfTheBoneBeyondItsLimitIsReported) {
+  RigidTransform moved = tracker_from_femur;
+  moved.translation.x() += 3.1;
+  const Guidance now = guide().at(at_rest(femur_from_tip(0, 10), moved));
+  EXPECT_EQ(now.decision(), "plan_stale");
+  EXPECT_NEAR(now.why_not->figures.at("distance_mm"), 3.1, 1e-9);
+  EXPECT_TRUE(now.aim);
+}
+
+TEST(FreehandGuide, PosesOlderThanTheLimitAreStale) {
+  PoseWindow late = at_rest(femur_from_tip(0, 10));
+  late.middle_s += 0.11;
+  EXPECT_EQ(guide().at(late).decision(), "stale_pose");
+}
+
+TEST(FreehandGuide, MarkerThatIsNotVisibleHasNoPose) {
+  PoseWindow hidden = at_rest(femur_from_tip(0, 10));
+  hidden.samples["femur"].clear();
+  const Guidance now = guide().at(hidden);
+  EXPECT_EQ(now.decision(), "no_pose");
+  EXPECT_FALSE(now.aim);
+}
+
+TEST(FreehandGuide, ScatteringSamplesAreUncertain) {
+  RandomStream random(5, 1);
+  const auto shaken = [&](int) { return femur_from_tip(1.5 * random.normal(), 10 + 1.5 * random.normal()); };
+  const Guidance now = guide().at(window(shaken));
+  EXPECT_EQ(now.decision(), "uncertain");
+  EXPECT_GT(now.aim->depth_sigma_mm, 0.3);
+}
+
+TEST(FreehandGuide, SteadyMotionIsNotScatter) {
+  const Guidance still = guide().at(at_rest(femur_from_tip(0, 10.5)));
+  const Guidance moving = guide().at(window([](int i) { return femur_from_tip(0, i); }));
+  EXPECT_NEAR(moving.aim->depth_sigma_mm, still.aim->depth_sigma_mm, 1e-6);
+  EXPECT_NEAR(moving.aim->depth_mm, 14 - 3.5, 1e-6);  // the mean of the last eight of 15
+  EXPECT_EQ(moving.decision(), "on_target");
+}
+
+TEST(FreehandGuide, RecordedSamplesGiveTheSameDecision) {
+  const PoseWindow recent = at_rest(femur_from_tip(0.7, 12, 0.02));
+  const PoseWindow read = pose_window_from(to_json(recent), "record").value();
+  EXPECT_EQ(to_json(guide().at(read)), to_json(guide().at(recent)));
+}
+
+TEST(FreehandGuide, PlanWithARobotIsRefused) {
+  OperationPlan with_robot = plan();
+  with_robot.drill.reset();
+  EXPECT_EQ(FreehandGuide::begin(with_robot, LiveTool(plan(), measured(), {}, tracked_tool(*plan().drill)),
+                                 "femur", {})
+                .error()
+                .reason,
+            Reason::usage);
+}
+
+}  // namespace
+}  // namespace helicarm::operation

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Guidance of a hand-held drill during an operation.
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "helicarm/operation/operation.h"
+
+namespace helicarm::operation {
+namespace {
+
+/// Refuses (off_target) a drill that cannot be at the end of its tunnel, however badly that was drilled.
+void check_in_tunnel(const Guidance& now) {
+  constexpr double farthest_mm = 10, widest_deg = 20;
+  if (!now.aim) return;
+  const TunnelAim& aim = *now.aim;
+  const double before_end_mm = aim.length_mm - aim.depth_mm;
+  if (aim.distance_mm <= farthest_mm && aim.angle_deg <= widest_deg && std::abs(before_end_mm) <= farthest_mm)
+    return;
+  throw BadInput(
+      {Reason::off_target,
+       fmt::format(
+           "the drill is not in the tunnel: its tip is {:.1f} mm beside the axis, {:.1f} mm before the "
+           "end, {:.0f} degrees off; limits {:g} mm and {:g} degrees. Put it into the tunnel",
+           aim.distance_mm, before_end_mm, aim.angle_deg, farthest_mm, widest_deg),
+       {},
+       {{"distance_mm", aim.distance_mm}, {"before_end_mm", before_end_mm}, {"angle_deg", aim.angle_deg}}});
+}
+
+}  // namespace
+
+Expected<void> Operation::guide(const std::string& name, double oldest_pose_s) {
+  return guarded([&] {
+    guide_.reset();
+    guided_.reset();
+    const PlannedTunnel& tunnel = tunnel_named(name);
+    if (const auto missing = checks_to_come(tunnel.bone); !missing.empty())
+      throw BadInput(Reason::usage, missing.front() + ": touch this check point first");
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    notify_(Step::navigate, name);
+    const PoseWindow window = look("guide");
+    record("guide", {{"tunnel", name}, {"oldest_pose_s", oldest_pose_s}, {"window", to_json(window)}});
+    guide_ =
+        value_or_throw(FreehandGuide::begin(plan_, value_or_throw(live_tool()), name,
+                                            value_or_throw(poses_now(window, plan_.tracker)), oldest_pose_s));
+  });
+}
+
+Expected<Guidance> Operation::guidance() {
+  return guarded([&] {
+    if (!guide_) throw BadInput(Reason::usage, "no tunnel is guided; begin with a tunnel of the plan");
+    const PoseWindow recent = guide_->recent(board_, tracker::monotonic_seconds());
+    Guidance now = guide_->at(recent);
+    const bool is_stale = guided_ && guided_->decision() == code(Reason::plan_stale);
+    if (is_stale) {
+      now.why_not = guided_->why_not;
+    } else if (!guided_ || guided_->decision() != now.decision()) {
+      record("guided",
+             {{"tunnel", guide_->tunnel().name}, {"window", to_json(recent)}, {"guidance", to_json(now)}});
+      if (now.decision() == code(Reason::plan_stale)) in_place_.clear();
+      guided_ = now;
+    }
+    return now;
+  });
+}
+
+Expected<TunnelOutcome> Operation::verify_drilled(const std::string& name) {
+  return guarded([&] {
+    const PlannedTunnel& tunnel = tunnel_named(name);
+    if (!result_) throw BadInput(Reason::usage, "no measurement yet");
+    if (!plan_.drill) throw BadInput(Reason::usage, "the plan has no hand-held drill");
+    if (guide_) check_in_tunnel(value_or_throw(guidance()));
+    guide_.reset();
+    in_place_.clear();
+    notify_(Step::verify, name);
+    return check(tunnel);
+  });
+}
+
+}  // namespace helicarm::operation

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/pipeline/outcome.h"
+
+#include <gtest/gtest.h>
+
+namespace helicarm::pipeline {
+namespace {
+
+PointResult point(const std::string& name, double gap_mm, bool rays_miss) {
+  PointResult point;
+  point.name = name;
+  point.source = localization::PointSource::pick;
+  point.place = guidance::PointInFrames{};
+  point.place->covariance_in_calibrator = 0.01 * Eigen::Matrix3d::Identity();
+  point.ray_gap_mm = gap_mm;
+  point.rays_miss = rays_miss;
+  return point;
+}
+
+Result with_deviating_calibrator(std::vector<PointResult> points) {
+  Result result;
+  result.points = std::move(points);
+  result.warnings.push_back({Reason::calibrator_deviates, "the fiducials deviate", {}, {}});
+  return result;
+}
+
+TEST(CheckPicksAgree, AllContradictingPicksWithADeviatingCalibratorAreRefused) {
+  const auto checked =
+      check_picks_agree(with_deviating_calibrator({point("a", 3.6, true), point("b", 64, true)}));
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().reason, Reason::calibrator_mismatch);
+  EXPECT_EQ(checked.error().figures.at("largest_gap_mm"), 64);
+}
+
+TEST(CheckPicksAgree, OneAgreeingPickIsEnough) {
+  EXPECT_TRUE(check_picks_agree(with_deviating_calibrator({point("a", 3.6, true), point("b", 0.1, false)})));
+}
+
+TEST(CheckPicksAgree, ContradictingPicksAloneMayBeMotion) {
+  Result result = with_deviating_calibrator({point("a", 3.6, true), point("b", 64, true)});
+  result.warnings.clear();
+  EXPECT_TRUE(check_picks_agree(result));
+  EXPECT_TRUE(check_picks_agree(with_deviating_calibrator({point("a", 3.6, true)})));
+}
+
+TEST(CheckCertain, LimitHoldsInTheToolsFrameToo) {
+  std::vector<PointResult> points = {point("a", 0, false)};
+  EXPECT_TRUE(check_certain(points, 0.5));
+  points[0].place->covariance_in_tool = Eigen::Matrix3d::Identity();
+  const auto refused = check_certain(points, 0.5);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::uncertain);
+  EXPECT_NE(refused.error().message.find("in the tool's frame"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace helicarm::pipeline
