@@ -57,18 +57,18 @@ bool VirtualTracker::hide(const std::string& body, bool hidden) {
   if (std::ranges::find(bodies_, body, &FollowedBody::name) == bodies_.end()) return false;
   const std::lock_guard lock(mutex_);
   if (hidden)
-    hidden_.insert(body);
+    disturbance_.hidden.insert(body);
   else
-    hidden_.erase(body);
+    disturbance_.hidden.erase(body);
   return true;
 }
 
 void VirtualTracker::set(TrackerFault fault, bool on) {
   const std::lock_guard lock(mutex_);
   if (on)
-    faults_.insert(fault);
+    disturbance_.faults.insert(fault);
   else
-    faults_.erase(fault);
+    disturbance_.faults.erase(fault);
 }
 
 void VirtualTracker::run(const std::stop_token& stop) {
@@ -85,37 +85,45 @@ void VirtualTracker::run(const std::stop_token& stop) {
   }
 }
 
-void VirtualTracker::notify(std::uint64_t number) {
-  // Released while computing: otherwise a machine too slow for the rate would block other threads.
-  std::unique_lock lock(mutex_);
-  const auto faults = faults_;
-  const auto hidden = hidden_;
-  lock.unlock();
-  const auto has = [&](TrackerFault fault) { return faults.contains(fault); };
-  if (has(TrackerFault::silent)) return;
-  if (!has(TrackerFault::frozen)) {
-    tracker::IgtlTracking tracking;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      const FollowedBody& followed = bodies_[i];
-      const geometry::RigidTransform truth = followed.tracker_from_body();
-      const simulation::TrackerSample sample = simulation::track_sample(
-          options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
-          options_.seed, samples_stream + 2 * std::uint32_t(i), number);
-      if (sample.valid() && !hidden.contains(followed.name))
-        tracking.tools.push_back({has(TrackerFault::swapped) ? other_bone(followed.name) : followed.name, 2,
-                                  sample.tracker_from_body->matrix()});
-      else if (has(TrackerFault::identity))
-        tracking.tools.push_back({followed.name, 2, Eigen::Matrix4d::Identity()});
-    }
-    if (has(TrackerFault::not_finite))
-      for (tracker::IgtlTool& tool : tracking.tools)
-        tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
-    if (has(TrackerFault::swapped_calibrator)) swap_with_calibrator(tracking.tools);
-    last_.device = "virtual";
-    last_.content = std::move(tracking);
+tracker::IgtlTracking VirtualTracker::track(std::uint64_t number, const Disturbance& disturbance) const {
+  const auto has = [&](TrackerFault fault) { return disturbance.faults.contains(fault); };
+  tracker::IgtlTracking tracking;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const FollowedBody& followed = bodies_[i];
+    const geometry::RigidTransform truth = followed.tracker_from_body();
+    const simulation::TrackerSample sample = simulation::track_sample(
+        options_.model, followed.body, [&](double) { return truth; }, double(number) / options_.rate_hz,
+        options_.seed, samples_stream + 2 * std::uint32_t(i), number);
+    if (sample.valid() && !disturbance.hidden.contains(followed.name))
+      tracking.tools.push_back({has(TrackerFault::swapped) ? other_bone(followed.name) : followed.name, 2,
+                                sample.tracker_from_body->matrix()});
+    else if (has(TrackerFault::identity))
+      tracking.tools.push_back({followed.name, 2, Eigen::Matrix4d::Identity()});
   }
-  last_.stamp = stamp_now(has(TrackerFault::time_jump) ? -hour_s : 0);
-  server_->send(last_);
+  if (has(TrackerFault::not_finite))
+    for (tracker::IgtlTool& tool : tracking.tools)
+      tool.matrix(0, 3) = std::numeric_limits<double>::quiet_NaN();
+  if (has(TrackerFault::swapped_calibrator)) swap_with_calibrator(tracking.tools);
+  return tracking;
+}
+
+void VirtualTracker::notify(std::uint64_t number) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    const Disturbance disturbance = disturbance_;
+    const auto has = [&](TrackerFault fault) { return disturbance.faults.contains(fault); };
+    if (has(TrackerFault::silent)) return;
+    if (!has(TrackerFault::frozen)) {
+      // Released while computing: otherwise a machine too slow for the rate would block other threads.
+      lock.unlock();
+      last_.content = track(number, disturbance);
+      lock.lock();
+      if (!(disturbance == disturbance_)) continue;
+    }
+    last_.device = "virtual";
+    last_.stamp = stamp_now(has(TrackerFault::time_jump) ? -hour_s : 0);
+    return server_->send(last_);
+  }
 }
 
 }  // namespace helicarm::virtual_devices

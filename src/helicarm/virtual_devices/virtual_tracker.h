@@ -52,7 +52,8 @@ class VirtualTracker {
   double rate_hz() const { return options_.rate_hz; }
   /// Names of all tracked bodies.
   std::vector<std::string> bodies() const;
-  /// Covers a body's markers; returns whether the body exists.
+  /// Covers a body's markers; returns whether the body exists. As with `set`, every pose sent after it
+  /// returns obeys.
   bool hide(const std::string& body, bool hidden);
   void set(TrackerFault fault, bool on);
 
@@ -60,14 +61,19 @@ class VirtualTracker {
   VirtualTracker(const VirtualTrackerOptions& options, std::vector<FollowedBody> bodies,
                  std::unique_ptr<tracker::IgtlServer> server);
   void run(const std::stop_token& stop);
+  struct Disturbance {
+    std::set<std::string> hidden;
+    std::set<TrackerFault> faults;
+    bool operator==(const Disturbance&) const = default;
+  };
   void notify(std::uint64_t number);
+  tracker::IgtlTracking track(std::uint64_t number, const Disturbance& disturbance) const;
 
   VirtualTrackerOptions options_;
   std::vector<FollowedBody> bodies_;
   std::unique_ptr<tracker::IgtlServer> server_;
   std::mutex mutex_;
-  std::set<std::string> hidden_;
-  std::set<TrackerFault> faults_;
+  Disturbance disturbance_;
   tracker::IgtlMessage last_;
   std::jthread thread_;
 };
