@@ -127,10 +127,8 @@ void design(const PhantomArguments& arguments, Console& console) {
       value_or_throw(phantom::cone_for_knee(arguments.knee_mm[0], arguments.knee_mm[1]));
   const phantom::ConicalHelix helix = phantom::helix_on(cone);
   const phantom::Calibrator calibrator = phantom::calibrator_on(helix, "knee");
-  phantom::RuleOptions options;
-  options.helix = helix;
   std::vector<std::string> broken;
-  for (const phantom::RuleFinding& rule : phantom::check_rules(calibrator, options))
+  for (const phantom::RuleFinding& rule : phantom::check_rules(calibrator))
     if (!rule.passed())
       broken.push_back(fmt::format("{} ({:.3g}, limit {:g})", rule.rule, rule.figure, rule.limit));
   if (console.json) {

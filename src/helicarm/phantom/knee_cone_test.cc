@@ -36,9 +36,8 @@ TEST(KneeCone, EndsOfTheHelixLieOnTheCone) {
 TEST(KneeCone, CalibratorsOfMeasuredKneesKeepTheRulesUpToTheirSize) {
   for (const auto& [d1, d2, excess] :
        {std::tuple{64.58, 55.34, 1.0}, {66.7, 57.2, 1.0}, {68.89, 59.02, 1.04}}) {
-    RuleOptions options;
-    options.helix = helix_on(*cone_for_knee(d1, d2));
-    for (const RuleFinding& rule : check_rules(calibrator_on(options.helix, "knee"), options))
+    const Calibrator calibrator = calibrator_on(helix_on(*cone_for_knee(d1, d2)), "knee");
+    for (const RuleFinding& rule : check_rules(calibrator))
       EXPECT_TRUE(rule.passed() || (rule.bound == Bound::at_most && rule.figure <= excess * rule.limit))
           << d1 << ": " << rule.rule << " " << rule.figure;
   }

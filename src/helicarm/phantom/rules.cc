@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/phantom/conical_helix.h"
 
 namespace helicarm::phantom {
 namespace {
@@ -67,6 +68,37 @@ double distance_to_helix_mm(const ConicalHelix& helix, const Eigen::Vector3d& po
   return distance(best);
 }
 
+/// The conical helix about z nearest to balls P1..P12 in that order, less than half a turn apart.
+ConicalHelix fitted_helix(const Points& balls) {
+  const auto count = static_cast<Eigen::Index>(balls.size());
+  Eigen::VectorXd angle(count), height(count), log_radius(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Vector3d& ball = balls[static_cast<std::size_t>(i)];
+    height(i) = ball.z();
+    log_radius(i) = std::log(std::max(ball.head<2>().norm(), 1e-3));
+    angle(i) = std::atan2(ball.y(), ball.x());
+    if (i > 0) angle(i) = angle(i - 1) + std::remainder(angle(i) - angle(i - 1), 2 * std::numbers::pi);
+  }
+  ConicalHelix helix;
+  double least = infinity;
+  Eigen::VectorXd t;
+  for (int turns = 0; turns <= 2; ++turns) {
+    const Eigen::VectorXd from_base = angle.array() + 2 * std::numbers::pi * turns;
+    const double rise = from_base.dot(height) / from_base.squaredNorm();
+    const double misfit = (height - rise * from_base).norm();
+    if (!(misfit < least)) continue;
+    least = misfit;
+    helix.h = rise;
+    t = from_base;
+  }
+  const Eigen::VectorXd spread = t.array() - t.mean();
+  const double slope = spread.dot(log_radius) / spread.squaredNorm();
+  helix.pp = -1 / slope;
+  helix.rr = std::exp(log_radius.mean() - slope * t.mean());
+  helix.t_end = std::max(helix.t_end, t.maxCoeff());
+  return helix;
+}
+
 double imaged(const Calibrator& calibrator, const geometry::View& view, const RuleOptions& options) {
   return double(
       std::count_if(calibrator.balls.begin(), calibrator.balls.end(), [&](const CalibratorBall& ball) {
@@ -113,12 +145,12 @@ void check_space(const Calibrator& calibrator, const DesignViews& views, const R
   }
 }
 
-void check_helical(const Points& balls, const DesignViews& views, const RuleOptions& options,
-                   std::vector<RuleFinding>& findings) {
+void check_helical(const Points& balls, const DesignViews& views, std::vector<RuleFinding>& findings) {
   const auto add = [&](auto... fields) { findings.push_back({fields...}); };
+  const ConicalHelix helix = fitted_helix(balls);
   double off_helix = 0;
-  for (const auto& ball : balls) off_helix = std::max(off_helix, distance_to_helix_mm(options.helix, ball));
-  add("on_helix", "all balls are on the conical helix", off_helix, Bound::at_most, 0.05, "mm");
+  for (const auto& ball : balls) off_helix = std::max(off_helix, distance_to_helix_mm(helix, ball));
+  add("on_helix", "all balls are on one conical helix", off_helix, Bound::at_most, 0.05, "mm");
   add("first_plane", "P1 P2 P5 P6 P9 P10 are on one plane", misfit_mm(pick(balls, {1, 2, 5, 6, 9, 10}), 2),
       Bound::at_most, 0.5, "mm");
   add("second_plane", "P3 P4 P7 P8 P11 P12 are on one plane", misfit_mm(pick(balls, {3, 4, 7, 8, 11, 12}), 2),
@@ -206,7 +238,7 @@ std::vector<RuleFinding> check_rules(const Calibrator& calibrator, const RuleOpt
   const DesignViews views = design_views(calibrator, options);
   check_space(calibrator, views, options, findings);
   const Points balls = numbered(calibrator);
-  if (!balls.empty()) check_helical(balls, views, options, findings);
+  if (!balls.empty()) check_helical(balls, views, findings);
   return findings;
 }
 

@@ -7,12 +7,10 @@
 
 #include "helicarm/geometry/view.h"
 #include "helicarm/phantom/calibrator.h"
-#include "helicarm/phantom/conical_helix.h"
 
 namespace helicarm::phantom {
 
 struct RuleOptions {
-  ConicalHelix helix;
   double source_detector_mm = 1000;
   double source_calibrator_mm = 650;  ///< to the centroid of the balls
   double field_mm = 228.6;            ///< diameter of the receiver

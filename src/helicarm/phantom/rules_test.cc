@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "helicarm/phantom/conical_helix.h"
+
 namespace helicarm::phantom {
 namespace {
 
