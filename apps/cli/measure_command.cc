@@ -12,6 +12,7 @@
 #include "helicarm/core/csv.h"
 #include "helicarm/fiducials/find_target.h"
 #include "helicarm/measures/measure_json.h"
+#include "helicarm/rectification/distortion_map.h"
 
 namespace helicarm::cli {
 namespace {
@@ -20,6 +21,7 @@ struct Point {
   Eigen::Vector3d xyz_mm;
   Eigen::Matrix3d covariance_mm2;
   std::map<std::string, measures::Click> seen = {};  ///< by view
+  Json warnings = Json::array();
 };
 
 /// A calibration and the points located with it.
@@ -60,6 +62,7 @@ void add_points(std::vector<JsonReader> entries, Measured& measured) {
                 Eigen::Map<const Eigen::Matrix3d>(entry.matrix("covariance_mm2", 3, 3, numbers).data())};
     if (entry.has("seen") && !rays_miss(entry))
       point.seen = seen_in(entry.object("seen"), name, measured.calibration.views);
+    if (!entry.objects("warnings", false).empty()) point.warnings = entry.raw("warnings");
     if (!measured.points.emplace(name, std::move(point)).second)
       entry.refuse(Reason::name_clash, "name", fmt::format("there is another point \"{}\"", name));
   }
@@ -97,7 +100,18 @@ const Point& point_named(const Measured& measured, const std::string& name, cons
 /// Nothing without fiducials, depth or point: lengths are then in pixels.
 std::optional<measures::ObjectPlane> plane_of(const MeasureArguments& arguments, const Measured& measured,
                                               const calibration::CalibratedView& view) {
-  if (arguments.depth_mm) return measures::plane_at(view, *arguments.depth_mm, arguments.depth_sigma_mm);
+  if (arguments.depth_mm) {
+    const auto& map = measured.calibration.maps[view_named(measured, view.name, "--depth")];
+    if (map && map->rectified_pixel_mm) {
+      const double receiver_mm = view.view.intrinsics.fx * *map->rectified_pixel_mm;
+      if (*arguments.depth_mm > receiver_mm)
+        throw BadInput(Reason::bad_value,
+                       fmt::format("--depth: {:g} mm is behind the receiver of {}, {:.0f} mm "
+                                   "from the source",
+                                   *arguments.depth_mm, view.name, receiver_mm));
+    }
+    return measures::plane_at(view, *arguments.depth_mm, arguments.depth_sigma_mm);
+  }
   if (arguments.at) {
     const Point& point = point_named(measured, *arguments.at, "--at");
     return value_or_throw(measures::plane_through(view, point.xyz_mm, point.covariance_mm2));
@@ -114,6 +128,7 @@ struct Wanted {
   measures::Kind kind;
   std::string view;
   std::vector<measures::Click> clicks = {};
+  std::map<std::string, Json> warnings = {};  ///< of its located points
 };
 
 measures::Click click_from(const CsvTable& table, std::size_t row, const std::optional<Measured>& measured,
@@ -136,12 +151,19 @@ measures::Click click_from(const CsvTable& table, std::size_t row, const std::op
   const Eigen::Vector2d uv{*u, *v};
   double sigma_px = sigma.value_or(fiducials::click_sigma_px);
   Eigen::Vector2d rectified = uv;
-  if (measured)
-    if (const auto& map = measured->calibration.maps[view_named(*measured, view_name, where)]; raw && map) {
+  if (measured) {
+    const auto& map = measured->calibration.maps[view_named(*measured, view_name, where)];
+    if (map && raw) {
       const auto seen = value_or_throw(fiducials::point_of_click(*map, uv, sigma));
       rectified = seen.uv;
       sigma_px = seen.sigma_px;
+    } else if (map && !rectification::raw_in_image(*map, uv)) {
+      throw BadInput(
+          Reason::bad_value,
+          fmt::format("{}: ({:g}, {:g}) px is not in the rectified image of {}; --raw for raw pixels", where,
+                      uv.x(), uv.y(), view_name));
     }
+  }
   return {name, rectified, sigma_px * sigma_px * Eigen::Matrix2d::Identity()};
 }
 
@@ -164,6 +186,9 @@ std::vector<Wanted> wanted_measures(const CsvTable& table, const std::optional<M
           Reason::bad_value,
           fmt::format("clicks: row {}: measure \"{}\" has another kind or view before", row + 1, name));
     wanted->clicks.push_back(click_from(table, row, measured, raw));
+    const std::string& point = wanted->clicks.back().name;
+    if (table.text(row, "u_px").empty() && !measured->points.at(point).warnings.empty())
+      wanted->warnings[point] = measured->points.at(point).warnings;
   }
   return all;
 }
@@ -171,6 +196,7 @@ std::vector<Wanted> wanted_measures(const CsvTable& table, const std::optional<M
 struct Answer {
   std::string name, view;
   measures::Measure measure;
+  std::map<std::string, Json> warnings;
 };
 
 std::vector<Answer> answers_to(const MeasureArguments& arguments) {
@@ -198,7 +224,7 @@ std::vector<Answer> answers_to(const MeasureArguments& arguments) {
       failure.view = wanted.view;
       throw BadInput(std::move(failure));
     }
-    answers.push_back({wanted.name, wanted.view, *std::move(measure)});
+    answers.push_back({wanted.name, wanted.view, *std::move(measure), wanted.warnings});
   }
   return answers;
 }
@@ -214,6 +240,10 @@ void print(const Answer& answer, std::ostream& out) {
     out << fmt::format(
         "  lengths in the plane {:.1f} mm from the source; 1 mm nearer to it they are {:.2f} % shorter\n",
         *measure.depth_mm, 100 / *measure.depth_mm);
+  for (const auto& [point, warnings] : answer.warnings)
+    for (const Json& warning : warnings)
+      out << fmt::format("  warning: {}: {}\n", point,
+                         warning.value("message", warning.value("code", std::string())));
 }
 
 }  // namespace
@@ -227,7 +257,7 @@ CommandResult measure_command(const MeasureArguments& arguments, Console& consol
     }
     Json all = Json::array();
     for (const Answer& answer : answers) {
-      Json one{{"name", answer.name}, {"view", answer.view}};
+      Json one{{"name", answer.name}, {"view", answer.view}, {"warnings", answer.warnings}};
       one.update(measures::to_json(answer.measure));
       all.push_back(std::move(one));
     }

@@ -22,8 +22,7 @@ const geometry::View lateral{{6000, 6000, 512, 500, 0}, {Eigen::Matrix3d::Identi
 /// One view, the located point FS, and two fiducials about the calibrator's origin.
 Json result_json() {
   Json view{{"name", "LAT"}};
-  view["rectification"] = {
-      {"map", rectification::to_json(rectification::identity_map(1024, 1024, std::nullopt))}};
+  view["rectification"] = {{"map", rectification::to_json(rectification::identity_map(1024, 1024, 0.2))}};
   view["projection"] = geometry::json_rows(lateral.projection());
   view["camera_from_calibrator"] = geometry::json_rows(lateral.camera_from_world.matrix());
   const Json point{{"name", "FS"},
@@ -114,6 +113,21 @@ TEST(MeasureCommand, PointWhoseRaysMissIsItsProjection) {
               1e-9);
 }
 
+TEST(MeasureCommand, WarningsOfALocatedPointStandWithTheMeasure) {
+  const std::string rows =
+      "q,tibia_ml,LAT,medial,100,500,0\nq,tibia_ml,LAT,lateral,300,500,0\nq,tibia_ml,LAT,missed,,,\n";
+  EXPECT_EQ(measured(rows).measures()[0]["warnings"]["missed"][0]["code"], "residual_too_large");
+  EXPECT_THAT(measured(rows, {}, true, false).text, HasSubstr("warning: missed: residual_too_large"));
+}
+
+TEST(MeasureCommand, PlaneBehindTheReceiverIsRefused) {
+  MeasureArguments arguments;
+  arguments.depth_mm = 1201;  // 6000 px of 0.2 mm
+  const Answer behind = measured(distance, arguments);
+  ASSERT_FALSE(behind.result);
+  EXPECT_THAT(behind.result.error().message, HasSubstr("1200 mm from the source"));
+}
+
 TEST(MeasureCommand, PlannedPointOfARegistrationIsGivenInPerCent) {
   const fs::path file = fs::temp_directory_path() / fmt::format("helicarm_registration_{}.json", ::getpid());
   const Json planned{{"name", "planned"},
@@ -147,6 +161,7 @@ TEST(MeasureCommand, RefusalsNameTheRow) {
   EXPECT_THAT(refusal("q,tibia_ml,LAT,lost,,,\n"), HasSubstr("no located point \"lost\""));
   EXPECT_THAT(refusal("q,tibia_ml,LAT,FS,,,\n", false), HasSubstr("needs --calibration"));
   EXPECT_THAT(refusal("d,distance,LAT,from,1,2,\n"), HasSubstr("measure \"d\": distance: \"to\" is missing"));
+  EXPECT_THAT(refusal("d,distance,LAT,from,1024.5,2,\n"), HasSubstr("not in the rectified image of LAT"));
   EXPECT_THAT(refusal(distance + "d,angle,LAT,vertex,1,2,\n"), HasSubstr("another kind"));
 }
 

@@ -116,6 +116,13 @@ Expected<Measure> measured_percent(const KindInfo& info, const Placed& placed, c
                 fmt::format("{}: the landmarks for 0 and 100 % are {:.2g} px apart, must be {:g} px or more",
                             info.word, least, least_length_px),
                 {{"length_px", least}, {"limit_px", least_length_px}});
+  if (info.kind == Kind::femoral_quadrants && axes.has("posterior") &&
+      (axes.hundred(pixels) - axes.zero(pixels)).dot(axes.direction(pixels)) < 0)
+    return fail(
+        Reason::bad_value,
+        fmt::format("{}: \"posterior\" and \"anterior\" contradict the direction of Blumensaat's line: "
+                    "one of the two pairs is exchanged",
+                    info.word));
   Measure measure{info.kind, {}};
   const Values lengths = [&](const PlanarPoints& p) { return axes.spans(p); };
   for (std::size_t i = 0; i < info.spans.size(); ++i)

@@ -48,7 +48,8 @@ struct Measure {
 /// differently, as in the publications; this is not in the covariances. The clicks' errors are taken as
 /// independent.
 /// Refuses (bad_value) clicks that lack a role of the kind, give one twice or have names that it does not
-/// take, and clicks that do not determine the measure, e.g. a circle through points on a line.
+/// take, clicks that do not determine the measure, e.g. a circle through points on a line, and exchanged
+/// landmarks where others contradict them.
 Expected<Measure> measure(Kind kind, std::span<const Click> clicks, const std::optional<ObjectPlane>& plane);
 
 /// The image of a point of the calibrator's frame, with its covariance carried through the view, which is

@@ -136,6 +136,15 @@ TEST(FemoralQuadrants, DepthFromPosteriorAndHeightFromBlumensaat) {
   EXPECT_NEAR(measured.quantities[1].value, 100, 1e-9);
 }
 
+TEST(FemoralQuadrants, BordersAgainstTheLineAreRefused) {
+  const Vector2d along(0.8, -0.6), line(300, 400);
+  const auto exchanged = measure(
+      Kind::femoral_quadrants,
+      femur({{"posterior", line + 230 * along, half_px}, {"anterior", line - 20 * along, half_px}}), {});
+  ASSERT_FALSE(exchanged);
+  EXPECT_EQ(exchanged.error().reason, Reason::bad_value);
+}
+
 TEST(FemoralQuadrants, BordersReplaceTheEndsOfTheLine) {
   const Vector2d along(0.8, -0.6), line(300, 400);
   const auto at_borders = measure(Kind::femoral_quadrants,
