@@ -4,7 +4,7 @@
 #include "helicarm/core/text.h"
 #include "helicarm/devices/robot/dashboard.h"
 #include "helicarm/devices/robot/robot_scene_test.h"
-#include "helicarm/devices/robot/virtual_controller.h"
+#include "helicarm/virtual_devices/robot/virtual_controller.h"
 #include "target.h"
 
 namespace helicarm::fuzz {

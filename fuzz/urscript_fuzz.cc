@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/script.h"
-#include "helicarm/devices/robot/urscript.h"
-#include "helicarm/devices/robot/virtual_controller.h"
+#include "helicarm/virtual_devices/robot/urscript.h"
+#include "helicarm/virtual_devices/robot/virtual_controller.h"
 #include "target.h"
 
 namespace helicarm::fuzz {

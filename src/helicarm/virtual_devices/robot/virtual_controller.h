@@ -10,8 +10,8 @@
 
 #include "helicarm/devices/robot/robot_order.h"
 #include "helicarm/devices/robot/robot_state.h"
-#include "helicarm/devices/robot/urscript.h"
-#include "helicarm/devices/robot/virtual_arm.h"
+#include "helicarm/virtual_devices/robot/urscript.h"
+#include "helicarm/virtual_devices/robot/virtual_arm.h"
 
 namespace helicarm::robot {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "helicarm/devices/robot/virtual_controller.h"
+#include "helicarm/virtual_devices/robot/virtual_controller.h"
 
 namespace helicarm::robot {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/devices/robot/virtual_controller.h"
+#include "helicarm/virtual_devices/robot/virtual_controller.h"
 
 #include <functional>
 

@@ -10,7 +10,7 @@
 
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/rtde_message.h"
-#include "helicarm/devices/robot/virtual_ur.h"
+#include "helicarm/virtual_devices/robot/virtual_ur.h"
 
 namespace helicarm::robot {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "helicarm/devices/robot/urscript.h"
+#include "helicarm/virtual_devices/robot/urscript.h"
 
 #include <cctype>
 #include <charconv>
