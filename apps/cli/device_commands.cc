@@ -155,9 +155,9 @@ void add_robot(CLI::App& app, Action& action) {
   robot->require_subcommand(1);
   auto* watch = robot->add_subcommand("watch", "Print the robot's modes, pose and whether it may move");
   auto& a = arguments_of(watch, action, robot_watch_command);
-  watch->add_option("ADDRESS", a.options.address, "Numeric address of the robot")->capture_default_str();
-  add_port(watch, "--port", a.options.port, "Port of RTDE");
-  watch->add_option("--rate", a.options.rate_hz, "Requested states per second")
+  watch->add_option("ADDRESS", a.robot.address, "Numeric address of the robot")->capture_default_str();
+  add_port(watch, "--port", a.robot.rtde_port, "Port of RTDE");
+  watch->add_option("--rate", a.robot.rate_hz, "Requested states per second")
       ->check(within(1, 500))
       ->capture_default_str();
   watch->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")

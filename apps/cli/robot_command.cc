@@ -9,6 +9,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "stop_signal.h"
 
@@ -49,22 +50,22 @@ CommandResult robot_watch_command(const RobotWatchArguments& arguments, Console&
     StopSignal interrupt;
     Received received;
     {
-      const robot::RtdeClient client(arguments.options, {[&](const robot::ControllerVersion& version) {
-                                                           const std::lock_guard lock(received.mutex);
-                                                           received.version = version;
-                                                         },
-                                                         [&](const robot::RobotState& state) {
-                                                           const std::lock_guard lock(received.mutex);
-                                                           received.state = state;
-                                                           ++received.states;
-                                                           return robot::Heartbeat{};
-                                                         },
-                                                         [&](const Failure& why) {
-                                                           const std::lock_guard lock(received.mutex);
-                                                           received.state.reset();
-                                                           received.trouble =
-                                                               without_control_characters(why.message);
-                                                         }});
+      const auto driver = robot::open_driver(arguments.robot);
+      driver->start({[&](const robot::ControllerVersion& version) {
+                       const std::lock_guard lock(received.mutex);
+                       received.version = version;
+                     },
+                     [&](const robot::RobotState& state) {
+                       const std::lock_guard lock(received.mutex);
+                       received.state = state;
+                       ++received.states;
+                       return robot::Heartbeat{};
+                     },
+                     [&](const Failure& why) {
+                       const std::lock_guard lock(received.mutex);
+                       received.state.reset();
+                       received.trouble = without_control_characters(why.message);
+                     }});
       const double until =
           tracker::monotonic_seconds() + arguments.seconds.value_or(std::numeric_limits<double>::infinity());
       for (;;) {
@@ -75,7 +76,7 @@ CommandResult robot_watch_command(const RobotWatchArguments& arguments, Console&
     }
     if (!received.version)
       throw BadInput(Reason::not_connected,
-                     fmt::format("{} port {}: {}", arguments.options.address, arguments.options.port,
+                     fmt::format("{} port {}: {}", arguments.robot.address, arguments.robot.rtde_port,
                                  received.trouble.empty() ? "no answer" : received.trouble));
     if (console.json)
       console.out << to_text({{"version", words_of(*received.version)},

@@ -4,12 +4,12 @@
 #include <optional>
 
 #include "command.h"
-#include "helicarm/devices/robot/rtde_client.h"
+#include "helicarm/devices/robot/robot_driver.h"
 
 namespace helicarm::cli {
 
 struct RobotWatchArguments {
-  robot::RtdeOptions options = {.rate_hz = 10, .commands = false};
+  robot::RobotAddress robot = {.rate_hz = 10, .reads_only = true};
   std::optional<double> seconds;  ///< empty: until interrupted
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/geometry/dense_matrix.h"
 #include "helicarm/geometry/ray.h"
 #include "helicarm/simulation/calibrator_body.h"

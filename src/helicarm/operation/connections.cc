@@ -3,6 +3,8 @@
 
 #include <chrono>
 
+#include "helicarm/devices/robot/robot_registry.h"
+
 namespace helicarm::operation {
 namespace {
 

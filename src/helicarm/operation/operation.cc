@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/core/files.h"
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/operation/case_of.h"
 #include "helicarm/operation/hand_eye_tour.h"
 #include "helicarm/operation/records.h"

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"

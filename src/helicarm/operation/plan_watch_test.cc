@@ -9,9 +9,9 @@
 #include "helicarm/core/random.h"
 #include "helicarm/devices/robot/robot_scene_test.h"
 #include "helicarm/devices/robot/script.h"
-#include "helicarm/virtual_devices/robot/virtual_controller.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/operation/hand_eye_test.h"
+#include "helicarm/virtual_devices/robot/virtual_controller.h"
 
 namespace helicarm::operation {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "helicarm/virtual_devices/robot/virtual_ur.h"
 #include "helicarm/virtual_devices/held_drill.h"
+#include "helicarm/virtual_devices/robot/virtual_ur.h"
 #include "helicarm/virtual_devices/virtual_c_arm.h"
 #include "helicarm/virtual_devices/virtual_tracker.h"
 

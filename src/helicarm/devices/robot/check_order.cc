@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/robot/straight_path.h"
 
 namespace helicarm::robot {

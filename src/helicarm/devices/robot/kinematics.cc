@@ -81,12 +81,6 @@ RobotModel ur5() { return {"UR5", 89.159, -425, -392.25, 109.15, 94.65, 82.3, 12
 // Universal Robots, "DH parameters for calculations of kinematics and dynamics".
 RobotModel ur5e() { return {"UR5e", 162.5, -425, -392.2, 133.3, 99.7, 99.6, 500, joint_limits()}; }
 
-Expected<RobotModel> robot_model(const std::string& name) {
-  for (const RobotModel& model : {ur5(), ur5e()})
-    if (model.name == name) return model;
-  return fail(Reason::bad_value, "robot: must be \"UR5\" or \"UR5e\"");
-}
-
 std::array<geometry::RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints) {
   std::array<geometry::RigidTransform, 6> frames;
   frames[0] = link(joints[0], model.d1, 0, 0, 1);

@@ -29,9 +29,6 @@ struct RobotModel {
 RobotModel ur5();
 RobotModel ur5e();
 
-/// "UR5" or "UR5e"; another name is bad_value.
-Expected<RobotModel> robot_model(const std::string& name);
-
 /// base_from_frame of the frames 1 to 6; the last is the flange.
 std::array<geometry::RigidTransform, 6> joint_frames(const RobotModel& model, const Joints& joints);
 geometry::RigidTransform base_from_flange(const RobotModel& model, const Joints& joints);

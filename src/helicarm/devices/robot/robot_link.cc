@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/robot/robot_link.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "helicarm/core/text.h"
-#include "helicarm/devices/robot/dashboard.h"
-#include "helicarm/devices/robot/script.h"
+#include "helicarm/devices/robot/robot_registry.h"
 #include "helicarm/devices/robot/straight_path.h"
 
 namespace helicarm::robot {
@@ -21,8 +22,6 @@ constexpr double correction_mm_s2 = 100;
 constexpr Milliseconds held_up{50};
 /// After a stall, waiting states and poses are read from the sockets first.
 constexpr Milliseconds catch_up{20};
-/// Time in which the kernel accepts a script: it fits into the buffer of a new socket.
-constexpr Milliseconds handing_over{50};
 
 std::chrono::steady_clock::duration duration_of(double s) {
   return std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(s));
@@ -30,44 +29,42 @@ std::chrono::steady_clock::duration duration_of(double s) {
 
 }  // namespace
 
-RobotLink::RobotLink(RobotConfig config)
+RobotLink::RobotLink(RobotConfig config) : RobotLink(config, open_driver(config)) {}
+
+RobotLink::RobotLink(RobotConfig config, std::unique_ptr<RobotDriver> driver)
     : config_(std::move(config)),
       machine_({.stale_s = config_.stale_s,
                 .program_silence_s = config_.program_silence_s,
                 .start_s = config_.start_s}),
-      client_({.address = config_.address,
-               .port = config_.rtde_port,
-               .rate_hz = config_.model.rate_hz,
-               .handshake_s = config_.lost_s,
-               .silence_s = config_.lost_s},
-              {.connected =
-                   [this](const ControllerVersion& version) {
-                     const std::lock_guard lock(guard_);
-                     version_ = version;
-                   },
-               .state =
-                   [this](const RobotState& state) {
-                     track_.take(state.time_s, state.base_from_tcp,
-                                 std::chrono::duration<double>(Clock::now().time_since_epoch()).count());
-                     const std::lock_guard lock(guard_);
-                     const Heartbeat answer = machine_.heard(state, Clock::now());
-                     changed();
-                     return answer;
-                   },
-               .lost =
-                   [this](const Failure& failure) {
-                     track_.forget();
-                     const std::lock_guard lock(guard_);
-                     machine_.lost(failure);
-                     changed();
-                   }}) {}
+      driver_(std::move(driver)) {
+  driver_->start({.connected =
+                      [this](const ControllerVersion& version) {
+                        const std::lock_guard lock(guard_);
+                        version_ = version;
+                      },
+                  .state =
+                      [this](const RobotState& state) {
+                        track_.take(state.time_s, state.base_from_tcp,
+                                    std::chrono::duration<double>(Clock::now().time_since_epoch()).count());
+                        const std::lock_guard lock(guard_);
+                        const Heartbeat answer = machine_.heard(state, Clock::now());
+                        changed();
+                        return answer;
+                      },
+                  .lost =
+                      [this](const Failure& failure) {
+                        track_.forget();
+                        const std::lock_guard lock(guard_);
+                        machine_.lost(failure);
+                        changed();
+                      }});
+}
 
 RobotLink::~RobotLink() = default;
 
-/// Call under the guard. The socket stays open while its order may move, because a robot may discard a script
-/// whose sender disconnects; closing it withdraws a script not yet read.
+/// Call under the guard. The channel stays open while its order may move.
 void RobotLink::changed() {
-  if (!machine_.permits()) script_socket_.reset();
+  if (!machine_.permits()) channel_.reset();
   news_.notify_all();
 }
 
@@ -85,13 +82,7 @@ RobotLinkStatus RobotLink::status() const {
                      mismatch, config_.model.name),
          {},
          {{"mismatch_mm", mismatch}}});
-  const auto& v = version_;
-  if (v.major == 5 && std::pair(v.minor, v.bugfix) < std::pair(25u, 1u))
-    status.warnings.push_back(
-        {Reason::unsupported,
-         fmt::format(
-             "PolyScope {}.{}.{} allows others to run commands on the robot: update to 5.25.1 or later",
-             v.major, v.minor, v.bugfix)});
+  std::ranges::move(driver_->advisories(version_), std::back_inserter(status.warnings));
   return status;
 }
 
@@ -103,16 +94,6 @@ Expected<RobotState> RobotLink::wait_connected(Clock::duration patience) const {
       machine_.why().value_or(Failure{Reason::not_connected, "the robot does not respond"}));
 }
 
-Expected<void> RobotLink::refuse_local_mode() const {
-  const auto remote =
-      ask_dashboard(config_.address, config_.dashboard_port, DashboardCommand::remote_control);
-  if (remote && *remote == "false")
-    return fail(Reason::robot_locked, "the robot is in local mode: switch it to remote control");
-  // A CB3 has no remote mode and rejects the query.
-  if (!remote && remote.error().reason != Reason::bad_value) return tl::unexpected<Failure>(remote.error());
-  return {};
-}
-
 Expected<void> RobotLink::unlock(const std::string& who) {
   if (who.empty() || who.size() > 100 || holds_control_character(who))
     return fail(Reason::bad_value, "the name of the user who unlocks the robot is missing");
@@ -122,11 +103,9 @@ Expected<void> RobotLink::unlock(const std::string& who) {
   }();
   const auto present = wait_connected({});
   if (!present) return tl::unexpected<Failure>(present.error());
-  if (auto remote = refuse_local_mode(); !remote) return remote;
+  if (auto remote = driver_->check_remote_control(); !remote) return remote;
   if (present->safety_mode == SafetyMode::protective_stop) {
-    const auto answer =
-        ask_dashboard(config_.address, config_.dashboard_port, DashboardCommand::unlock_protective_stop);
-    if (!answer) return fail(Reason::robot_stopped, answer.error().message);
+    if (auto released = driver_->release_protective_stop(); !released) return released;
     std::unique_lock lock(guard_);
     news_.wait_for(lock, duration_of(config_.start_s),
                    [&] { return machine_.state() && !why_stopped(*machine_.state()); });
@@ -147,7 +126,7 @@ std::string RobotLink::confirm(const RobotOrder& order) {
 }
 
 Expected<RobotState> RobotLink::run(const RobotOrder& order, Stops since, const Watch& watch) {
-  if (auto remote = refuse_local_mode(); !remote) return tl::unexpected<Failure>(remote.error());
+  if (auto remote = driver_->check_remote_control(); !remote) return tl::unexpected<Failure>(remote.error());
   if (auto watched = watch(); !watched) return tl::unexpected<Failure>(watched.error());
   if (auto sent = send(order, since); !sent) return tl::unexpected<Failure>(sent.error());
   return supervise(since, watch);
@@ -155,15 +134,15 @@ Expected<RobotState> RobotLink::run(const RobotOrder& order, Stops since, const 
 
 /// Check, permission and sending are one critical section, so that no stop occurs in between.
 Expected<void> RobotLink::send(const RobotOrder& order, Stops since) {
-  auto socket = TimedSocket::connect(config_.address, config_.script_port, Milliseconds(1000));
-  if (!socket) return tl::unexpected<Failure>(socket.error());
+  auto channel = driver_->open_channel();
+  if (!channel) return tl::unexpected<Failure>(channel.error());
   const std::lock_guard lock(guard_);
   if (auto ready = machine_.ready(since, Clock::now()); !ready) return ready;
   if (auto sound = check_order(order, *machine_.state(), config_.limits); !sound) return sound;
   const auto number = machine_.begin(since, 1.5 * duration_s(order), Clock::now());
   if (!number) return tl::unexpected<Failure>(number.error());
-  script_socket_ = *std::move(socket);
-  if (auto sent = script_socket_->send(script_of(order, config_.model, *number), handing_over); !sent) {
+  channel_ = *std::move(channel);
+  if (auto sent = channel_->send(order, *number); !sent) {
     machine_.stop(sent.error());
     changed();
     return sent;

@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -11,21 +12,14 @@
 #include "helicarm/devices/robot/check_order.h"
 #include "helicarm/devices/robot/follow_target.h"
 #include "helicarm/devices/robot/link_state_machine.h"
-#include "helicarm/devices/robot/rtde_client.h"
-#include "helicarm/devices/robot/timed_socket.h"
+#include "helicarm/devices/robot/robot_driver.h"
 #include "helicarm/devices/robot/tool_track.h"
 
 namespace helicarm::robot {
 
-struct RobotConfig {
-  RobotModel model = ur5();
-  std::string address = "127.0.0.1";
-  std::uint16_t rtde_port = 30004;
-  std::uint16_t dashboard_port = 29999;
-  std::uint16_t script_port = 30002;
+struct RobotConfig : RobotAddress {
   double stale_s = 0.1;            ///< a state older than this is not used
   double program_silence_s = 0.1;  ///< heartbeats end this long after the program's last check
-  double lost_s = 1;               ///< reconnect after this time without an answer or a state
   double start_s = 2;              ///< time limit for a script to begin
   double mismatch_mm = 0.5;        ///< kinematic mismatch above which a warning is given
   RobotLimits limits = {};
@@ -43,12 +37,14 @@ struct RobotLinkStatus {
   std::vector<Warning> warnings;
 };
 
-/// A robot on its three ports, and the lock on its motion: sockets and threads around a `LinkStateMachine`,
-/// which decides. Only `execute` causes motion; any stop or disconnection is latched and reset by `unlock`
-/// only. All members are thread-safe.
+/// A robot behind its driver, and the lock on its motion: threads around a `LinkStateMachine`, which decides.
+/// Only `execute` causes motion; any stop or disconnection is latched and reset by `unlock` only. All members
+/// are thread-safe.
 class RobotLink {
  public:
+  /// On the driver of the configured model. Throws BadInput as `open_driver`.
   explicit RobotLink(RobotConfig config);
+  RobotLink(RobotConfig config, std::unique_ptr<RobotDriver> driver);
   ~RobotLink();
 
   RobotLinkStatus status() const;
@@ -86,7 +82,6 @@ class RobotLink {
   Expected<RobotState> supervise(Stops since, const Watch& watch);
   Expected<void> correct(const RobotOrder& order, Stops since, const geometry::RigidTransform& tcp_from_new,
                          const Watch& watch);
-  Expected<void> refuse_local_mode() const;
   void changed();
 
   RobotConfig config_;
@@ -96,8 +91,8 @@ class RobotLink {
   mutable std::condition_variable news_;
   LinkStateMachine machine_;
   ControllerVersion version_;
-  std::optional<TimedSocket> script_socket_;
-  RtdeClient client_;  ///< last: its thread uses all others
+  std::unique_ptr<OrderChannel> channel_;  ///< of the order that may move
+  std::unique_ptr<RobotDriver> driver_;    ///< last: its thread uses all others
 };
 
 }  // namespace helicarm::robot

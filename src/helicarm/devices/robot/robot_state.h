@@ -44,6 +44,11 @@ enum class SafetyMode : std::int32_t {
 
 enum class RuntimeState : std::uint32_t { stopping, stopped, playing, pausing, paused, resuming };
 
+/// Of the controller's software.
+struct ControllerVersion {
+  std::uint32_t major = 0, minor = 0, bugfix = 0, build = 0;
+};
+
 /// The robot's reported state at one moment of its own clock.
 struct RobotState {
   double time_s = 0;  ///< since the controller started

@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "helicarm/devices/robot/rtde_message.h"
 #include "helicarm/devices/robot/timed_socket.h"
 
 namespace helicarm::robot {
@@ -47,7 +48,7 @@ struct Line {
 
 }  // namespace
 
-RtdeClient::RtdeClient(RtdeOptions options, RtdeListener listener)
+RtdeClient::RtdeClient(RtdeOptions options, RobotListener listener)
     : options_(std::move(options)),
       listener_(std::move(listener)),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}

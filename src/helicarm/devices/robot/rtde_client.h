@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <thread>
 
-#include "helicarm/devices/robot/rtde_message.h"
+#include "helicarm/devices/robot/robot_driver.h"
 
 namespace helicarm::robot {
 
@@ -20,18 +19,10 @@ struct RtdeOptions {
   double longest_retry_s = 2;  ///< longest pause between attempts; the first is 0.1 s
 };
 
-/// Callbacks on the client's thread: each state, answered with the returned heartbeat, and each end of a
-/// connection with its reason. After an end the client reconnects with the whole handshake.
-struct RtdeListener {
-  std::function<void(const ControllerVersion&)> connected;
-  std::function<Heartbeat(const RobotState&)> state;
-  std::function<void(const Failure&)> lost;
-};
-
-/// A persistent connection to a robot's RTDE port.
+/// A persistent connection to a robot's RTDE port; after an end it is set up again with the whole handshake.
 class RtdeClient {
  public:
-  RtdeClient(RtdeOptions options, RtdeListener listener);
+  RtdeClient(RtdeOptions options, RobotListener listener);
   ~RtdeClient();
 
  private:
@@ -39,7 +30,7 @@ class RtdeClient {
   Expected<void> serve(const std::stop_token& stop);
 
   RtdeOptions options_;
-  RtdeListener listener_;
+  RobotListener listener_;
   std::jthread thread_;
 };
 

@@ -65,9 +65,6 @@ Expected<std::uint8_t> read_recipe(const RtdeMessage& reply, const std::vector<s
 /// Whether version, start or pause was accepted; another kind or length is bad_value.
 Expected<bool> read_granted(const RtdeMessage& reply, RtdeKind kind);
 
-struct ControllerVersion {
-  std::uint32_t major = 0, minor = 0, bugfix = 0, build = 0;
-};
 Expected<ControllerVersion> read_controller_version(const RtdeMessage& reply);
 
 /// The robot's text message for the log, without control characters.
