@@ -551,6 +551,16 @@ class Tracker(unittest.TestCase):
         server.terminate()
         self.assertEqual(server.wait(timeout=5), 0)
 
+    def test_recording_is_watched_without_a_server(self):
+        done = run("tracker", "watch", f"file:{self.file}", "--seconds", 0.5, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        seen = json.loads(done.stdout)
+        self.assertEqual(seen["state"], "connected")
+        self.assertGreater(seen["tools"][0]["accepted"], 5)
+        done = run("tracker", "watch", "file:/nowhere.mha", "--seconds", 0.5)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("missing_file", done.stderr)
+
     def test_port_in_use_and_pivot_without_rotation_are_refused(self):
         _, port = self.replay()
         done = run("tracker", "replay", self.file, "--port", port)

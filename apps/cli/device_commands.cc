@@ -56,16 +56,13 @@ void add_receive(CLI::App& app, Action& action) {
 }
 
 void add_tracker_link(CLI::App* command, TrackerLinkArguments& a) {
-  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server")->required();
+  command->add_option("PEER", a.peer, "address:port of an OpenIGTLink server, or file:PATH of a recording")
+      ->required();
   command->add_option("--seconds", a.seconds, "End after this time, s; default: when interrupted")
       ->check(within(0, 1e6));
-  command
-      ->add_option_function<double>(
-          "--rate", [&a](double rate_hz) { a.options.interval_ms = static_cast<int>(1000 / rate_hz); },
-          "Rate to request, Hz; default: 60")
+  command->add_option("--rate", a.tracker.rate_hz, "Rate to request, Hz; default: 60")
       ->check(within(1, 1000));
-  a.options.ask_for_tracking = true;
-  command->add_flag("--ask,!--no-ask", a.options.ask_for_tracking,
+  command->add_flag("--ask,!--no-ask", a.tracker.ask_for_tracking,
                     "Request tracking (STT_TDATA), which some servers require (default)");
 }
 
@@ -74,7 +71,6 @@ void add_calibrate_mount(CLI::App* tracker, Action& action) {
       "calibrate-mount", "Find the pose of your marker in the calibrator by touching its balls or divots");
   auto& a = arguments_of(command, action, calibrate_mount_command);
   command->add_option("PEER", a.link.peer, "address:port of an OpenIGTLink server, for --touch");
-  a.link.options.ask_for_tracking = true;
   command->add_option("--facet", a.facet, "Name of the calibrator's marker")->required();
   command->add_option("--pointer", a.pointer, "Name of the pointer's marker")->capture_default_str();
   command->add_option("--tip", a.tip, "The pointer's tip, as `tracker pivot --json` prints it");

@@ -13,6 +13,7 @@
 #include "helicarm/core/text.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
+#include "helicarm/devices/tracker/tracker_registry.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan.h"
 #include "helicarm/phantom/calibrator.h"
@@ -111,10 +112,8 @@ void add_touched(Observations& observations, const MountArguments& arguments, co
   constexpr double reading_s = 0.6;
   StopSignal stop;
   tracker::PoseBoard board;
-  const auto client = value_or_throw(tracker::IgtlClient::start(
-      value_or_throw(client_options(arguments.link)),
-      [&](const tracker::IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
-      [&] { board.forget_time(); }));
+  const auto source = value_or_throw(
+      tracker::open_tracker(value_or_throw(tracker_address(arguments.link)), tracker::onto(board)));
   LineInput input(STDIN_FILENO);
   const auto wait = [&](double seconds) {
     if (stop.wait(seconds)) throw BadInput(Reason::interrupted, "stopped by signal");

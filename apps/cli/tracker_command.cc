@@ -14,6 +14,7 @@
 #include "helicarm/core/text.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/sequence_stream.h"
+#include "helicarm/devices/tracker/tracker_registry.h"
 #include "helicarm/geometry/view_json.h"
 #include "stop_signal.h"
 
@@ -76,38 +77,35 @@ Expected<void> check_tool(const std::vector<tracker::SequenceFrame>& frames,
 
 }  // namespace
 
-Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments) {
-  tracker::IgtlClientOptions options = arguments.options;
+Expected<tracker::TrackerAddress> tracker_address(const TrackerLinkArguments& arguments) {
+  tracker::TrackerAddress tracker = arguments.tracker;
   const std::string& peer = arguments.peer;
+  tracker.address = peer;
   const auto colon = peer.rfind(':');
-  if (colon != peer.npos) {
-    int port = 0;
-    const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
-    if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
-      return fail(Reason::usage, fmt::format("PEER: \"{}\" is not address:port with a port from 1 to 65535",
-                                             without_control_characters(peer)));
-    options.port = static_cast<std::uint16_t>(port);
-  }
-  options.address = peer.substr(0, colon);
-  return options;
+  if (colon == peer.npos || tracker::is_recording(peer)) return tracker;
+  int port = 0;
+  const auto [end, error] = std::from_chars(peer.data() + colon + 1, peer.data() + peer.size(), port);
+  if (error != std::errc() || end != peer.data() + peer.size() || port < 1 || port > 65535)
+    return fail(Reason::usage, fmt::format("PEER: \"{}\" is not address:port with a port from 1 to 65535",
+                                           without_control_characters(peer)));
+  tracker.port = static_cast<std::uint16_t>(port);
+  tracker.address = peer.substr(0, colon);
+  return tracker;
 }
 
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console) {
-  const auto options = client_options(arguments);
-  if (!options) return tl::unexpected(options.error());
+  const auto address = tracker_address(arguments);
+  if (!address) return tl::unexpected(address.error());
   StopSignal interrupt;
   tracker::PoseBoard board;
-  const auto client = tracker::IgtlClient::start(
-      *options,
-      [&](const tracker::IgtlMessage& message, double arrival_s) { board.take(message, arrival_s); },
-      [&] { board.forget_time(); });
-  if (!client) return tl::unexpected(client.error());
+  const auto source = tracker::open_tracker(*address, tracker::onto(board));
+  if (!source) return tl::unexpected(source.error());
   const auto tools = [&] { return board.tools(tracker::monotonic_seconds()); };
   wait_telling(interrupt, arguments.seconds, [&] {
     if (!console.json && !console.quiet)
-      console.progress << table_of((*client)->status(), tools()) << std::flush;
+      console.progress << table_of((*source)->status(), tools()) << std::flush;
   });
-  const tracker::TrackerLinkStatus link = (*client)->status();
+  const tracker::TrackerLinkStatus link = (*source)->status();
   if (console.json)
     console.out << to_text(json_of(link, tools())) << '\n';
   else
@@ -116,28 +114,28 @@ CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Conso
 }
 
 CommandResult tracker_record_command(const TrackerLinkArguments& arguments, Console& console) {
-  const auto options = client_options(arguments);
-  if (!options) return tl::unexpected(options.error());
+  const auto address = tracker_address(arguments);
+  if (!address) return tl::unexpected(address.error());
   StopSignal interrupt;
   std::mutex mutex;
   tracker::SequenceRecorder recorder;
   bool full = false;
-  const auto client =
-      tracker::IgtlClient::start(*options, [&](const tracker::IgtlMessage& message, double arrival_s) {
+  const auto source =
+      tracker::open_tracker(*address, {[&](const tracker::IgtlMessage& message, double arrival_s) {
         tracker::SequenceFrame frame = tracker::frame_of(message, arrival_s);
         const std::lock_guard lock(mutex);
         if (!full && !recorder.take(std::move(frame))) full = true, interrupt.raise();
-      });
-  if (!client) return tl::unexpected(client.error());
+      }});
+  if (!source) return tl::unexpected(source.error());
   wait_telling(interrupt, arguments.seconds, [] {});
-  (*client)->stop();
+  (*source)->stop();
   const std::vector<tracker::SequenceFrame>& frames = recorder.frames();
   if (full)
     console.progress << fmt::format("recording ended: limit of {} poses per file reached\n",
                                     recorder.most_poses())
                      << std::flush;
   if (frames.empty()) {
-    const std::string trouble = (*client)->status().trouble;
+    const std::string trouble = (*source)->status().trouble;
     return fail(Reason::no_pose, fmt::format("{}: no pose received, no file written{}{}", arguments.peer,
                                              trouble.empty() ? "" : ": ", trouble));
   }

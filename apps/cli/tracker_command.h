@@ -6,17 +6,17 @@
 #include <string>
 
 #include "command.h"
-#include "helicarm/devices/tracker/igtl_client.h"
 #include "helicarm/devices/tracker/igtl_server.h"
 #include "helicarm/devices/tracker/pivot_calibration.h"
+#include "helicarm/devices/tracker/tracker_source.h"
 
 namespace helicarm::cli {
 
 struct TrackerLinkArguments {
-  std::string peer;  ///< address:port
+  std::string peer;  ///< address:port, or file:PATH
   std::filesystem::path file;
   std::optional<double> seconds;  ///< empty: until interrupted
-  tracker::IgtlClientOptions options;
+  tracker::TrackerAddress tracker;
 };
 
 struct TrackerReplayArguments {
@@ -32,8 +32,8 @@ struct TrackerPivotArguments {
   tracker::PivotOptions options;
 };
 
-/// Options with the address and port of "address:port". Refuses usage.
-Expected<tracker::IgtlClientOptions> client_options(const TrackerLinkArguments& arguments);
+/// The tracker's address with that of PEER. Refuses usage.
+Expected<tracker::TrackerAddress> tracker_address(const TrackerLinkArguments& arguments);
 
 /// Prints a tracker's poses, tool by tool.
 CommandResult tracker_watch_command(const TrackerLinkArguments& arguments, Console& console);

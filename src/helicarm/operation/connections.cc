@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "helicarm/devices/robot/robot_registry.h"
+#include "helicarm/devices/tracker/tracker_registry.h"
 
 namespace helicarm::operation {
 namespace {
@@ -33,15 +34,8 @@ Connections::Connections(const OperationPlan& plan, std::unique_ptr<receiver::In
                          const FreshnessLimits& limits)
     : inbox_(std::move(inbox)), board_(board_options(limits)) {
   if (!plan.drill) robot_ = std::make_unique<robot::RobotLink>(config_of(plan.robot, limits));
-  tracker::IgtlClientOptions options;
-  options.address = plan.tracker.address;
-  options.port = plan.tracker.port;
-  options.ask_for_tracking = true;
-  options.interval_ms = static_cast<int>(1000 / plan.tracker.rate_hz);
-  tracker_ = value_or_throw(tracker::IgtlClient::start(
-      options,
-      [this](const tracker::IgtlMessage& message, double arrival_s) { board_.take(message, arrival_s); },
-      [this] { board_.forget_time(); }));
+  tracker_ = value_or_throw(tracker::open_tracker(
+      {plan.tracker.address, plan.tracker.port, plan.tracker.rate_hz}, tracker::onto(board_)));
 }
 
 robot::RobotLink& Connections::robot() {

@@ -9,8 +9,8 @@
 
 #include "helicarm/devices/receiver/receiver.h"
 #include "helicarm/devices/robot/robot_link.h"
-#include "helicarm/devices/tracker/igtl_client.h"
 #include "helicarm/devices/tracker/pose_board.h"
+#include "helicarm/devices/tracker/tracker_source.h"
 #include "helicarm/operation/plan.h"
 
 namespace helicarm::operation {
@@ -67,7 +67,7 @@ class Connections {
   std::uint64_t broken_before_ = 0;  ///< connections lost before the last image
   tracker::PoseBoard board_;
   std::unique_ptr<robot::RobotLink> robot_;  ///< null for a hand-held drill
-  std::unique_ptr<tracker::IgtlClient> tracker_;
+  std::unique_ptr<tracker::TrackerSource> tracker_;
   std::unique_ptr<receiver::DicomReceiver> receiver_;
 };
 

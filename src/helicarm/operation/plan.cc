@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "helicarm/devices/robot/robot_registry.h"
+#include "helicarm/devices/tracker/tracker_registry.h"
 #include "helicarm/geometry/rotation.h"
 #include "helicarm/geometry/view_json.h"
 #include "helicarm/operation/plan_fields.h"
@@ -235,6 +236,9 @@ Expected<OperationPlan> plan_from(const Json& json, const std::string& origin) {
       plan.robot = robot_from(reader.object("robot"));
     else if (!reader.raw("robot").is_null())
       reader.refuse(Reason::bad_value, "robot", "must be null if \"drill\" is given");
+    if (!plan.drill && tracker::is_recording(plan.tracker.address))
+      reader.refuse(Reason::bad_value, "tracker",
+                    "\"address\" names a recording, which must not guide a robot: give a server's address");
     std::set<std::string> names;
     for (JsonReader& entry : reader.objects("tunnels", true, 20)) {
       plan.tunnels.push_back(tunnel_from(entry));

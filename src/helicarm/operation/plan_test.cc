@@ -41,6 +41,16 @@ TEST(Plan, DrillWhosePointsCoincideIsRefused) {
   EXPECT_EQ(plan_from(to_json(freehand), "plan.json").error().reason, Reason::bad_value);
 }
 
+TEST(Plan, RecordedPosesGuideNoRobot) {
+  OperationPlan recorded = plan();
+  recorded.tracker.address = "file:poses.mha";
+  const auto refused = plan_from(to_json(recorded), "plan.json");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::bad_value);
+  recorded.drill = HandDrill{{1, -140, 3}, {2, -20, 5}};
+  EXPECT_TRUE(plan_from(to_json(recorded), "plan.json"));
+}
+
 TEST(Plan, ErrorOfAMountIsAddedToThatOfTheReadings) {
   OperationPlan mounted = plan();
   mounted.tracker.sigma_mm = 0.12;

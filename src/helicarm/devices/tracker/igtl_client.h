@@ -7,9 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "helicarm/core/failure.h"
-#include "helicarm/devices/tracker/igtl_message.h"
-#include "helicarm/devices/tracker/pose_sample.h"
+#include "helicarm/devices/tracker/tracker_source.h"
 
 namespace helicarm::tracker {
 
@@ -24,16 +22,6 @@ struct IgtlClientOptions {
   double silence_s = 5;  ///< reconnect after this time without data; 0: never
 };
 
-enum class LinkState { connecting, connected, waiting };
-std::string_view code(LinkState state);
-
-struct TrackerLinkStatus {
-  LinkState state = LinkState::connecting;
-  std::string trouble;  ///< why the last connection ended or failed; empty if none did
-  /// "attempts", "connections", "silences" and, over all connections, those of IgtlConnection
-  Counters counters;
-};
-
 /// Pause before the next attempt to connect.
 inline double next_pause(double pause_s, const IgtlClientOptions& options) {
   return std::min(2 * pause_s, options.last_pause_s);
@@ -42,7 +30,7 @@ inline double next_pause(double pause_s, const IgtlClientOptions& options) {
 /// Maintains a connection to an OpenIGTLink server on its own thread and reconnects when it ends or becomes
 /// silent. The pause between attempts is reset only after a message, so that a server that accepts and
 /// disconnects is not flooded.
-class IgtlClient {
+class IgtlClient : public TrackerSource {
  public:
   using OnMessage = std::function<void(const IgtlMessage&, double arrival_s)>;
 
@@ -50,13 +38,13 @@ class IgtlClient {
   /// monotonic_seconds(). Fails only with `bad_value` for an address that is not numeric.
   static Expected<std::unique_ptr<IgtlClient>> start(const IgtlClientOptions& options, OnMessage on_message,
                                                      std::function<void()> on_connect = {});
-  ~IgtlClient();
+  ~IgtlClient() override;
 
-  TrackerLinkStatus status() const;  ///< thread-safe
+  /// Counters: "attempts", "connections", "silences" and, over all connections, those of IgtlConnection.
+  TrackerLinkStatus status() const override;
   /// Thread-safe; dropped while there is no connection.
   void send(const IgtlMessage& message);
-  /// Returns at once, with the thread ended.
-  void stop();
+  void stop() override;
 
  private:
   struct Impl;

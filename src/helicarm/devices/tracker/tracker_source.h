@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "helicarm/core/failure.h"
+#include "helicarm/devices/tracker/igtl_message.h"
+#include "helicarm/devices/tracker/pose_sample.h"
+
+namespace helicarm::tracker {
+
+class PoseBoard;
+
+/// Where poses come from; the address decides on the source (`open_tracker`).
+struct TrackerAddress {
+  std::string address = "127.0.0.1";  ///< numeric, of an OpenIGTLink server, or "file:" and a sequence file
+  std::uint16_t port = 18944;         ///< of a server
+  double rate_hz = 60;                ///< requested
+  bool ask_for_tracking = true;       ///< some servers send nothing else, many need no request
+};
+
+enum class LinkState { connecting, connected, waiting };
+std::string_view code(LinkState state);
+
+struct TrackerLinkStatus {
+  LinkState state = LinkState::connecting;
+  std::string trouble;  ///< why the last connection ended or failed; empty if none did
+  Counters counters;    ///< as the source counts
+};
+
+/// Called on the source's thread, one at a time; must not call a member of the source.
+struct TrackerListener {
+  /// `arrival_s` is of monotonic_seconds(). Whatever a tracker speaks, its poses come as a TDATA, QTDATA,
+  /// TRANSFORM or POSITION in mm, its state as a STATUS; they may be wrong in any way, as `PoseBoard` checks.
+  std::function<void(const IgtlMessage&, double arrival_s)> message;
+  std::function<void()> connected = [] {};  ///< before the first message of each connection
+};
+
+/// Hands everything to the board, which outlives the source.
+TrackerListener onto(PoseBoard& board);
+
+/// A tracker on its own thread. It reconnects by itself after any loss; the destructor ends the thread.
+class TrackerSource {
+ public:
+  virtual ~TrackerSource() = default;
+  virtual TrackerLinkStatus status() const = 0;  ///< thread-safe
+  /// Returns at once, with the thread ended: no further calls of the listener.
+  virtual void stop() = 0;
+};
+
+}  // namespace helicarm::tracker
