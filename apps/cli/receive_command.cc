@@ -5,7 +5,7 @@
 
 #include "helicarm/core/json.h"
 #include "helicarm/core/text.h"
-#include "helicarm/devices/receiver/watched_folder.h"
+#include "helicarm/devices/receiver/image_registry.h"
 #include "helicarm/pipeline/result.h"
 #include "stop_signal.h"
 
@@ -78,13 +78,12 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
     StopSignal stop;
     ReceptionLog tale(console, arguments.count, stop);
     const auto inbox = value_or_throw(receiver::Inbox::open(arguments.out));
-    std::unique_ptr<receiver::DicomReceiver> receiver;
-    std::optional<receiver::WatchedFolder> watched;
+    std::unique_ptr<receiver::ImageSource> source;
     if (arguments.watch.empty()) {
-      receiver = value_or_throw(receiver::DicomReceiver::open(options, *inbox, tale.hooks()));
+      source = value_or_throw(receiver::open_images(options, *inbox, tale.hooks()));
       if (!console.quiet)
         console.progress << fmt::format("{} listens on {} port {}{}; Ctrl-C ends\n",
-                                        options.negotiation.title, options.address, receiver->port(),
+                                        options.negotiation.title, options.address, source->port(),
                                         options.tls ? ", TLS" : "")
                          << std::flush;
     } else {
@@ -93,8 +92,8 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
                        fmt::format("--watch: {}: no such folder", arguments.watch.string()));
       if (std::filesystem::equivalent(arguments.watch, arguments.out))
         throw BadInput(Reason::usage, "--watch and --out name the same folder; give another one");
-      watched.emplace(arguments.watch, *inbox, tale.hooks(), receiver::WatchedFolder::usual_pause,
-                      arguments.count);
+      source = value_or_throw(receiver::open_images(
+          receiver::FolderOptions{.folder = arguments.watch, .most = arguments.count}, *inbox, tale.hooks()));
     }
     stop.wait(arguments.seconds);
   });

@@ -43,7 +43,7 @@ robot::RobotLink& Connections::robot() {
   return *robot_;
 }
 
-Expected<void> Connections::listen(const receiver::ReceiverOptions& options) {
+Expected<void> Connections::listen(const receiver::ImageSourceOptions& options) {
   receiver::ReceiverHooks hooks;
   hooks.arrived = [this](const receiver::Arrival& arrival) {
     const std::lock_guard lock(mutex_);
@@ -56,17 +56,11 @@ Expected<void> Connections::listen(const receiver::ReceiverOptions& options) {
     const std::lock_guard lock(mutex_);
     c_arm_.refused = why;
   };
-  return receiver::DicomReceiver::open(options, *inbox_, std::move(hooks))
-      .map([this](std::unique_ptr<receiver::DicomReceiver> receiver) {
+  return receiver::open_images(options, *inbox_, std::move(hooks))
+      .map([this](std::unique_ptr<receiver::ImageSource> images) {
         const std::lock_guard lock(mutex_);
-        receiver_ = std::move(receiver);
+        images_ = std::move(images);
       });
-}
-
-std::uint64_t Connections::broken() const {
-  if (!receiver_) return 0;
-  const receiver::ReceiverCounters& counters = receiver_->counters();
-  return counters.rejected + counters.aborted + counters.timed_out;
 }
 
 CArmStatus Connections::c_arm() const {

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <optional>
 
-#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/receiver/image_registry.h"
 #include "helicarm/devices/robot/robot_link.h"
 #include "helicarm/devices/tracker/pose_board.h"
 #include "helicarm/devices/tracker/tracker_source.h"
@@ -43,9 +43,10 @@ class Connections {
   Connections(const OperationPlan& plan, std::unique_ptr<receiver::Inbox> inbox,
               const FreshnessLimits& limits = {});
 
-  /// Starts receiving images. Refuses as DicomReceiver.
-  Expected<void> listen(const receiver::ReceiverOptions& options);
-  std::uint16_t receiver_port() const { return receiver_->port(); }
+  /// Starts receiving images. Refuses as `open_images`.
+  Expected<void> listen(const receiver::ImageSourceOptions& options);
+  /// Of the source of images; 0: it has none.
+  std::uint16_t receiver_port() const { return images_->port(); }
 
   /// The oldest image not yet taken; empty if none arrives within this time.
   std::optional<DatedArrival> next_image(double patience_s);
@@ -57,7 +58,7 @@ class Connections {
   CArmStatus c_arm() const;
 
  private:
-  std::uint64_t broken() const;
+  std::uint64_t broken() const { return images_ ? images_->broken() : 0; }
 
   std::unique_ptr<receiver::Inbox> inbox_;
   mutable std::mutex mutex_;
@@ -68,7 +69,7 @@ class Connections {
   tracker::PoseBoard board_;
   std::unique_ptr<robot::RobotLink> robot_;  ///< null for a hand-held drill
   std::unique_ptr<tracker::TrackerSource> tracker_;
-  std::unique_ptr<receiver::DicomReceiver> receiver_;
+  std::unique_ptr<receiver::ImageSource> images_;
 };
 
 }  // namespace helicarm::operation

@@ -110,6 +110,10 @@ Expected<std::unique_ptr<DicomReceiver>> DicomReceiver::open(const ReceiverOptio
 }
 
 std::uint16_t DicomReceiver::port() const { return engine_->acceptor.local_endpoint().port(); }
+std::uint64_t DicomReceiver::broken() const {
+  const ReceiverCounters& counters = engine_->shared.counters;
+  return counters.rejected + counters.aborted + counters.timed_out;
+}
 const ReceiverCounters& DicomReceiver::counters() const { return engine_->shared.counters; }
 
 }  // namespace helicarm::receiver

@@ -4,12 +4,11 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "helicarm/devices/receiver/inbox.h"
+#include "helicarm/devices/receiver/image_source.h"
 #include "helicarm/devices/receiver/negotiation.h"
 
 namespace helicarm::receiver {
@@ -54,28 +53,18 @@ struct ReceiverCounters {
   std::atomic<std::size_t> bytes_on_the_way{0};  ///< present total of images being received
 };
 
-/// Called on the receiver's threads. No message contains patient data.
-struct ReceiverHooks {
-  std::function<void(const Arrival&)> arrived = [](const Arrival&) {};
-  /// A refused image or association.
-  std::function<void(const Failure&)> refused = [](const Failure&) {};
-  /// An incomplete image, or a connection that ended without a release: `truncated`, `bad_value` for a
-  /// protocol violation, `not_connected`, `interrupted` when the receiver ends. At most 20 per second if no
-  /// image was being received.
-  std::function<void(const Failure&)> cut = [](const Failure&) {};
-};
-
 /// Service class provider for C-STORE and C-ECHO. An image is acknowledged after it is stored in the inbox;
 /// otherwise its status states the cause. Peers cannot block each other.
-class DicomReceiver {
+class DicomReceiver : public ImageSource {
  public:
   /// Listens on return. Refuses port_taken, and bad_value for an invalid address or TLS files.
   static Expected<std::unique_ptr<DicomReceiver>> open(const ReceiverOptions& options, Inbox& inbox,
                                                        ReceiverHooks hooks = {});
   /// Closes all connections; an image that is being stored is completed first.
-  ~DicomReceiver();
+  ~DicomReceiver() override;
 
-  std::uint16_t port() const;
+  std::uint16_t port() const override;
+  std::uint64_t broken() const override;
   const ReceiverCounters& counters() const;
 
  private:

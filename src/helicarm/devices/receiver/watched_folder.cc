@@ -1,16 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "helicarm/devices/receiver/watched_folder.h"
 
-#include "helicarm/core/files.h"
-
 namespace helicarm::receiver {
 namespace fs = std::filesystem;
-
-namespace {
-
-constexpr std::uintmax_t most_file_bytes = std::uintmax_t{256} << 20;
-
-}  // namespace
 
 std::vector<fs::path> FolderScan::unchanged_files() {
   std::vector<fs::path> resting;
@@ -35,29 +27,18 @@ std::vector<fs::path> FolderScan::unchanged_files() {
   return resting;
 }
 
-WatchedFolder::WatchedFolder(fs::path folder, Inbox& inbox, ReceiverHooks hooks,
-                             std::chrono::milliseconds pause, std::optional<std::uint64_t> most)
-    : scan_(std::move(folder)),
+WatchedFolder::WatchedFolder(FolderOptions options, Inbox& inbox, ReceiverHooks hooks)
+    : scan_(std::move(options.folder)),
       inbox_(inbox),
       hooks_(std::move(hooks)),
-      pause_(pause),
-      left_(most),
+      pause_(options.pause),
+      left_(options.most),
       thread_([this](const std::stop_token& stop) { watch(stop); }) {}
 
 void WatchedFolder::watch(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    for (const fs::path& path : scan_.unchanged_files()) {
-      const std::string origin = path.filename().string();
-      const auto arrival = read_file(path, most_file_bytes).and_then([&](const std::string& file) {
-        return inbox_.store(file, origin);
-      });
-      if (!arrival) {
-        hooks_.refused(arrival.error());
-        continue;
-      }
-      hooks_.arrived(*arrival);
-      if (left_ && --*left_ == 0) return;
-    }
+    for (const fs::path& path : scan_.unchanged_files())
+      if (take_file(path, inbox_, hooks_) && left_ && --*left_ == 0) return;
     std::unique_lock lock(mutex_);
     wake_.wait_for(lock, stop, pause_, [] { return false; });
   }

@@ -10,7 +10,7 @@
 #include <stop_token>
 #include <thread>
 
-#include "helicarm/devices/receiver/receiver.h"
+#include "helicarm/devices/receiver/image_source.h"
 
 namespace helicarm::receiver {
 
@@ -33,14 +33,20 @@ class FolderScan {
   std::map<std::filesystem::path, Trace> traces_;
 };
 
+struct FolderOptions {
+  std::filesystem::path folder;
+  std::chrono::milliseconds pause{500};    ///< between two polls
+  std::optional<std::uint64_t> most = {};  ///< images; empty: without limit
+};
+
 /// Takes every image that appears in a folder to the inbox, until it is destroyed or has taken `most`. The
 /// folder is not modified. Hooks are called on its own thread.
-class WatchedFolder {
+class WatchedFolder : public ImageSource {
  public:
-  static constexpr std::chrono::milliseconds usual_pause{500};
+  WatchedFolder(FolderOptions options, Inbox& inbox, ReceiverHooks hooks);
 
-  WatchedFolder(std::filesystem::path folder, Inbox& inbox, ReceiverHooks hooks,
-                std::chrono::milliseconds pause = usual_pause, std::optional<std::uint64_t> most = {});
+  std::uint16_t port() const override { return 0; }
+  std::uint64_t broken() const override { return 0; }
 
  private:
   void watch(const std::stop_token& stop);

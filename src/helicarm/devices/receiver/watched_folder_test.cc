@@ -69,9 +69,8 @@ TEST_F(FolderOnDisk, ImageGoesToTheInboxAndTheFileStays) {
   const auto inbox = Inbox::open(folder_ / "inbox").value();
   fs::create_directory(folder_ / "share");
   std::promise<Arrival> arrived;
-  const WatchedFolder watched(folder_ / "share", *inbox,
-                              {[&](const Arrival& a) { arrived.set_value(a); }, [](const Failure&) {}},
-                              std::chrono::milliseconds(5));
+  const WatchedFolder watched({folder_ / "share", std::chrono::milliseconds(5)}, *inbox,
+                              {[&](const Arrival& a) { arrived.set_value(a); }, [](const Failure&) {}});
   put("share/knee", xray::DicomBuilder().bytes());
   EXPECT_EQ(arrived.get_future().get().path, folder_ / "inbox" / "2.25.17.dcm");
   EXPECT_TRUE(fs::exists(folder_ / "share/knee"));
@@ -84,9 +83,8 @@ TEST_F(FolderOnDisk, AtMostTheRequestedNumberOfImagesIsTaken) {
   put("share/two", xray::DicomBuilder().text(0x00080018, "UI", "2.25.18").bytes());
   std::promise<void> arrived;
   {
-    const WatchedFolder watched(folder_ / "share", *inbox,
-                                {[&](const Arrival&) { arrived.set_value(); }, [](const Failure&) {}},
-                                std::chrono::milliseconds(5), 1);
+    const WatchedFolder watched({folder_ / "share", std::chrono::milliseconds(5), 1}, *inbox,
+                                {[&](const Arrival&) { arrived.set_value(); }, [](const Failure&) {}});
     arrived.get_future().wait();
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
