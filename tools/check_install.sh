@@ -12,6 +12,7 @@ cmake --install "$build" --component dev --prefix "$folder/usr" >/dev/null
 cmake -S examples/cpp -B "$folder/example" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH="$folder/usr" >/dev/null
 cmake --build "$folder/example" >/dev/null
 "$folder/example/locate_point"
+"$folder/example/own_tracker"
 # Nothing of the source or build tree may be named in what was installed.
 if grep -rlF -e "$PWD" "$folder/usr" --include='*.cmake' --include='*.pc' --include='*.h'; then
   echo "These installed files name this folder." >&2
