@@ -378,6 +378,17 @@ class CommandLine(unittest.TestCase):
             self.assertAlmostEqual(point["u"], u, 6)
             self.assertAlmostEqual(point["v"], v, 6)
 
+    def test_rectify_fits_the_named_distortion_model(self):
+        image, plate, out = self.root / "case/AP.dcm", self.root / "case/plate.json", self.root / "radial"
+        done = run("rectify", image, "--plate", plate, "--model", "radial", "--out", out, "--json")
+        self.assertEqual(json.loads(done.stdout)["model"], "radial", done.stderr)
+        self.assertEqual(json.loads((out / "map.json").read_text())["kind"], "radial")
+        self.assertEqual(run("rectify", image, "--map", out / "map.json", "--out", out).returncode, 0)
+        refused = run("rectify", image, "--plate", plate, "--model", "spline", "--out", out)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn("polynomial, radial, kriging", refused.stderr)
+        self.assertEqual(run("rectify", image, "--map", out / "map.json", "--model", "radial").returncode, 2)
+
     def test_rectify_applies_a_map_to_the_images_of_a_folder(self):
         out, series = self.root / "fitted", self.root / "series"
         series.mkdir()

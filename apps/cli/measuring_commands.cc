@@ -3,6 +3,7 @@
 #include "detect_command.h"
 #include "export_command.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/rectification/distortion_model.h"
 #include "helicarm/report/exports.h"
 #include "import_command.h"
 #include "locate_command.h"
@@ -205,6 +206,11 @@ void add_rectify(CLI::App& app, Action& action) {
   command->add_option("--method", a.method, "best, or paper: Hough circles and a quadratic")
       ->type_name("WORD")
       ->capture_default_str();
+  command
+      ->add_option("--model", a.model,
+                   "Distortion model, with --method best: " + rectification::model_names() +
+                       " (default: by the number of dots and their held-out errors)")
+      ->type_name("WORD");
   command->add_flag("--stages", a.stages,
                     "With --method paper: also the paper's Fig. 2, stage-raw.png to stage-inpainted.png");
 }

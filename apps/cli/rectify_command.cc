@@ -43,7 +43,7 @@ rectification::DistortionMap map_of(const RectifyArguments& arguments) {
 }
 
 Json figures_of(const rectification::Rectification& r) {
-  return {{"model", r.map.model},
+  return {{"model", r.map.model->name()},
           {"dots_found", r.dots_found},
           {"dots_expected", r.dots_expected ? Json(*r.dots_expected) : Json(nullptr)},
           {"residual_rms_px", r.map.residual_rms_px},
@@ -68,7 +68,8 @@ void write_stages(const xray::XrayImage& xray_image, const rectification::Rectif
 void rectify_image(const RectifyArguments& arguments, Console& console) {
   const xray::XrayImage xray_image = read(arguments.images.front(), arguments);
   const rectification::Rectification r = value_or_throw(rectification::rectify(
-      xray_image, plate_from(*arguments.plate), {value_or_throw(method_named(arguments.method)), {}}));
+      xray_image, plate_from(*arguments.plate),
+      {value_or_throw(method_named(arguments.method)), {}, arguments.model.value_or("")}));
   std::string residuals = "u_px,v_px,residual_px\n";
   for (std::size_t i = 0; i < r.plate_dots.size(); ++i)
     residuals += fmt::format("{},{},{}\n", r.plate_dots[i].centre_px.x(), r.plate_dots[i].centre_px.y(),
@@ -88,8 +89,8 @@ void rectify_image(const RectifyArguments& arguments, Console& console) {
   else if (!console.quiet)
     console.out << fmt::format(
         "{}: {} dots, residual {:.3f} px rms, {:.3f} max, cross-validated {:.3f}; written to {}\n",
-        r.map.model, r.dots_found, r.map.residual_rms_px, r.map.residual_max_px, r.map.held_out_rms_px,
-        arguments.out.string());
+        r.map.model->name(), r.dots_found, r.map.residual_rms_px, r.map.residual_max_px,
+        r.map.held_out_rms_px, arguments.out.string());
 }
 
 /// Refuses an image that the map is not for, or whose plate it does not make straight.
@@ -180,6 +181,8 @@ CommandResult rectify_command(const RectifyArguments& arguments, Console& consol
     const RectifyArguments& a = arguments;
     if (a.stages && (!a.plate || a.method != "paper"))
       throw BadInput(Reason::usage, "rectify: --stages is of IMAGE --plate --method paper");
+    if (a.model && (!a.plate || a.method == "paper"))
+      throw BadInput(Reason::usage, "rectify: --model is of IMAGE --plate --method best");
     if (a.points && a.map && a.images.empty()) return map_points(a, console);
     if (a.images.size() == 1 && a.test_grid_mm && a.map) return measure_grid(a, console);
     if (!a.images.empty() && a.map && !a.plate && !a.points && !a.test_grid_mm) return map_images(a, console);

@@ -20,9 +20,10 @@ struct RectifyArguments {
   std::optional<double> test_grid_mm;           ///< pitch of the grid of 3.1
   std::filesystem::path out = "helicarm-rectified";
   std::string method = "best";
-  bool inverse = false;       ///< points: rectified -> raw
-  bool stages = false;        ///< also the images of the paper's Fig. 2
-  bool keep_patient = false;  ///< written images stay with the patient and the study of theirs
+  std::optional<std::string> model;  ///< distortion model; nothing: automatic
+  bool inverse = false;              ///< points: rectified -> raw
+  bool stages = false;               ///< also the images of the paper's Fig. 2
+  bool keep_patient = false;         ///< written images stay with the patient and the study of theirs
 };
 
 /// Fits the distortion of an image and writes rectified.dcm, map.json and residuals.csv; or applies a map to

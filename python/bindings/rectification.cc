@@ -8,6 +8,7 @@
 #include "helicarm/core/parallel.h"
 #include "helicarm/image/grey_image.h"
 #include "helicarm/pipeline/run_fields.h"
+#include "helicarm/rectification/models/polynomial.h"
 #include "helicarm/rectification/rectify.h"
 #include "helicarm/xray/dicom_acquisition.h"
 #include "module.h"
@@ -76,8 +77,8 @@ rectification::DistortionMap loaded(const std::filesystem::path& path) {
 }
 
 rectification::Rectification rectified(const xray::XrayImage& image, const GivenPlate& plate,
-                                       const std::string& method) {
-  const rectification::RectificationOptions options{method_of(method), {}};
+                                       const std::string& method, const std::optional<std::string>& model) {
+  const rectification::RectificationOptions options{method_of(method), {}, model.value_or("")};
   const phantom::Plate given = plate_of(plate);
   auto found = without_gil([&] { return rectification::rectify(image, given, options); });
   if (!found) found.error().view = image.name;
@@ -99,9 +100,16 @@ rectification::Method method_of(const std::string& word) {
 namespace {
 
 void add_attributes(py::class_<rectification::DistortionMap>& map_class) {
-  map_class.def_readonly("model", &rectification::DistortionMap::model)
-      .def_readonly("order", &rectification::DistortionMap::order,
-                    "Order of the polynomial; 0: the identity.")
+  map_class
+      .def_property_readonly("model",
+                             [](const rectification::DistortionMap& map) { return map.model->name(); })
+      .def_property_readonly(
+          "order",
+          [](const rectification::DistortionMap& map) {
+            const auto* polynomial = dynamic_cast<const rectification::PolynomialModel*>(map.model.get());
+            return polynomial ? polynomial->order() : 0;
+          },
+          "Order of the polynomial; 0: there is none.")
       .def_readonly("residual_rms_px", &rectification::DistortionMap::residual_rms_px)
       .def_readonly("residual_max_px", &rectification::DistortionMap::residual_max_px)
       .def_readonly("held_out_rms_px", &rectification::DistortionMap::held_out_rms_px)
@@ -117,7 +125,7 @@ void add_attributes(py::class_<rectification::DistortionMap>& map_class) {
           "shape", [](const rectification::DistortionMap& map) { return std::pair(map.height, map.width); },
           "(height, width) of the image it belongs to.")
       .def("__repr__", [](const rectification::DistortionMap& map) {
-        return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model, map.width, map.height);
+        return fmt::format("<DistortionMap {}: {} x {} pixels>", map.model->name(), map.width, map.height);
       });
 }
 
@@ -220,9 +228,11 @@ void add_rectification(py::module_& module) {
   module.def(
       "rectify", &rectified, py::arg("image"), py::arg("plate"), py::kw_only(),
       py::arg("method") = std::string(pipeline::method_words[std::size_t(pipeline::RunOptions{}.method)]),
+      py::arg("model") = py::none(),
       R"(Finds the plate in an image and fits the distortion map (2.1, Eq. 1-3).
 
-plate: a Plate, a built-in's name ("plate48") or the path of a plate.json. method: "best" or "paper". Releases the GIL.
+plate: a Plate, a built-in's name ("plate48") or the path of a plate.json. method: "best" or "paper". model, of
+method best: "polynomial", "radial" or "kriging"; None: by the number of dots and their held-out errors. Releases the GIL.
 Returns a Rectification. Raises InputError; RefusedError: blank_image, saturated, plate_not_found, plate_mismatch.)");
 }
 

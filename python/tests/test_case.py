@@ -94,6 +94,7 @@ def test_plate_is_found_in_an_image(case):
     assert found.dots_found > 20 and found.uv_raw.shape[1] == 2
     assert np.sqrt(np.mean(found.residual_px ** 2)) < 0.3
     assert helicarm.rectify(image, "plate48").dots_found == found.dots_found
+    assert helicarm.rectify(image, "plate48", model="radial").map.model == "radial"
 
 
 def test_blank_image_is_refused():

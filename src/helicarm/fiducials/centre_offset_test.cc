@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/rectification/basis.h"
+#include "helicarm/rectification/models/polynomial.h"
 
 namespace helicarm::fiducials {
 namespace {
@@ -39,12 +39,10 @@ Vector2d traced_offset(const rectification::DistortionMap& map, const geometry::
 /// Pincushion distortion of an image intensifier: 6.5 px at the edge of a 512 px image.
 rectification::DistortionMap pincushion() {
   rectification::DistortionMap map = rectification::identity_map(512, 512, {});
-  map.order = 3;
-  map.centre = {255.5, 255.5};
-  map.scale = 252;
-  map.coefficients = Eigen::MatrixX2d::Zero(rectification::term_count(3), 2);
-  map.coefficients.topRows(3) << 255.5, 255.5, 252, 0, 0, 252;
-  map.coefficients.bottomRows(4) << 6.5, 0, 0, 6.5, 6.5, 0, 0, 6.5;
+  Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
+  coefficients.topRows(3) << 255.5, 255.5, 252, 0, 0, 252;
+  coefficients.bottomRows(4) << 6.5, 0, 0, 6.5, 6.5, 0, 0, 6.5;
+  map.model = rectification::polynomial_model(3, {{255.5, 255.5}, 252}, coefficients);
   return map;
 }
 

@@ -42,7 +42,7 @@ Json json_of(const rectification::Rectification& rectification) {
   const bool fitted = !map.is_identity();
   const auto if_fitted = [&](double value) { return fitted ? number(value) : Json(nullptr); };
   return {
-      {"model", map.model},
+      {"model", map.model->name()},
       {"dots_found", rectification.dots_found},
       {"dots_expected", optional_number(rectification.dots_expected)},
       {"residual_rms_px", if_fitted(map.residual_rms_px)},

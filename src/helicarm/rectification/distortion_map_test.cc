@@ -4,7 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/core/random.h"
-#include "helicarm/rectification/basis.h"
+#include "helicarm/rectification/models/kriging.h"
+#include "helicarm/rectification/models/monomials.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -12,27 +13,25 @@ namespace {
 using Eigen::Vector2d;
 
 /// About 15 px of pincushion at the edge of a 512 px image, a quadratic part and three kernels.
-DistortionMap curved_map() {
+Trend curved_trend() {
+  Trend trend;
+  trend.order = 3;
+  trend.terms.normalised = {{250, 260}, 250};
+  Eigen::MatrixX2d& coefficients = trend.terms.coefficients;
+  coefficients = Eigen::MatrixX2d::Zero(13, 2);
+  coefficients.topRows(4) << 251, 258, 249, 3, -3, 249, 1, -0.5;
+  coefficients.middleRows(6, 4) << 7, 0, 0, 7, 7, 0, 0, 7;
+  coefficients.bottomRows(3) << 0.8, -0.3, 0.2, 0.9, -0.7, 0.4;
+  trend.terms.covariance = 1e-4 * Eigen::MatrixXd::Identity(13, 13);
+  trend.knots.resize(3, 2);
+  trend.knots << 0.1, 0.2, -0.6, 0.3, 0.5, -0.5;
+  trend.length = 0.3;
+  return trend;
+}
+
+DistortionMap map_of(const Trend& trend) {
   DistortionMap map;
-  map.model = "for this test";
-  map.order = 3;
-  map.centre = {250, 260};
-  map.scale = 250;
-  map.coefficients = Eigen::MatrixX2d::Zero(term_count(3), 2);
-  map.coefficients.row(0) << 251, 258;
-  map.coefficients.row(1) << 249, 3;
-  map.coefficients.row(2) << -3, 249;
-  map.coefficients.row(3) << 1, -0.5;
-  map.coefficients.row(6) << 7, 0;
-  map.coefficients.row(7) << 0, 7;
-  map.coefficients.row(8) << 7, 0;
-  map.coefficients.row(9) << 0, 7;
-  map.knots.resize(3, 2);
-  map.knots << 0.1, 0.2, -0.6, 0.3, 0.5, -0.5;
-  map.weights.resize(3, 2);
-  map.weights << 0.8, -0.3, 0.2, 0.9, -0.7, 0.4;
-  map.kernel_length = 0.3;
-  map.coefficient_covariance = 1e-4 * Eigen::MatrixXd::Identity(13, 13);
+  map.model = std::make_shared<KrigingModel>(trend);
   map.residual_rms_px = 0.03;
   map.residual_max_px = 0.1;
   map.held_out_rms_px = 0.05;
@@ -44,6 +43,8 @@ DistortionMap curved_map() {
   map.height = 512;
   return map;
 }
+
+DistortionMap curved_map() { return map_of(curved_trend()); }
 
 TEST(Monomials, AreOrderedByDegreeInFallingPowersOfX) {
   const Eigen::VectorXd terms = monomials({2, 3}, 3);
@@ -89,12 +90,15 @@ TEST(DistortionMap, PointFarOutsideThePlateHasNoRectifiedPosition) {
   EXPECT_FALSE(curved_map().rectified_from_raw({1e4, -3e4}));
 }
 
-TEST(DistortionMap, SigmaIsTheQuadraticFormOfTheBasisRow) {
-  DistortionMap map = curved_map();
-  const Eigen::VectorXd row = basis_row((Vector2d(100, 300) - map.centre) / map.scale, 3, map.knots, 0.3);
-  EXPECT_NEAR(map.sigma_px({100, 300}), 1e-2 * row.norm(), 1e-12);
-  map.coefficient_covariance.resize(0, 0);
-  EXPECT_EQ(map.sigma_px({100, 300}), 0);
+TEST(DistortionMap, SigmaIsTheQuadraticFormOfTheTerms) {
+  Trend trend = curved_trend();
+  const Vector2d t = trend.terms.normalised({100, 300});
+  double squares = monomials(t, 3).squaredNorm();
+  for (int k = 0; k < 3; ++k)
+    squares += std::pow(kernel((t - trend.knots.row(k).transpose()).squaredNorm(), 0.3), 2);
+  EXPECT_NEAR(map_of(trend).sigma_px({100, 300}), 1e-2 * std::sqrt(squares), 1e-12);
+  trend.terms.covariance.resize(0, 0);
+  EXPECT_EQ(map_of(trend).sigma_px({100, 300}), 0);
 }
 
 TEST(DistortionMap, PointsOutsideTheImageAreNotMapped) {
@@ -110,9 +114,10 @@ TEST(DistortionMap, PointsOutsideTheImageAreNotMapped) {
     EXPECT_FALSE(rectified_in_image(map, off));
   EXPECT_FALSE(raw_in_image(map, {530, 530}));
   EXPECT_FALSE(raw_in_image(map, {1e6, -1e6}));
-  DistortionMap folded = map;  // x beyond its fold maps back into the image
-  folded.coefficients(3, 0) = -100;
-  const Vector2d beyond = folded.centre + folded.scale * Vector2d(2, 0);
+  Trend trend = curved_trend();  // x beyond its fold maps back into the image
+  trend.terms.coefficients(3, 0) = -100;
+  const DistortionMap folded = map_of(trend);
+  const Vector2d beyond = Vector2d(250, 260) + 250 * Vector2d(2, 0);
   ASSERT_TRUE(folded.shows(folded.raw_from_rectified(beyond)));
   EXPECT_FALSE(raw_in_image(folded, beyond));
 }
@@ -156,6 +161,7 @@ TEST(DistortionMapJson, InconsistentFieldsAreRefused) {
   EXPECT_EQ(refused("format", "helicarm-map/2"), "bad_value");
   EXPECT_EQ(refused("rectified_plane", "wall"), "bad_value");
   EXPECT_EQ(refused("surplus", 1), "unknown_key");
+  EXPECT_EQ(refused("kind", "no such model"), "bad_value");
   EXPECT_NE(refused("covariance", Json::array({Json::array({1.0})})), "accepted");
   EXPECT_NE(refused("coefficients", "none"), "accepted");
 }

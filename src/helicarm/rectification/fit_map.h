@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -18,9 +19,8 @@ struct Correspondence {
 };
 
 struct MapOptions {
-  std::optional<int> order;  ///< fixed order, 1..7; otherwise chosen by held-out error
-  int max_order = 7;
-  bool remainder = true;  ///< allow the smooth remainder in addition to the polynomial
+  std::optional<int> order;  ///< of the polynomial, 1..7; otherwise chosen by held-out error
+  std::string model;         ///< of `model_kinds`; "": polynomial if `order` is given, else automatic_fit
   bool reject_outliers = true;
 };
 
@@ -32,9 +32,9 @@ struct MapFit {
   Eigen::Affine2d rectified_from_plate = Eigen::Affine2d::Identity();  ///< a similarity
 };
 
-/// Fits the map of Eq. 1 by (penalised) least squares. Order and remainder minimise the held-out error of
+/// Fits the map of Eq. 1 by (penalised) least squares. Model and order minimise the held-out error of
 /// each dot predicted from the others (closed-form leave-one-out). plate_not_found below 6 correspondences or
-/// if they do not determine an affine map.
+/// if they do not determine the model; bad_value for an unknown model.
 Expected<MapFit> fit_map(const std::vector<Correspondence>& dots, int width, int height,
                          const MapOptions& options);
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "helicarm/rectification/basis.h"
+#include "helicarm/rectification/models/polynomial.h"
 
 namespace helicarm::rectification {
 namespace {
@@ -13,17 +13,10 @@ using Eigen::Vector2d;
 /// About 15 px of pincushion at the edge of a 512 px image.
 DistortionMap pincushion() {
   DistortionMap map = identity_map(512, 512, {});
-  map.order = 3;
-  map.centre = {255.5, 255.5};
-  map.scale = 250;
-  map.coefficients = Eigen::MatrixX2d::Zero(term_count(3), 2);
-  map.coefficients.row(0) << 255.5, 255.5;
-  map.coefficients.row(1) << 250, 0;
-  map.coefficients.row(2) << 0, 250;
-  map.coefficients.row(6) << 15, 0;
-  map.coefficients.row(7) << 0, 15;
-  map.coefficients.row(8) << 15, 0;
-  map.coefficients.row(9) << 0, 15;
+  Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
+  coefficients.topRows(3) << 255.5, 255.5, 250, 0, 0, 250;
+  coefficients.bottomRows(4) << 15, 0, 0, 15, 15, 0, 0, 15;
+  map.model = polynomial_model(3, {{255.5, 255.5}, 250}, coefficients);
   return map;
 }
 

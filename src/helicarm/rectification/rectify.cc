@@ -226,7 +226,7 @@ Expected<Rectification> rectify(const xray::XrayImage& xray_image, const phantom
   }
   MapOptions map_options;
   map_options.order = options.method == Method::paper ? std::optional(2) : options.order;
-  map_options.remainder = options.method == Method::best && !options.order;
+  if (options.method == Method::best) map_options.model = options.model;
   map_options.reject_outliers = true;
   auto fit = fit_map(seen, width, height, map_options);
   if (!fit) return tl::unexpected<Failure>(fit.error());
@@ -306,7 +306,6 @@ Expected<Rectification> with_map(const xray::XrayImage& xray_image, const Distor
   }
   MapOptions straight;
   straight.order = 1;
-  straight.remainder = false;
   const auto fit = fit_map(dots, map.width, map.height, straight);
   const double limit = std::max(0.5, 3 * map.held_out_rms_px);
   if (fit && fit->map.residual_rms_px > limit)

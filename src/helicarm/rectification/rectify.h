@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "helicarm/detection/blobs.h"
@@ -38,6 +39,7 @@ struct Rectification {
 struct RectificationOptions {
   Method method = Method::best;
   std::optional<int> order;  ///< fixed polynomial order; otherwise chosen by held-out error
+  std::string model = {};    ///< distortion model by name (MapOptions), of method best; "": automatic
 };
 
 /// Finds the plate in the image and fits the map (2.1). Refuses a blank or saturated image, a missing plate,

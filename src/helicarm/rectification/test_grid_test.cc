@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "helicarm/detection/drawn_image_test.h"
+#include "helicarm/rectification/models/polynomial.h"
 #include "helicarm/simulation/simulate_case.h"
 
 namespace helicarm::rectification {
@@ -37,12 +38,10 @@ Vector2d pincushion(const Vector2d& p) {
 
 DistortionMap pincushion_map() {
   DistortionMap map = identity_map(side, side, {});
-  map.order = 3;
-  map.centre = middle;
-  map.scale = 128;
-  map.coefficients = Eigen::MatrixX2d::Zero(10, 2);
-  map.coefficients.topRows(3) << middle.transpose(), 128, 0, 0, 128;
-  map.coefficients.bottomRows(4) << 5, 0, 0, 5, 5, 0, 0, 5;
+  Eigen::MatrixX2d coefficients = Eigen::MatrixX2d::Zero(10, 2);
+  coefficients.topRows(3) << middle.transpose(), 128, 0, 0, 128;
+  coefficients.bottomRows(4) << 5, 0, 0, 5, 5, 0, 0, 5;
+  map.model = polynomial_model(3, {middle, 128}, coefficients);
   return map;
 }
 

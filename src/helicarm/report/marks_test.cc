@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "helicarm/rectification/models/polynomial.h"
+
 namespace helicarm::report {
 namespace {
 
@@ -11,11 +13,9 @@ using Eigen::Vector2d;
 /// A scaling about the image's corner, with simple expected values.
 rectification::DistortionMap doubling_map() {
   rectification::DistortionMap map = rectification::identity_map(200, 200, {});
-  map.order = 1;
-  map.scale = 200;
-  map.coefficients = Eigen::MatrixX2d::Zero(3, 2);
-  map.coefficients.row(1) << 400, 0;
-  map.coefficients.row(2) << 0, 400;
+  Eigen::MatrixX2d coefficients(3, 2);
+  coefficients << 0, 0, 400, 0, 0, 400;
+  map.model = rectification::polynomial_model(1, {{0, 0}, 200}, coefficients);
   return map;
 }
 

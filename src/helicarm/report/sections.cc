@@ -209,7 +209,7 @@ std::string rectification_section(const pipeline::Result& result) {
   for (const pipeline::ViewResult& view : result.views) {
     if (!view.rectification || view.rectification->map.is_identity()) continue;
     const rectification::Rectification& r = *view.rectification;
-    table.row({escaped(view.name), escaped(r.map.model),
+    table.row({escaped(view.name), escaped(r.map.model->name()),
                r.dots_expected ? fmt::format("{} of {}", r.dots_found, *r.dots_expected)
                                : std::to_string(r.dots_found),
                fixed(r.map.residual_rms_px, 3), fixed(r.map.residual_max_px, 3),

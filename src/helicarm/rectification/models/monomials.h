@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cmath>
-
 #include <Eigen/Core>
 
 namespace helicarm::rectification {
@@ -32,28 +30,6 @@ inline Eigen::MatrixX2d monomial_slopes(const Eigen::Vector2d& t, int order) {
       if (j > 0) slopes(at, 1) = j * lower[at - degree - 1];
     }
   return slopes;
-}
-
-/// Matern covariance of smoothness 3/2: matches the roughness of real screens between dots.
-inline double kernel(double squared_distance, double length) {
-  const double s = std::sqrt(3 * squared_distance) / length;
-  return (1 + s) * std::exp(-s);
-}
-
-/// Its gradient with respect to the offset.
-inline double kernel_slope(double squared_distance, double length) {
-  return -3 / (length * length) * std::exp(-std::sqrt(3 * squared_distance) / length);
-}
-
-/// Monomials, then the kernels at the knots.
-inline Eigen::VectorXd basis_row(const Eigen::Vector2d& t, int order, const Eigen::MatrixX2d& knots,
-                                 double length) {
-  const Eigen::Index terms = term_count(order);
-  Eigen::VectorXd row(terms + knots.rows());
-  row.head(terms) = monomials(t, order);
-  for (Eigen::Index k = 0; k < knots.rows(); ++k)
-    row[terms + k] = kernel((t - knots.row(k).transpose()).squaredNorm(), length);
-  return row;
 }
 
 }  // namespace helicarm::rectification

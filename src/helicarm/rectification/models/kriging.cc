@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "helicarm/rectification/models/kriging.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "helicarm/geometry/dense_matrix.h"
+#include "helicarm/rectification/models/monomials.h"
+
+namespace helicarm::rectification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixX2d;
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::VectorXd;
+
+constexpr std::size_t max_knots = 240;
+
+/// A thinned, evenly spread subset of at most `max_knots` points.
+MatrixX2d thinned(const std::vector<Vector2d>& points) {
+  std::vector<Vector2d> kept = points;
+  for (double gap = 0.05; kept.size() > max_knots; gap *= 1.05) {
+    kept.clear();
+    for (const Vector2d& p : points)
+      if (std::all_of(kept.begin(), kept.end(), [&](const Vector2d& q) { return (p - q).norm() > gap; }))
+        kept.push_back(p);
+  }
+  MatrixX2d knots(static_cast<Index>(kept.size()), 2);
+  for (Index k = 0; k < knots.rows(); ++k) knots.row(k) = kept[static_cast<std::size_t>(k)].transpose();
+  return knots;
+}
+
+/// Monomials, then the kernels at the knots.
+VectorXd basis_row(const Vector2d& t, int order, const MatrixX2d& knots, double length) {
+  const Index terms = term_count(order);
+  VectorXd row(terms + knots.rows());
+  row.head(terms) = monomials(t, order);
+  const Eigen::ArrayXd s =
+      ((knots.rowwise() - t.transpose()).rowwise().norm() * (std::sqrt(3.0) / length)).array();
+  row.tail(knots.rows()) = (1 + s) * (-s).exp();
+  return row;
+}
+
+MatrixXd rows_of_dots(const PlateDots& dots, int order, const MatrixX2d& knots, double length) {
+  return rows_for(dots, [&](const Vector2d& t) { return basis_row(t, order, knots, length); });
+}
+
+MatrixXd gram_of(const MatrixX2d& knots, double length) {
+  MatrixXd gram(knots.rows(), knots.rows());
+  for (Index j = 0; j < knots.rows(); ++j)
+    for (Index i = 0; i < knots.rows(); ++i)
+      gram(i, j) = kernel((knots.row(i) - knots.row(j)).squaredNorm(), length);
+  gram.diagonal().array() += 1e-7;
+  return gram;
+}
+
+/// Maximum-likelihood estimate of the remainder's strength and the dots' noise.
+struct Roughness {
+  double length = 0;
+  double gain = 0;      ///< remainder's variance relative to that of a dot of weight one
+  double variance = 0;  ///< of a dot of weight one, px^2
+  double misfit = std::numeric_limits<double>::infinity();  ///< -2 log of the restricted likelihood
+};
+
+/// Restricted likelihood (Patterson and Thompson 1971) of a remainder of one length, with the trend projected
+/// out, maximised over gains; the dots' own sigmas are accepted within a factor of 1.5.
+Roughness roughness_of(const PlateDots& data, const MatrixXd& rows, const MatrixXd& gram, double length) {
+  constexpr double log_variance_sigma = 0.8;
+  const Index knots = gram.rows();
+  const VectorXd root = data.weights.cwiseSqrt();
+  const MatrixXd weighted = root.asDiagonal() * rows;
+  const Index terms = rows.cols() - knots;
+  const MatrixXd trend = geometry::orthonormal_columns(weighted.leftCols(terms));
+  const auto whitens = geometry::whitening(gram);
+  if (!whitens) return {};
+  MatrixXd kernels = weighted.rightCols(knots) * whitens->transpose();
+  kernels -= trend * (trend.transpose() * kernels);
+  MatrixX2d raw = root.asDiagonal() * data.raw;
+  raw -= trend * (trend.transpose() * raw);
+  const geometry::SymmetricEigen modes = geometry::symmetric_eigen(kernels.transpose() * kernels);
+  const MatrixX2d along = modes.vectors.transpose() * (kernels.transpose() * raw);
+  const double freedom = 2.0 * double(rows.rows() - terms);
+  Roughness best;
+  for (double gain = 1e-2; gain < 1e6; gain *= 1.5) {
+    // y' (I + gain K K')^-1 y and log det (I + gain K K') for both axes, in the eigenbasis of K'K.
+    double energy = raw.squaredNorm();
+    double log_determinant = 0;
+    for (Index k = 0; k < knots; ++k) {
+      const double raised = 1 + gain * std::max(0.0, modes.values[k]);
+      energy -= gain / raised * along.row(k).squaredNorm();
+      log_determinant += 2 * std::log(raised);
+    }
+    energy = std::max(energy, 1e-12 * data.variance);
+    const auto misfit = [&](double log_variance) {
+      const double surprise = (log_variance - std::log(data.variance)) / log_variance_sigma;
+      return freedom * log_variance + energy * std::exp(-log_variance) + log_determinant +
+             surprise * surprise;
+    };
+    double x = std::log(energy / freedom);
+    for (int i = 0; i < 20; ++i) {
+      const double normal_prior = 2 / (log_variance_sigma * log_variance_sigma);
+      const double pull = energy * std::exp(-x);
+      x -= std::clamp((freedom - pull + normal_prior * (x - std::log(data.variance))) / (pull + normal_prior),
+                      -1.0, 1.0);
+    }
+    if (misfit(x) < best.misfit) best = {length, gain, std::exp(x), misfit(x)};
+  }
+  return best;
+}
+
+/// Universal kriging. Length, strength and dot noise maximise the restricted likelihood.
+ModelFit fit_order(const PlateDots& dots, int order, const MatrixX2d& knots) {
+  Roughness best;
+  for (const double length : {0.14, 0.2, 0.28, 0.4, 0.57, 0.8, 1.1, 1.6, 2.2}) {
+    const Roughness roughness =
+        roughness_of(dots, rows_of_dots(dots, order, knots, length), gram_of(knots, length), length);
+    if (roughness.misfit < best.misfit) best = roughness;
+  }
+  if (!(best.length > 0)) return {};
+  const MatrixXd gram = gram_of(knots, best.length);
+  const LinearFit fit = fit_linear(dots, rows_of_dots(dots, order, knots, best.length), gram / best.gain);
+  if (fit.coefficients.size() == 0) return {};
+  MatrixXd covariance = best.variance * fit.inverse;
+  covariance.bottomRightCorner(gram.rows(), gram.cols()) -=
+      best.gain * best.variance *
+      geometry::solve_spd(gram, MatrixXd::Identity(gram.rows(), gram.cols())).solution;
+  return {std::make_shared<KrigingModel>(Trend{order,
+                                               {dots.normalised, fit.coefficients, std::move(covariance)},
+                                               knots,
+                                               best.length,
+                                               std::sqrt(best.gain * best.variance)}),
+          fit.held_out, fit.held_out_rms};
+}
+
+constexpr int cubic = 3;  // beyond the dots only the trend remains: it must extrapolate moderately
+
+ModelFit fit(const PlateDots& dots, std::optional<int> order) {
+  const Index n = dots.raw.rows();
+  const int highest = n > 200 ? std::min(highest_order(n), 5) : cubic;
+  if (highest_order(n) < order.value_or(cubic)) return {};
+  const MatrixX2d knots = thinned(dots.points);
+  return simplest_good(order.value_or(cubic), order.value_or(highest),
+                       [&](int o) { return fit_order(dots, o, knots); });
+}
+
+}  // namespace
+
+double kernel(double squared_distance, double length) {
+  const double s = std::sqrt(3 * squared_distance) / length;
+  return (1 + s) * std::exp(-s);
+}
+
+VectorXd KrigingModel::basis(const Vector2d& t) const { return basis_row(t, order(), knots_, length_); }
+
+MatrixX2d KrigingModel::slopes(const Vector2d& t) const {
+  const Index terms = term_count(order());
+  MatrixX2d slopes(terms + knots_.rows(), 2);
+  slopes.topRows(terms) = monomial_slopes(t, order());
+  const MatrixX2d away = -(knots_.rowwise() - t.transpose());
+  const VectorXd steepness =
+      -3 / (length_ * length_) * (-std::sqrt(3.0) / length_ * away.rowwise().norm().array()).exp();
+  slopes.bottomRows(knots_.rows()) = steepness.asDiagonal() * away;
+  return slopes;
+}
+
+double KrigingModel::prior_covariance(const Vector2d& p, const Vector2d& q) const {
+  return sigma_px_ * sigma_px_ * kernel((p - q).squaredNorm(), length_);
+}
+
+void KrigingModel::write(Json& json) const {
+  write_trend({order(), terms(), knots_, length_, sigma_px_}, json);
+}
+
+void write_trend(const Trend& trend, Json& json) {
+  const MatrixX2d& all = trend.terms.coefficients;
+  json["order"] = trend.order;
+  write_coefficients(trend.terms.normalised, all.topRows(all.rows() - trend.knots.rows()), json);
+  json["kernel"] = "matern-3/2";
+  json["kernel_length"] = trend.length;
+  json["kernel_sigma_px"] = trend.sigma_px;
+  json["knots"] = rows_of(trend.knots);
+  json["weights"] = rows_of(all.bottomRows(trend.knots.rows()));
+  json["covariance"] = rows_of(trend.terms.covariance);
+}
+
+ModelPointer read_trend(JsonReader& reader) {
+  Trend trend;
+  trend.order = reader.integer("order", 0, 9);
+  trend.terms = read_coefficients(reader);
+  reader.choice("kernel", {"matern-3/2"});
+  trend.length = reader.number("kernel_length", {0, 1e3});
+  trend.sigma_px = reader.number("kernel_sigma_px", {0, 1e4});
+  trend.knots = matrix_of(reader, "knots", 2, 2000);
+  const MatrixXd weights = matrix_of(reader, "weights", 2, 2000);
+  MatrixX2d& coefficients = trend.terms.coefficients;
+  if (trend.order > 0 && coefficients.rows() != term_count(trend.order))
+    reader.refuse(Reason::bad_value, "coefficients", "do not match the order");
+  if (weights.rows() != trend.knots.rows())
+    reader.refuse(Reason::bad_value, "weights", "do not match the knots");
+  if (trend.knots.rows() > 0 && !(trend.length > 0))
+    reader.refuse(Reason::bad_value, "kernel_length", "must be positive where there are knots");
+  trend.terms.covariance = read_covariance(reader, coefficients.rows() + weights.rows());
+  if (trend.order == 0) return identity_model();
+  if (weights.rows() == 0) return std::make_shared<PolynomialModel>(trend.order, std::move(trend.terms));
+  coefficients.conservativeResize(coefficients.rows() + weights.rows(), 2);
+  coefficients.bottomRows(weights.rows()) = weights;
+  return std::make_shared<KrigingModel>(std::move(trend));
+}
+
+ModelKind kriging_kind() { return {"kriging", 2 * term_count(cubic), fit, read_trend}; }
+
+}  // namespace helicarm::rectification
