@@ -11,42 +11,28 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# Bottom to top: each module with the other modules it may include.
-MODULES = {
-    "core": "",
-    "geometry": "core",
-    "phantom": "core geometry",
-    "image": "core",
-    "xray": "core geometry image",
-    "detection": "core geometry image xray",
-    "rectification": "core geometry image phantom xray detection",
-    "fiducials": "core geometry image phantom xray detection rectification",
-    "calibration": "core geometry phantom rectification fiducials",
-    "localization": "core geometry image phantom xray detection rectification fiducials calibration",
-    "measures": "core geometry phantom calibration",
-    "guidance": "core geometry image phantom xray detection rectification fiducials calibration localization",
-    "verification": "core geometry image phantom xray detection rectification fiducials calibration localization guidance",
-    "volume": "core geometry image xray",
-    "registration": "core geometry image phantom xray detection rectification fiducials calibration localization volume",
-    "simulation": "core geometry image phantom xray volume",
-    "devices": "core geometry image xray",
-    "virtual_devices": "core geometry image phantom xray volume simulation devices",
-    "session": "core",
-    "pipeline": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                  " verification volume simulation",
-    "report": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-              " verification volume simulation pipeline",
-    "case_registration": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                         " volume registration pipeline report",
-    "phantom_calibration": "core geometry image phantom xray detection rectification fiducials calibration localization"
-                           " pipeline report",
-    "operation": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-                 " verification devices session pipeline report",
-    "rehearsal": "core geometry image phantom xray volume simulation devices virtual_devices session pipeline operation"
-                 " guidance verification report",
-    "study": "core geometry image phantom xray detection rectification fiducials calibration localization guidance"
-             " verification volume simulation pipeline report",
-}
+USES = re.compile(r"\bhelicarm_module\((\w+)[^)]*?\bUSES ([a-z_\s]+)")
+
+
+def modules():
+    """Folders of src/helicarm bottom to top, as the root's CMakeLists.txt lists them, each with the folders it may include:
+    what its own CMakeLists.txt USES, and what these use."""
+    listed = re.search(r"foreach\(module IN ITEMS([^)]*)\)", (ROOT / "CMakeLists.txt").read_text())[1].split()
+    of_target, used = {}, {}
+    for folder in listed:
+        used[folder] = set()
+        for path in sorted((ROOT / "src" / "helicarm" / folder).rglob("CMakeLists.txt")):
+            for target, names in USES.findall(path.read_text()):
+                of_target[target] = folder
+                used[folder] |= set(names.split())
+    allowed = {}
+    for folder in listed:
+        direct = {of_target.get(name, name) for name in used[folder]} - {folder}
+        allowed[folder] = direct.union(*(allowed.get(other, set()) for other in direct))
+    return allowed
+
+
+MODULES = modules()
 FOR_TESTS = {"core", "simulation"}
 
 SOURCES = {".h", ".cc", ".py"}
@@ -61,7 +47,7 @@ def includes(path):
 
 
 def breaches_of_layers(module, path):
-    allowed = {module, *MODULES[module].split()}
+    allowed = {module, *MODULES[module]}
     if path.stem.endswith("_test"):
         allowed |= FOR_TESTS
         if list(MODULES).index(module) > list(MODULES).index("virtual_devices"):
@@ -76,12 +62,24 @@ def breaches_of_layers(module, path):
             yield f"{path.relative_to(ROOT)}:{number}: includes are relative to src/, without .. ({included})"
 
 
+def breaches_of_order():
+    """A module that uses one below it in the list, and rows of CONTRIBUTING.md that are not the list."""
+    listed = list(MODULES)
+    for at, module in enumerate(listed):
+        for later in sorted(MODULES[module] - set(listed[:at])):
+            yield f"src/helicarm/{module}/CMakeLists.txt: USES {later}, which is not above it in the root's CMakeLists.txt"
+    rows = re.findall(r"^\| `(\w+)/(?:\w+/)?` \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.MULTILINE)
+    if list(dict.fromkeys(rows)) != listed:
+        yield f"CONTRIBUTING.md: the table of modules differs from the list in CMakeLists.txt: {' '.join(listed)}"
+
+
 def breaches():
+    yield from breaches_of_order()
     for folder in sorted((ROOT / "src" / "helicarm").iterdir()):
         if not folder.is_dir():
             continue
         if folder.name not in MODULES:
-            yield f"{folder.relative_to(ROOT)}: not a module of {pathlib.Path(__file__).name}"
+            yield f"{folder.relative_to(ROOT)}: not in the list of modules of CMakeLists.txt"
             continue
         for path in sorted(p for p in folder.rglob("*") if p.suffix in SOURCES):
             yield from breaches_of_layers(folder.name, path)
