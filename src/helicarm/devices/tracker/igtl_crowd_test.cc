@@ -137,7 +137,7 @@ TEST(IgtlSockets, MessageOverTheServersLimitEndsTheConnection) {
   const auto server = a_server();
   RawPeer peer;
   peer.dial(server->port());
-  std::string header = encode({"x", 0, IgtlImage{}}).substr(0, IgtlHeader::size);
+  std::string header = encode({"x", 0, IgtlUnknown{"STRING", ""}}).substr(0, IgtlHeader::size);
   header[45] = 16;  // body of over 1 MiB
   peer.write(header);
   EXPECT_TRUE(peer.is_disconnected());
@@ -154,7 +154,7 @@ TEST(IgtlSockets, MessagesAStalledServerCannotSendAreDropped) {
                 }).value();
   RawPeer peer;
   peer.dial(server->port());
-  peer.write(encode({"x", 0, IgtlString{"hold"}}));
+  peer.write(encode({"x", 0, IgtlUnknown{"STRING", "hold"}}));
   ASSERT_TRUE(eventually([&] { return held.load(); }));
   for (int i = 0; i < 1000; ++i) server->send({"pose", 0, IgtlTransform{}});
   EXPECT_EQ(count_of(server->status().counters, "unsent"), 990u);

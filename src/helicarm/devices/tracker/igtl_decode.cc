@@ -16,7 +16,6 @@ constexpr std::size_t extended_header_size = 12;
 constexpr std::size_t metadata_entry_size = 8;
 constexpr std::size_t tool_size = 70;
 constexpr std::size_t quaternion_tool_size = 50;
-constexpr std::size_t point_size = 136;
 
 /// Text of a field, limited to characters that can be shown or looked up.
 std::string take_text(BigEndianReader& in, std::size_t width) {
@@ -34,12 +33,6 @@ Eigen::Matrix4d take_matrix(BigEndianReader& in) {
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   for (int column = 0; column < 4; ++column) matrix.col(column).head<3>() = take_floats<3>(in);
   return matrix;
-}
-
-std::array<std::uint16_t, 3> take_sizes(BigEndianReader& in) {
-  std::array<std::uint16_t, 3> sizes;
-  for (auto& size : sizes) size = in.take<std::uint16_t>();
-  return sizes;
 }
 
 /// Number of elements of one size in the rest.
@@ -99,59 +92,6 @@ IgtlStatus take_status(BigEndianReader& in) {
   return status;
 }
 
-IgtlImage take_image(BigEndianReader& in) {
-  IgtlImage image;
-  if (const auto version = in.take<std::uint16_t>(); version != 1 && version != 2)
-    throw BadInput(Reason::unsupported, fmt::format("IMAGE: version {}", version));
-  image.components = in.take<std::uint8_t>();
-  image.scalar_type = in.take<std::uint8_t>();
-  image.endian = in.take<std::uint8_t>();
-  image.coordinates = in.take<std::uint8_t>();
-  image.size = take_sizes(in);
-  for (int column = 0; column < 4; ++column) image.axes_and_centre.col(column) = take_floats<3>(in);
-  image.part_offset = take_sizes(in);
-  image.part_size = take_sizes(in);
-  if (scalar_bytes(image.scalar_type) == 0 || image.components == 0 ||
-      (image.endian != 1 && image.endian != 2))
-    throw BadInput(Reason::bad_value, fmt::format("IMAGE: {} components of type {}, byte order {}",
-                                                  image.components, image.scalar_type, image.endian));
-  std::uint64_t expected = image.components * scalar_bytes(image.scalar_type);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (image.part_size[axis] == 0 || image.part_offset[axis] + image.part_size[axis] > image.size[axis])
-      throw BadInput(Reason::bad_size,
-                     fmt::format("IMAGE: part of {} at {} in a volume of {}", image.part_size[axis],
-                                 image.part_offset[axis], image.size[axis]));
-    // Three 16-bit sizes and at most 255 * 8 bytes: below 2^59.
-    expected *= image.part_size[axis];
-  }
-  if (expected != in.left())
-    throw BadInput(Reason::bad_size,
-                   fmt::format("IMAGE: {} bytes of pixels, {} expected", in.left(), expected));
-  image.pixels = in.take(in.left());
-  return image;
-}
-
-IgtlPoints take_points(BigEndianReader& in) {
-  IgtlPoints list;
-  list.points.resize(element_count(in, point_size, "POINT"));
-  for (IgtlPoint& point : list.points) {
-    point.name = take_text(in, 64);
-    point.group = take_text(in, 32);
-    for (auto& channel : point.rgba) channel = in.take<std::uint8_t>();
-    point.position = take_floats<3>(in);
-    point.diameter = in.take<float>();
-    point.owner = take_text(in, 20);
-  }
-  return list;
-}
-
-IgtlString take_string(BigEndianReader& in) {
-  IgtlString string;
-  string.encoding = in.take<std::uint16_t>();
-  string.text = in.take(in.take<std::uint16_t>());
-  return string;
-}
-
 IgtlStart take_start(BigEndianReader& in, std::string what) {
   IgtlStart start;
   start.what = std::move(what);
@@ -166,9 +106,6 @@ IgtlContent take_content(BigEndianReader& in, const std::string& type) {
   if (type == "QTDATA") return take_quaternions(in);
   if (type == "POSITION" || type == "QTRANS") return take_position(in);
   if (type == "STATUS") return take_status(in);
-  if (type == "IMAGE") return take_image(in);
-  if (type == "POINT") return take_points(in);
-  if (type == "STRING") return take_string(in);
   if (type == "STT_TDATA" || type == "STT_QTDATA") return take_start(in, type.substr(4));
   if (type.starts_with("STP_")) return IgtlStop{type.substr(4)};
   if (type.starts_with("GET_")) return IgtlGet{type.substr(4)};

@@ -55,29 +55,6 @@ struct ContentWriter {
         .put(status.text)
         .put(std::uint8_t{0});
   }
-  void operator()(const IgtlImage& image) const {
-    out.put(std::uint16_t{1})
-        .put(image.components)
-        .put(image.scalar_type)
-        .put(image.endian)
-        .put(image.coordinates);
-    for (const auto size : image.size) out.put(size);
-    for (int column = 0; column < 4; ++column) put_floats(out, image.axes_and_centre.col(column));
-    for (const auto offset : image.part_offset) out.put(offset);
-    for (const auto size : image.part_size) out.put(size);
-    out.put(image.pixels);
-  }
-  void operator()(const IgtlPoints& list) const {
-    for (const IgtlPoint& point : list.points) {
-      out.put_name(point.name, 64).put_name(point.group, 32);
-      for (const auto channel : point.rgba) out.put(channel);
-      put_floats(out, point.position);
-      out.put(static_cast<float>(point.diameter)).put_name(point.owner, 20);
-    }
-  }
-  void operator()(const IgtlString& string) const {
-    out.put(string.encoding).put(length<std::uint16_t>(string.text.size())).put(string.text);
-  }
   void operator()(const IgtlStart& start) const {
     out.put(start.interval_ms).put_name(start.coordinates, 32);
   }

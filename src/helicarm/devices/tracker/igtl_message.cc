@@ -16,9 +16,6 @@ struct TypeName {
   std::string operator()(const IgtlQuaternions&) const { return "QTDATA"; }
   std::string operator()(const IgtlPosition&) const { return "POSITION"; }
   std::string operator()(const IgtlStatus&) const { return "STATUS"; }
-  std::string operator()(const IgtlImage&) const { return "IMAGE"; }
-  std::string operator()(const IgtlPoints&) const { return "POINT"; }
-  std::string operator()(const IgtlString&) const { return "STRING"; }
   std::string operator()(const IgtlStart& start) const { return "STT_" + start.what; }
   std::string operator()(const IgtlStop& stop) const { return "STP_" + stop.what; }
   std::string operator()(const IgtlGet& get) const { return "GET_" + get.what; }
@@ -37,11 +34,6 @@ std::uint64_t stamp_from_seconds(double seconds) {
 }
 
 std::uint64_t body_limit(std::string_view type) { return std::uint64_t{type == "IMAGE" ? 64u : 1u} << 20; }
-
-std::size_t scalar_bytes(std::uint8_t scalar_type) {
-  constexpr std::array<std::size_t, 12> bytes{0, 0, 1, 1, 2, 2, 4, 4, 0, 0, 4, 8};
-  return scalar_type < bytes.size() ? bytes[scalar_type] : 0;
-}
 
 Eigen::Matrix4d matrix_from(const Eigen::Vector3d& position, const Eigen::Vector4d& quaternion) {
   const double norm = quaternion.norm();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -56,36 +55,6 @@ struct IgtlStatus {
   std::string text;
 };
 
-struct IgtlImage {
-  std::uint8_t components = 1;
-  std::uint8_t scalar_type = 3;  ///< 2 i8, 3 u8, 4 i16, 5 u16, 6 i32, 7 u32, 10 f32, 11 f64
-  std::uint8_t endian = 2;       ///< of the pixels: 1 big, 2 little
-  std::uint8_t coordinates = 1;  ///< 1 RAS, 2 LPS
-  std::array<std::uint16_t, 3> size{};
-  /// Columns: the three axes, each of the length of a pixel, and the centre.
-  Eigen::Matrix<double, 3, 4> axes_and_centre = Eigen::Matrix<double, 3, 4>::Identity();
-  std::array<std::uint16_t, 3> part_offset{};
-  std::array<std::uint16_t, 3> part_size{};
-  std::string pixels;  ///< of the sub-volume, in the byte order above
-};
-
-struct IgtlPoint {
-  std::string name;
-  std::string group;
-  std::array<std::uint8_t, 4> rgba{};
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  double diameter = 0;
-  std::string owner;
-};
-struct IgtlPoints {
-  std::vector<IgtlPoint> points;
-};
-
-struct IgtlString {
-  std::string text;
-  std::uint16_t encoding = 3;  ///< MIB number: 3 ASCII, 106 UTF-8
-};
-
 /// STT_TDATA and STT_QTDATA
 struct IgtlStart {
   std::string what;  ///< requested type, e.g. TDATA
@@ -112,9 +81,8 @@ struct IgtlUnknown {
   std::string content;
 };
 
-using IgtlContent =
-    std::variant<IgtlTransform, IgtlTracking, IgtlQuaternions, IgtlPosition, IgtlStatus, IgtlImage,
-                 IgtlPoints, IgtlString, IgtlStart, IgtlStop, IgtlGet, IgtlReply, IgtlUnknown>;
+using IgtlContent = std::variant<IgtlTransform, IgtlTracking, IgtlQuaternions, IgtlPosition, IgtlStatus,
+                                 IgtlStart, IgtlStop, IgtlGet, IgtlReply, IgtlUnknown>;
 
 struct IgtlMessage {
   std::string device;
@@ -139,8 +107,7 @@ double seconds_from_stamp(std::uint64_t stamp);
 /// Rounded to 2^-32 s; times before 1970 and NaN give 0.
 std::uint64_t stamp_from_seconds(double seconds);
 
-/// Largest accepted body: 64 MiB for IMAGE (a volume; an X-ray image is 2 MiB), 1 MiB for other types (over
-/// 7,000 points).
+/// Largest accepted body: 64 MiB for IMAGE, which a server may send besides poses, 1 MiB for other types.
 std::uint64_t body_limit(std::string_view type);
 
 /// The first 58 bytes of a message. `truncated`; `bad_value` if the type is not a name or the version is 0,
@@ -152,14 +119,11 @@ Expected<IgtlHeader> decode_header(std::string_view bytes);
 Expected<IgtlMessage> decode(const IgtlHeader& header, std::string_view body);
 
 /// Header and body. Names are truncated to their fields, matrices rounded to 32 bits. Throws
-/// std::invalid_argument for content that does not fit: text of STRING or keys over 65,535 bytes.
+/// std::invalid_argument for metadata whose keys exceed 65,535 bytes.
 std::string encode(const IgtlMessage& message);
 
 /// Type in the header, e.g. "TDATA", "STT_TDATA".
 std::string type_of(const IgtlContent& content);
-
-/// Bytes of one pixel's component; 0 for a type that does not exist.
-std::size_t scalar_bytes(std::uint8_t scalar_type);
 
 /// Rotation and position as a matrix. A quaternion within 1e-3 of unit length is normalised (devices round);
 /// any other scales the rotation, so that PoseGate rejects it.

@@ -11,12 +11,6 @@ namespace helicarm::tracker {
 inline std::vector<IgtlMessage> sample_messages() {
   Eigen::Matrix4d pose = Eigen::Matrix4d::Identity();
   pose.topRightCorner<3, 1>() << 12.5, -3, 800;
-  IgtlImage image;
-  image.size = {4, 3, 1};
-  image.part_size = {4, 2, 1};
-  image.part_offset = {0, 1, 0};
-  image.scalar_type = 5;
-  image.pixels.assign(16, '\x5a');
   const std::uint64_t stamp = 0x6543210012345678u;
   return {{"femur", stamp, IgtlTransform{pose}},
           {"tracker", stamp, IgtlTracking{{{"femur", 1, pose}, {"tibia", 2, pose}}}},
@@ -24,9 +18,6 @@ inline std::vector<IgtlMessage> sample_messages() {
           {"tracker", stamp, IgtlQuaternions{{{"tool", 1, {1, 2, 3}, {0, 0, 0.5, 0.5}}}}},
           {"tool", stamp, IgtlPosition{{1, 2, 3}, Eigen::Vector4d(0, 1, 0, 0)}},
           {"tracker", stamp, IgtlStatus{18, -5, "Hardware", "temperature"}},
-          {"picture", stamp, image},
-          {"points", stamp, IgtlPoints{{{"P1", "balls", {1, 2, 3, 4}, {1, 2, 3}, 4, "owner"}}}},
-          {"text", stamp, IgtlString{"some text", 3}},
           {"", stamp, IgtlStart{"TDATA", 50, "tracker"}},
           {"", stamp, IgtlStop{"TDATA"}},
           {"", stamp, IgtlGet{"STATUS"}},

@@ -30,12 +30,12 @@ TEST(IgtlSockets, TrackingIsSentToSubscribers) {
   ASSERT_TRUE(all_connected(*server, 2));
   ASSERT_TRUE(eventually([&] { return asks.count == 1; }));  // RTS_TDATA
   server->send({"tracker", 0, IgtlTracking{}});
-  server->send({"end", 0, IgtlString{"."}});
+  server->send({"end", 0, IgtlUnknown{"STRING", "."}});
   ASSERT_TRUE(eventually([&] { return asks.count == 3 && does_not.count == 1; }));
   asks.client->send({"", 0, IgtlStop{"TDATA"}});
   ASSERT_TRUE(eventually([&] { return asks.count == 4; }));
   server->send({"tracker", 0, IgtlTracking{}});
-  server->send({"end", 0, IgtlString{"."}});
+  server->send({"end", 0, IgtlUnknown{"STRING", "."}});
   ASSERT_TRUE(eventually([&] { return asks.count == 5; }));
   EXPECT_EQ(asks.last_device(), "end");
 }

@@ -21,7 +21,7 @@ TEST(SequenceStream, MessageToFrameRoundTrips) {
   EXPECT_TRUE(frame.poses.contains("my_tool"));
   EXPECT_EQ(messages_of(frame, false, 9).front().stamp, stamp_from_seconds(9));
   EXPECT_EQ(frame_of({"x", 0, IgtlTransform{}}, 3).time_s, 3);
-  EXPECT_TRUE(frame_of({"x", 0, IgtlString{"text"}}, 3).poses.empty());
+  EXPECT_TRUE(frame_of({"x", 0, IgtlUnknown{"STRING", "text"}}, 3).poses.empty());
 }
 
 TEST(SequenceStream, RecorderStoresNoMorePosesThanItsLimit) {
