@@ -67,7 +67,15 @@ void run(std::string_view bytes) {
 std::vector<std::string> seeds() {
   const std::string request = receiver::peer::Request().bytes(),
                     store = receiver::peer::store(xray::DicomBuilder());
-  return {request + receiver::peer::echo() + receiver::peer::release(),
+  receiver::peer::Request committing;
+  committing.contexts += receiver::peer::context(5, std::string(receiver::commitment_class),
+                                                 std::string(receiver::dicom::implicit_little_endian));
+  const auto element = receiver::dicom::element;
+  const std::string reference =
+      element(0xFFFEE000, element(0x00081150, receiver::xa_class) + element(0x00081155, "2.25.17"));
+  return {committing.bytes() + store +
+              receiver::peer::commit(element(0x00081195, "2.25.99") + element(0x00081199, reference)),
+          request + receiver::peer::echo() + receiver::peer::release(),
           request + store + receiver::peer::release(),
           request + store + store + receiver::peer::echo() + receiver::peer::release(),
           request + receiver::peer::store(xray::DicomBuilder(), "2.25.18"),

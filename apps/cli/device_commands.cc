@@ -39,6 +39,10 @@ void add_receive(CLI::App& app, Action& action) {
           ->capture_default_str();
   auto* peer = command->add_option("--peer", a.receiver.negotiation.peers,
                                    "Title of a C-arm that may send; repeatable (default: any)");
+  auto* commitment =
+      command->add_option("--commitment", a.report_peers,
+                          "TITLE=ADDRESS:PORT: where this C-arm or archive listens for storage commitment "
+                          "reports; repeatable (default: on its own association)");
   auto* certificate =
       command->add_option("--tls-certificate", a.certificate,
                           "PEM file of this receiver's certificate; only TLS connections are then accepted");
@@ -50,7 +54,7 @@ void add_receive(CLI::App& app, Action& action) {
   authorities->needs(certificate);
   auto* watch =
       command->add_option("--watch", a.watch, "Read images from this folder instead; its files are kept");
-  for (auto* of_network : {address, port, title, peer, certificate}) watch->excludes(of_network);
+  for (auto* of_network : {address, port, title, peer, commitment, certificate}) watch->excludes(of_network);
   command->add_option("--count", a.count, "End after this number of images")->check(within(1, 1e9));
   command->add_option("--seconds", a.seconds, "End after this time")->check(within(0, 1e9));
 }

@@ -73,6 +73,8 @@ CommandResult receive_command(const ReceiveArguments& arguments, Console& consol
   return guarded([&] {
     receiver::ReceiverOptions options = arguments.receiver;
     check_titles(options.negotiation);
+    for (const std::string& peer : arguments.report_peers)
+      options.report_peers.push_back(value_or_throw(receiver::read_report_peer(peer)));
     if (!arguments.certificate.empty())
       options.tls = receiver::TlsFiles{arguments.certificate, arguments.key, arguments.authorities};
     StopSignal stop;

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "command.h"
 #include "helicarm/devices/receiver/receiver.h"
@@ -12,6 +14,7 @@ namespace helicarm::cli {
 struct ReceiveArguments {
   std::filesystem::path out = "inbox";
   receiver::ReceiverOptions receiver;
+  std::vector<std::string> report_peers;                ///< TITLE=ADDRESS:PORT
   std::filesystem::path certificate, key, authorities;  ///< all or none
   std::filesystem::path watch;                          ///< empty: listen
   std::optional<std::uint64_t> count;

@@ -15,6 +15,7 @@ using dicom::AbortReason, dicom::Operation, dicom::PduType, dicom::Status;
 
 constexpr std::size_t most_request_bytes = std::size_t{256} << 10;
 constexpr std::size_t most_command_bytes = std::size_t{64} << 10;
+constexpr std::size_t most_commitment_bytes = std::size_t{1} << 20;
 // Bounds what remote peers can write into a log.
 constexpr unsigned max_lines_per_s = 20;
 
@@ -86,6 +87,7 @@ std::string Association::associate(std::string_view body) {
   if (answers && !shared_.admission.associate(id_, Admission::Clock::now()))
     answers = tl::unexpected(local_limit_exceeded);
   title_ = request.calling;
+  peer_pdu_bytes_ = request.most_pdu_bytes;
   if (!answers) {
     ++shared_.counters.rejected;
     const dicom::Rejection why = answers.error();
@@ -122,6 +124,9 @@ std::string Association::take_fragment(const dicom::Fragment& fragment) {
     take_memory(fragment.bytes.size());
   else if (bytes_.size() + fragment.bytes.size() > most_command_bytes)
     throw Breach{AbortReason::unspecified, fmt::format("command over {} bytes", most_command_bytes)};
+  if (command_ && command_->is(Operation::action) && memory_taken_ > most_commitment_bytes)
+    throw Breach{AbortReason::unspecified,
+                 fmt::format("storage commitment over {} bytes", most_commitment_bytes)};
   bytes_ += fragment.bytes;
   if (!fragment.last) return {};
   if (fragment.command) {
@@ -140,7 +145,8 @@ std::string Association::take_fragment(const dicom::Fragment& fragment) {
 }
 
 std::string Association::answer(const dicom::ContextAnswer& context) {
-  if (command_->is(Operation::cancel)) return {};
+  if (command_->is(Operation::cancel) || command_->is(Operation::event_report_response)) return {};
+  if (command_->is(Operation::action)) return commit(context);
   Status status = Status::operation_unknown;
   std::string comment;
   if (command_->is(Operation::echo)) {
@@ -151,6 +157,29 @@ std::string Association::answer(const dicom::ContextAnswer& context) {
     std::tie(status, comment) = store(context);
   }
   return dicom::command_data(context_, dicom::write_response(*command_, status, comment));
+}
+
+std::string Association::commit(const dicom::ContextAnswer& context) {
+  const auto respond = [&](Status status, std::string_view comment = {}) {
+    return dicom::command_data(context_, dicom::write_response(*command_, status, comment));
+  };
+  if (context.abstract_syntax != commitment_class || command_->sop_class != commitment_class)
+    return respond(Status::no_such_class);
+  if (command_->sop_instance != commitment_instance) return respond(Status::no_such_instance);
+  if (command_->action_type != 1) return respond(Status::no_such_action);
+  const auto request = read_commitment_request(bytes_);
+  if (!request) return respond(Status::invalid_argument, request.error().message);
+  CommitmentReport report = receiver::commit(*request, shared_.inbox);
+  shared_.counters.commitments += report.failed.empty();
+  const std::uint16_t event = report.event();
+  for (const ReportPeer& peer : shared_.options.report_peers)
+    if (peer.title == title_)
+      return respond(shared_.send_report(peer, std::move(report)) ? Status::success
+                                                                  : Status::resource_limitation);
+  return respond(Status::success) +
+         dicom::command_data(context_, dicom::write_event_report({1, std::string(commitment_class),
+                                                                  std::string(commitment_instance), event})) +
+         dicom::data_set_data(context_, write_commitment_report(report), peer_pdu_bytes_);
 }
 
 std::pair<Status, std::string> Association::store(const dicom::ContextAnswer& context) {

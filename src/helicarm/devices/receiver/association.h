@@ -25,6 +25,8 @@ struct ReceiverShared {
   ReceiverHooks hooks;
   ReceiverCounters counters;
   Admission admission;
+  /// Reports to this peer on an association of its own; false if too many reports wait. Set by the receiver.
+  std::function<bool(const ReportPeer&, CommitmentReport)> send_report;
   LineLimit lines;  ///< limits log lines about peers that sent no image
 };
 
@@ -67,6 +69,7 @@ class Association {
   std::string take_data(std::string_view body);
   std::string take_fragment(const dicom::Fragment& fragment);
   std::string answer(const dicom::ContextAnswer& context);
+  std::string commit(const dicom::ContextAnswer& context);
   std::pair<dicom::Status, std::string> store(const dicom::ContextAnswer& context);
   void take_memory(std::size_t bytes);
   void release_memory();
@@ -76,6 +79,7 @@ class Association {
   const Admission::Id id_;
   bool associated_ = false, over_ = false, aborted_by_peer_ = false;
   std::string title_;
+  std::uint32_t peer_pdu_bytes_ = 0;
   std::map<std::uint8_t, dicom::ContextAnswer> contexts_;
   std::uint64_t images_ = 0;
   std::uint64_t messages_ = 0;

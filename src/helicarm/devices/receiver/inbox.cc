@@ -2,6 +2,8 @@
 #include "helicarm/devices/receiver/inbox.h"
 
 #include <cerrno>
+#include <fstream>
+#include <optional>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -24,6 +26,7 @@ namespace {
 
 constexpr const char* lock_name = ".lock";
 constexpr int most_versions = 100;
+constexpr std::streamsize meta_bytes = 4096;
 constexpr std::uintmax_t most_file_bytes = std::uintmax_t{1} << 30;
 
 void remove_parts(const fs::path& folder) {
@@ -44,6 +47,25 @@ std::string meta_element(std::uint16_t number, std::string_view vr, std::string 
   const auto word = [](std::size_t v) { return std::string{char(v & 0xFF), char(v >> 8 & 0xFF)}; };
   const std::string length = vr == "OB" ? word(0) + word(value.size()) + word(0) : word(value.size());
   return word(2) + word(number) + std::string(vr) + length + value;
+}
+
+/// Media Storage SOP Class UID of a file's first bytes, without reading its image.
+std::optional<std::string> class_in_meta_group(std::string_view head) {
+  const auto byte = [&](std::size_t at) { return std::size_t{static_cast<unsigned char>(head[at])}; };
+  for (std::size_t at = 132; at + 12 <= head.size() && head.substr(at, 2) == std::string_view("\2\0", 2);) {
+    const bool wide = head.substr(at + 4, 2) == "OB";
+    const std::size_t start = at + (wide ? 12 : 8);
+    const std::size_t length =
+        wide ? byte(at + 8) | byte(at + 9) << 8 | byte(at + 10) << 16 : byte(at + 6) | byte(at + 7) << 8;
+    if (length > head.size() - start) return {};
+    if (head.substr(at, 4) == std::string_view("\2\0\2\0", 4)) {
+      std::string_view uid = head.substr(start, length);
+      while (uid.ends_with('\0') || uid.ends_with(' ')) uid.remove_suffix(1);
+      return std::string(uid);
+    }
+    at = start + length;
+  }
+  return {};
 }
 
 }  // namespace
@@ -111,6 +133,21 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
     std::error_code ec;
     fs::permissions(arrival.path, fs::perms::owner_read | fs::perms::owner_write, ec);
     return arrival;
+  });
+}
+
+Expected<std::string> Inbox::class_of(const std::string& sop_instance) const {
+  return guarded([&]() -> std::string {
+    const std::string origin = "storage commitment";
+    check_folder(origin);
+    const fs::path path = folder_ / (sop_instance + ".dcm");
+    std::ifstream file(path, std::ios::binary);
+    std::string head(meta_bytes, '\0');
+    if (!dicom::is_uid(sop_instance) || !file)
+      throw BadInput(Reason::missing_file, fmt::format("{}: {} is not stored", origin, sop_instance));
+    file.read(head.data(), meta_bytes);
+    head.resize(static_cast<std::size_t>(file.gcount()));
+    return class_in_meta_group(head).value_or("");
   });
 }
 

@@ -38,6 +38,9 @@ class Inbox {
   /// each message; no message contains patient data.
   Expected<Arrival> store(std::string_view file, const std::string& origin);
 
+  /// SOP class of a stored image. Refuses missing_file, and cannot_write like `store`.
+  Expected<std::string> class_of(const std::string& sop_instance) const;
+
   const std::filesystem::path& folder() const { return folder_; }
 
  private:

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 
+#include "helicarm/devices/receiver/commitment.h"
 #include "helicarm/xray/dicom_check.h"
 #include "helicarm/xray/transfer_syntax.h"
 
 namespace helicarm::receiver::dicom {
 namespace {
 
-constexpr std::string_view dicom_application = "1.2.840.10008.3.1.1.1";
 constexpr std::string_view verification = "1.2.840.10008.1.1";
 
 constexpr Rejection version_not_supported{1, 2, 2};
@@ -19,12 +19,15 @@ constexpr Rejection calling_title_unknown{1, 1, 3};
 constexpr Rejection called_title_unknown{1, 1, 7};
 constexpr Rejection no_reason_given{1, 1, 1};
 
-// Longest response: header, fragment, command with two UIDs and a comment.
-constexpr std::uint32_t least_pdu_bytes = 512;
-
 ContextAnswer answer(const PresentationContext& context) {
   ContextAnswer answer{context.id, ContextResult::accepted, context.abstract_syntax,
                        context.transfer_syntaxes.front()};
+  if (context.abstract_syntax == commitment_class) {
+    answer.transfer_syntax = implicit_little_endian;
+    if (std::ranges::count(context.transfer_syntaxes, implicit_little_endian) == 0)
+      answer.result = ContextResult::transfer_syntaxes_unknown;
+    return answer;
+  }
   if (context.abstract_syntax != verification && !xray::is_xray_class(context.abstract_syntax)) {
     answer.result = ContextResult::abstract_syntax_unknown;
     return answer;

@@ -17,7 +17,8 @@ struct NegotiationOptions {
 };
 
 /// Answers to the contexts in the request's order, or the rejection (PS3.8, 9.3.4). Accepted are verification
-/// and X-ray storage classes (`is_xray_class`) in the transfer syntaxes that the reader supports.
+/// and X-ray storage classes (`is_xray_class`) in the transfer syntaxes that the reader supports, and storage
+/// commitment in implicit little endian.
 tl::expected<std::vector<ContextAnswer>, Rejection> negotiate(const AssociationRequest& request,
                                                               const NegotiationOptions& options);
 

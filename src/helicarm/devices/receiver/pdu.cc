@@ -2,6 +2,7 @@
 #include "helicarm/devices/receiver/pdu.h"
 
 #include <algorithm>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -22,6 +23,7 @@ enum Item : std::uint8_t {
   user_information_item = 0x50,
   most_pdu_bytes_item = 0x51,
   implementation_item = 0x52,
+  role_selection_item = 0x54,
   implementation_name_item = 0x55
 };
 
@@ -94,6 +96,21 @@ std::uint32_t most_pdu_bytes_of(std::string_view user_information) {
   return most;
 }
 
+std::string user_information(std::uint32_t most_pdu_bytes, std::string_view roles = {}) {
+  return item(most_pdu_bytes_item, BigEndianWriter().put(most_pdu_bytes).bytes()) +
+         item(implementation_item, implementation_uid) + std::string(roles) +
+         item(implementation_name_item, implementation_name);
+}
+
+std::string fragment(std::uint8_t context, std::uint8_t control, std::string_view bytes) {
+  return pdu(PduType::data, BigEndianWriter()
+                                .put(static_cast<std::uint32_t>(bytes.size() + 2))
+                                .put(context)
+                                .put(control)
+                                .put(bytes)
+                                .bytes());
+}
+
 }  // namespace
 
 bool is_uid(std::string_view text) {
@@ -147,6 +164,52 @@ Expected<AssociationRequest> read_association_request(std::string_view body) {
   });
 }
 
+std::string associate_request(std::string_view called, std::string_view calling,
+                              const ProviderContext& context) {
+  const std::string syntaxes = item(abstract_syntax_item, context.abstract_syntax) +
+                               item(transfer_syntax_item, implicit_little_endian);
+  const std::string provider = BigEndianWriter()
+                                   .put(static_cast<std::uint16_t>(context.abstract_syntax.size()))
+                                   .put(context.abstract_syntax)
+                                   .put(std::uint8_t{0})
+                                   .put(std::uint8_t{1})
+                                   .bytes();
+  return pdu(
+      PduType::associate_request,
+      BigEndianWriter()
+          .put<std::uint16_t>(1)
+          .put<std::uint16_t>(0)
+          .put_name(called, title_bytes, ' ')
+          .put_name(calling, title_bytes, ' ')
+          .put_name({}, 32)
+          .put(item(application_context_item, dicom_application))
+          .put(item(requested_context_item, std::string{static_cast<char>(context.id), 0, 0, 0} + syntaxes))
+          .put(item(user_information_item,
+                    user_information(context.most_pdu_bytes, item(role_selection_item, provider))))
+          .bytes());
+}
+
+Expected<AssociationAnswer> read_association_answer(std::string_view body) {
+  return guarded([&] {
+    BigEndianReader reader(body);
+    reader.take(4 + 2 * title_bytes + 32);
+    std::optional<ContextResult> result;
+    std::uint32_t most_pdu_bytes = 0;
+    each_item(reader.take(reader.left()), [&](std::uint8_t type, std::string_view content) {
+      if (type == user_information_item) most_pdu_bytes = most_pdu_bytes_of(content);
+      if (type != answered_context_item) return;
+      BigEndianReader answer(content);
+      answer.take(2);
+      result = ContextResult{answer.take<std::uint8_t>()};
+    });
+    if (!result) throw BadInput(Reason::bad_value, "the association's answer has no context");
+    if (most_pdu_bytes != 0 && most_pdu_bytes < least_pdu_bytes)
+      throw BadInput(Reason::bad_value,
+                     fmt::format("the peer accepts PDUs of {} bytes only", most_pdu_bytes));
+    return AssociationAnswer{*result, most_pdu_bytes};
+  });
+}
+
 std::string associate_accept(const AssociationRequest& request, const std::vector<ContextAnswer>& contexts,
                              std::uint32_t most_pdu_bytes) {
   BigEndianWriter body;
@@ -161,10 +224,7 @@ std::string associate_accept(const AssociationRequest& request, const std::vecto
                                              .put<std::uint8_t>(0)
                                              .put(item(transfer_syntax_item, context.transfer_syntax))
                                              .bytes()));
-  body.put(
-      item(user_information_item, item(most_pdu_bytes_item, BigEndianWriter().put(most_pdu_bytes).bytes()) +
-                                      item(implementation_item, implementation_uid) +
-                                      item(implementation_name_item, implementation_name)));
+  body.put(item(user_information_item, user_information(most_pdu_bytes)));
   return pdu(PduType::associate_accept, body.bytes());
 }
 
@@ -176,6 +236,8 @@ std::string associate_reject(const Rejection& rejection) {
                                             .put(rejection.reason)
                                             .bytes());
 }
+
+std::string release_request() { return pdu(PduType::release_request, std::string(4, '\0')); }
 
 std::string release_answer() { return pdu(PduType::release_answer, std::string(4, '\0')); }
 
@@ -189,12 +251,22 @@ std::string abort(AbortReason reason) {
 
 std::string command_data(std::uint8_t context, std::string_view command) {
   constexpr std::uint8_t last_of_command = 3;
-  return pdu(PduType::data, BigEndianWriter()
-                                .put(static_cast<std::uint32_t>(command.size() + 2))
-                                .put(context)
-                                .put(last_of_command)
-                                .put(command)
-                                .bytes());
+  return fragment(context, last_of_command, command);
+}
+
+std::string data_set_data(std::uint8_t context, std::string_view data_set, std::uint32_t most_pdu_bytes) {
+  constexpr std::uint32_t usual_pdu_bytes = 16384, fragment_header_bytes = 6;
+  const std::size_t most =
+      std::min(most_pdu_bytes == 0 ? usual_pdu_bytes : std::max(most_pdu_bytes, least_pdu_bytes),
+               usual_pdu_bytes) -
+      fragment_header_bytes;
+  std::string pdus;
+  do {
+    const std::string_view part = data_set.substr(0, most);
+    data_set.remove_prefix(part.size());
+    pdus += fragment(context, data_set.empty() ? 2 : 0, part);
+  } while (!data_set.empty());
+  return pdus;
 }
 
 Expected<std::vector<Fragment>> read_fragments(std::string_view body) {

@@ -22,6 +22,10 @@ enum class PduType : std::uint8_t {
 };
 
 inline constexpr std::size_t pdu_header_bytes = 6;
+/// Peers must accept PDUs of this size: header, fragment, the longest command with two UIDs and a comment.
+inline constexpr std::uint32_t least_pdu_bytes = 512;
+inline constexpr std::string_view dicom_application = "1.2.840.10008.3.1.1.1";
+inline constexpr std::string_view implicit_little_endian = "1.2.840.10008.1.2";
 
 /// Identifies this implementation (PS3.7, D.3.3.2).
 inline constexpr std::string_view implementation_name = "HELICARM_" HELICARM_VERSION;
@@ -51,6 +55,15 @@ struct AssociationRequest {
   std::uint32_t most_pdu_bytes = 0;  ///< largest PDU the peer accepts; 0: any
 };
 
+/// A-ASSOCIATE-RQ for one SOP class in implicit little endian, of which the requestor is the provider.
+struct ProviderContext {
+  std::uint8_t id;  ///< odd
+  std::string_view abstract_syntax;
+  std::uint32_t most_pdu_bytes;
+};
+std::string associate_request(std::string_view called, std::string_view calling,
+                              const ProviderContext& context);
+
 /// Body of A-ASSOCIATE-RQ. Refuses (truncated, bad_value) items that exceed it, invalid titles and UIDs,
 /// context numbers that are even or duplicate, and more than 128 contexts.
 Expected<AssociationRequest> read_association_request(std::string_view body);
@@ -68,6 +81,16 @@ struct ContextAnswer {
   std::string transfer_syntax;
 };
 
+/// Of an association with one context.
+struct AssociationAnswer {
+  ContextResult result;
+  std::uint32_t most_pdu_bytes;  ///< largest PDU the peer accepts; 0: any
+};
+
+/// Body of A-ASSOCIATE-AC. Refuses (truncated, bad_value) items that exceed it or an answer without a
+/// context.
+Expected<AssociationAnswer> read_association_answer(std::string_view body);
+
 struct Rejection {
   std::uint8_t result;  ///< 1 permanent, 2 transient
   std::uint8_t source;  ///< 1 user, 2 association control, 3 presentation
@@ -80,10 +103,13 @@ enum class AbortReason : std::uint8_t { unspecified = 0, unknown_pdu = 1, unexpe
 std::string associate_accept(const AssociationRequest& request, const std::vector<ContextAnswer>& contexts,
                              std::uint32_t most_pdu_bytes);
 std::string associate_reject(const Rejection& rejection);
+std::string release_request();
 std::string release_answer();
 std::string abort(AbortReason reason);
 /// One command as one fragment.
 std::string command_data(std::uint8_t context, std::string_view command);
+/// A data set in as many PDUs as the peer's largest size requires (at least 512 bytes; 0: any).
+std::string data_set_data(std::uint8_t context, std::string_view data_set, std::uint32_t most_pdu_bytes);
 
 /// A fragment of a command or of a data set; a view of the PDU.
 struct Fragment {

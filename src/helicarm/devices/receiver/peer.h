@@ -10,6 +10,7 @@
 #include <asio/write.hpp>
 
 #include "helicarm/core/big_endian.h"
+#include "helicarm/devices/receiver/commitment.h"
 #include "helicarm/xray/dicom_builder.h"
 
 namespace helicarm::receiver {
@@ -106,6 +107,19 @@ inline std::string store(const xray::DicomBuilder& builder, const std::string& s
                          const std::string& sop_class = xa_class) {
   return pdu(4, fragment(3, 3, command(1, sop_class, sop_instance))) +
          pdu(4, fragment(3, 2, data_set(builder)));
+}
+
+/// N-ACTION of storage commitment in context 5.
+inline std::string commit(const std::string& data_set, int type = 1,
+                          const std::string& instance = std::string(commitment_instance)) {
+  using xray::DicomBuilder;
+  const std::string all = command_element(0x0003, std::string(commitment_class)) +
+                          command_element(0x0100, DicomBuilder::number(0x0130, 2)) +
+                          command_element(0x0110, DicomBuilder::number(9, 2)) +
+                          command_element(0x0800, DicomBuilder::number(0, 2)) +
+                          command_element(0x1001, instance) +
+                          command_element(0x1008, DicomBuilder::number(type, 2));
+  return pdu(4, fragment(5, 3, all)) + pdu(4, fragment(5, 2, data_set));
 }
 
 inline std::string echo() { return pdu(4, fragment(1, 3, command(0x30, verification_class))); }

@@ -10,6 +10,7 @@
 #include <asio/use_awaitable.hpp>
 #include <fmt/format.h>
 
+#include "helicarm/devices/receiver/send_report.h"
 #include "helicarm/devices/receiver/serve.h"
 
 namespace helicarm::receiver {
@@ -19,11 +20,12 @@ using asio::ip::tcp;
 
 // Checking and storing an image occupies a thread for some milliseconds.
 constexpr std::size_t thread_count = 4;
+constexpr unsigned most_reports = 32;
 // Without file descriptors an immediate retry would use a whole core.
 constexpr std::chrono::milliseconds retry_delay{100};
 
 asio::ssl::context tls_context(const TlsFiles& files) {
-  asio::ssl::context context(asio::ssl::context::tls_server);
+  asio::ssl::context context(asio::ssl::context::tls);
   const auto use = [](const char* what, const std::filesystem::path& file, auto&& load) {
     asio::error_code error;
     load(error);
@@ -51,7 +53,11 @@ struct DicomReceiver::Engine {
   tcp::acceptor acceptor{pool};
 
   Engine(const ReceiverOptions& options, Inbox& inbox, ReceiverHooks hooks)
-      : shared(options, inbox, std::move(hooks)) {}
+      : shared(options, inbox, std::move(hooks)) {
+    shared.send_report = [this](const ReportPeer& peer, CommitmentReport report) {
+      return send_report(peer, std::move(report));
+    };
+  }
   ~Engine() {
     pool.stop();
     pool.join();
@@ -73,6 +79,27 @@ struct DicomReceiver::Engine {
       throw BadInput(Reason::port_taken,
                      fmt::format("{} port {}: {}", options.address, options.port, error.message()));
     asio::co_spawn(pool, accept(), asio::detached);
+  }
+
+  bool send_report(const ReportPeer& peer, CommitmentReport report) {
+    if (++shared.counters.reports_on_the_way > most_reports) {
+      --shared.counters.reports_on_the_way;
+      return false;
+    }
+    asio::co_spawn(
+        asio::make_strand(pool),
+        receiver::send_report(peer, shared.options.negotiation.title, std::move(report),
+                              tls ? &*tls : nullptr, shared.options.idle_limit_s),
+        [this, peer](const std::exception_ptr&, const std::string& why) {
+          --shared.counters.reports_on_the_way;
+          if (why.empty())
+            ++shared.counters.reported;
+          else
+            shared.hooks.cut({Reason::not_connected,
+                              fmt::format("\"{}\" ({} port {}): storage commitment not reported: {}",
+                                          peer.title, peer.address, peer.port, why)});
+        });
+    return true;
   }
 
   asio::awaitable<void> accept() {

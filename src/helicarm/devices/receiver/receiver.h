@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "helicarm/devices/receiver/commitment.h"
 #include "helicarm/devices/receiver/image_source.h"
 #include "helicarm/devices/receiver/negotiation.h"
 
@@ -25,6 +26,8 @@ struct ReceiverOptions {
   std::uint16_t port = 11112;         ///< 0: any free port
   dicom::NegotiationOptions negotiation;
   std::optional<TlsFiles> tls;
+  /// Peers that are told of a storage commitment on an association to them; others on their own.
+  std::vector<ReportPeer> report_peers;
   unsigned most_associations = 32;  ///< concurrent; more are rejected as transient
   unsigned most_of_address = 16;    ///< of these, from one address
   double spared_s = 2;              ///< an association can be replaced after this time without an image
@@ -50,11 +53,14 @@ struct ReceiverCounters {
   std::atomic<std::uint64_t> stored{0};
   std::atomic<std::uint64_t> repeated{0};
   std::atomic<std::uint64_t> refused{0};         ///< images
+  std::atomic<std::uint64_t> commitments{0};     ///< requests of which every image was stored
+  std::atomic<std::uint64_t> reported{0};        ///< commitments, on associations to peers
+  std::atomic<unsigned> reports_on_the_way{0};   ///< present number of these
   std::atomic<std::size_t> bytes_on_the_way{0};  ///< present total of images being received
 };
 
-/// Service class provider for C-STORE and C-ECHO. An image is acknowledged after it is stored in the inbox;
-/// otherwise its status states the cause. Peers cannot block each other.
+/// Service class provider for C-STORE, C-ECHO and storage commitment. An image is acknowledged after it is
+/// stored in the inbox; otherwise its status states the cause. Peers cannot block each other.
 class DicomReceiver : public ImageSource {
  public:
   /// Listens on return. Refuses port_taken, and bad_value for an invalid address or TLS files.
