@@ -139,6 +139,7 @@ Expected<Arrival> Inbox::store(std::string_view file, const std::string& origin)
 Expected<std::string> Inbox::class_of(const std::string& sop_instance) const {
   return guarded([&]() -> std::string {
     const std::string origin = "storage commitment";
+    const std::lock_guard naming(naming_);  // a new file's name is synced too when `store` returns it
     check_folder(origin);
     const fs::path path = folder_ / (sop_instance + ".dcm");
     std::ifstream file(path, std::ios::binary);

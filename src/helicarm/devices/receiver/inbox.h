@@ -49,7 +49,7 @@ class Inbox {
 
   std::filesystem::path folder_;
   int lock_;
-  std::mutex naming_;
+  mutable std::mutex naming_;
 };
 
 /// A DICOM file (PS3.10) with the data set as received; the UIDs must be valid.
