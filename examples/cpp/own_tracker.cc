@@ -10,7 +10,7 @@
 
 namespace tracker = helicarm::tracker;
 
-class OwnTracker : public tracker::TrackerSource {
+class OwnTracker final : public tracker::TrackerSource {
  public:
   explicit OwnTracker(tracker::TrackerListener listener)
       : listener_(std::move(listener)), thread_([this](const std::stop_token& stop) { run(stop); }) {}

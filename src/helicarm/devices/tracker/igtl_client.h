@@ -30,7 +30,7 @@ inline double next_pause(double pause_s, const IgtlClientOptions& options) {
 /// Maintains a connection to an OpenIGTLink server on its own thread and reconnects when it ends or becomes
 /// silent. The pause between attempts is reset only after a message, so that a server that accepts and
 /// disconnects is not flooded.
-class IgtlClient : public TrackerSource {
+class IgtlClient final : public TrackerSource {
  public:
   using OnMessage = std::function<void(const IgtlMessage&, double arrival_s)>;
 

@@ -12,7 +12,7 @@
 namespace helicarm::tracker {
 
 /// A sequence file as a tracker: its frames repeatedly, with their recorded timing and present time stamps.
-class PlayedSequence : public TrackerSource {
+class PlayedSequence final : public TrackerSource {
  public:
   /// Refuses as `read_sequence`, and no_pose for a file without frames.
   static Expected<std::unique_ptr<PlayedSequence>> open(const std::filesystem::path& file,
