@@ -6,6 +6,7 @@
 #include <openssl/pem.h>
 #include <openssl/x509.h>
 
+#include "helicarm/devices/receiver/dimse.h"
 #include "helicarm/devices/receiver/receiver_fixture.h"
 
 namespace helicarm::receiver {
@@ -84,6 +85,32 @@ TEST_F(ReceiverTls, PeerWithoutACertificateIsRefusedAndReported) {
 TEST_F(ReceiverTls, CertificateOfAnotherAuthorityIsRefusedAndReported) {
   EXPECT_EQ(answer_over_tls(self_signed(folder_, "stranger")), closed);
   EXPECT_EQ(line_with("TLS handshake: certificate: ").reason, Reason::not_connected);
+}
+
+TEST_F(ReceiverTls, StorageCommitmentIsReportedOverTls) {
+  asio::io_context io;
+  asio::ip::tcp::acceptor archive(io, {asio::ip::address_v4::loopback(), 0});
+  options_.report_peers = {{"C_ARM", "127.0.0.1", archive.local_endpoint().port()}};
+  open();
+  asio::ssl::context context(asio::ssl::context::tls);
+  context.use_certificate_file(ours_.certificate.string(), asio::ssl::context::pem);
+  context.use_private_key_file(ours_.key.string(), asio::ssl::context::pem);
+  asio::ssl::stream<asio::ip::tcp::socket> asks(io, context), listens(io, context);
+  asks.next_layer().connect({asio::ip::address_v4::loopback(), receiver_->port()});
+  asks.handshake(decltype(asks)::client);
+  peer::Request request;
+  request.contexts +=
+      peer::context(5, std::string(commitment_class), std::string(dicom::implicit_little_endian));
+  asio::write(asks, asio::buffer(request.bytes()));
+  const std::string reference = dicom::element(
+      0xFFFEE000, dicom::element(0x00081150, xa_class) + dicom::element(0x00081155, "2.25.17"));
+  asio::write(asks, asio::buffer(peer::commit(dicom::element(0x00081195, "2.25.99") +
+                                              dicom::element(0x00081199, reference))));
+  archive.accept(listens.next_layer());
+  listens.handshake(decltype(listens)::server);
+  char type = 0;
+  asio::read(listens, asio::buffer(&type, 1));
+  EXPECT_EQ(type, 1);
 }
 
 TEST_F(ReceiverTls, ConnectionWithoutTlsIsRefusedAndReported) {
